@@ -1,0 +1,38 @@
+# One static library per layer, with the warnings and sanitizers that the whole project uses.
+
+# The install interface carries no warnings: they are for our code, not for our users' code.
+add_library(surfeit_build_options INTERFACE)
+target_compile_options(surfeit_build_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Wcast-align
+  $<$<BOOL:${SURFEIT_WARNINGS_AS_ERRORS}>:-Werror>)
+if(SURFEIT_SANITIZE)
+  target_compile_options(surfeit_build_options INTERFACE -fsanitize=${SURFEIT_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(surfeit_build_options INTERFACE -fsanitize=${SURFEIT_SANITIZE})
+endif()
+
+# surfeit_add_layer(<name> SOURCES ... LINKS ... [PRIVATE_LINKS ...])
+function(surfeit_add_layer name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  add_library(surfeit_${name} STATIC ${ARG_SOURCES})
+  add_library(surfeit::${name} ALIAS surfeit_${name})
+  set_target_properties(surfeit_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_compile_features(surfeit_${name} PUBLIC cxx_std_20)
+  target_include_directories(surfeit_${name}
+    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
+    PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_link_libraries(surfeit_${name}
+    PUBLIC ${ARG_LINKS}
+    PRIVATE $<BUILD_INTERFACE:surfeit_build_options> ${ARG_PRIVATE_LINKS})
+endfunction()
+
+# surfeit_add_test(<layer> SOURCES ... LINKS ...): one GoogleTest program per layer.
+function(surfeit_add_test layer)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_executable(${layer}_test ${ARG_SOURCES})
+  target_include_directories(${layer}_test PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
+  target_link_libraries(${layer}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main surfeit_build_options)
+  target_compile_definitions(${layer}_test PRIVATE
+    SURFEIT_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}/tests"
+    SURFEIT_SHARED_DATA_DIR="${PROJECT_SOURCE_DIR}/../shared/data")
+  gtest_discover_tests(${layer}_test TEST_PREFIX "${layer}." DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+endfunction()

@@ -1,0 +1,43 @@
+// Building the paged octree file (.sft) from surfel clouds, offline.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+struct IndexOptions {
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // budget of the process
+  int threads = 0;                    // 0: all that the job may use
+  std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
+  float overlap = 2;                  // disk area over surfel area where one must be made up
+  bool full_precision = false;        // keep floats instead of quantized values
+  bool strict = false;                // refuse invalid records instead of skipping them
+  std::string temporary_directory;    // empty: beside the output
+};
+
+struct IndexStats {
+  std::uint64_t surfels = 0;
+  std::uint64_t skipped_records = 0;
+  std::uint64_t nodes = 0;
+  std::uint64_t node_pages = 0;
+  std::uint64_t surfel_pages = 0;
+  std::uint64_t file_bytes = 0;
+  std::uint64_t temporary_bytes = 0;  // most bytes of temporary files at any time
+  std::vector<std::pair<std::string, double>> phase_seconds;
+};
+
+// Writes `output` from the surfels of all inputs. The result depends on the surfels alone: not on
+// their order, the threads or the budget. It appears under its name only when complete. What an
+// input lacks is filled in by the rules of docs/format.md and told through progress.note().
+// Errors: kIoError, kCorruption (bad input, or no valid surfel at all), kInvalidArgument,
+// kBudgetTooSmall, kInterrupted.
+Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
+                               const IndexOptions& options, Progress& progress);
+
+}  // namespace surfeit

@@ -1,0 +1,29 @@
+// How long-running work tells its caller where it stands, and learns that it should stop.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace surfeit {
+
+// Implement to show progress or to cancel. All calls may come from any thread.
+class Progress {
+ public:
+  virtual ~Progress() = default;
+
+  // A new phase begins; `total` counts `unit`s ("surfels", "receivers", "bytes"), 0 when unknown.
+  virtual void beginPhase(std::string_view name, std::uint64_t total, std::string_view unit) {
+    (void)name, (void)total, (void)unit;
+  }
+  // `count` more units of the phase are done.
+  virtual void advance(std::uint64_t count) { (void)count; }
+
+  // Something the user should read once: a rule that filled in missing data, records skipped.
+  virtual void note(const std::string& message) { (void)message; }
+
+  // Polled often; true makes the work stop with Status::interrupted() and leave nothing behind.
+  virtual bool isCancelled() const { return false; }
+};
+
+}  // namespace surfeit

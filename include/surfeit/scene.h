@@ -1,0 +1,44 @@
+// What a paged octree file says about itself, and whether all of it is sound.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+struct SceneInfo {
+  std::uint64_t file_bytes = 0;
+  std::uint64_t surfels = 0;
+  std::uint64_t nodes = 0;
+  std::uint32_t leaf_capacity = 0;
+  std::uint32_t node_pages = 0, surfel_pages = 0;
+  std::uint64_t node_page_bytes = 0, surfel_page_bytes = 0;  // stored
+  std::uint64_t node_cache_bytes = 0, surfel_cache_bytes = 0;  // all pages decoded
+  glm::vec3 min{0}, max{0};     // bounds of the surfel positions
+  CloudChannels channels;       // what the input brought
+  bool full_precision = false;
+  std::vector<std::uint32_t> level_pages;  // node pages of levels 0..21
+  std::string provenance;       // JSON
+};
+
+// Reads header and directory, but no page. Errors: kIoError, kCorruption.
+Result<SceneInfo> readSceneInfo(const std::string& path);
+
+struct VerifyReport {
+  std::uint64_t pages_checked = 0;
+  std::uint64_t bytes_checked = 0;
+  std::vector<std::string> findings;  // one line each; at most 100 are kept
+  std::uint64_t finding_count = 0;
+};
+
+// Reads every page and checks every checksum, and the invariants of docs/format.md: references,
+// counts, areas that add up, bounding spheres that hold what is below. Damage ends up in `findings`
+// and the check goes on with the next page. Errors: kIoError, kInterrupted.
+Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress);
+
+}  // namespace surfeit

@@ -1,0 +1,47 @@
+// Contributions: what a node or a surfel adds to the raster of one receiver when it is seen as a
+// single patch of solid angle (memo 3.4.2 and 3.4.3). docs/algorithm.md, "Contributions".
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include "octree/node.h"
+#include "surfeit/gather.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// A patch as the receiver sees it. Plain floats without padding.
+struct Contribution {
+  float distance_sq;    // from the receiver, > 0
+  float radius;         // of what it stands for: how far that reaches before and behind
+  glm::vec3 direction;  // unit, from the receiver
+  float solid_angle;    // steradians, > 0
+  glm::vec3 normal;     // shape for RasterCube::splatRectangle; zero: looks round
+  glm::vec3 radiosity;  // of what covers; back sides are black. Zero when color is not asked for.
+};
+static_assert(sizeof(Contribution) == 12 * sizeof(float));
+
+// How contributions are to be made.
+struct ContributionRules {
+  GatherSides sides = GatherSides::kFront;
+  bool has_color = true;
+};
+
+// Sum over the surfels of a node of weight * max(d . n, 0), from the 9 coefficients of that sum
+// (clamped cosine, memo 3.2) and the basis in direction d. Never negative, exact when all surfels
+// have one normal and when normals are spread evenly. `opposite` gets the sum for direction -d.
+// Two-sided surfels and spheres may be part of the sum.
+float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& basis,
+                   float& opposite);
+
+// The patch of a node, or false when the receiver sees nothing of it. `to_node` leads from the
+// receiver to the node's position; the receiver must lie outside the node's radius.
+bool makeContribution(const Node& node, const glm::vec3& to_node, const ContributionRules& rules,
+                      Contribution& contribution);
+
+// The patch of a surfel, or false when the receiver sees nothing of it: it faces away, is seen
+// edge-on, or lies at the receiver.
+bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
+                      const ContributionRules& rules, Contribution& contribution);
+
+}  // namespace surfeit

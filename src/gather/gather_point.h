@@ -1,0 +1,56 @@
+// The gather of one receiver from a paged octree: chooses the cut by solid angle and hands it to
+// the raster (memo, section 3). This scalar code is the definition that faster gathers are held to.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "core/curve_key.h"
+#include "gather/receiver_raster.h"
+#include "octree/node.h"
+#include "octree/paged_octree.h"
+#include "surfeit/gather.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// One thread at a time; make one per thread. For its memory see ReceiverRaster.
+class PointGatherer {
+ public:
+  // `quality` must be valid, as gatherCloud checks it: even resolution within its limits, the rest
+  // neither negative nor NaN.
+  PointGatherer(GatherMode mode, const GatherQuality& quality);
+
+  // Gathers at `receiver`, whose values must be finite. On an error (a page that cannot be read or
+  // decoded) `result` is unchanged. The result depends on the scene, the receiver, mode and quality
+  // alone, bit for bit.
+  Status gather(const Receiver& receiver, PagedOctree::Reader& octree, GatherResult& result);
+
+  // What the last gather took, for benches and tests.
+  struct Work {
+    std::size_t nodes_visited = 0;
+    std::size_t surfels_visited = 0;
+    std::size_t contributions = 0;
+    std::size_t near_surfels = 0;
+  };
+  const Work& work() const { return work_; }
+  // Bytes that a gatherer holds from the start; more only for cuts larger than ReceiverRaster
+  // reserves, which max_solid_angle = 0 may ask for.
+  static std::size_t memoryBytes(const GatherQuality& quality) {
+    return sizeof(PointGatherer) + ReceiverRaster::memoryBytes(quality);
+  }
+
+ private:
+  // Every level leaves at most 7 sibling ranges behind on the way down, the last one 8.
+  static constexpr std::size_t kStackSize = 7 * (kCurveLevels + 1) + 8;
+
+  bool isFarEnough(const Node& node, float distance_sq) const;
+  Status selectCut(PagedOctree::Reader& octree);
+
+  GatherQuality quality_;
+  ReceiverRaster raster_;
+  Work work_;
+  std::array<NodeRange, kStackSize> stack_;
+};
+
+}  // namespace surfeit

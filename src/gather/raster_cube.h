@@ -1,0 +1,119 @@
+// The raster cube: what a receiver sees, as six faces of pixels with coverage and radiosity (memo
+// 3.4). The cube is aligned with the world's axes, so that projecting needs no trigonometry.
+//
+// A direction d belongs to the face of its largest component |d[axis]|; the faces are +x -x +y -y
+// +z -z, and a point on one has the coordinates
+//
+//   u = d[axis + 1] / |d[axis]|, v = d[axis + 2] / |d[axis]|   (axes modulo 3), both in [-1, 1].
+//
+// Pixel index = (face * resolution + row of v) * resolution + column of u.
+#pragma once
+
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+namespace surfeit {
+
+// Directions and solid angles of the pixels for one resolution. Immutable, so threads may share it.
+class RasterGeometry {
+ public:
+  static constexpr int kFaces = 6;
+  static constexpr int kMinResolution = 2;
+  static constexpr int kMaxResolution = 64;
+
+  struct Pixel {
+    glm::vec3 direction;  // unit, through the middle of the pixel
+    float solid_angle;    // exact; those of all pixels sum to 4 pi
+  };
+
+  // `resolution` must be even, so that no pixel straddles an axis, and within the limits above.
+  explicit RasterGeometry(int resolution);
+
+  static bool isValidResolution(int resolution) {
+    return resolution >= kMinResolution && resolution <= kMaxResolution && resolution % 2 == 0;
+  }
+  static std::size_t pixelCount(int resolution) {
+    return std::size_t(kFaces) * std::size_t(resolution) * std::size_t(resolution);
+  }
+
+  int resolution() const { return resolution_; }
+  std::span<const Pixel> pixels() const { return pixels_; }
+
+ private:
+  int resolution_;
+  std::vector<Pixel> pixels_;
+};
+
+// Distances from the receiver between which something lies.
+struct DepthRange {
+  float begin, end;
+};
+
+// What the pixels hold for one receiver. Contributions must come front to back, in the order of the
+// middles of their depth ranges. One thread at a time.
+//
+// Coverage adds up within a layer and covers between layers. Neighbouring surfels of one surface
+// share a pixel without overlapping, so their coverages add until the layer is full; a surface
+// behind is hidden by the part that the layers before it cover, wherever in the pixel that is. A
+// contribution belongs to the layer before it when their depth ranges meet. Adding everything, the
+// memo's rule, lets the half-covered silhouettes of things behind each other fill a pixel. Measured
+// on a plane with 500 spheres, near field 8: AO RMSE .0135 and bias +.007 with it, .0095 and -.004
+// with layers (docs/algorithm.md, "Coverage").
+class RasterCube {
+ public:
+  // `geometry` must outlive the cube. Without color, radiosities are neither added nor stored.
+  RasterCube(const RasterGeometry& geometry, bool has_color);
+
+  // Uncovers every pixel.
+  void clear();
+
+  // Covers a rectangle of `solid_angle` around the unit `direction`, aligned with the pixels,
+  // for the mid and the far field (memo 3.4.2). What sticks out of a face spills over to its
+  // neighbours. The sides of the rectangle follow the extents on the face of a disk with
+  // `normal`: unit length for a disk; zero for a sphere, in between for what is partly flat.
+  void splatRectangle(const glm::vec3& direction, const glm::vec3& normal, float solid_angle,
+                      const DepthRange& depth, const glm::vec3& radiosity);
+
+  // Covers every pixel whose ray hits the disk, fully: the near field (memo 3.4.1). `centre` is
+  // relative to the origin of the rays. Both sides are hit: facing is the caller's business.
+  void traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius,
+                 const DepthRange& depth, const glm::vec3& radiosity);
+  // The same with a sphere, which must not contain the origin.
+  void traceSphere(const glm::vec3& centre, float radius, const DepthRange& depth,
+                   const glm::vec3& radiosity);
+
+  const RasterGeometry& geometry() const { return *geometry_; }
+  // Covered fraction of a pixel, 0..1.
+  float coverage(std::size_t pixel) const { return coverage_[pixel].total; }
+  // Radiosity of a pixel times its coverage. Requires color.
+  const glm::vec3& radiosity(std::size_t pixel) const { return radiosity_[pixel]; }
+
+  // Bytes that a cube with color holds for each pixel.
+  static constexpr std::size_t kPixelBytes = 4 * sizeof(float) + sizeof(glm::vec3);
+
+ private:
+  struct Coverage {
+    float total = 0;      // of all layers together
+    float room = 1;       // what the layers before the last one leave uncovered
+    float layer = 0;      // of the last layer by itself
+    float layer_end = 0;  // where the depth ranges of the last layer end
+  };
+  struct Rectangle {  // on a face
+    float u_begin, u_end, v_begin, v_end;
+  };
+  void coverPixel(std::size_t pixel, float amount, const DepthRange& depth,
+                  const glm::vec3& radiosity);
+  void coverRectangle(int face, const Rectangle& rectangle, const DepthRange& depth,
+                      const glm::vec3& radiosity);
+  template <typename IsHit>
+  void tracePixels(const glm::vec3& centre, float radius, const DepthRange& depth,
+                   const glm::vec3& radiosity, const IsHit& isHit);
+
+  const RasterGeometry* geometry_;
+  std::vector<Coverage> coverage_;
+  std::vector<glm::vec3> radiosity_;
+};
+
+}  // namespace surfeit

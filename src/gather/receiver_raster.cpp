@@ -1,0 +1,196 @@
+#include "gather/receiver_raster.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "core/assert.h"
+
+namespace surfeit {
+namespace {
+
+// How far before and behind its middle a contribution meets others of its layer, in radii. Less
+// tears surfaces apart (errors double at 0.5), more joins what is apart (a tenth more at 1.5).
+constexpr float kLayerReach = 1;
+
+}  // namespace
+
+ReceiverRaster::ReceiverRaster(GatherMode mode, const GatherQuality& quality)
+    : quality_(quality),
+      rules_{quality.sides, mode == GatherMode::kBleeding},
+      max_distance_sq_(quality.max_distance < 1e19f ? quality.max_distance * quality.max_distance
+                                                    : std::numeric_limits<float>::infinity()),
+      geometry_(quality.raster_resolution),
+      cube_(geometry_, rules_.has_color) {
+  contributions_.reserve(kReservedContributions);
+  order_.reserve(kReservedContributions);
+  near_surfels_.reserve(kReservedNearSurfels);
+}
+
+void ReceiverRaster::begin(const Receiver& receiver) {
+  receiver_ = receiver;
+  is_spherical_ = receiver.isSpherical();
+  contributions_.clear();
+  near_surfels_.clear();
+}
+
+float ReceiverRaster::heightAboveHorizon(const glm::vec3& offset) const {
+  return is_spherical_ ? std::numeric_limits<float>::infinity()
+                       : glm::dot(offset, receiver_.normal);
+}
+
+void ReceiverRaster::addNode(const Node& node) {
+  const glm::vec3 to_node = node.position - receiver_.position;
+  if (!(heightAboveHorizon(to_node) > 0)) return;
+  Entry entry;
+  if (!makeContribution(node, to_node, rules_, entry.contribution)) return;
+  if (!(entry.contribution.distance_sq <= max_distance_sq_)) return;
+  contributions_.push_back(entry);
+}
+
+void ReceiverRaster::addSurfel(const Surfel& surfel) {
+  const glm::vec3 to_surfel = surfel.position - receiver_.position;
+  const float distance_sq = glm::dot(to_surfel, to_surfel);
+  if (!(distance_sq <= max_distance_sq_)) return;
+
+  // Mid field: a patch, when its middle is above the horizon
+  const float height = heightAboveHorizon(to_surfel);
+  const float near_distance = quality_.near_field_radii * surfel.radius;
+  if (distance_sq >= near_distance * near_distance) {
+    Entry entry;
+    if (height > 0 && makeContribution(surfel, to_surfel, rules_, entry.contribution)) {
+      contributions_.push_back(entry);
+    }
+    return;
+  }
+
+  // Near field: traced later, unless even the highest point of the disk is below the horizon of the
+  // rays. Along the receiver's normal a disk reaches radius * sin(angle of normals) above its
+  // middle; this drops the receiver's own surface, which would cover it through rounding alone.
+  const float bias = rayBias(surfel);
+  const float cosine = glm::dot(receiver_.normal, surfel.normal);
+  const float rise = surfel.radius * std::sqrt(std::max(0.f, 1 - cosine * cosine));
+  if (!(height + rise > bias)) return;
+
+  // Nothing is seen of the back of a one-sided disk, nor of a sphere from inside
+  const glm::vec3 centre = to_surfel - bias * receiver_.normal;
+  if (surfel.isSphere()) {
+    if (!(glm::dot(centre, centre) > surfel.radius * surfel.radius)) return;
+  } else if (rules_.sides == GatherSides::kFront && !surfel.isTwoSided()) {
+    if (!(glm::dot(centre, surfel.normal) < 0)) return;
+  }
+  Entry entry;
+  entry.contribution = {};
+  entry.contribution.distance_sq = distance_sq;
+  entry.contribution.radius = surfel.radius;
+  entry.near_index = std::int32_t(near_surfels_.size());
+  near_surfels_.push_back(surfel);
+  contributions_.push_back(entry);
+}
+
+// A strict order of what two entries draw, whatever order they were added in.
+bool ReceiverRaster::isLessContent(const Entry& a, const Entry& b) const {
+  const int patch = std::memcmp(&a.contribution, &b.contribution, sizeof(Contribution));
+  if (patch != 0) return patch < 0;
+  if (a.near_index < 0) return false;  // equal patches; a near surfel has no direction
+  return std::memcmp(&near_surfels_[std::size_t(a.near_index)],
+                     &near_surfels_[std::size_t(b.near_index)], sizeof(Surfel)) < 0;
+}
+
+void ReceiverRaster::sortByDistance() {
+  // Distances are positive, and positive floats sort like their bits
+  SURFEIT_CHECK(contributions_.size() <= std::numeric_limits<std::uint32_t>::max());
+  order_.resize(contributions_.size());
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const std::uint32_t bits =
+        std::bit_cast<std::uint32_t>(contributions_[i].contribution.distance_sq);
+    order_[i] = std::uint64_t{bits} << 32 | i;
+  }
+  std::sort(order_.begin(), order_.end());
+
+  // Equal distances: by content, so that the order of adding does not matter
+  const auto isLess = [this](std::uint64_t a, std::uint64_t b) {
+    return isLessContent(contributions_[std::uint32_t(a)], contributions_[std::uint32_t(b)]);
+  };
+  for (std::size_t begin = 0; begin < order_.size();) {
+    std::size_t end = begin + 1;
+    while (end < order_.size() && order_[end] >> 32 == order_[begin] >> 32) ++end;
+    if (end - begin > 1) {
+      std::sort(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(end),
+                isLess);
+    }
+    begin = end;
+  }
+}
+
+// The bias keeps disks of the receiver's own surface from covering it. A surface that faces the
+// receiver closely is none of those, and the bias fades out with its normal: a wall closer than the
+// bias would be looked through otherwise. (A dragon on a plane: AO RMSE .0254 with a constant bias,
+// .0218 with this one.)
+float ReceiverRaster::rayBias(const Surfel& surfel) const {
+  const float cosine = glm::dot(receiver_.normal, surfel.normal);  // zero for spheres
+  return quality_.bias * surfel.radius * std::min(1.f, 1 + cosine);
+}
+
+void ReceiverRaster::trace(const Surfel& surfel, const DepthRange& depth) {
+  const glm::vec3 centre =
+      surfel.position - receiver_.position - rayBias(surfel) * receiver_.normal;
+  if (surfel.isSphere()) {
+    cube_.traceSphere(centre, surfel.radius, depth, surfel.radiosity);
+    return;
+  }
+  const bool sends_light = surfel.isTwoSided() || glm::dot(centre, surfel.normal) < 0;
+  cube_.traceDisk(centre, surfel.normal, surfel.radius, depth,
+                  sends_light ? surfel.radiosity : glm::vec3(0));
+}
+
+GatherResult ReceiverRaster::finish() {
+  sortByDistance();
+  cube_.clear();
+  for (const std::uint64_t key : order_) {
+    const Entry& entry = contributions_[std::uint32_t(key)];
+    const Contribution& patch = entry.contribution;
+    const float distance = std::sqrt(patch.distance_sq);
+    const float reach = kLayerReach * patch.radius;
+    const DepthRange depth = {distance - reach, distance + reach};
+    if (entry.near_index >= 0) {
+      trace(near_surfels_[std::size_t(entry.near_index)], depth);
+    } else {
+      cube_.splatRectangle(patch.direction, patch.normal, patch.solid_angle, depth,
+                           patch.radiosity);
+    }
+  }
+  return integrate();
+}
+
+// Dividing by the sum of the weights rather than by pi makes a wholly covered hemisphere exactly 1,
+// whatever the resolution.
+GatherResult ReceiverRaster::integrate() const {
+  const std::span<const RasterGeometry::Pixel> pixels = geometry_.pixels();
+  float weight_sum = 0;
+  GatherResult result;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const float cosine =
+        is_spherical_ ? 1 : std::max(0.f, glm::dot(pixels[i].direction, receiver_.normal));
+    const float weight = cosine * pixels[i].solid_angle;
+    weight_sum += weight;
+    result.occlusion += weight * cube_.coverage(i);
+    if (rules_.has_color) result.irradiance += weight * cube_.radiosity(i);
+  }
+  result.occlusion /= weight_sum;
+  result.irradiance /= weight_sum;
+  return result;
+}
+
+std::size_t ReceiverRaster::memoryBytes(const GatherQuality& quality) {
+  const std::size_t pixel_bytes = sizeof(RasterGeometry::Pixel) + RasterCube::kPixelBytes;
+  return sizeof(ReceiverRaster) +
+         RasterGeometry::pixelCount(quality.raster_resolution) * pixel_bytes +
+         kReservedContributions * (sizeof(Entry) + sizeof(std::uint64_t)) +
+         kReservedNearSurfels * sizeof(Surfel);
+}
+
+}  // namespace surfeit

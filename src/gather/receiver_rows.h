@@ -1,0 +1,77 @@
+// Rows of clouds on their way through a gather: where a receiver stands in a row of the input, and
+// how a row of the result is made of an input row and what was gathered there.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gather/receiver_raster.h"
+#include "io/ply_format.h"
+#include "io/surfel_source.h"
+#include "surfeit/gather.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Index of the element whose rows are the receivers: the one that holds surfels in a surfel cloud.
+// kCorruption when there is none.
+Result<std::size_t> findReceivers(const PlyHeader& header, const std::string& path);
+
+// Finds position and normal in the rows of an element, by the names of docs/format.md, "Surfel
+// clouds in PLY". What else a receiver holds (a radius of zero, say) is no concern of the gather
+// and never makes it invalid. Immutable; safe from any thread.
+class ReceiverMapping {
+ public:
+  // kCorruption as SurfelMapping::create has it for these properties.
+  static Result<ReceiverMapping> create(const PlyElement& element, const std::string& path);
+
+  // Without normals every receiver gathers over the whole sphere.
+  bool hasNormals() const { return surfels_.channels().normal; }
+
+  // Returns false, and counts the defect under `record`, when the row holds no valid receiver.
+  bool decode(const std::byte* row, std::uint64_t record, Receiver& receiver,
+              SurfelDefects& defects) const;
+
+  // What is wrong with a row that decode refused, found and expected.
+  std::string describeDefect(const std::byte* row) const { return surfels_.describeDefect(row); }
+
+ private:
+  explicit ReceiverMapping(SurfelMapping surfels) : surfels_(std::move(surfels)) {}
+
+  SurfelMapping surfels_;  // made from an element that has nothing but position and normal
+};
+
+// Rows of the result: the scalars of the input row, then what was gathered, as floats. A property
+// that the input has under the name of a result is replaced where it stands. Immutable.
+class ResultRows {
+ public:
+  ResultRows(const PlyElement& input, GatherMode mode);
+
+  const std::vector<PlyProperty>& properties() const { return properties_; }
+  std::size_t rowBytes() const { return row_bytes_; }
+
+  // Makes one row of rowBytes() at `output`.
+  void make(const std::byte* input, const GatherResult& result, std::byte* output) const;
+
+ private:
+  struct Copy {  // bytes of the input row that stay as they are
+    std::size_t from, to, bytes;
+  };
+  struct Insert {  // number of a result (the .cpp file has their names), offset in the output row
+    std::size_t result, to;
+  };
+
+  void addProperty(const PlyProperty& property);
+  void addCopy(const Copy& copy);
+
+  std::vector<PlyProperty> properties_;
+  std::vector<Copy> copies_;
+  std::vector<Insert> inserts_;
+  std::size_t row_bytes_ = 0;
+};
+
+}  // namespace surfeit

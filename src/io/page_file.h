@@ -1,0 +1,114 @@
+// The container of a .sft file: header, pages, provenance, directory, footer. It knows offsets,
+// sizes and checksums, not what the pages hold. docs/format.md, "Container", has every byte.
+//
+//   [ header : 512 | surfel pages | node pages | provenance | directory | footer : 64 ]
+//
+// Nothing lies between the parts, so that every byte of the file is under one checksum.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/file.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+inline constexpr std::size_t kFileHeaderBytes = 512;
+inline constexpr std::size_t kFileFooterBytes = 64;
+// Fields of the scene, between the container's own and the header's checksum.
+inline constexpr std::size_t kSceneFieldsOffset = 64;
+inline constexpr std::size_t kSceneFieldsBytes = kFileHeaderBytes - kSceneFieldsOffset - 8;
+// No page decodes to more than this; what declares more is refused before anything is allocated.
+inline constexpr std::uint32_t kMaxPayloadBytes = 4 << 20;
+
+// Where a page lies and what it must hash to.
+struct PageEntry {
+  std::uint64_t offset = 0;
+  std::uint32_t stored_bytes = 0;
+  std::uint32_t payload_bytes = 0;
+  std::uint64_t checksum = 0;  // XXH3-64 of the stored bytes, seeded by pageSeed
+};
+static_assert(sizeof(PageEntry) == 24);
+
+// The seed of a page's checksum: a page of another file, or at another offset, does not pass.
+std::uint64_t pageSeed(std::uint64_t file_identity, std::uint64_t offset);
+
+// A file open for reading. Immutable; safe from any thread.
+class PageFile {
+ public:
+  // Checks everything but the pages. kCorruption names file, part, found and expected; a newer
+  // version is refused with its number. Allocates no more than the file's own directory.
+  static Result<PageFile> open(const std::string& path);
+
+  const std::string& path() const { return file_.path(); }
+  std::uint64_t fileBytes() const { return file_.size(); }
+  std::uint64_t identity() const { return identity_; }
+  Bytes sceneFields() const { return scene_fields_; }
+  const std::string& provenance() const { return provenance_; }
+
+  // Pages are numbered through: node pages first, then surfel pages.
+  std::uint32_t pageCount() const { return static_cast<std::uint32_t>(directory_.size()); }
+  std::uint32_t nodePageCount() const { return node_page_count_; }
+  const PageEntry& entry(std::uint32_t page) const { return directory_[page]; }
+  // Most stored and decoded bytes of any page.
+  std::uint32_t maxStoredBytes() const { return max_stored_bytes_; }
+  std::uint32_t maxPayloadBytes() const { return max_payload_bytes_; }
+
+  // Reads, checks and decompresses a page into `payload`, with `stored` as scratch. page must be
+  // below pageCount(). Messages read "scene.sft: page 1832 at 30015488: checksum ..., expected ...".
+  Status readPage(std::uint32_t page, std::vector<std::byte>& stored,
+                  std::vector<std::byte>& payload) const;
+  // Prefixes a message about a page's contents with file, page and offset, as kCorruption.
+  Status pageError(std::uint32_t page, const std::string& message) const;
+
+ private:
+  Status readHeader();
+  Status readFooter(std::uint64_t& directory_offset, std::uint64_t& provenance_offset,
+                    std::uint64_t& directory_checksum, std::uint64_t& provenance_checksum);
+  Status checkDirectory(std::uint64_t pages_end);
+  Status partError(const char* part, const std::string& message) const;
+
+  InputFile file_;
+  std::uint64_t identity_ = 0;
+  std::uint32_t node_page_count_ = 0;
+  std::vector<std::byte> scene_fields_;
+  std::string provenance_;
+  std::vector<PageEntry> directory_;
+  std::uint32_t max_stored_bytes_ = 0;
+  std::uint32_t max_payload_bytes_ = 0;
+};
+
+// Writes a file, surfel pages first, then node pages; it appears when finish() succeeds. One thread
+// at a time.
+class PageFileWriter {
+ public:
+  // `identity` must differ between files of different content and be the same for the same content.
+  static Result<PageFileWriter> create(const std::string& path, std::uint64_t identity);
+
+  // `stored` is a page that compressPage made of payload_bytes bytes.
+  Status addSurfelPage(Bytes stored, std::uint32_t payload_bytes);
+  Status addNodePage(Bytes stored, std::uint32_t payload_bytes);
+
+  // Writes what remains. scene_fields: at most kSceneFieldsBytes.
+  Status finish(Bytes scene_fields, const std::string& provenance);
+
+  std::uint64_t fileBytes() const { return file_.size(); }
+  std::size_t directoryBytes() const {
+    return (surfel_pages_.size() + node_pages_.size()) * sizeof(PageEntry);
+  }
+
+ private:
+  PageFileWriter(AtomicFile file, std::uint64_t identity)
+      : file_(std::move(file)), identity_(identity) {}
+  Status addPage(Bytes stored, std::uint32_t payload_bytes, std::vector<PageEntry>& pages);
+
+  AtomicFile file_;
+  std::uint64_t identity_;
+  std::vector<PageEntry> surfel_pages_, node_pages_;
+};
+
+}  // namespace surfeit

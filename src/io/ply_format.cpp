@@ -1,0 +1,344 @@
+#include "io/ply_format.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cstring>
+#include <set>
+#include <utility>
+
+namespace surfeit {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r\v\f";
+constexpr std::size_t kMaxQuotedChars = 40;
+constexpr std::size_t kMaxNameChars = 64;
+
+struct TypeRow {
+  PlyType type;
+  std::size_t bytes;
+  std::string_view classic, sized;
+};
+
+// In the order of PlyType
+constexpr TypeRow kTypes[] = {
+    {PlyType::kInt8, 1, "char", "int8"},        {PlyType::kUint8, 1, "uchar", "uint8"},
+    {PlyType::kInt16, 2, "short", "int16"},     {PlyType::kUint16, 2, "ushort", "uint16"},
+    {PlyType::kInt32, 4, "int", "int32"},       {PlyType::kUint32, 4, "uint", "uint32"},
+    {PlyType::kFloat32, 4, "float", "float32"}, {PlyType::kFloat64, 8, "double", "float64"},
+};
+
+const TypeRow& typeRow(PlyType type) { return kTypes[static_cast<std::size_t>(type)]; }
+
+// Takes the first word off the line; empty at its end.
+std::string_view takeWord(std::string_view& line) {
+  const std::size_t begin = std::min(line.find_first_not_of(kBlanks), line.size());
+  const std::size_t end = std::min(line.find_first_of(kBlanks, begin), line.size());
+  const std::string_view word = line.substr(begin, end - begin);
+  line.remove_prefix(end);
+  return word;
+}
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+}
+
+std::string_view encodingName(PlyEncoding encoding) {
+  switch (encoding) {
+    case PlyEncoding::kAscii:
+      return "ascii";
+    case PlyEncoding::kBinaryLittleEndian:
+      return "binary_little_endian";
+    case PlyEncoding::kBinaryBigEndian:
+      break;
+  }
+  return "binary_big_endian";
+}
+
+std::optional<PlyEncoding> encodingFromName(std::string_view name) {
+  for (const PlyEncoding encoding :
+       {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
+    if (name == encodingName(encoding)) return encoding;
+  }
+  return std::nullopt;
+}
+
+// Reads the header line by line; each handler gets the words after its keyword.
+class HeaderParser {
+ public:
+  HeaderParser(std::string_view text, const std::string& path) : text_(text), path_(path) {}
+
+  Result<PlyHeader> parse() {
+    SURFEIT_RETURN_IF_ERROR(nextLine());
+    if (line_ != "ply") return unexpected("'ply'");
+    for (;;) {
+      SURFEIT_RETURN_IF_ERROR(nextLine());
+      std::string_view rest = line_;
+      const std::string_view keyword = takeWord(rest);
+      if (keyword == "end_header") {
+        if (!trimmed(rest).empty()) return unexpected("nothing after 'end_header'");
+        break;
+      }
+      SURFEIT_RETURN_IF_ERROR(parseLine(keyword, rest));
+    }
+    SURFEIT_RETURN_IF_ERROR(finishElement());
+    if (!has_format_) return unexpected("a 'format' line before it");
+    header_.data_offset = next_;
+    return std::move(header_);
+  }
+
+ private:
+  Status parseLine(std::string_view keyword, std::string_view rest) {
+    if (keyword.empty() || keyword == "obj_info") return {};
+    if (keyword == "comment") {
+      if (!trimmed(rest).empty()) header_.comments.emplace_back(trimmed(rest));
+      return {};
+    }
+    if (keyword == "format") return parseFormat(rest);
+    if (keyword == "element") return parseElement(rest);
+    if (keyword == "property") return parseProperty(rest);
+    return unexpected("'format', 'comment', 'obj_info', 'element', 'property' or 'end_header'");
+  }
+
+  Status parseFormat(std::string_view rest) {
+    const std::optional<PlyEncoding> encoding = encodingFromName(takeWord(rest));
+    if (has_format_) return unexpected("a single 'format' line");
+    if (!encoding || trimmed(rest) != "1.0") {
+      return unexpected(
+          "'format' with 'ascii', 'binary_little_endian' or 'binary_big_endian', then '1.0'");
+    }
+    header_.encoding = *encoding;
+    has_format_ = true;
+    return {};
+  }
+
+  Status parseElement(std::string_view rest) {
+    SURFEIT_RETURN_IF_ERROR(finishElement());
+    PlyElement element;
+    element.name = takeWord(rest);
+    const std::string_view count = takeWord(rest);
+    const char* const count_end = count.data() + count.size();
+    const auto [end, error] = std::from_chars(count.data(), count_end, element.count);
+    if (!isPlyName(element.name) || error != std::errc{} || end != count_end ||
+        !trimmed(rest).empty()) {
+      return unexpected("'element', a name and a count below 2^64");
+    }
+    if (!element_names_.insert(element.name).second) return unexpected("a new element name");
+    header_.elements.push_back(std::move(element));
+    property_names_.clear();
+    return {};
+  }
+
+  Status parseProperty(std::string_view rest) {
+    if (header_.elements.empty()) return unexpected("an 'element' line first");
+    PlyProperty property;
+    std::string_view type_name = takeWord(rest);
+    if (type_name == "list") {
+      property.is_list = true;
+      const std::optional<PlyType> count_type = plyTypeFromName(takeWord(rest));
+      if (!count_type || *count_type >= PlyType::kFloat32) {
+        return unexpected("an integer type for the length of the list");
+      }
+      property.count_type = *count_type;
+      type_name = takeWord(rest);
+    }
+    const std::optional<PlyType> type = plyTypeFromName(type_name);
+    if (!type) {
+      return unexpected("a type: char, uchar, short, ushort, int, uint, float or double");
+    }
+    property.type = *type;
+    property.name = takeWord(rest);
+    if (!isPlyName(property.name) || !trimmed(rest).empty()) return unexpected("one property name");
+    if (!property_names_.insert(property.name).second) {
+      return unexpected(fmt::format("a new property name for element {}",
+                                    quotePlyText(header_.elements.back().name)));
+    }
+    header_.elements.back().properties.push_back(std::move(property));
+    return {};
+  }
+
+  // Rows without values would make a count that the file's size cannot bound.
+  Status finishElement() {
+    if (header_.elements.empty()) return {};
+    PlyElement& element = header_.elements.back();
+    if (element.properties.empty() && element.count > 0) {
+      return unexpected(fmt::format("a 'property' line for element {} of {} rows",
+                                    quotePlyText(element.name), element.count));
+    }
+    packPlyRow(element);
+    return {};
+  }
+
+  Status nextLine() {
+    ++line_number_;
+    const std::size_t end = text_.find('\n', next_);
+    if (end == std::string_view::npos) {
+      return Status::corruption(
+          fmt::format("{}: header line {}: found no line end in the first {} bytes, expected {}",
+                      path_, line_number_, text_.size(),
+                      line_number_ == 1 ? "'ply'" : "the header up to 'end_header'"));
+    }
+    line_ = text_.substr(next_, end - next_);
+    if (line_.ends_with('\r')) line_.remove_suffix(1);
+    next_ = end + 1;
+    return {};
+  }
+
+  Status unexpected(std::string_view expected) const {
+    return Status::corruption(fmt::format("{}: header line {}: found {}, expected {}", path_,
+                                          line_number_, quotePlyText(line_), expected));
+  }
+
+  std::string_view text_;
+  const std::string& path_;
+  std::size_t next_ = 0;  // first byte of the next line
+  std::uint64_t line_number_ = 0;
+  std::string_view line_;
+  PlyHeader header_;
+  bool has_format_ = false;
+  // A header of 1 MiB may declare 60000 properties: sets keep the check for twins cheap
+  std::set<std::string> element_names_, property_names_;
+};
+
+template <typename T>
+double valueAs(const std::byte* bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof value);
+  return static_cast<double>(value);
+}
+
+}  // namespace
+
+std::size_t plyTypeBytes(PlyType type) { return typeRow(type).bytes; }
+
+std::string_view plyTypeName(PlyType type) { return typeRow(type).classic; }
+
+std::optional<PlyType> plyTypeFromName(std::string_view name) {
+  for (const TypeRow& row : kTypes) {
+    if (name == row.classic || name == row.sized) return row.type;
+  }
+  return std::nullopt;
+}
+
+bool isPlyName(std::string_view word) {
+  return !word.empty() && word.size() <= kMaxNameChars &&
+         std::none_of(word.begin(), word.end(),
+                      [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == '\x7f'; });
+}
+
+bool PlyElement::hasLists() const {
+  return std::any_of(properties.begin(), properties.end(),
+                     [](const PlyProperty& property) { return property.is_list; });
+}
+
+const PlyProperty* PlyElement::find(std::string_view property) const {
+  for (const PlyProperty& candidate : properties) {
+    if (candidate.name == property) return &candidate;
+  }
+  return nullptr;
+}
+
+std::optional<std::size_t> PlyHeader::findElement(std::string_view element) const {
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    if (elements[i].name == element) return i;
+  }
+  return std::nullopt;
+}
+
+Result<PlyHeader> parsePlyHeader(std::string_view text, const std::string& path) {
+  return HeaderParser(text.substr(0, kMaxPlyHeaderBytes), path).parse();
+}
+
+std::string formatPlyHeader(const PlyHeader& header) {
+  std::string text = fmt::format("ply\nformat {} 1.0\n", encodingName(header.encoding));
+  for (std::string comment : header.comments) {
+    std::replace_if(
+        comment.begin(), comment.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+    text += fmt::format("comment {}\n", comment);
+  }
+  for (const PlyElement& element : header.elements) {
+    text += fmt::format("element {} {}\n", element.name, element.count);
+    for (const PlyProperty& property : element.properties) {
+      const std::string list =
+          property.is_list ? fmt::format("list {} ", plyTypeName(property.count_type)) : "";
+      text += fmt::format("property {}{} {}\n", list, plyTypeName(property.type), property.name);
+    }
+  }
+  return text + "end_header\n";
+}
+
+double plyValue(const std::byte* bytes, PlyType type) {
+  switch (type) {
+    case PlyType::kInt8:
+      return valueAs<std::int8_t>(bytes);
+    case PlyType::kUint8:
+      return valueAs<std::uint8_t>(bytes);
+    case PlyType::kInt16:
+      return valueAs<std::int16_t>(bytes);
+    case PlyType::kUint16:
+      return valueAs<std::uint16_t>(bytes);
+    case PlyType::kInt32:
+      return valueAs<std::int32_t>(bytes);
+    case PlyType::kUint32:
+      return valueAs<std::uint32_t>(bytes);
+    case PlyType::kFloat32:
+      return valueAs<float>(bytes);
+    case PlyType::kFloat64:
+      break;
+  }
+  return valueAs<double>(bytes);
+}
+
+void packPlyRow(PlyElement& element) {
+  element.row_bytes = 0;
+  for (PlyProperty& property : element.properties) {
+    if (property.is_list) continue;
+    property.offset = element.row_bytes;
+    element.row_bytes += plyTypeBytes(property.type);
+  }
+}
+
+bool needsByteSwap(PlyEncoding encoding) {
+  if (encoding == PlyEncoding::kAscii) return false;
+  return (encoding == PlyEncoding::kBinaryLittleEndian) !=
+         (std::endian::native == std::endian::little);
+}
+
+void swapPlyValue(std::byte* value, PlyType type) {
+  // Constant lengths let the compiler turn each case into a few moves
+  switch (plyTypeBytes(type)) {
+    case 2:
+      std::reverse(value, value + 2);
+      break;
+    case 4:
+      std::reverse(value, value + 4);
+      break;
+    case 8:
+      std::reverse(value, value + 8);
+      break;
+    default:
+      break;
+  }
+}
+
+void swapPlyRows(const PlyElement& element, std::span<std::byte> rows) {
+  if (element.row_bytes == 0) return;
+  for (std::size_t row = 0; row + element.row_bytes <= rows.size(); row += element.row_bytes) {
+    for (const PlyProperty& property : element.properties) {
+      if (!property.is_list) swapPlyValue(&rows[row + property.offset], property.type);
+    }
+  }
+}
+
+std::string quotePlyText(std::string_view text) {
+  std::string quoted = "'";
+  for (const char c : text.substr(0, kMaxQuotedChars)) quoted += c >= ' ' && c <= '~' ? c : '?';
+  if (text.size() > kMaxQuotedChars) quoted += "...";
+  return quoted + "'";
+}
+
+}  // namespace surfeit

@@ -1,0 +1,499 @@
+#include "io/ply_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <limits>
+#include <string_view>
+#include <utility>
+
+#include "io/file.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kBufferBytes = 256 << 10;
+constexpr std::size_t kUsualHeaderBytes = 16 << 10;
+constexpr std::size_t kMaxListItems = 1 << 20;
+// Longest number in an ascii file. With at most this many digits the sign of the exponent tells
+// whether a number that from_chars finds out of range is too large or too small.
+constexpr std::size_t kMaxNumberChars = 256;
+constexpr std::size_t kNoList = std::numeric_limits<std::size_t>::max();
+
+bool isBlank(std::byte byte) {
+  const char c = static_cast<char>(byte);
+  return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+}
+
+bool isLineEnd(std::byte byte) { return static_cast<char>(byte) == '\n'; }
+
+template <typename T>
+bool storeInteger(std::string_view text, std::byte* out) {
+  T value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return false;
+  std::memcpy(out, &value, sizeof value);
+  return true;
+}
+
+// Numbers too large for the type become infinite and numbers too small become zero, as in C.
+template <typename T>
+bool storeReal(std::string_view text, std::byte* out) {
+  T value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (end != text.data() + text.size()) return false;
+  if (error == std::errc::result_out_of_range) {
+    // A float may be small without an exponent; a double of kMaxNumberChars digits may not
+    double wide = 0;
+    const auto [wide_end, wide_error] =
+        std::from_chars(text.data(), text.data() + text.size(), wide);
+    const bool is_tiny = wide_error == std::errc::result_out_of_range
+                             ? text.find("e-") != text.npos || text.find("E-") != text.npos
+                             : wide > -1 && wide < 1;
+    value = is_tiny ? T{0} : std::numeric_limits<T>::infinity();
+    if (text.front() == '-') value = -value;
+  } else if (error != std::errc{}) {
+    return false;
+  }
+  std::memcpy(out, &value, sizeof value);
+  return true;
+}
+
+// Stores the number that `text` spells; false when it spells no number of that type.
+bool storeNumber(std::string_view text, PlyType type, std::byte* out) {
+  if (text.size() > kMaxNumberChars) return false;
+  // from_chars reads no plus sign
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  switch (type) {
+    case PlyType::kInt8:
+      return storeInteger<std::int8_t>(text, out);
+    case PlyType::kUint8:
+      return storeInteger<std::uint8_t>(text, out);
+    case PlyType::kInt16:
+      return storeInteger<std::int16_t>(text, out);
+    case PlyType::kUint16:
+      return storeInteger<std::uint16_t>(text, out);
+    case PlyType::kInt32:
+      return storeInteger<std::int32_t>(text, out);
+    case PlyType::kUint32:
+      return storeInteger<std::uint32_t>(text, out);
+    case PlyType::kFloat32:
+      return storeReal<float>(text, out);
+    case PlyType::kFloat64:
+      break;
+  }
+  return storeReal<double>(text, out);
+}
+
+}  // namespace
+
+// The file behind a buffer, and where in the file we are.
+struct PlyReader::State {
+  InputFile file;
+  PlyHeader header;
+  Status failure;  // of the last read, until the next seek
+
+  // buffer[begin, end) are the next bytes; the file goes on at end_offset
+  std::vector<std::byte> buffer = std::vector<std::byte>(kBufferBytes);
+  std::size_t begin = 0, end = 0;
+  std::uint64_t end_offset = 0;
+  bool at_end = false;  // the file has nothing at end_offset
+  std::string_view token;
+
+  std::size_t element_index = 0;
+  std::uint64_t row = 0;
+  std::vector<std::uint64_t> element_begin;  // offsets of the first elements, as far as known
+  std::vector<std::byte> skipped_row;
+
+  const PlyElement& element() const { return header.elements[element_index]; }
+  bool isAscii() const { return header.encoding == PlyEncoding::kAscii; }
+  std::uint64_t offset() const { return end_offset - (end - begin); }
+
+  Status damaged(std::string_view what) const {
+    return Status::corruption(
+        fmt::format("{}: element {} row {}: {}", file.path(), element().name, row, what));
+  }
+  Status endsEarly(std::string_view expected) const {
+    return damaged(fmt::format("file ends early: {} bytes, expected {}", file.size(), expected));
+  }
+
+  // --- Bytes ---
+
+  void jumpTo(std::uint64_t new_offset) {
+    begin = end = 0;
+    end_offset = new_offset;
+    at_end = false;
+  }
+
+  // Appends what fits behind the bytes that are left. A system error ends the file here; it is
+  // kept in `failure`, which goes before any complaint about the early end.
+  void refill() {
+    std::memmove(buffer.data(), buffer.data() + begin, end - begin);
+    end -= begin;
+    begin = 0;
+    Result<std::size_t> got = file.readSome(end_offset, std::span(buffer).subspan(end));
+    if (!got.ok()) failure = got.status();
+    const std::size_t got_bytes = got.ok() ? *got : 0;
+    at_end = got_bytes < buffer.size() - end;
+    end += got_bytes;
+    end_offset += got_bytes;
+  }
+
+  Status readBytes(std::span<std::byte> bytes) {
+    while (!bytes.empty()) {
+      if (begin == end) {
+        // Large reads go past the buffer, straight to where they are wanted
+        if (bytes.size() >= kBufferBytes) {
+          SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, file.readSome(end_offset, bytes));
+          if (got < bytes.size()) return endsEarly(fmt::format("{} more", bytes.size() - got));
+          end_offset += got;
+          return {};
+        }
+        refill();
+        SURFEIT_RETURN_IF_ERROR(failure);
+        if (begin == end) return endsEarly(fmt::format("{} more", bytes.size()));
+      }
+      const std::size_t size = std::min(bytes.size(), end - begin);
+      std::memcpy(bytes.data(), &buffer[begin], size);
+      begin += size;
+      bytes = bytes.subspan(size);
+    }
+    return {};
+  }
+
+  Status skipBytes(std::uint64_t size) {
+    if (size > file.size() - std::min(file.size(), offset())) {
+      return endsEarly(fmt::format("{} bytes at {}", size, offset()));
+    }
+    if (size <= end - begin) {
+      begin += static_cast<std::size_t>(size);
+    } else {
+      jumpTo(offset() + size);
+    }
+    return {};
+  }
+
+  // --- Ascii ---
+
+  // Afterwards the cursor stands on a number, a line end or the end of the file, and a number is
+  // in the buffer as a whole unless it is too long to be one.
+  void skipBlanks() {
+    for (;;) {
+      while (begin < end && isBlank(buffer[begin])) ++begin;
+      if (end - begin > kMaxNumberChars || at_end) return;
+      refill();
+    }
+  }
+
+  // Moves `token` to the next number of the line; empty at the end of the line.
+  void nextToken() {
+    skipBlanks();
+    const std::size_t limit = std::min(end, begin + kMaxNumberChars + 1);
+    std::size_t last = begin;
+    while (last < limit && !isBlank(buffer[last]) && !isLineEnd(buffer[last])) ++last;
+    token = {reinterpret_cast<const char*>(buffer.data()) + begin, last - begin};
+    begin = last;
+  }
+
+  void skipEmptyLines() {
+    for (skipBlanks(); begin < end && isLineEnd(buffer[begin]); skipBlanks()) ++begin;
+  }
+
+  Status badToken(const PlyProperty& property, PlyType type) const {
+    SURFEIT_RETURN_IF_ERROR(failure);
+    const std::string expected = fmt::format("{} of type {}", property.name, plyTypeName(type));
+    if (!token.empty()) {
+      return damaged(fmt::format("found {}, expected {}", quotePlyText(token), expected));
+    }
+    if (begin == end) return endsEarly(expected);
+    return damaged(fmt::format("line ends early, expected {}", expected));
+  }
+
+  Status readAsciiRow(std::byte* scalars, std::size_t wanted_list, std::vector<double>* list) {
+    skipEmptyLines();
+    const std::vector<PlyProperty>& properties = element().properties;
+    for (std::size_t i = 0; i < properties.size(); ++i) {
+      // A scalar
+      const PlyProperty& property = properties[i];
+      nextToken();
+      if (!property.is_list) {
+        if (!storeNumber(token, property.type, scalars + property.offset)) {
+          return badToken(property, property.type);
+        }
+        continue;
+      }
+
+      // The length of a list, then its items
+      std::byte value[8];
+      if (!storeNumber(token, property.count_type, value)) {
+        return badToken(property, property.count_type);
+      }
+      const bool is_wanted = i == wanted_list;
+      SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t item_count,
+                               listLength(property, value, is_wanted));
+      for (std::uint64_t item = 0; item < item_count; ++item) {
+        nextToken();
+        if (!storeNumber(token, property.type, value)) return badToken(property, property.type);
+        if (is_wanted) list->push_back(plyValue(value, property.type));
+      }
+    }
+
+    // A row with too many values is as wrong as one with too few
+    nextToken();
+    if (!token.empty()) {
+      return damaged(fmt::format("found {}, expected the end of the line", quotePlyText(token)));
+    }
+    if (begin < end) ++begin;
+    return failure;
+  }
+
+  // --- Binary rows with lists ---
+
+  Status readBinaryValue(PlyType type, std::byte* value) {
+    SURFEIT_RETURN_IF_ERROR(readBytes({value, plyTypeBytes(type)}));
+    if (needsByteSwap(header.encoding)) swapPlyValue(value, type);
+    return {};
+  }
+
+  Status readBinaryRow(std::byte* scalars, std::size_t wanted_list, std::vector<double>* list) {
+    const std::vector<PlyProperty>& properties = element().properties;
+    for (std::size_t i = 0; i < properties.size(); ++i) {
+      // A scalar
+      const PlyProperty& property = properties[i];
+      if (!property.is_list) {
+        SURFEIT_RETURN_IF_ERROR(readBinaryValue(property.type, scalars + property.offset));
+        continue;
+      }
+
+      // The length of a list, then its items
+      std::byte value[8];
+      SURFEIT_RETURN_IF_ERROR(readBinaryValue(property.count_type, value));
+      const bool is_wanted = i == wanted_list;
+      SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t item_count,
+                               listLength(property, value, is_wanted));
+      if (!is_wanted) {
+        SURFEIT_RETURN_IF_ERROR(skipBytes(item_count * plyTypeBytes(property.type)));
+        continue;
+      }
+      for (std::uint64_t item = 0; item < item_count; ++item) {
+        SURFEIT_RETURN_IF_ERROR(readBinaryValue(property.type, value));
+        list->push_back(plyValue(value, property.type));
+      }
+    }
+    return {};
+  }
+
+  Result<std::uint64_t> listLength(const PlyProperty& property, const std::byte* value,
+                                   bool is_wanted) const {
+    const double length = plyValue(value, property.count_type);
+    if (length < 0 || (is_wanted && length > kMaxListItems)) {
+      return damaged(fmt::format("list {} has length {}, expected 0 to {}", property.name, length,
+                                 is_wanted ? kMaxListItems : 0xffffffffu));
+    }
+    return static_cast<std::uint64_t>(length);
+  }
+
+  // --- Elements ---
+
+  // Reads one row; the caller has made sure that there is one.
+  Status readRow(std::byte* scalars, std::size_t wanted_list, std::vector<double>* list) {
+    SURFEIT_RETURN_IF_ERROR(isAscii() ? readAsciiRow(scalars, wanted_list, list)
+                                      : readBinaryRow(scalars, wanted_list, list));
+    ++row;
+    return {};
+  }
+
+  // At the end of an element, notes where the next begins; the last must end with the file.
+  Status endElement() {
+    if (row < element().count || element_begin.size() > element_index + 1) return {};
+    const std::uint64_t next_begin = offset();
+    const bool is_last = std::all_of(
+        header.elements.begin() + static_cast<std::ptrdiff_t>(element_index) + 1,
+        header.elements.end(), [](const PlyElement& later) { return later.count == 0; });
+    if (is_last) SURFEIT_RETURN_IF_ERROR(checkEnd());
+    element_begin.push_back(next_begin);
+    return {};
+  }
+
+  Status checkEnd() {
+    // Only so few bytes can be a line end rather than data
+    if (isAscii() || file.size() - offset() <= 2) skipEmptyLines();
+    SURFEIT_RETURN_IF_ERROR(failure);
+    if (offset() >= file.size()) return {};
+    return Status::corruption(
+        fmt::format("{}: {} bytes at {} after the last element, expected the end of the file",
+                    file.path(), file.size() - offset(), offset()));
+  }
+
+  // What the file can hold bounds every count before anyone uses it; sums cannot overflow later.
+  Status checkCounts() {
+    std::uint64_t left = file.size() - std::min(file.size(), header.data_offset);
+    bool is_fixed_size = !isAscii();
+    for (element_index = 0; element_index < header.elements.size(); ++element_index) {
+      // An ascii value takes a digit and a blank; a list takes its length at least
+      std::uint64_t least_row_bytes = element().row_bytes;
+      for (const PlyProperty& property : element().properties) {
+        if (property.is_list) least_row_bytes += plyTypeBytes(property.count_type);
+      }
+      if (isAscii()) least_row_bytes = 2 * element().properties.size();
+      if (least_row_bytes == 0) continue;  // and no rows either
+      // The last line may lack its end
+      const std::uint64_t rows_that_fit = (left + (isAscii() ? 1 : 0)) / least_row_bytes;
+      if (element().count > rows_that_fit) {
+        row = rows_that_fit;
+        return damaged(
+            fmt::format("file ends early: {} bytes hold at most {} rows of {}{} bytes, expected {}",
+                        left, rows_that_fit, isAscii() || element().hasLists() ? "at least " : "",
+                        least_row_bytes, element().count));
+      }
+      left -= std::min(left, element().count * least_row_bytes);
+      is_fixed_size = is_fixed_size && !element().hasLists();
+    }
+    element_index = 0;
+
+    // With rows of fixed size the end is known at once
+    if (is_fixed_size) {
+      jumpTo(file.size() - left);
+      SURFEIT_RETURN_IF_ERROR(checkEnd());
+    }
+    return {};
+  }
+
+  Status seekElement(std::size_t index) {
+    // Start at the last element whose place is known, or go on from here when inside it
+    const std::size_t known = std::min(index, element_begin.size() - 1);
+    if (known != element_index || known == index || !failure.ok()) {
+      jumpTo(element_begin[known]);
+      element_index = known;
+      row = 0;
+      failure = {};
+    }
+
+    // Rows of fixed size are passed by arithmetic, others must be read
+    while (element_index < index) {
+      if (!isAscii() && !element().hasLists()) {
+        SURFEIT_RETURN_IF_ERROR(skipBytes((element().count - row) * element().row_bytes));
+        row = element().count;
+      }
+      skipped_row.resize(element().row_bytes);
+      while (row < element().count) {
+        SURFEIT_RETURN_IF_ERROR(readRow(skipped_row.data(), kNoList, nullptr));
+      }
+      SURFEIT_RETURN_IF_ERROR(endElement());
+      ++element_index;
+      row = 0;
+    }
+    return {};
+  }
+
+  Result<std::size_t> readRows(std::span<std::byte> rows) {
+    const std::size_t row_bytes = element().row_bytes;
+    const std::size_t row_count = static_cast<std::size_t>(
+        std::min<std::uint64_t>(element().count - row, rows.size() / row_bytes));
+    rows = rows.first(row_count * row_bytes);
+    if (isAscii() || element().hasLists()) {
+      for (std::size_t i = 0; i < row_count; ++i) {
+        SURFEIT_RETURN_IF_ERROR(readRow(rows.data() + i * row_bytes, kNoList, nullptr));
+      }
+    } else {
+      // The rows of the file are the packed rows
+      SURFEIT_RETURN_IF_ERROR(readBytes(rows));
+      if (needsByteSwap(header.encoding)) swapPlyRows(element(), rows);
+      row += row_count;
+    }
+    SURFEIT_RETURN_IF_ERROR(endElement());
+    return row_count;
+  }
+
+  Result<bool> readRowWithList(std::span<std::byte> scalars, std::size_t list_property,
+                               std::vector<double>& list) {
+    list.clear();
+    const bool has_row = row < element().count;
+    if (has_row) SURFEIT_RETURN_IF_ERROR(readRow(scalars.data(), list_property, &list));
+    SURFEIT_RETURN_IF_ERROR(endElement());
+    return has_row;
+  }
+
+  Status invalidCall(std::string_view what) const {
+    return Status::invalidArgument(fmt::format("{}: {}", file.path(), what));
+  }
+};
+
+Result<PlyReader> PlyReader::open(const std::string& path) {
+  auto state = std::make_unique<State>();
+  SURFEIT_ASSIGN_OR_RETURN(state->file, InputFile::open(path));
+
+  // Headers are short; only one that does not parse gets the room that it may have at most
+  for (const std::size_t header_bytes : {kUsualHeaderBytes, kMaxPlyHeaderBytes}) {
+    std::string text(header_bytes, '\0');
+    SURFEIT_ASSIGN_OR_RETURN(
+        const std::size_t got,
+        state->file.readSome(0, std::as_writable_bytes(std::span(text.data(), text.size()))));
+    text.resize(got);
+    Result<PlyHeader> header = parsePlyHeader(text, path);
+    if (header.ok()) {
+      state->header = std::move(*header);
+      break;
+    }
+    if (got < header_bytes || header_bytes == kMaxPlyHeaderBytes) return header.status();
+  }
+
+  SURFEIT_RETURN_IF_ERROR(state->checkCounts());
+  state->element_begin = {state->header.data_offset};
+  state->jumpTo(state->header.data_offset);
+  state->row = 0;
+  return PlyReader(std::move(state));
+}
+
+PlyReader::PlyReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+PlyReader::PlyReader(PlyReader&&) noexcept = default;
+PlyReader& PlyReader::operator=(PlyReader&&) noexcept = default;
+PlyReader::~PlyReader() = default;
+
+const std::string& PlyReader::path() const { return state_->file.path(); }
+
+const PlyHeader& PlyReader::header() const { return state_->header; }
+
+Status PlyReader::seekElement(std::size_t index) {
+  if (index >= state_->header.elements.size()) {
+    return state_->invalidCall(
+        fmt::format("seek to element {} of {}", index, state_->header.elements.size()));
+  }
+  Status status = state_->seekElement(index);
+  if (!status.ok()) state_->failure = status;
+  return status;
+}
+
+Result<std::size_t> PlyReader::readRows(std::span<std::byte> rows) {
+  if (state_->header.elements.empty()) return state_->invalidCall("no element to read");
+  const std::size_t row_bytes = state_->element().row_bytes;
+  if (row_bytes == 0 || rows.size() < row_bytes) {
+    return state_->invalidCall(
+        fmt::format("room for {} bytes given to read rows of {} bytes", rows.size(), row_bytes));
+  }
+  SURFEIT_RETURN_IF_ERROR(state_->failure);
+  Result<std::size_t> count = state_->readRows(rows);
+  if (!count.ok()) state_->failure = count.status();
+  return count;
+}
+
+Result<bool> PlyReader::readRowWithList(std::span<std::byte> scalars, std::size_t list_property,
+                                        std::vector<double>& list) {
+  if (state_->header.elements.empty()) return state_->invalidCall("no element to read");
+  const PlyElement& element = state_->element();
+  if (scalars.size() < element.row_bytes || list_property >= element.properties.size() ||
+      !element.properties[list_property].is_list) {
+    return state_->invalidCall(
+        fmt::format("property {} of element {} read as a list, with {} "
+                    "bytes for {} bytes of scalars",
+                    list_property, element.name, scalars.size(), element.row_bytes));
+  }
+  SURFEIT_RETURN_IF_ERROR(state_->failure);
+  Result<bool> has_row = state_->readRowWithList(scalars, list_property, list);
+  if (!has_row.ok()) state_->failure = has_row.status();
+  return has_row;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,183 @@
+#include "io/ply_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <utility>
+
+#include "io/file.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kScratchBytes = 64 << 10;
+constexpr std::size_t kMaxCountDigits = 20;  // of 2^64 - 1
+// The longest shortest double is -2.2250738585072014e-308
+constexpr std::size_t kMaxNumberChars = 32;
+
+template <typename T>
+char* formatAs(const std::byte* bytes, char* out) {
+  T value;
+  std::memcpy(&value, bytes, sizeof value);
+  return std::to_chars(out, out + kMaxNumberChars, value).ptr;
+}
+
+// Writes the shortest text that reads back as the same value; returns its end.
+char* formatNumber(const std::byte* bytes, PlyType type, char* out) {
+  switch (type) {
+    case PlyType::kInt8:
+      return formatAs<std::int8_t>(bytes, out);
+    case PlyType::kUint8:
+      return formatAs<std::uint8_t>(bytes, out);
+    case PlyType::kInt16:
+      return formatAs<std::int16_t>(bytes, out);
+    case PlyType::kUint16:
+      return formatAs<std::uint16_t>(bytes, out);
+    case PlyType::kInt32:
+      return formatAs<std::int32_t>(bytes, out);
+    case PlyType::kUint32:
+      return formatAs<std::uint32_t>(bytes, out);
+    case PlyType::kFloat32:
+      return formatAs<float>(bytes, out);
+    case PlyType::kFloat64:
+      break;
+  }
+  return formatAs<double>(bytes, out);
+}
+
+// The header with its count padded to a fixed size. Parsers split lines at blanks in different
+// ways, but all of them skip comments: the room is a comment behind the element line.
+std::string paddedHeader(const PlyHeader& header) {
+  std::string text = formatPlyHeader(header);
+  const PlyElement& element = header.elements.front();
+  const std::string line = fmt::format("\nelement {} {}\n", element.name, element.count);
+  const std::size_t digits = fmt::formatted_size("{}", element.count);
+  text.insert(text.find(line) + line.size(),
+              "comment" + std::string(1 + kMaxCountDigits - digits, ' ') + "\n");
+  return text;
+}
+
+Status checkProperties(const std::string& path, const std::vector<PlyProperty>& properties) {
+  if (properties.empty()) {
+    return Status::invalidArgument(fmt::format("{}: no properties to write", path));
+  }
+  for (std::size_t i = 0; i < properties.size(); ++i) {
+    const std::string& name = properties[i].name;
+    const bool is_twin = std::any_of(properties.begin(), properties.begin() + std::ptrdiff_t(i),
+                                     [&](const PlyProperty& other) { return other.name == name; });
+    if (!isPlyName(name) || is_twin || properties[i].is_list) {
+      return Status::invalidArgument(
+          fmt::format("{}: property {}: expected a scalar with a name of "
+                      "one word that no other property has",
+                      path, quotePlyText(name)));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+struct PlyWriter::State {
+  State(AtomicFile new_file, PlyHeader new_header)
+      : file(std::move(new_file)), header(std::move(new_header)) {}
+
+  AtomicFile file;
+  PlyHeader header;
+  bool is_finished = false;
+  std::vector<std::byte> scratch;  // rows on their way to another byte order or to text
+
+  PlyElement& element() { return header.elements.front(); }
+
+  Status appendSwapped(Bytes rows) {
+    const std::size_t row_bytes = element().row_bytes;
+    const std::size_t batch_bytes = std::max<std::size_t>(1, kScratchBytes / row_bytes) * row_bytes;
+    while (!rows.empty()) {
+      const Bytes batch = rows.first(std::min(batch_bytes, rows.size()));
+      scratch.assign(batch.begin(), batch.end());
+      swapPlyRows(element(), scratch);
+      SURFEIT_RETURN_IF_ERROR(file.append(scratch));
+      rows = rows.subspan(batch.size());
+    }
+    return {};
+  }
+
+  // A row is a line, its values parted by single blanks.
+  Status appendText(Bytes rows) {
+    scratch.resize(kScratchBytes);
+    std::size_t size = 0;
+    for (; !rows.empty(); rows = rows.subspan(element().row_bytes)) {
+      for (const PlyProperty& property : element().properties) {
+        if (scratch.size() - size <= kMaxNumberChars) {
+          SURFEIT_RETURN_IF_ERROR(file.append(Bytes(scratch).first(size)));
+          size = 0;
+        }
+        char* const begin = reinterpret_cast<char*>(scratch.data()) + size;
+        char* const end = formatNumber(&rows[property.offset], property.type, begin);
+        *end = &property == &element().properties.back() ? '\n' : ' ';
+        size += static_cast<std::size_t>(end - begin) + 1;
+      }
+    }
+    return file.append(Bytes(scratch).first(size));
+  }
+};
+
+Result<PlyWriter> PlyWriter::create(const std::string& path, PlyEncoding encoding,
+                                    std::vector<PlyProperty> properties,
+                                    std::vector<std::string> comments) {
+  if (path == "-") {
+    return Status::invalidArgument("-: a PLY file cannot be written to the standard output");
+  }
+  SURFEIT_RETURN_IF_ERROR(checkProperties(path, properties));
+  PlyElement element;
+  element.name = "vertex";
+  element.properties = std::move(properties);
+  packPlyRow(element);
+
+  PlyHeader header;
+  header.encoding = encoding;
+  header.comments = std::move(comments);
+  header.elements.push_back(std::move(element));
+  const std::string text = paddedHeader(header);
+  if (text.size() > kMaxPlyHeaderBytes) {
+    return Status::invalidArgument(fmt::format("{}: header of {} bytes, expected at most {}", path,
+                                               text.size(), kMaxPlyHeaderBytes));
+  }
+  SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
+  SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
+  return PlyWriter(std::make_unique<State>(std::move(file), std::move(header)));
+}
+
+PlyWriter::PlyWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+PlyWriter::PlyWriter(PlyWriter&&) noexcept = default;
+PlyWriter& PlyWriter::operator=(PlyWriter&&) noexcept = default;
+PlyWriter::~PlyWriter() = default;
+
+const PlyElement& PlyWriter::element() const { return state_->element(); }
+
+Status PlyWriter::writeRows(std::span<const std::byte> rows) {
+  PlyElement& element = state_->element();
+  if (state_->is_finished || rows.size() % element.row_bytes != 0) {
+    return Status::invalidArgument(
+        fmt::format("{}: {} bytes to write, expected whole rows of {} bytes before finish",
+                    state_->file.path(), rows.size(), element.row_bytes));
+  }
+  element.count += rows.size() / element.row_bytes;
+  if (state_->header.encoding == PlyEncoding::kAscii) return state_->appendText(rows);
+  if (needsByteSwap(state_->header.encoding)) return state_->appendSwapped(rows);
+  return state_->file.append(rows);
+}
+
+Status PlyWriter::finish() {
+  if (state_->is_finished) {
+    return Status::invalidArgument(fmt::format("{}: finished twice", state_->file.path()));
+  }
+  const std::string header = paddedHeader(state_->header);
+  SURFEIT_RETURN_IF_ERROR(state_->file.writeAt(0, std::as_bytes(std::span(header))));
+  SURFEIT_RETURN_IF_ERROR(state_->file.commit());
+  state_->is_finished = true;
+  return {};
+}
+
+}  // namespace surfeit

@@ -1,0 +1,176 @@
+#include "octree/local_density.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "core/spherical_harmonics.h"
+
+namespace surfeit {
+namespace {
+
+// Neighbours looked at: on a square grid the 8th is the diagonal one, and pi d^2 / k is right
+// within a fifth; fewer are noisy, more smear edges.
+constexpr std::size_t kNeighbours = 8;
+// Strays: radii are limited to this many times the cloud's median.
+constexpr float kStrayLimit = 8;
+constexpr std::size_t kSamplePages = 64;
+
+// Squared distances to the nearest surfels at other positions, ascending.
+struct Nearest {
+  std::array<float, kNeighbours> distance_sq;
+  std::uint64_t coincident = 0;
+
+  Nearest() { distance_sq.fill(std::numeric_limits<float>::infinity()); }
+  float limit() const { return distance_sq.back(); }
+  void add(float d2) {
+    if (d2 == 0) {
+      ++coincident;
+      return;
+    }
+    if (d2 >= limit()) return;
+    std::size_t i = kNeighbours - 1;
+    for (; i > 0 && distance_sq[i - 1] > d2; --i) distance_sq[i] = distance_sq[i - 1];
+    distance_sq[i] = d2;
+  }
+};
+
+// A node to visit, by the least distance that its surfels can have.
+struct Candidate {
+  float distance;
+  Node node;
+};
+
+float leastDistance(const glm::vec3& position, const Node& node) {
+  return std::max(0.f, glm::length(node.position - position) - node.radius);
+}
+
+// Depth first, nearest child first; a visited range is copied because the reader may drop its page.
+Status search(const glm::vec3& position, const NodeRange& range, PagedOctree::Reader& reader,
+              Nearest& nearest) {
+  SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(range));
+  std::array<Candidate, 8> candidates;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    candidates[i] = {leastDistance(position, nodes[i]), nodes[i]};
+  }
+  const std::span<Candidate> order = std::span(candidates).first(nodes.size());
+  std::sort(order.begin(), order.end(),
+            [](const Candidate& a, const Candidate& b) { return a.distance < b.distance; });
+  for (const Candidate& candidate : order) {
+    // Positions count, not disks; a slack of one part in a million covers rounding
+    if (candidate.distance * candidate.distance > nearest.limit() * 1.000001f) break;
+    if (!candidate.node.isLeaf()) {
+      SURFEIT_RETURN_IF_ERROR(search(position, childrenOf(candidate.node), reader, nearest));
+      continue;
+    }
+    SURFEIT_RETURN_IF_ERROR(reader.visitLeaf(candidate.node, [&](std::span<const Surfel> surfels) {
+      for (const Surfel& surfel : surfels) {
+        const glm::vec3 d = surfel.position - position;
+        nearest.add(glm::dot(d, d));
+      }
+    }));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<float> localArea(const glm::vec3& position, PagedOctree::Reader& reader) {
+  Nearest nearest;
+  SURFEIT_RETURN_IF_ERROR(search(position, kRootRange, reader, nearest));
+  const auto end = std::find(nearest.distance_sq.begin(), nearest.distance_sq.end(),
+                             std::numeric_limits<float>::infinity());
+  const auto found = end - nearest.distance_sq.begin();
+  if (found == 0) return 0.f;
+  const float sharers = float(std::max<std::uint64_t>(nearest.coincident, 1));
+  return kPi * *(end - 1) / float(found) / sharers;
+}
+
+SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap, int threads)
+    : octree_(octree), overlap_(overlap) {
+  for (int i = 0; i < threads; ++i) {
+    readers_.push_back(std::make_unique<PagedOctree::Reader>(octree));
+  }
+}
+
+SizedSurfelStream::~SizedSurfelStream() = default;
+
+Status SizedSurfelStream::prepare() {
+  const SceneFile& file = octree_.file();
+  const std::uint32_t pages = file.surfelPageCount();
+  const std::uint32_t step = std::max<std::uint32_t>(1, pages / kSamplePages);
+  std::vector<float> areas;
+  for (std::uint32_t page = 0; page < pages; page += step) {
+    page_.resize(file.header().surfel_group_capacity);
+    SceneFile::Scratch scratch;
+    SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count, file.decodeSurfels(page, scratch, page_));
+    for (std::uint32_t i = 0; i < count; i += 16) {
+      SURFEIT_ASSIGN_OR_RETURN(const float area, localArea(page_[i].position, *readers_[0]));
+      if (area > 0) areas.push_back(area);
+    }
+  }
+  page_.clear();
+  // One position for all: any size will do, so take a thousandth of the scene
+  const float fallback = float(file.header().cube.size) * 1e-3f;
+  if (areas.empty()) {
+    largest_radius_ = fallback;
+    return {};
+  }
+  const auto median = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
+  std::nth_element(areas.begin(), median, areas.end());
+  largest_radius_ = kStrayLimit * std::sqrt(*median * overlap_ / kPi);
+  return {};
+}
+
+Result<bool> SizedSurfelStream::readPage() {
+  const SceneFile& file = octree_.file();
+  if (next_page_ == file.surfelPageCount()) return false;
+  page_.resize(file.header().surfel_group_capacity);
+  SceneFile::Scratch scratch;
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
+                           file.decodeSurfels(next_page_++, scratch, page_));
+  page_.resize(count);
+  at_ = 0;
+
+  // One slice of the page per reader
+  std::vector<Status> statuses(readers_.size());
+  tbb::parallel_for(std::size_t{0}, readers_.size(), [&](std::size_t r) {
+    const std::size_t begin = count * r / readers_.size();
+    const std::size_t end = count * (r + 1) / readers_.size();
+    for (std::size_t i = begin; i < end; ++i) {
+      Surfel& surfel = page_[i];
+      if ((surfel.flags & kSurfelNeedsSize) == 0) continue;
+      const Result<float> area = localArea(surfel.position, *readers_[r]);
+      if (!area.ok()) {
+        statuses[r] = area.status();
+        return;
+      }
+      surfel.flags &= ~kSurfelNeedsSize;
+      surfel.radius = std::min(std::sqrt(*area * overlap_ / kPi), largest_radius_);
+      if (!(surfel.radius > 0)) surfel.radius = largest_radius_;
+      surfel.area = kPi * surfel.radius * surfel.radius / overlap_;
+    }
+  });
+  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
+  return true;
+}
+
+Result<std::size_t> SizedSurfelStream::next(std::span<SortedSurfel> out) {
+  if (at_ == page_.size()) {
+    SURFEIT_ASSIGN_OR_RETURN(const bool more, readPage());
+    if (!more) return std::size_t{0};
+  }
+  const std::size_t count = std::min(out.size(), page_.size() - at_);
+  for (std::size_t i = 0; i < count; ++i, ++at_) {
+    out[i] = {curveKey(page_[at_].position, octree_.file().header().cube), page_[at_]};
+  }
+  return count;
+}
+
+}  // namespace surfeit

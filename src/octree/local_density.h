@@ -1,0 +1,55 @@
+// Radius and area from the neighbourhood, for clouds that bring neither (docs/format.md, "Rules for
+// what is missing"): the distance to the k-th nearest neighbour tells the area per surfel.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "octree/paged_octree.h"
+#include "octree/surfel_sorter.h"
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Marks surfels whose radius and area are to be found; never in a finished file.
+inline constexpr std::uint32_t kSurfelNeedsSize = 1u << 7;
+// Radius and area of such a surfel meanwhile: positive, because pages hold nothing else.
+inline constexpr float kPlaceholderSize = 1e-30f;
+
+// The surfels of a scene in curve order, with sizes filled in. The neighbour search goes through
+// the scene's own caches, so memory stays within their budget. `overlap`: disk area over surfel
+// area.
+class SizedSurfelStream : public SortedSurfelStream {
+ public:
+  SizedSurfelStream(PagedOctree& octree, float overlap, int threads);
+  ~SizedSurfelStream() override;
+
+  // Samples the cloud for the limit below. Call once, before next().
+  Status prepare();
+  // No radius becomes larger than this: strays far from everything would cover the scene.
+  float largestRadius() const { return largest_radius_; }
+
+  Result<std::size_t> next(std::span<SortedSurfel> out) override;
+
+ private:
+  Result<bool> readPage();
+
+  PagedOctree& octree_;
+  float overlap_;
+  std::vector<std::unique_ptr<PagedOctree::Reader>> readers_;
+  float largest_radius_ = 0;
+  std::uint32_t next_page_ = 0;
+  std::vector<Surfel> page_;
+  std::size_t at_ = 0;
+};
+
+// Area per surfel around `position`: pi d^2 / k for the k-th nearest surfel at another position,
+// shared among the surfels that lie at `position` itself. 0 when there is no other position.
+Result<float> localArea(const glm::vec3& position, PagedOctree::Reader& reader);
+
+}  // namespace surfeit

@@ -1,0 +1,53 @@
+// Nodes as the gather sees them: decoded, plain, immutable. docs/format.md, "Node-group page", has
+// the stored form.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+#include "core/spherical_harmonics.h"
+
+namespace surfeit {
+
+// What a node is beyond its numbers.
+enum NodeFlags : std::uint8_t {
+  // Flat: |sum A n| / sum A above the file's flatness limit. Drawn as one disk (mean normal, summed
+  // area); its coefficients are not stored and are zero here. Order-2 harmonics ring on flat
+  // clusters, one disk is wrong for rough ones (anchors: pbgi_peers 4).
+  kNodeFlat = 1u << 0,
+};
+
+// A cluster of surfels: one octree cell, single-child levels skipped.
+struct Node {
+  glm::vec3 position;   // area-weighted mean of the surfel positions
+  float radius;         // of a sphere around position that holds every surfel's disk
+  glm::vec3 normal;     // unit mean normal, direction of sum A n; zero when that sum is zero
+  float area;           // sum of the surfel areas
+  glm::vec3 radiosity;  // area-weighted mean
+  float flatness;       // |sum A n| / sum A, 0..1
+  std::uint32_t page;   // interior: node page of the children; leaf: surfel page of its first surfel
+  std::uint16_t first;  // index of the first child or surfel in that page
+  std::uint8_t child_count;     // 0: a leaf
+  std::uint8_t flags;           // NodeFlags
+  std::uint64_t surfel_count;   // below this node; those of a leaf may run on into following pages
+  ShCoefficients area_sh;       // projected area, clamped cosine (memo 3.2)
+  ShCoefficients power_sh[3];   // projected power, rgb
+
+  bool isLeaf() const { return child_count == 0; }
+  bool isFlat() const { return (flags & kNodeFlat) != 0; }
+};
+static_assert(sizeof(Node) == 208);
+
+// Siblings: `count` nodes side by side in one node page.
+struct NodeRange {
+  std::uint32_t page = 0;
+  std::uint16_t first = 0;
+  std::uint16_t count = 0;
+};
+
+// The root's own range: it stands alone on the first node page.
+inline constexpr NodeRange kRootRange = {0, 0, 1};
+
+inline NodeRange childrenOf(const Node& node) { return {node.page, node.first, node.child_count}; }
+
+}  // namespace surfeit

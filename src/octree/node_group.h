@@ -1,0 +1,41 @@
+// A node group: consecutive nodes of one octree level along the curve, siblings side by side,
+// stored as one page. docs/format.md, "Node-group page", has the byte layout.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "io/file.h"
+#include "octree/node.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// A node on its way to a page: its `page` counts within the level of its children, because where
+// that level's pages begin is known only when all are written.
+struct LevelNode {
+  Node node;
+  std::uint8_t child_level = 0;  // of an interior node; 0 for a leaf
+};
+
+// What references of a group may point at; from the header.
+struct NodeLimits {
+  std::span<const std::uint32_t> level_first_page;  // levels 0..21 and the end: 23 values
+  std::uint32_t surfel_page_count = 0;
+  std::uint32_t node_group_capacity = 0;
+  std::uint32_t surfel_group_capacity = 0;
+};
+
+// The payload of a page with these nodes (at least one), replaced.
+void encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precision,
+                     std::vector<std::byte>& payload);
+
+// Decodes node page number `page` into `nodes` (the file's group capacity) and returns how many
+// there are. Children always lie on a deeper level, so that damaged links cannot form a loop. Safe
+// on arbitrary bytes; kCorruption names the field, but not the file.
+Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::uint32_t page,
+                                      const NodeLimits& limits, std::span<Node> nodes);
+
+}  // namespace surfeit

@@ -1,0 +1,85 @@
+#include "octree/node_sums.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace surfeit {
+namespace {
+
+// The lobe that a surfel's projected area is, by direction (memo 3.2 and 7.5).
+const ZonalFactors& lobeOf(const Surfel& surfel) {
+  if (surfel.isSphere()) return kConstant;
+  return surfel.isTwoSided() ? kAbsoluteCosine : kClampedCosine;
+}
+
+}  // namespace
+
+void NodeSums::add(const Surfel& surfel) {
+  const double a = double(surfel.area);
+  surfel_count += 1;
+  area += a;
+  for (int axis = 0; axis < 3; ++axis) {
+    position[axis] += a * double(surfel.position[axis]);
+    radiosity[axis] += a * double(surfel.radiosity[axis]);
+    // Both sides of a two-sided disk face everywhere: it gives a node no direction
+    if (!surfel.isTwoSided()) normal[axis] += a * double(surfel.normal[axis]);
+  }
+  const ZonalFactors& factors = lobeOf(surfel);
+  const ShCoefficients basis = shBasis(surfel.normal);
+  for (int i = 0; i < kShCount; ++i) {
+    // A sphere has no normal, and only band 0
+    if (surfel.isSphere() && i > 0) break;
+    const double lobe = a * double(factors[kShBand[i]]) * double(basis[i]);
+    area_sh[i] += lobe;
+    for (int c = 0; c < 3; ++c) power_sh[c][i] += lobe * double(surfel.radiosity[c]);
+  }
+  disk_bounds.add(surfel.position - glm::vec3(surfel.radius));
+  disk_bounds.add(surfel.position + glm::vec3(surfel.radius));
+}
+
+void NodeSums::add(const NodeSums& child) {
+  surfel_count += child.surfel_count;
+  area += child.area;
+  for (int axis = 0; axis < 3; ++axis) {
+    position[axis] += child.position[axis];
+    normal[axis] += child.normal[axis];
+    radiosity[axis] += child.radiosity[axis];
+    for (int i = 0; i < kShCount; ++i) power_sh[axis][i] += child.power_sh[axis][i];
+  }
+  for (int i = 0; i < kShCount; ++i) area_sh[i] += child.area_sh[i];
+  disk_bounds.add(child.disk_bounds);
+}
+
+glm::vec3 NodeSums::centre() const {
+  return {float(position[0] / area), float(position[1] / area), float(position[2] / area)};
+}
+
+Node NodeSums::toNode(float flatness_limit) const {
+  Node node{};
+  node.position = centre();
+  node.area = float(area);
+  node.surfel_count = surfel_count;
+  const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] +
+                                  normal[2] * normal[2]);
+  node.flatness = float(std::min(length / area, 1.0));
+  for (int axis = 0; axis < 3; ++axis) {
+    node.normal[axis] = length > 0 ? float(normal[axis] / length) : 0;
+    node.radiosity[axis] = float(radiosity[axis] / area);
+  }
+  if (node.flatness > flatness_limit) {
+    node.flags = kNodeFlat;
+    return node;
+  }
+  for (int i = 0; i < kShCount; ++i) {
+    node.area_sh[i] = float(area_sh[i]);
+    for (int c = 0; c < 3; ++c) node.power_sh[c][i] = float(power_sh[c][i]);
+  }
+  return node;
+}
+
+float radiusOfBox(const glm::vec3& centre, const Bounds3& box) {
+  return glm::length(glm::max(box.max - centre, centre - box.min));
+}
+
+}  // namespace surfeit

@@ -1,0 +1,39 @@
+// What a node adds up over its surfels, in double so that the sums do not drift: a parent's sums
+// are those of its children (memo 3.2).
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+
+#include "core/bounds.h"
+#include "octree/node.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// Sums over surfels i with area A, position x, normal n, radiosity B. Plain data.
+struct NodeSums {
+  std::uint64_t surfel_count = 0;
+  double area = 0;                      // sum A
+  double position[3] = {};              // sum A x
+  double normal[3] = {};                // sum A n over one-sided disks
+  double radiosity[3] = {};             // sum A B
+  double area_sh[kShCount] = {};        // sum A K_l Y_lm(n)
+  double power_sh[3][kShCount] = {};    // the same, times B
+  Bounds3 disk_bounds;                  // boxes around every surfel's bounding sphere
+
+  void add(const Surfel& surfel);
+  void add(const NodeSums& child);
+
+  // Mean position.
+  glm::vec3 centre() const;
+  // The node's numbers, without references and radius. `flatness_limit` decides kNodeFlat.
+  Node toNode(float flatness_limit) const;
+};
+
+// Radius of the sphere around `centre` that holds the box, for when it is smaller than what the
+// children's spheres give.
+float radiusOfBox(const glm::vec3& centre, const Bounds3& box);
+
+}  // namespace surfeit

@@ -1,0 +1,31 @@
+// A surfel group: a run of surfels of neighbouring leaves along the curve, stored as one page.
+// docs/format.md, "Surfel-group page", has the byte layout.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "io/file.h"
+#include "surfeit/status.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// How surfels and nodes are stored; from the header.
+struct PageForm {
+  bool full_precision = false;
+  bool has_albedo = false;
+};
+
+// The payload of a page with these surfels (at least one), replaced.
+void encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
+                       std::vector<std::byte>& payload);
+
+// Decodes into `surfels` (the file's group capacity) and returns how many there are. Safe on
+// arbitrary bytes; kCorruption names the field, but not the file.
+Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
+                                        std::span<Surfel> surfels);
+
+}  // namespace surfeit

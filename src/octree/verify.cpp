@@ -1,0 +1,239 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <mutex>
+#include <thread>
+
+#include "core/job_limits.h"
+#include "octree/paged_octree.h"
+#include "octree/scene_file.h"
+#include "surfeit/scene.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kMaxFindings = 100;
+// Quantized sums and spheres may differ by this part.
+constexpr float kAreaTolerance = 2e-3f;
+constexpr float kReachTolerance = 2e-3f;
+
+// Collects findings from several threads.
+class Findings {
+ public:
+  explicit Findings(VerifyReport& report) : report_(report) {}
+  void add(const std::string& finding) {
+    const std::lock_guard lock(mutex_);
+    ++report_.finding_count;
+    if (report_.findings.size() < kMaxFindings) report_.findings.push_back(finding);
+  }
+  void finish() { std::sort(report_.findings.begin(), report_.findings.end()); }
+
+ private:
+  std::mutex mutex_;
+  VerifyReport& report_;
+};
+
+// Checks pages one by one. Each thread has its own.
+class PageChecker {
+ public:
+  PageChecker(const SceneFile& file, PagedOctree& octree, Findings& findings)
+      : file_(file), reader_(octree), findings_(findings) {
+    nodes_.resize(file.header().node_group_capacity);
+    surfels_.resize(file.header().surfel_group_capacity);
+  }
+
+  // Returns how many records the page holds, 0 when it is damaged; kIoError when it cannot be read.
+  Result<std::uint64_t> checkSurfelPage(std::uint32_t page) {
+    const Result<std::uint32_t> count = file_.decodeSurfels(page, scratch_, surfels_);
+    if (count.ok()) return std::uint64_t{*count};
+    return report(count.status());
+  }
+
+  Result<std::uint64_t> checkNodePage(std::uint32_t page) {
+    const Result<std::uint32_t> count = file_.decodeNodes(page, scratch_, nodes_);
+    if (!count.ok()) return report(count.status());
+    for (std::uint32_t i = 0; i < *count; ++i) {
+      const Status status = nodes_[i].isLeaf() ? checkLeaf(nodes_[i]) : checkInterior(nodes_[i]);
+      if (status.ok()) continue;
+      const Status at = status.code() == StatusCode::kCorruption && !describesPage(status)
+                            ? file_.pages().pageError(page, fmt::format("node {}: {}", i,
+                                                                        status.message()))
+                            : status;
+      SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t none, report(at));
+      static_cast<void>(none);
+    }
+    return std::uint64_t{*count};
+  }
+
+ private:
+  // A damaged page is a finding and the check goes on; a failing disk is not.
+  Result<std::uint64_t> report(const Status& status) {
+    if (status.code() != StatusCode::kCorruption) return status;
+    findings_.add(status.message());
+    return std::uint64_t{0};
+  }
+
+  bool describesPage(const Status& status) const {
+    return status.message().rfind(file_.path(), 0) == 0;
+  }
+
+  // What a node claims, against what lies below it.
+  struct Below {
+    double area = 0;
+    std::uint64_t surfels = 0;
+    float reach = 0;
+    void add(const Node& node, const glm::vec3& at, float radius, float child_area,
+             std::uint64_t count) {
+      area += double(child_area);
+      surfels += count;
+      reach = std::max(reach, glm::length(at - node.position) + radius);
+    }
+  };
+
+  static Status compare(const Node& node, const Below& below) {
+    if (below.surfels != node.surfel_count) {
+      return Status::corruption(fmt::format("surfel count {}, expected {} from what lies below",
+                                            node.surfel_count, below.surfels));
+    }
+    if (std::abs(below.area - double(node.area)) > double(kAreaTolerance * node.area)) {
+      return Status::corruption(fmt::format("area {}, expected {} from what lies below", node.area,
+                                            below.area));
+    }
+    return {};
+  }
+
+  Status checkInterior(const Node& node) {
+    SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> children, reader_.nodes(childrenOf(node)));
+    Below below;
+    for (const Node& child : children) {
+      below.add(node, child.position, 0, child.area, child.surfel_count);
+      // A child's sphere may stick out of its parent's, its surfels' disks may not
+      if (glm::length(child.position - node.position) >
+          node.radius * (1 + kReachTolerance) + child.radius) {
+        return Status::corruption("a child lies outside the bounding sphere");
+      }
+    }
+    return compare(node, below);
+  }
+
+  Status checkLeaf(const Node& node) {
+    Below below;
+    SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
+      for (const Surfel& surfel : surfels) {
+        below.add(node, surfel.position, surfel.radius, surfel.area, 1);
+      }
+    }));
+    if (below.reach > node.radius * (1 + kReachTolerance)) {
+      return Status::corruption(fmt::format("bounding radius {}, expected at least {} for the "
+                                            "disks of its surfels", node.radius, below.reach));
+    }
+    return compare(node, below);
+  }
+
+  const SceneFile& file_;
+  PagedOctree::Reader reader_;
+  Findings& findings_;
+  SceneFile::Scratch scratch_;
+  std::vector<Node> nodes_;
+  std::vector<Surfel> surfels_;
+};
+
+}  // namespace
+
+Result<SceneInfo> readSceneInfo(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(const SceneFile file, SceneFile::open(path));
+  const SceneHeader& header = file.header();
+  SceneInfo info;
+  info.file_bytes = file.fileBytes();
+  info.surfels = header.surfel_count;
+  info.nodes = header.node_count;
+  info.leaf_capacity = header.leaf_capacity;
+  info.node_pages = file.nodePageCount();
+  info.surfel_pages = file.surfelPageCount();
+  for (std::uint32_t i = 0; i < info.node_pages; ++i) info.node_page_bytes += file.nodePageBytes(i);
+  for (std::uint32_t i = 0; i < info.surfel_pages; ++i) {
+    info.surfel_page_bytes += file.surfelPageBytes(i);
+  }
+  info.node_cache_bytes = std::uint64_t{info.node_pages} * header.node_group_capacity * sizeof(Node);
+  info.surfel_cache_bytes =
+      std::uint64_t{info.surfel_pages} * header.surfel_group_capacity * sizeof(Surfel);
+  info.min = header.bounds.min;
+  info.max = header.bounds.max;
+  info.channels = header.channels;
+  info.full_precision = header.full_precision;
+  for (int level = 0; level <= kCurveLevels; ++level) {
+    info.level_pages.push_back(header.level_first_page[level + 1] - header.level_first_page[level]);
+  }
+  info.provenance = file.provenance();
+  return info;
+}
+
+Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress) {
+  VerifyReport report;
+  Findings findings(report);
+  Result<SceneFile> opened = SceneFile::open(path);
+  if (!opened.ok()) {
+    if (opened.status().code() != StatusCode::kCorruption) return opened.status();
+    findings.add(opened.status().message());
+    return report;
+  }
+  threads = threads > 0 ? threads : defaultThreadCount();
+  const std::uint32_t node_pages = opened->nodePageCount();
+  const std::uint32_t pages = opened->pages().pageCount();
+  const std::uint64_t expected_nodes = opened->header().node_count;
+  const std::uint64_t expected_surfels = opened->header().surfel_count;
+
+  // References are followed through small caches: pages come in curve order, so few are needed
+  constexpr std::size_t kCacheBytes = 64 << 20;
+  SURFEIT_ASSIGN_OR_RETURN(
+      const PagedOctree::Memory memory,
+      PagedOctree::planMemory(*opened,
+                              std::max(kCacheBytes, static_cast<std::size_t>(threads) << 20),
+                              threads));
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
+                           PagedOctree::create(std::move(*opened), memory));
+  const SceneFile& file = octree->file();
+  progress.beginPhase("verify", pages, "pages");
+
+  std::atomic<std::uint32_t> next_page{0};
+  std::atomic<std::uint64_t> nodes{0}, surfels{0};
+  std::atomic<bool> stop{false};
+  std::vector<Status> statuses(static_cast<std::size_t>(threads));
+  const auto work = [&](std::size_t worker) {
+    PageChecker checker(file, *octree, findings);
+    while (!stop && !progress.isCancelled()) {
+      const std::uint32_t page = next_page++;
+      if (page >= pages) return;
+      const bool is_node_page = page < node_pages;
+      const Result<std::uint64_t> count =
+          is_node_page ? checker.checkNodePage(page) : checker.checkSurfelPage(page - node_pages);
+      if (!count.ok()) {
+        statuses[worker] = count.status();
+        stop = true;
+        return;
+      }
+      (is_node_page ? nodes : surfels) += *count;
+      progress.advance(1);
+    }
+  };
+  std::vector<std::thread> workers;
+  for (std::size_t i = 0; i < statuses.size(); ++i) workers.emplace_back(work, i);
+  for (std::thread& worker : workers) worker.join();
+  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
+  if (progress.isCancelled()) return Status::interrupted();
+
+  // Sums over the whole file
+  if (report.finding_count == 0 && (nodes != expected_nodes || surfels != expected_surfels)) {
+    findings.add(fmt::format("{}: {} nodes and {} surfels on the pages, the header says {} and {}",
+                             path, nodes.load(), surfels.load(), expected_nodes, expected_surfels));
+  }
+  report.pages_checked = pages;
+  report.bytes_checked = file.fileBytes();
+  findings.finish();
+  return report;
+}
+
+}  // namespace surfeit

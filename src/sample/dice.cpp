@@ -1,0 +1,230 @@
+#include "sample/dice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <utility>
+
+#include "core/assert.h"
+#include "core/curve_key.h"
+
+namespace surfeit {
+namespace {
+
+// The corner where the longest edge begins.
+int longestEdge(const Micropolygon& polygon) {
+  int longest = 0;
+  double longest_sq = -1;
+  for (int i = 0; i < 3; ++i) {
+    const glm::dvec3 edge = polygon.corner[(i + 1) % 3] - polygon.corner[i];
+    const double length_sq = glm::dot(edge, edge);
+    if (length_sq > longest_sq) longest = i, longest_sq = length_sq;
+  }
+  return longest;
+}
+
+// The two parts of a cut from the corner opposite the longest edge, which is divided at `ratio`.
+std::pair<Micropolygon, Micropolygon> cut(const Micropolygon& polygon, double ratio) {
+  const int a = longestEdge(polygon), b = (a + 1) % 3;
+  const glm::dvec3 corner = polygon.corner[a] + ratio * (polygon.corner[b] - polygon.corner[a]);
+  const glm::dvec3 weight = polygon.weight[a] + ratio * (polygon.weight[b] - polygon.weight[a]);
+  std::pair<Micropolygon, Micropolygon> parts(polygon, polygon);
+  parts.first.corner[b] = parts.second.corner[a] = corner;
+  parts.first.weight[b] = parts.second.weight[a] = weight;
+  return parts;
+}
+
+// Cuts a triangle into slabs across its longest edge a b, in the coordinates of that edge: t runs
+// from 0 at a to 1 at b, s from 0 on the edge to 1 at the corner c opposite, whose foot is at
+// t = foot. The triangle is 0 <= s <= height(t), and its area in these coordinates is 1/2.
+class SlabCutter {
+ public:
+  SlabCutter(const Micropolygon& polygon, double area) : polygon_(polygon), area_(area) {
+    a_ = longestEdge(polygon), b_ = (a_ + 1) % 3, c_ = (a_ + 2) % 3;
+    const glm::dvec3 edge = polygon.corner[b_] - polygon.corner[a_];
+    length_ = glm::length(edge);
+    const glm::dvec3 to_c = polygon.corner[c_] - polygon.corner[a_];
+    foot_ = std::clamp(glm::dot(to_c, edge) / (length_ * length_), 0.0, 1.0);
+  }
+
+  double length() const { return length_; }
+
+  // The part between t = begin and t = end, begin < end.
+  PiecePart slab(double begin, double end) const {
+    // Its corners in turn: along the edge, and back along the top
+    glm::dvec2 corners[5] = {{begin, 0}, {end, 0}, {end, height(end)}};
+    int count = 3;
+    if (begin < foot_ && foot_ < end) corners[count++] = {foot_, 1};
+    corners[count++] = {begin, height(begin)};
+
+    // Area and centroid, as a fan of triangles from the first corner
+    double area = 0;
+    glm::dvec2 moment(0);
+    for (int i = 2; i < count; ++i) {
+      const glm::dvec2 u = corners[i - 1] - corners[0], v = corners[i] - corners[0];
+      const double triangle_area = 0.5 * (u.x * v.y - u.y * v.x);
+      area += triangle_area;
+      moment += triangle_area * (corners[0] + corners[i - 1] + corners[i]) / 3.0;
+    }
+
+    PiecePart part;
+    part.area = 2 * area * area_;
+    const glm::dvec3 weights = pieceWeights(moment / area);
+    part.centroid = combine(polygon_.corner, weights);
+    part.weight = combine(polygon_.weight, weights);
+    for (int i = 0; i < count; ++i) {
+      part.radius = std::max(
+          part.radius,
+          glm::distance(combine(polygon_.corner, pieceWeights(corners[i])), part.centroid));
+    }
+    return part;
+  }
+
+ private:
+  double height(double t) const {
+    if (t < foot_) return t / foot_;
+    return foot_ < 1 ? (1 - t) / (1 - foot_) : 1;
+  }
+  // Barycentric weights of a, b, c at coordinates (t, s).
+  glm::dvec3 pieceWeights(const glm::dvec2& at) const {
+    const double weight_b = at.x - at.y * foot_;
+    return {1 - at.y - weight_b, weight_b, at.y};
+  }
+  glm::dvec3 combine(const glm::dvec3 (&values)[3], const glm::dvec3& weights) const {
+    return values[a_] * weights.x + values[b_] * weights.y + values[c_] * weights.z;
+  }
+
+  const Micropolygon& polygon_;
+  double area_, length_, foot_;
+  int a_, b_, c_;
+};
+
+// Goes down to one piece of `count`; `takeFirst(parts, first_count)` chooses at every cut.
+template <typename TakeFirst>
+Micropolygon descend(Micropolygon polygon, std::uint64_t count, TakeFirst&& takeFirst) {
+  while (count > 1) {
+    const std::uint64_t first_count = count / 2;
+    auto parts = cut(polygon, double(first_count) / double(count));
+    const bool is_first = takeFirst(parts, first_count);
+    polygon = is_first ? parts.first : parts.second;
+    count = is_first ? first_count : count - first_count;
+  }
+  return polygon;
+}
+
+}  // namespace
+
+double Micropolygon::radius() const {
+  const glm::dvec3 centre = centroid();
+  double radius_sq = 0;
+  for (const glm::dvec3& point : corner) {
+    radius_sq = std::max(radius_sq, glm::dot(point - centre, point - centre));
+  }
+  return std::sqrt(radius_sq);
+}
+
+Micropolygon wholeTriangle(const Mesh& mesh, std::uint32_t triangle) {
+  const glm::uvec3& corners = mesh.triangle[triangle];
+  Micropolygon polygon;
+  for (int i = 0; i < 3; ++i) {
+    polygon.corner[i] = glm::dvec3(mesh.position[corners[i]]);
+    polygon.weight[i] = glm::dvec3(0);
+    polygon.weight[i][i] = 1;
+  }
+  return polygon;
+}
+
+Micropolygon piece(Micropolygon polygon, std::uint64_t count, std::uint64_t index) {
+  SURFEIT_ASSERT(index < count);
+  return descend(polygon, count, [&](const auto&, std::uint64_t first_count) {
+    const bool is_first = index < first_count;
+    if (!is_first) index -= first_count;
+    return is_first;
+  });
+}
+
+std::uint64_t pieceNear(Micropolygon polygon, std::uint64_t count, const glm::dvec3& target) {
+  std::uint64_t index = 0;
+  descend(polygon, count, [&](const auto& parts, std::uint64_t first_count) {
+    const bool is_first = glm::distance(parts.first.centroid(), target) <=
+                          glm::distance(parts.second.centroid(), target);
+    if (!is_first) index += first_count;
+    return is_first;
+  });
+  return index;
+}
+
+void appendParts(const Micropolygon& polygon, double area, double spacing,
+                 std::vector<PiecePart>& parts) {
+  const double radius = polygon.radius();
+  if (radius <= std::max(1.5 * spacing, 2 * std::sqrt(area))) {
+    parts.push_back({polygon.centroid(),
+                     (polygon.weight[0] + polygon.weight[1] + polygon.weight[2]) / 3.0, radius,
+                     area});
+    return;
+  }
+  const SlabCutter cutter(polygon, area);
+  const int slabs =
+      int(std::clamp(std::ceil(cutter.length() / (2 * spacing)), 1.0, double(kMaxSlabs)));
+  for (int i = 0; i < slabs; ++i) {
+    parts.push_back(cutter.slab(double(i) / slabs, double(i + 1) / slabs));
+  }
+}
+
+DicePlan::DicePlan(const Mesh& mesh, std::uint64_t count) : mesh_(mesh), count_(count) {
+  // Triangles along the curve, ties in the order of the file
+  const RootCube cube = rootCube(mesh.bounds());
+  std::vector<std::pair<CurveKey, std::uint32_t>> keys;
+  keys.reserve(mesh.triangle.size());
+  for (std::size_t i = 0; i < mesh.triangle.size(); ++i) {
+    const glm::uvec3& corners = mesh.triangle[i];
+    const glm::vec3 centroid = mesh.position[corners.x] / 3.0f + mesh.position[corners.y] / 3.0f +
+                               mesh.position[corners.z] / 3.0f;
+    keys.emplace_back(curveKey(centroid, cube), std::uint32_t(i));
+  }
+  std::sort(keys.begin(), keys.end());
+  order_.reserve(keys.size());
+  for (const auto& [key, triangle] : keys) order_.push_back(triangle);
+
+  // Always summed in this order: next() must come to the same total, to the last bit
+  for (const std::uint32_t triangle : order_) total_area_ += triangleArea(mesh, triangle);
+  double area = 0;
+  for (std::uint64_t i = 0; i < order_.size(); ++i) {
+    const double before = area;
+    area += triangleArea(mesh, order_[i]);
+    if (surfelsUpTo(area) > surfelsUpTo(before)) last_bearer_ = i;
+  }
+}
+
+double DicePlan::spacing() const { return std::sqrt(total_area_ / double(count_)); }
+
+std::uint64_t DicePlan::surfelsUpTo(double area) const {
+  return std::uint64_t(std::floor(area / total_area_ * double(count_) + 0.5));
+}
+
+bool DicePlan::next(DiceJob& job) {
+  while (cursor_ < order_.size()) {
+    const std::uint64_t i = cursor_++;
+    const double area = triangleArea(mesh_, order_[i]);
+    job.first_surfel = surfelsUpTo(area_before_);
+    area_before_ += area;
+    job.piece_count = surfelsUpTo(area_before_) - job.first_surfel;
+    if (job.piece_count == 0) continue;
+
+    // Small triangles hand their area on to the next with pieces; those after the last, back to it
+    job.triangle = order_[i];
+    job.area = area;
+    job.carried_begin = carried_begin_;
+    job.carried_end = i;
+    carried_begin_ = i + 1;
+    if (i == last_bearer_ && i + 1 < order_.size()) {
+      job.carried_end = order_.size();  // the range then includes the triangle itself, skipped
+      cursor_ = order_.size();
+    }
+    return true;
+  }
+  return false;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,99 @@
+#include "sample/ray_scene.h"
+
+#include <embree3/rtcore.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <utility>
+
+namespace surfeit {
+namespace {
+
+RTCRay makeRay(const glm::vec3& origin, const glm::vec3& direction, float begin, float end) {
+  RTCRay ray;
+  ray.org_x = origin.x, ray.org_y = origin.y, ray.org_z = origin.z;
+  ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
+  ray.tnear = begin, ray.tfar = end;
+  ray.time = 0, ray.mask = ~0u, ray.id = 0, ray.flags = 0;
+  return ray;
+}
+
+}  // namespace
+
+struct RayScene::Handles {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+
+  ~Handles() {
+    if (scene != nullptr) rtcReleaseScene(scene);
+    if (device != nullptr) rtcReleaseDevice(device);
+  }
+};
+
+RayScene::RayScene(std::unique_ptr<Handles> handles) : handles_(std::move(handles)) {}
+RayScene::RayScene(RayScene&&) noexcept = default;
+RayScene& RayScene::operator=(RayScene&&) noexcept = default;
+RayScene::~RayScene() = default;
+
+Result<RayScene> RayScene::build(const Mesh& mesh, int threads) {
+  auto handles = std::make_unique<Handles>();
+  handles->device = rtcNewDevice(fmt::format("threads={}", std::max(threads, 1)).c_str());
+  if (handles->device == nullptr) {
+    return Status::failed(
+        fmt::format("Embree: no device: error {}", int(rtcGetDeviceError(nullptr))));
+  }
+  RTCDevice device = handles->device;
+  handles->scene = rtcNewScene(device);
+
+  // Robust: a hit then depends on the triangle alone, not on the shape of the hierarchy, so that
+  // the same scene gives the same shadows for any number of build threads
+  rtcSetSceneFlags(handles->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT);
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                             mesh.position.data(), 0, sizeof(glm::vec3), mesh.position.size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             mesh.triangle.data(), 0, sizeof(glm::uvec3), mesh.triangle.size());
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(handles->scene, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(handles->scene);
+  if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE) {
+    return Status::failed(fmt::format("Embree: {} triangles: error {}{}", mesh.triangle.size(),
+                                      int(error),
+                                      error == RTC_ERROR_OUT_OF_MEMORY ? " (out of memory)" : ""));
+  }
+
+  RayScene scene(std::move(handles));
+  scene.bounds_ = mesh.bounds();
+  const glm::vec3 reach = glm::max(glm::abs(scene.bounds_.min), glm::abs(scene.bounds_.max));
+  scene.surface_offset_ = std::max(1e-5f * glm::length(scene.bounds_.extent()),
+                                   4e-7f * std::max({reach.x, reach.y, reach.z}));
+  return scene;
+}
+
+bool RayScene::isOccluded(const glm::vec3& origin, const glm::vec3& direction, float begin,
+                          float end) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRay ray = makeRay(origin, direction, begin, end);
+  rtcOccluded1(handles_->scene, &context, &ray);
+  return ray.tfar < 0;  // Embree marks occluded rays with -inf
+}
+
+std::optional<RayHit> RayScene::closestHit(const glm::vec3& origin, const glm::vec3& direction,
+                                           float begin, float end) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit query;
+  query.ray = makeRay(origin, direction, begin, end);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(handles_->scene, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return RayHit{query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v};
+}
+
+}  // namespace surfeit

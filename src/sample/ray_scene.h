@@ -1,0 +1,50 @@
+// A mesh made ready for tracing rays; the one place that knows Embree.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+
+#include "sample/mesh.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Where a ray meets the mesh: the point of `triangle` with barycentric weights (1 - u - v, u, v).
+struct RayHit {
+  float distance;  // in lengths of the ray's direction
+  std::uint32_t triangle;
+  float u, v;
+};
+
+// Shares the mesh's arrays, so the mesh must outlive it and stay as it is. Queries are safe from
+// any thread.
+class RayScene {
+ public:
+  // Builds the hierarchy with up to `threads` threads. kFailed when Embree refuses.
+  static Result<RayScene> build(const Mesh& mesh, int threads);
+  RayScene(RayScene&&) noexcept;
+  RayScene& operator=(RayScene&&) noexcept;
+  ~RayScene();
+
+  // Is anything hit between distances begin and end along the ray?
+  bool isOccluded(const glm::vec3& origin, const glm::vec3& direction, float begin,
+                  float end) const;
+  std::optional<RayHit> closestHit(const glm::vec3& origin, const glm::vec3& direction, float begin,
+                                   float end) const;
+
+  // How far off a surface a ray must start so as not to meet it again: covers the rounding of
+  // positions of the size of this scene.
+  float surfaceOffset() const { return surface_offset_; }
+  const Bounds3& bounds() const { return bounds_; }
+
+ private:
+  struct Handles;
+  explicit RayScene(std::unique_ptr<Handles> handles);
+  std::unique_ptr<Handles> handles_;
+  Bounds3 bounds_;
+  float surface_offset_ = 0;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,141 @@
+#include "sample/reference.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <optional>
+#include <utility>
+
+#include "core/spherical_harmonics.h"
+
+namespace surfeit {
+namespace {
+
+// `count` directions over the hemisphere around a normal, with density cos / pi: a jittered grid
+// on the unit square, lifted from the disk r = sqrt(u), phi = 2 pi v. When count is no square, rows
+// differ by one sample, and in height as much, so that all samples weigh the same.
+class CosineDirections {
+ public:
+  CosineDirections(const glm::vec3& normal, int count, std::uint64_t seed)
+      : normal_(normal), seed_(seed), count_(count) {
+    rows_ = std::max(1, int(std::sqrt(double(count))));
+    // Any frame will do; this one is continuous but for one direction (Duff et al. 2017)
+    const float sign = std::copysign(1.0f, normal.z);
+    const float a = -1 / (sign + normal.z), b = normal.x * normal.y * a;
+    tangent_ = {1 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x};
+    bitangent_ = {b, sign + normal.y * normal.y * a, -normal.y};
+  }
+
+  glm::vec3 operator[](int i) const {
+    // Row r holds the samples i with floor(i rows / n) = r
+    const std::int64_t n = count_, rows = rows_;
+    const std::int64_t row = i * rows / n;
+    const std::int64_t begin = (row * n + rows - 1) / rows, end = ((row + 1) * n + rows - 1) / rows;
+    const std::uint64_t bits = mixBits(seed_ + std::uint64_t(i));
+    const float jitter_u = float(bits >> 40) * 0x1p-24f;
+    const float jitter_v = float((bits >> 8) & 0xffffff) * 0x1p-24f;
+    const float u = (float(begin) + jitter_u * float(end - begin)) / float(n);
+    const float v = (float(i - begin) + jitter_v) / float(end - begin);
+
+    const float r = std::sqrt(u), phi = 2 * kPi * v;
+    const float cos_theta = std::sqrt(std::max(0.0f, 1 - u));
+    return glm::normalize(tangent_ * (r * std::cos(phi)) + bitangent_ * (r * std::sin(phi)) +
+                          normal_ * cos_theta);
+  }
+
+ private:
+  glm::vec3 normal_, tangent_, bitangent_;
+  std::uint64_t seed_;
+  int count_, rows_;
+};
+
+}  // namespace
+
+struct ReferenceScene::State {
+  Mesh mesh;
+  std::optional<RayScene> rays;
+  std::optional<DirectLight> light;
+};
+
+ReferenceScene::ReferenceScene(std::unique_ptr<State> state) : state_(std::move(state)) {}
+ReferenceScene::ReferenceScene(ReferenceScene&&) noexcept = default;
+ReferenceScene& ReferenceScene::operator=(ReferenceScene&&) noexcept = default;
+ReferenceScene::~ReferenceScene() = default;
+
+const Mesh& ReferenceScene::mesh() const { return state_->mesh; }
+const RayScene& ReferenceScene::rays() const { return *state_->rays; }
+const DirectLight& ReferenceScene::light() const { return *state_->light; }
+
+Result<ReferenceScene> ReferenceScene::load(const std::vector<std::string>& meshes,
+                                            const Surroundings& surroundings, int threads,
+                                            Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(checkSurroundings(surroundings));
+  auto state = std::make_unique<State>();
+  SURFEIT_ASSIGN_OR_RETURN(state->mesh, loadMeshes(meshes, surroundings.default_albedo, progress));
+  addGroundPlane(surroundings.ground, state->mesh);
+  SURFEIT_ASSIGN_OR_RETURN(RayScene rays, RayScene::build(state->mesh, threads));
+  state->rays.emplace(std::move(rays));
+  state->light.emplace(state->mesh, *state->rays, surroundings.lights);
+  return ReferenceScene(std::move(state));
+}
+
+glm::vec3 ReferenceScene::origin(const glm::vec3& position, const glm::vec3& normal,
+                                 float offset) const {
+  const float diagonal = glm::length(state_->rays->bounds().extent());
+  return position + normal * (offset > 0 ? offset : 1e-4f * diagonal);
+}
+
+ReferenceGather ReferenceScene::gather(const glm::vec3& position, const glm::vec3& normal,
+                                       std::uint64_t seed, const ReferenceQuality& quality) const {
+  const RayScene& rays = *state_->rays;
+  const glm::vec3 start = origin(position, normal, quality.offset);
+  const CosineDirections directions(normal, quality.rays, seed);
+  ReferenceGather sum;
+  int front = 0, both = 0;
+  for (int i = 0; i < quality.rays; ++i) {
+    const glm::vec3 direction = directions[i];
+    float begin = 0;
+    // A scene of more layers than this before the first front does not occur; a ray caught in
+    // coplanar triangles does
+    constexpr int kMaxLayers = 64;
+    for (int layer = 0; layer < kMaxLayers; ++layer) {
+      const auto hit = rays.closestHit(start, direction, begin, quality.max_distance);
+      if (!hit) break;
+      if (layer == 0) ++both;
+      const SurfacePoint point = surfacePoint(state_->mesh, hit->triangle, hit->u, hit->v);
+      if (glm::dot(point.geometric_normal, direction) < 0) {
+        ++front;
+        if (state_->light->hasLight()) {
+          const std::uint64_t hit_seed = mixBits(seed) + std::uint64_t(i);
+          const glm::vec3 exitance =
+              state_->light->exitance(point, hit_seed, quality.light_samples);
+          sum.irradiance_front += exitance;
+          if (layer == 0) sum.irradiance_both += exitance;
+        }
+        break;
+      }
+      begin = std::nextafter(hit->distance + 0.1f * rays.surfaceOffset(), 1e30f);
+    }
+  }
+
+  // E = pi times the mean radiance over cosine-weighted rays = the mean exitance B = pi L
+  const float weight = 1 / float(quality.rays);
+  sum.occlusion_front = float(front) * weight;
+  sum.occlusion_both = float(both) * weight;
+  sum.irradiance_front *= weight;
+  sum.irradiance_both *= weight;
+  return sum;
+}
+
+float ReferenceScene::occlusion(const glm::vec3& position, const glm::vec3& normal,
+                                std::uint64_t seed, const ReferenceQuality& quality) const {
+  const glm::vec3 start = origin(position, normal, quality.offset);
+  const CosineDirections directions(normal, quality.rays, seed);
+  int hits = 0;
+  for (int i = 0; i < quality.rays; ++i) {
+    hits += state_->rays->isOccluded(start, directions[i], 0, quality.max_distance) ? 1 : 0;
+  }
+  return float(hits) / float(quality.rays);
+}
+
+}  // namespace surfeit

@@ -1,0 +1,325 @@
+#include "sample/sample.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_pipeline.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <new>
+
+#include "core/job_limits.h"
+#include "core/spherical_harmonics.h"
+#include "io/surfel_source.h"
+#include "sample/dice.h"
+#include "sample/ray_scene.h"
+
+namespace surfeit {
+namespace {
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Pieces [begin, end) of a triangle.
+struct PieceRange {
+  DiceJob job;
+  std::uint64_t begin = 0, end = 0;
+};
+
+// What one task turns into surfels. Cut by counts alone, so that tasks, and with them the order of
+// the surfels, do not depend on the threads.
+struct Batch {
+  std::vector<PieceRange> ranges;
+  std::vector<Surfel> surfels;
+  double disk_area = 0;
+};
+
+// 512 pieces are 32 KiB of surfels; a batch of nothing but the worst slivers stays below 32 MiB.
+constexpr std::uint64_t kBatchPieces = 512;
+constexpr std::size_t kBatchesInFlightPerThread = 4;
+
+// Deals the plan out in batches; a large triangle spans many. One thread at a time.
+class BatchDealer {
+ public:
+  explicit BatchDealer(DicePlan& plan) : plan_(plan) {}
+
+  // False at the end.
+  bool next(Batch& batch) {
+    std::uint64_t room = kBatchPieces;
+    while (room > 0) {
+      if (current_.begin == current_.end) {
+        if (!plan_.next(current_.job)) break;
+        current_.begin = 0;
+        current_.end = current_.job.piece_count;
+      }
+      PieceRange range = current_;
+      range.end = range.begin + std::min(room, range.end - range.begin);
+      room -= range.end - range.begin;
+      current_.begin = range.end;
+      batch.ranges.push_back(range);
+    }
+    return !batch.ranges.empty();
+  }
+
+ private:
+  DicePlan& plan_;
+  PieceRange current_;
+};
+
+// Turns pieces into surfels. Immutable; safe from any thread.
+class SurfelMaker {
+ public:
+  // `light` is null when nothing emits.
+  SurfelMaker(const Mesh& mesh, const DicePlan& plan, const DirectLight* light)
+      : mesh_(mesh), plan_(plan), light_(light) {}
+
+  void fill(Batch& batch) const {
+    for (const PieceRange& range : batch.ranges) addPieces(range, batch.surfels);
+    for (const Surfel& surfel : batch.surfels) {
+      batch.disk_area += double(kPi) * double(surfel.radius) * double(surfel.radius);
+    }
+  }
+
+ private:
+  // Area and reach of the triangles that have no surfels of their own.
+  struct Carried {
+    double area = 0;
+    glm::dvec3 centroid{0};
+    std::uint64_t piece = 0;  // that takes them over: the one nearest to their centroid
+  };
+
+  Carried gatherCarried(const DiceJob& job, const Micropolygon& whole) const {
+    Carried carried;
+    for (std::uint64_t i = job.carried_begin; i < job.carried_end; ++i) {
+      const std::uint32_t triangle = plan_.order()[i];
+      if (triangle == job.triangle) continue;
+      const double area = triangleArea(mesh_, triangle);
+      carried.area += area;
+      carried.centroid += area * wholeTriangle(mesh_, triangle).centroid();
+    }
+    if (carried.area > 0) {
+      carried.centroid /= carried.area;
+      carried.piece = pieceNear(whole, job.piece_count, carried.centroid);
+    }
+    return carried;
+  }
+
+  // Gives the carried area to the nearest of the surfels from `begin`, and widens its disk over the
+  // carried triangles, so that they leave no holes. Those far away (the curve jumps now and then)
+  // are left: a hole of their size is better than so large a disk.
+  void takeOver(const DiceJob& job, const Carried& carried, std::vector<Surfel>& surfels,
+                std::size_t begin) const {
+    const glm::vec3 centroid(carried.centroid);
+    Surfel& surfel = *std::min_element(
+        surfels.begin() + std::ptrdiff_t(begin), surfels.end(), [&](const auto& a, const auto& b) {
+          return glm::distance(a.position, centroid) < glm::distance(b.position, centroid);
+        });
+    surfel.area = float(double(surfel.area) + carried.area);
+    const float reach = float(2 * plan_.spacing());
+    for (std::uint64_t i = job.carried_begin; i < job.carried_end; ++i) {
+      const std::uint32_t triangle = plan_.order()[i];
+      if (triangle == job.triangle) continue;
+      float radius = 0;
+      for (int k = 0; k < 3; ++k) {
+        const glm::vec3& corner = mesh_.position[mesh_.triangle[triangle][k]];
+        radius = std::max(radius, glm::distance(corner, surfel.position));
+      }
+      if (radius <= reach) surfel.radius = std::max(surfel.radius, radius);
+    }
+  }
+
+  Surfel makeSurfel(const DiceJob& job, const PiecePart& part, std::uint64_t seed) const {
+    const SurfacePoint point =
+        surfacePoint(mesh_, job.triangle, float(part.weight.y), float(part.weight.z));
+    Surfel surfel;
+    surfel.position = glm::vec3(part.centroid);
+    surfel.normal = point.normal;
+    surfel.radius = float(part.radius * (1 + 1e-6));  // still circumscribes after rounding
+    surfel.area = std::max(float(part.area), std::numeric_limits<float>::min());  // never 0
+    surfel.albedo = point.albedo;
+    if (light_ != nullptr) surfel.radiosity = light_->exitance(point, seed, light_->samples());
+    return surfel;
+  }
+
+  void addPieces(const PieceRange& range, std::vector<Surfel>& surfels) const {
+    const DiceJob& job = range.job;
+    const Micropolygon whole = wholeTriangle(mesh_, job.triangle);
+    const Carried carried = gatherCarried(job, whole);
+    const double piece_area = job.area / double(job.piece_count);
+    std::vector<PiecePart> parts;
+    for (std::uint64_t i = range.begin; i < range.end; ++i) {
+      parts.clear();
+      appendParts(piece(whole, job.piece_count, i), piece_area, plan_.spacing(), parts);
+      const std::size_t begin = surfels.size();
+      for (std::size_t k = 0; k < parts.size(); ++k) {
+        const std::uint64_t seed = ((job.first_surfel + i) << kMaxSlabBits) + k;
+        surfels.push_back(makeSurfel(job, parts[k], seed));
+      }
+      if (carried.area > 0 && i == carried.piece) takeOver(job, carried, surfels, begin);
+    }
+  }
+
+  const Mesh& mesh_;
+  const DicePlan& plan_;
+  const DirectLight* light_;
+};
+
+// Cuts, lights and writes in a pipeline: batches are dealt and written in order, lit in parallel.
+Status writeSurfels(DicePlan& plan, const SurfelMaker& maker, int threads, SurfelWriter& writer,
+                    Progress& progress, SampleStats& stats) {
+  Status status;
+  std::atomic<bool> has_failed = false;
+  BatchDealer dealer(plan);
+  using BatchPtr = std::shared_ptr<Batch>;  // not unique: an exception must free what is in flight
+  const auto deal = [&](tbb::flow_control& control) {
+    auto batch = std::make_shared<Batch>();
+    if (has_failed || progress.isCancelled() || !dealer.next(*batch)) control.stop();
+    return batch;
+  };
+  const auto light = [&](BatchPtr batch) {
+    maker.fill(*batch);
+    return batch;
+  };
+  const auto write = [&](BatchPtr batch) {
+    if (!status.ok()) return;
+    status = writer.write(batch->surfels);
+    has_failed = !status.ok();
+    stats.surfels += batch->surfels.size();
+    stats.disk_area += batch->disk_area;
+    progress.advance(batch->surfels.size());
+  };
+  tbb::parallel_pipeline(
+      kBatchesInFlightPerThread * std::size_t(threads),
+      tbb::make_filter<void, BatchPtr>(tbb::filter_mode::serial_in_order, deal) &
+          tbb::make_filter<BatchPtr, BatchPtr>(tbb::filter_mode::parallel, light) &
+          tbb::make_filter<BatchPtr, void>(tbb::filter_mode::serial_in_order, write));
+  if (status.ok() && progress.isCancelled()) return Status::interrupted();
+  return status;
+}
+
+Status checkOptions(const SampleOptions& options) {
+  if (!(options.spacing >= 0) || !std::isfinite(options.spacing)) {
+    return Status::invalidArgument(
+        fmt::format("spacing {}: expected a positive length", options.spacing));
+  }
+  if (options.spacing == 0 && options.count == 0) {
+    return Status::invalidArgument("count 0: expected at least 1 surfel");
+  }
+  return checkSurroundings(options.surroundings);
+}
+
+double totalArea(const Mesh& mesh) {
+  double area = 0;
+  for (std::size_t i = 0; i < mesh.triangle.size(); ++i) {
+    area += triangleArea(mesh, std::uint32_t(i));
+  }
+  return area;
+}
+
+// Surfels for that area. The numbers beyond 2^40 are left to a spacing mistyped.
+Result<std::uint64_t> surfelCountFor(const SampleOptions& options, double area) {
+  constexpr double kMaxCount = 0x1p40;
+  const double count = options.spacing > 0
+                           ? std::max(1.0, std::round(area / (options.spacing * options.spacing)))
+                           : double(options.count);
+  if (!(count <= kMaxCount)) {
+    return Status::invalidArgument(
+        fmt::format("{:.3g} surfels for an area of {:.6g}, expected at most 2^40", count, area));
+  }
+  return std::uint64_t(count);
+}
+
+}  // namespace
+
+Status checkSurroundings(const Surroundings& surroundings) {
+  if (surroundings.lights.samples < 1 || surroundings.lights.samples > 65536) {
+    return Status::invalidArgument(
+        fmt::format("light samples {}: expected 1 to 65536", surroundings.lights.samples));
+  }
+  const GroundPlane& ground = surroundings.ground;
+  if (ground.up_axis < 0 || ground.up_axis > 2 || !(ground.size > 0) || !(ground.size < 1e6f)) {
+    return Status::invalidArgument(fmt::format(
+        "ground of size {} across axis {}: expected a size up to 1e6 and an axis 0 to 2",
+        ground.size, ground.up_axis));
+  }
+  // A sum is finite only when all its terms are
+  const auto isFinite = [](const glm::vec3& sum) { return std::isfinite(sum.x + sum.y + sum.z); };
+  for (const PointLight& light : surroundings.lights.points) {
+    if (!isFinite(light.position + light.intensity)) {
+      return Status::invalidArgument("point light: a value is not finite");
+    }
+  }
+  for (const DirectionalLight& light : surroundings.lights.directionals) {
+    const float length = glm::length(light.direction);
+    if (!(length > 0) || !isFinite(light.direction / length + light.irradiance)) {
+      return Status::invalidArgument("directional light: direction is zero or a value not finite");
+    }
+  }
+  for (const AreaLight& light : surroundings.lights.areas) {
+    const float quarter_area = glm::length(glm::cross(light.u, light.v));
+    if (!(quarter_area > 0) || !std::isfinite(quarter_area) ||
+        !isFinite(light.centre + light.radiance)) {
+      return Status::invalidArgument(
+          "area light: half edges u and v are parallel or zero, or a value is not finite");
+    }
+  }
+  return {};
+}
+
+Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const std::string& output,
+                                 const SampleOptions& options, Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(checkOptions(options));
+  SampleStats stats;
+  stats.threads = options.threads > 0 ? options.threads : defaultThreadCount();
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  std::size_t(stats.threads));
+  try {
+    auto start = std::chrono::steady_clock::now();
+    progress.beginPhase("load", 0, "triangles");
+    SURFEIT_ASSIGN_OR_RETURN(Mesh mesh,
+                             loadMeshes(meshes, options.surroundings.default_albedo, progress));
+    addGroundPlane(options.surroundings.ground, mesh);
+    stats.triangles = mesh.triangle.size();
+    stats.degenerate_faces = mesh.degenerate_faces;
+    stats.load_seconds = secondsSince(start);
+
+    start = std::chrono::steady_clock::now();
+    progress.beginPhase("build", 0, "triangles");
+    SURFEIT_ASSIGN_OR_RETURN(const RayScene scene, RayScene::build(mesh, stats.threads));
+    const DirectLight light(mesh, scene, options.surroundings.lights);
+    if (!light.hasLight()) {
+      progress.note("no light and nothing emits: the cloud gets albedo but no radiosity");
+    }
+    SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t count, surfelCountFor(options, totalArea(mesh)));
+    DicePlan plan(mesh, count);
+    stats.area = plan.totalArea();
+    stats.spacing = plan.spacing();
+    stats.build_seconds = secondsSince(start);
+
+    start = std::chrono::steady_clock::now();
+    progress.beginPhase("sample", plan.surfelCount(), "surfels");
+    CloudChannels channels;
+    channels.normal = channels.radius = channels.area = channels.albedo = true;
+    channels.radiosity = light.hasLight();
+    SURFEIT_ASSIGN_OR_RETURN(
+        SurfelWriter writer,
+        SurfelWriter::create(output, channels, PlyEncoding::kBinaryLittleEndian));
+    const SurfelMaker maker(mesh, plan, light.hasLight() ? &light : nullptr);
+    SURFEIT_RETURN_IF_ERROR(writeSurfels(plan, maker, stats.threads, writer, progress, stats));
+    SURFEIT_RETURN_IF_ERROR(writer.finish());
+    stats.sliver_surfels = stats.surfels - plan.surfelCount();
+    stats.sample_seconds = secondsSince(start);
+  } catch (const std::bad_alloc&) {
+    return Status::failed(fmt::format("{}: out of memory", output));
+  }
+  return stats;
+}
+
+}  // namespace surfeit

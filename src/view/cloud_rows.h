@@ -1,0 +1,45 @@
+// Any file that `surfeit view` draws, as a stream of rows with named scalar properties: the vertex
+// element of a PLY file, or the surfels of a .sft file page by page. Only one batch is in memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/bounds.h"
+#include "io/ply_format.h"
+#include "surfeit/status.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// One thread at a time; next() may use TBB's threads itself.
+class CloudRows {
+ public:
+  // Most rows that next() returns, unless one page of a .sft file holds more.
+  static constexpr std::size_t kBatchRows = 32768;
+
+  virtual ~CloudRows() = default;
+
+  virtual const std::string& path() const = 0;
+  // Names, types and offsets of a row's properties; row_bytes apart.
+  virtual const PlyElement& element() const = 0;
+  // The next rows, empty at the end. Valid until the next call on this object.
+  virtual Result<std::span<const std::byte>> next() = 0;
+  // Back to the first row.
+  virtual Status rewind() = 0;
+
+  // Bounds of the positions where the file states them.
+  virtual std::optional<Bounds3> statedBounds() const { return std::nullopt; }
+  // What the cloud came with, where the file states it: the rest was filled in when indexing.
+  virtual std::optional<CloudChannels> statedChannels() const { return std::nullopt; }
+};
+
+// Opens a file by its content: PLY when it starts with "ply", else .sft.
+// kCorruption when it is neither, or when no element has x, y and z.
+Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path);
+
+}  // namespace surfeit

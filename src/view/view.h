@@ -1,0 +1,67 @@
+// Pictures of surfel clouds, streamed: the memory it takes depends on the picture, not on the
+// cloud.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+#include "view/camera.h"
+
+namespace surfeit {
+
+// How surfels are drawn.
+enum class ViewMode : std::uint8_t {
+  kDiscs,    // disks in perspective; spheres where there is no normal
+  kPoints,   // squares of a fixed number of pixels
+  kNormals,  // as kDiscs, colored by 0.5 n + 0.5
+};
+
+struct ViewOptions {
+  ViewMode mode = ViewMode::kDiscs;
+  std::string channel;  // view/channel.h; empty: the most telling one
+  CameraOptions camera;
+  int width = 1280, height = 960;  // pixels
+  int samples = 2;                 // along each edge of a pixel, 1..8
+  float point_size = 1;            // kPoints: edge of a square, pixels
+  float radius = 0;                // > 0: radius of every surfel, scene units
+  float radius_scale = 1;          // times the cloud's, estimated or given radius
+  bool cull_back = false;          // leave out disks that are seen from behind
+  float exposure = 0;              // PNG: stops, on channels of light
+  glm::vec3 background{0.13f};     // PNG: display values, 0..1
+  // Value shown black and value shown white, for any channel. Absent: scalars other than occlusion
+  // are stretched over the values they take, in PNG; everything else is shown as it is.
+  std::optional<glm::dvec2> range;
+  std::uint64_t memory_bytes =
+      0;            // budget of the process; 0: three quarters of what the job may use
+  int threads = 0;  // 0: all that the job may use
+};
+
+struct ViewStats {
+  std::uint64_t records = 0;
+  std::uint64_t skipped_records = 0;    // cannot be drawn: not finite, or a radius <= 0
+  std::uint64_t drawn_surfels = 0;      // at least partly on the screen
+  std::uint64_t non_finite_values = 0;  // drawn in magenta
+  double coverage = 0;                  // part of the picture that the cloud covers, 0..1
+  std::string channel;                  // the one shown
+  bool radius_estimated = false;
+  float mean_estimated_radius = 0;
+  glm::dvec3 eye{0}, look_at{0};  // the camera that was used
+  std::uint64_t framebuffer_bytes = 0;
+  int threads = 0;
+  double seconds = 0;
+};
+
+// Draws `input`, a PLY cloud or a .sft file, into `picture`, .png or .exr by its name; it appears
+// only when complete. The picture depends on the cloud and the options alone, not on the threads;
+// reordering the records changes it by rounding only. EXR files hold the channel's own values.
+// Errors: kInvalidArgument (options, or a channel that the cloud lacks: the message lists those it
+// has), kBudgetTooSmall (picture too large), kCorruption, kIoError, kInterrupted.
+Result<ViewStats> viewCloud(const std::string& input, const std::string& picture,
+                            const ViewOptions& options, Progress& progress);
+
+}  // namespace surfeit

@@ -1,0 +1,323 @@
+#!/usr/bin/env bash
+# One case of the program's end-to-end tests; CMakeLists.txt lists the cases.
+#
+#   cli_test.sh CASE SURFEIT CORNELL_SCENE README WORK_DIR
+set -euo pipefail
+
+case_name=$1
+surfeit=$2
+cornell_scene=$3
+readme=$4
+work_dir=$5
+
+fail() {
+  echo "FAILED: $*" >&2
+  exit 1
+}
+
+# run STATUS ARGUMENT...: runs surfeit, which must exit with STATUS; what it said is in `said`.
+run() {
+  local expected=$1 status=0
+  shift
+  said=$("$surfeit" "$@" 2>&1) || status=$?
+  printf '$ surfeit %s\n%s\n' "$*" "$said"
+  [[ $status == "$expected" ]] || fail "exit status $status, expected $expected: surfeit $*"
+}
+
+# says TEXT...: every text must stand in what the last run said.
+says() {
+  local text
+  for text in "$@"; do
+    [[ $said == *"$text"* ]] || fail "expected \"$text\" in: $said"
+  done
+}
+
+exists() { [[ -s $1 ]] || fail "$1 is missing or empty"; }
+
+# Neither a file of that name nor a temporary one beside it.
+leavesNothing() {
+  local left
+  left=$(find . -name "$1*" -o -name '*.tmp')
+  [[ -z $left ]] || fail "left behind: $left"
+}
+
+sameBytes() { cmp "$1" "$2" || fail "$1 and $2 differ"; }
+
+# jsonHas FILE KEY...
+jsonHas() {
+  local file=$1 key
+  shift
+  for key in "$@"; do
+    grep -q "\"$key\":" "$file" || fail "$file has no \"$key\": $(cat "$file")"
+  done
+}
+
+# A scene of about that many surfels: cornell.obj, cornell.ply and cornell.sft.
+makeScene() {
+  "$cornell_scene" .
+  run 0 sample cornell.obj -o cornell.ply --count "$1" --light-samples 2 --quiet
+  run 0 index cornell.ply -o cornell.sft --memory 64M --quiet
+}
+
+# Replaces the byte at an offset of a file by its complement.
+flipByte() {
+  local value
+  value=$(od -An -tu1 -j "$2" -N 1 "$1")
+  printf '%b' "\\$(printf '%03o' $((255 - value)))" |
+    dd of="$1" bs=1 seek="$2" conv=notrunc status=none
+}
+
+wholePipelineWorks() {
+  "$cornell_scene" .
+  exists cornell.obj
+  run 0 sample cornell.obj -o cornell.ply --count 5000
+  says "5,000 surfels"
+  run 0 index cornell.ply -o cornell.sft --memory 64M
+  says "5,000 surfels"
+  run 0 verify cornell.sft
+  run 0 info cornell.sft
+  says "5,000" "radiosity"
+  run 0 info cornell.ply
+  run 0 gather cornell.sft cornell.ply -o lit.ply --mode bleeding --memory 64M
+  run 0 info lit.ply
+  says occlusion irradiance_r irradiance_g irradiance_b albedo_r
+  run 0 view lit.ply -o lit.png --channel lit --size 64x48
+  exists lit.png
+  [[ $(od -An -c -j 1 -N 3 lit.png | tr -d ' ') == PNG ]] || fail "lit.png is no PNG"
+  run 0 view cornell.sft -o scene.exr --size 64x48
+  exists scene.exr
+  [[ -z $(find . -name '*.tmp') ]] || fail "temporary files left behind"
+}
+
+# The command lines of README.md under <!-- tested -->, in their order, with fewer surfels.
+readmeCommandsWork() {
+  local commands
+  commands=$(awk '/^<!-- tested -->/ { tested = 1 }
+                  /^```/ { if (inside) { inside = tested = 0 } else inside = 1; next }
+                  inside && tested' "$readme" | sed -E 's/--count [0-9]+/--count 3000/')
+  [[ $(grep -c '^surfeit ' <<< "$commands") -ge 5 ]] || fail "found few commands in $readme"
+  mkdir bin
+  ln -s "$surfeit" bin/surfeit
+  ln -s "$cornell_scene" bin/cornell_scene
+  PATH=$PWD/bin:$PATH bash -euxo pipefail -c "$commands" || fail "a command of $readme"
+}
+
+resultsDoNotDependOnThreadsOrMemory() {
+  makeScene 20000
+  run 0 index cornell.ply -o other.sft --memory 32M --threads 1
+  sameBytes cornell.sft other.sft
+  run 0 sample cornell.obj -o receivers.ply --count 300 --light-samples 1
+  run 0 gather cornell.sft receivers.ply -o one.ply --mode bleeding --threads 1 --memory 1G
+  run 0 gather cornell.sft receivers.ply -o many.ply --mode bleeding --threads 4 --memory 16M
+  sameBytes one.ply many.ply
+}
+
+statisticsHaveTheDocumentedFields() {
+  local common=(command stats_version wall_seconds cpu_seconds peak_resident_bytes threads)
+  makeScene 3000
+  run 0 sample cornell.obj -o again.ply --count 1000 --stats sample.json
+  jsonHas sample.json "${common[@]}" triangles surfels area spacing phases
+  run 0 index cornell.ply -o again.sft --stats index.json
+  jsonHas index.json "${common[@]}" memory_bytes surfels skipped_records nodes node_pages \
+    surfel_pages file_bytes bytes_per_surfel temporary_bytes surfels_per_second phases \
+    scan sort build
+  run 0 verify cornell.sft --stats verify.json
+  jsonHas verify.json "${common[@]}" pages bytes finding_count findings
+  run 0 gather cornell.sft again.ply -o lit.ply --memory 64M --stats gather.json
+  jsonHas gather.json "${common[@]}" memory_bytes mode max_solid_angle raster_resolution \
+    receivers invalid_receivers receivers_per_second gather_seconds node_cache surfel_cache \
+    requests hits misses evictions bytes_read peak_bytes budget_bytes decoded_bytes
+  grep -q '"stats_version": 1' gather.json || fail "stats_version is not 1"
+  run 0 view lit.ply -o lit.png --size 32x32 --stats view.json
+  jsonHas view.json "${common[@]}" channel records drawn_surfels coverage
+}
+
+helpAndVersionExitWithZero() {
+  run 0 --version
+  says "surfeit 0."
+  run 0 --help
+  says sample index info verify gather view
+  local command
+  for command in sample index info verify gather view; do run 0 "$command" --help; done
+}
+
+missingFileIsAnIoError() {
+  makeScene 1000
+  run 74 index nowhere.ply -o nowhere.sft
+  says nowhere.ply
+  run 74 info nowhere.sft
+  run 74 verify nowhere.sft
+  run 74 gather nowhere.sft cornell.ply -o result.ply
+  run 74 gather cornell.sft nowhere.ply -o result.ply
+  run 74 gather cornell.sft cornell.ply -o no/such/directory/result.ply
+  run 74 view nowhere.ply -o nowhere.png
+  run 74 sample nowhere.obj -o nowhere.ply
+  leavesNothing result
+  leavesNothing nowhere
+}
+
+foreignAndEmptyFilesAreBadData() {
+  makeScene 1000
+  echo "These are no surfels, and no scene either." > foreign
+  : > empty
+  local file
+  for file in foreign empty; do
+    run 3 index "$file" -o result.sft
+    says "$file"
+    run 3 info "$file"
+    run 3 verify "$file"
+    run 3 gather "$file" cornell.ply -o result.ply
+    says "$file"
+    run 3 gather cornell.sft "$file" -o result.ply
+    run 3 view "$file" -o result.png
+  done
+  # A cloud where a scene is expected, and the other way round
+  run 3 gather cornell.ply cornell.ply -o result.ply
+  run 3 index cornell.sft -o result.sft
+  leavesNothing result
+}
+
+unknownOptionsAreUsageErrorsWithASuggestion() {
+  run 2
+  run 2 gahter
+  says "did you mean gather?"
+  run 2 index cloud.ply -o scene.sft --memroy 1G
+  says "did you mean --memory?"
+  run 2 gather scene.sft cloud.ply -o result.ply --max-solid-angel 0.1
+  says "did you mean --max-solid-angle?"
+  run 2 gather scene.sft
+  leavesNothing scene
+}
+
+impossibleValuesAreUsageErrors() {
+  makeScene 1000
+  local gather=(gather cornell.sft cornell.ply -o result.ply) index=(index cornell.ply -o result.sft)
+  run 2 "${gather[@]}" --max-solid-angle -1
+  run 2 "${gather[@]}" --max-solid-angle nan
+  run 2 "${gather[@]}" --raster-resolution 13
+  run 2 "${gather[@]}" --raster-resolution 1000
+  run 2 "${gather[@]}" --threads 0
+  run 2 "${gather[@]}" --threads two
+  run 2 "${gather[@]}" --memory 12X
+  run 2 "${gather[@]}" --memory -5G
+  run 2 "${gather[@]}" --mode glossy
+  run 2 "${gather[@]}" --max-dist 0
+  run 2 "${index[@]}" --leaf 0
+  run 2 "${index[@]}" --overlap 0.5
+  run 2 "${index[@]}" --precision double
+  run 2 sample cornell.obj -o result.ply --count 0
+  run 2 sample cornell.obj -o result.ply --light-point "1 2 3"
+  run 2 view cornell.ply -o result.png --channel nothing
+  says radiosity
+  run 2 view cornell.ply -o result.jpeg
+  run 2 gather cornell.sft cornell.ply -o cornell.sft
+  leavesNothing result
+}
+
+tooSmallBudgetsSayWhatWouldDo() {
+  makeScene 20000
+  run 33 index cornell.ply -o result.sft --memory 1M
+  says "MiB"
+  run 33 gather cornell.sft cornell.ply -o result.ply --memory 1M --threads 1
+  says "least that works"
+  leavesNothing result
+  # What it says works
+  local least
+  least=$(sed -E 's/.* ([0-9.]+) MiB is the least.*/\1/' <<< "$said")
+  run 0 sample cornell.obj -o receivers.ply --count 50 --light-samples 1
+  run 33 gather cornell.sft receivers.ply -o result.ply --memory 1M --threads 1
+  least=$(sed -E 's/.* ([0-9.]+) MiB is the least.*/\1/' <<< "$said")
+  run 0 gather cornell.sft receivers.ply -o result.ply --memory "${least}M" --threads 1
+}
+
+damagedScenesAreRefusedAndLeaveNoOutput() {
+  makeScene 3000
+  local size offset
+  size=$(stat --format=%s cornell.sft)
+  # First surfel page, a page in the middle, header, scene fields, directory, footer
+  for offset in 700 $((size / 2)) 20 80 $((size - 100)) $((size - 60)) $((size - 1)); do
+    cp cornell.sft damaged.sft
+    flipByte damaged.sft "$offset"
+    run 3 verify damaged.sft
+    says "damaged.sft"
+    run 3 gather damaged.sft cornell.ply -o result.ply
+    says "damaged.sft"
+    leavesNothing result
+  done
+  cp cornell.sft damaged.sft
+  flipByte damaged.sft 700
+  run 3 gather damaged.sft cornell.ply -o result.ply
+  says "damaged.sft: page" "at 512" "checksum" "expected"
+  run 3 verify damaged.sft
+  says "damaged.sft: page" "at 512" "checksum" "expected"
+}
+
+cutScenesAreRefused() {
+  makeScene 3000
+  local size length
+  size=$(stat --format=%s cornell.sft)
+  for length in 3 100 512 600 $((size / 2)) $((size - 1)); do
+    head --bytes="$length" cornell.sft > cut.sft
+    run 3 verify cut.sft
+    run 3 info cut.sft
+    run 3 gather cut.sft cornell.ply -o result.ply
+  done
+  cp cornell.sft long.sft
+  echo >> long.sft
+  run 3 verify long.sft
+  leavesNothing result
+}
+
+invalidReceiversGetNanOrAreRefused() {
+  makeScene 1000
+  cat > receivers.ply << 'PLY'
+ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+property float nx
+property float ny
+property float nz
+end_header
+0.5 0.01 0.5 0 1 0
+nan 0.01 0.5 0 1 0
+0.4 0.01 0.5 0 1 0
+PLY
+  run 0 gather cornell.sft receivers.ply -o result.ply --memory 64M
+  says "1 record with a non-finite value (first: record 1)"
+  exists result.ply
+  rm result.ply
+  run 3 gather cornell.sft receivers.ply -o result.ply --memory 64M --strict
+  says "record 1"
+  leavesNothing result
+}
+
+interruptLeavesNoFile() {
+  makeScene 60000
+  local signal expected process status
+  set -m # jobs of their own take SIGINT
+  for signal in INT TERM; do
+    expected=$([[ $signal == INT ]] && echo 130 || echo 143)
+    "$surfeit" gather cornell.sft cornell.ply -o result.ply --mode bleeding --memory 1G \
+      --max-solid-angle 0.002 --raster-resolution 32 --threads 1 &
+    process=$!
+    for ((i = 0; i < 300; ++i)); do
+      compgen -G 'result.ply*.tmp' > /dev/null && break
+      sleep 0.1
+    done
+    compgen -G 'result.ply*.tmp' > /dev/null || fail "the gather did not begin"
+    kill -"$signal" "$process"
+    status=0
+    wait "$process" || status=$?
+    [[ $status == "$expected" ]] || fail "exit status $status after SIG$signal, expected $expected"
+    leavesNothing result
+  done
+}
+
+rm -rf "$work_dir"
+mkdir -p "$work_dir"
+cd "$work_dir"
+"$case_name"
+echo "passed: $case_name"

@@ -1,0 +1,187 @@
+#include "gather/contribution.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <span>
+#include <vector>
+
+namespace surfeit {
+namespace {
+
+ShCoefficients projectLobes(std::span<const glm::vec3> normals, const ZonalFactors& factors) {
+  ShCoefficients sum{};
+  for (const glm::vec3& normal : normals) {
+    const ShCoefficients basis = shBasis(normal);
+    for (std::size_t i = 0; i < kShCount; ++i)
+      sum[i] += factors[std::size_t(kShBand[i])] * basis[i];
+  }
+  return sum;
+}
+
+std::vector<glm::vec3> evenDirections(int count) {
+  std::vector<glm::vec3> directions;
+  for (int i = 0; i < count; ++i) {
+    const float z = 1 - float(2 * i + 1) / float(count), phi = float(i) * 2.39996323f;
+    const float rho = std::sqrt(1 - z * z);
+    directions.push_back({rho * std::cos(phi), rho * std::sin(phi), z});
+  }
+  return directions;
+}
+
+// A node of `count` surfels of area 1 and the given normals and radiosity, two away along z.
+Node makeNode(std::span<const glm::vec3> normals, const glm::vec3& radiosity) {
+  Node node{};
+  node.position = {0, 0, 2};
+  node.radius = 1;
+  glm::vec3 sum(0);
+  for (const glm::vec3& normal : normals) sum += normal;
+  node.area = 1;
+  node.flatness = glm::length(sum) / float(normals.size());
+  node.normal = glm::length(sum) > 0 ? glm::normalize(sum) : glm::vec3(0);
+  node.radiosity = radiosity;
+  node.area_sh = projectLobes(normals, kClampedCosine);
+  for (std::size_t i = 0; i < kShCount; ++i) {
+    node.area_sh[i] /= float(normals.size());
+    for (int c = 0; c < 3; ++c) node.power_sh[c][i] = node.area_sh[i] * radiosity[c];
+  }
+  return node;
+}
+
+TEST(ProjectedSum, IsExactForASingleNormal) {
+  for (const glm::vec3& normal : evenDirections(50)) {
+    const ShCoefficients lobe = projectLobes(std::span(&normal, 1), kClampedCosine);
+    for (const glm::vec3& direction : evenDirections(60)) {
+      float opposite;
+      const float facing = projectedSum(lobe, shBasis(direction), opposite);
+      const float cosine = glm::dot(normal, direction);
+      EXPECT_NEAR(facing, std::max(0.f, cosine), 2e-3);
+      EXPECT_NEAR(opposite, std::max(0.f, -cosine), 2e-3);
+    }
+  }
+}
+
+TEST(ProjectedSum, IsExactForEvenlySpreadNormalsAndForSpheres) {
+  const std::vector<glm::vec3> normals = evenDirections(1000);
+  const ShCoefficients convex = projectLobes(normals, kClampedCosine);
+  const glm::vec3 any{0, 0, 1};
+  const ShCoefficients sphere = projectLobes(std::span(&any, 1), kConstant);
+  for (const glm::vec3& direction : evenDirections(60)) {
+    float opposite;
+    EXPECT_NEAR(projectedSum(convex, shBasis(direction), opposite), 250, 1);
+    EXPECT_NEAR(projectedSum(sphere, shBasis(direction), opposite), 1, 1e-4);
+  }
+}
+
+TEST(ProjectedSum, ErrsByAFewPercentForABox) {
+  const glm::vec3 normals[] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+  const ShCoefficients box = projectLobes(normals, kClampedCosine);
+  for (const glm::vec3& d : evenDirections(60)) {
+    float opposite;
+    const float expected = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
+    EXPECT_NEAR(projectedSum(box, shBasis(d), opposite), expected, .5);  // 1.5, of 1 to 1.73
+  }
+}
+
+TEST(ProjectedSum, IsNeverNegativeAndSidesDifferByTheMean) {
+  const std::vector<glm::vec3> all = evenDirections(97);
+  for (std::size_t count = 1; count < all.size(); count += 7) {
+    const std::span<const glm::vec3> normals(all.data(), count);  // ever wider caps around z
+    const ShCoefficients sum = projectLobes(normals, kClampedCosine);
+    for (const glm::vec3& direction : evenDirections(60)) {
+      float opposite, mean = 0;
+      const float facing = projectedSum(sum, shBasis(direction), opposite);
+      for (const glm::vec3& normal : normals) mean += glm::dot(normal, direction);
+      EXPECT_GE(facing, 0);
+      EXPECT_GE(opposite, -1e-4f);
+      EXPECT_NEAR(facing - opposite, mean, 1e-3);
+    }
+  }
+}
+
+TEST(NodeContribution, FlatNodeIsADisk) {
+  const glm::vec3 normal{0, 0, -1};
+  Node node = makeNode(std::span(&normal, 1), {3, 2, 1});
+  node.flags = kNodeFlat;
+  node.area_sh = {};
+  Contribution patch;
+  ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
+  EXPECT_FLOAT_EQ(patch.solid_angle, .25f);
+  EXPECT_FLOAT_EQ(patch.distance_sq, 4);
+  EXPECT_FLOAT_EQ(patch.direction.z, 1);
+  EXPECT_FLOAT_EQ(patch.radiosity.x, 3);
+
+  // From behind: nothing, or black
+  EXPECT_FALSE(makeContribution(node, -node.position, {}, patch));
+  ASSERT_TRUE(makeContribution(node, -node.position, {GatherSides::kBoth, true}, patch));
+  EXPECT_FLOAT_EQ(patch.solid_angle, .25f);
+  EXPECT_EQ(patch.radiosity, glm::vec3(0));
+}
+
+TEST(NodeContribution, RoughNodeShowsAQuarterOfItsAreaOnAverage) {
+  const Node node = makeNode(evenDirections(500), {3, 2, 1});
+  Contribution patch;
+  ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
+  EXPECT_NEAR(patch.solid_angle, 1.f / 16, 1e-3);
+  EXPECT_NEAR(patch.radiosity.x, 3, .02);
+  ASSERT_TRUE(makeContribution(node, node.position, {GatherSides::kBoth, true}, patch));
+  EXPECT_NEAR(patch.solid_angle, 2.f / 16, 1e-3);
+  EXPECT_NEAR(patch.radiosity.x, 1.5, .02);  // half of what covers is black
+}
+
+TEST(NodeContribution, NeverExceedsTheOutlineOfItsSphere) {
+  Node node = makeNode(evenDirections(500), {1, 1, 1});
+  node.radius = .1f;
+  Contribution patch;
+  ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
+  EXPECT_FLOAT_EQ(patch.solid_angle, kPi * .01f / 4);
+  EXPECT_NEAR(patch.radiosity.x, 1, .01);
+}
+
+TEST(SurfelContribution, IsItsProjectedArea) {
+  Surfel surfel;
+  surfel.position = {0, 0, 2};
+  surfel.normal = glm::normalize(glm::vec3(0, 1, -1));
+  surfel.radius = .2f;
+  surfel.area = .1f;
+  surfel.radiosity = {3, 2, 1};
+  Contribution patch;
+  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, patch));
+  EXPECT_FLOAT_EQ(patch.solid_angle, .1f / 4 * std::sqrt(.5f));
+  EXPECT_EQ(patch.radiosity, surfel.radiosity);
+
+  // The back side: nothing, black, or the same when two-sided
+  EXPECT_FALSE(makeContribution(surfel, -surfel.position, {}, patch));
+  ASSERT_TRUE(makeContribution(surfel, -surfel.position, {GatherSides::kBoth, true}, patch));
+  EXPECT_EQ(patch.radiosity, glm::vec3(0));
+  surfel.flags = kSurfelTwoSided;
+  ASSERT_TRUE(makeContribution(surfel, -surfel.position, {}, patch));
+  EXPECT_EQ(patch.radiosity, surfel.radiosity);
+}
+
+TEST(SurfelContribution, SphereLooksTheSameFromEverywhere) {
+  Surfel surfel;
+  surfel.radius = .2f;
+  surfel.area = .1f;
+  surfel.radiosity = {3, 2, 1};
+  surfel.flags = kSurfelSphere;
+  for (const glm::vec3& direction : evenDirections(20)) {
+    Contribution patch;
+    ASSERT_TRUE(makeContribution(surfel, 2.f * direction, {}, patch));
+    EXPECT_NEAR(patch.solid_angle, .1f / 4, 1e-6);
+    EXPECT_EQ(patch.radiosity, surfel.radiosity);
+  }
+}
+
+TEST(SurfelContribution, NothingIsSeenOfASurfelAtTheReceiver) {
+  Surfel surfel;
+  surfel.radius = surfel.area = 1;
+  surfel.normal = {0, 0, 1};
+  surfel.flags = kSurfelTwoSided;
+  Contribution patch;
+  EXPECT_FALSE(makeContribution(surfel, glm::vec3(0), {GatherSides::kBoth, true}, patch));
+}
+
+}  // namespace
+}  // namespace surfeit

@@ -1,0 +1,201 @@
+#include "gather/raster_cube.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <vector>
+
+#include "core/spherical_harmonics.h"
+
+namespace surfeit {
+namespace {
+
+constexpr glm::vec3 kRound{0};  // the normal of what looks the same from everywhere
+constexpr glm::vec3 kWhite{1};
+constexpr DepthRange kDepth{1, 1};
+
+// Covered solid angle of the whole cube.
+double coveredSolidAngle(const RasterCube& cube) {
+  double sum = 0;
+  for (std::size_t i = 0; i < cube.geometry().pixels().size(); ++i) {
+    sum += double(cube.coverage(i)) * double(cube.geometry().pixels()[i].solid_angle);
+  }
+  return sum;
+}
+
+// Directions all around, with some on edges and corners of the cube and some close to them.
+std::vector<glm::vec3> testDirections() {
+  std::vector<glm::vec3> directions = {{1, 1, 0},   {1, 0, -1},   {0, -1, 1},      {1, 1, 1},
+                                       {-1, 1, -1}, {1, .98f, 0}, {.97f, 1, -.9f}, {0, 0, 1}};
+  constexpr int kCount = 400;
+  for (int i = 0; i < kCount; ++i) {
+    const float z = 1 - float(2 * i + 1) / kCount, phi = float(i) * 2.39996323f;
+    const float rho = std::sqrt(1 - z * z);
+    directions.push_back({rho * std::cos(phi), rho * std::sin(phi), z});
+  }
+  for (glm::vec3& direction : directions) direction = glm::normalize(direction);
+  return directions;
+}
+
+TEST(RasterGeometry, SolidAnglesSumToTheSphere) {
+  for (int resolution = 2; resolution <= 64; resolution += 2) {
+    const RasterGeometry geometry(resolution);
+    ASSERT_EQ(geometry.pixels().size(), RasterGeometry::pixelCount(resolution));
+    double sum = 0;
+    for (const RasterGeometry::Pixel& pixel : geometry.pixels()) sum += double(pixel.solid_angle);
+    EXPECT_NEAR(sum, 4 * double(kPi), 1e-5) << resolution;
+  }
+}
+
+TEST(RasterGeometry, DirectionsAreUnitAndBalanced) {
+  const RasterGeometry geometry(12);
+  glm::vec3 sum(0);
+  for (const RasterGeometry::Pixel& pixel : geometry.pixels()) {
+    EXPECT_NEAR(glm::length(pixel.direction), 1, 1e-6);
+    sum += pixel.solid_angle * pixel.direction;
+  }
+  EXPECT_LT(glm::length(sum), 1e-5f);
+}
+
+TEST(RasterGeometry, OnlyEvenResolutionsWithinLimitsAreValid) {
+  EXPECT_TRUE(RasterGeometry::isValidResolution(2));
+  EXPECT_TRUE(RasterGeometry::isValidResolution(64));
+  for (const int resolution : {-2, 0, 1, 13, 66}) {
+    EXPECT_FALSE(RasterGeometry::isValidResolution(resolution)) << resolution;
+  }
+}
+
+TEST(RasterCube, SplatKeepsItsSolidAngleEverywhere) {
+  for (const int resolution : {12, 32, 64}) {
+    const RasterGeometry geometry(resolution);
+    RasterCube cube(geometry, false);
+    for (const glm::vec3& direction : testDirections()) {
+      for (const float solid_angle : {1e-4f, .01f, .05f}) {
+        cube.clear();
+        cube.splatRectangle(direction, kRound, solid_angle, kDepth, kWhite);
+        // What spills over an edge is drawn as a rectangle instead of a trapezoid, the part of a
+        // pixel that is covered is measured on the face, and pixels nearly full are filled
+        const double tolerance = resolution == 12 ? .18 : .10;
+        EXPECT_NEAR(coveredSolidAngle(cube) / double(solid_angle), 1, tolerance)
+            << resolution << ": " << direction.x << " " << direction.y << " " << direction.z;
+      }
+    }
+  }
+}
+
+TEST(RasterCube, SplatsOfAllDirectionsConserveSolidAngleOnAverage) {
+  const RasterGeometry geometry(12);
+  RasterCube cube(geometry, false);
+  double ratio = 0;
+  for (const glm::vec3& direction : testDirections()) {
+    cube.clear();
+    cube.splatRectangle(direction, kRound, 2e-4f, kDepth, kWhite);
+    ratio += coveredSolidAngle(cube) / 2e-4;
+  }
+  EXPECT_NEAR(ratio / double(testDirections().size()), 1, .01);
+}
+
+TEST(RasterCube, SplatOfSlantedDiskFollowsItsShape) {
+  const RasterGeometry geometry(64);
+  RasterCube cube(geometry, false);
+  // Seen from straight below, a disk leaning in z is narrow in z and wide in y on the +x face
+  cube.splatRectangle({1, 0, 0}, glm::normalize(glm::vec3(-.3f, 0, 1)), .01f, kDepth, kWhite);
+  int columns = 0, rows = 0;
+  for (std::size_t i = 0; i < 64; ++i) {
+    columns += cube.coverage(32 * 64 + i) > 0;
+    rows += cube.coverage(i * 64 + 32) > 0;
+  }
+  EXPECT_GT(columns, 2 * rows);
+}
+
+TEST(RasterCube, TracedDiskHasItsAnalyticSolidAngle) {
+  const RasterGeometry geometry(64);
+  RasterCube cube(geometry, false);
+  for (const glm::vec3& direction : testDirections()) {
+    for (const float distance : {.2f, 1.f, 3.f}) {
+      cube.clear();
+      cube.traceDisk(distance * direction, direction, 1, kDepth, kWhite);
+      const double expected =
+          2 * double(kPi) *
+          (1 - double(distance) / std::sqrt(1 + double(distance) * double(distance)));
+      EXPECT_NEAR(coveredSolidAngle(cube) / expected, 1, .035);
+    }
+  }
+}
+
+TEST(RasterCube, TracedDiskAcrossTheOriginCoversHalfTheSphere) {
+  const RasterGeometry geometry(16);
+  RasterCube cube(geometry, false);
+  const glm::vec3 normal = glm::normalize(glm::vec3(1, 2, 3));
+  cube.traceDisk(1e-4f * normal, normal, 100, kDepth, kWhite);
+  EXPECT_NEAR(coveredSolidAngle(cube), 2 * double(kPi), .06);
+}
+
+TEST(RasterCube, TracedSphereHasItsAnalyticSolidAngle) {
+  const RasterGeometry geometry(64);
+  RasterCube cube(geometry, false);
+  for (const glm::vec3& direction : testDirections()) {
+    for (const float distance : {1.001f, 1.5f, 4.f}) {
+      cube.clear();
+      cube.traceSphere(distance * direction, 1, kDepth, kWhite);
+      const double sine = 1 / double(distance);
+      const double expected = 2 * double(kPi) * (1 - std::sqrt(1 - sine * sine));
+      EXPECT_NEAR(coveredSolidAngle(cube) / expected, 1, .035);
+    }
+  }
+}
+
+TEST(RasterCube, CoverageAddsWithinALayerAndNeverExceedsOne) {
+  const RasterGeometry geometry(12);
+  RasterCube cube(geometry, true);
+  for (int i = 0; i < 1000; ++i) {
+    for (const glm::vec3& direction : testDirections()) {
+      const DepthRange depth = {1 + float(i) / 100, 1 + float(i + 7) / 100};
+      cube.splatRectangle(direction, kRound, .06f, depth, kWhite);
+    }
+  }
+  for (std::size_t i = 0; i < geometry.pixels().size(); ++i) {
+    ASSERT_EQ(cube.coverage(i), 1) << i;
+    ASSERT_NEAR(cube.radiosity(i).x, 1, 1e-5);
+  }
+}
+
+TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
+  const RasterGeometry geometry(2);  // one pixel is a quarter of a face
+  RasterCube cube(geometry, true);
+  const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
+  const float axis_cubed = direction.x * direction.x * direction.x;
+  const auto splatHalf = [&](DepthRange depth, const glm::vec3& radiosity) {
+    cube.splatRectangle(direction, kRound, .5f * axis_cubed, depth, radiosity);
+  };
+  const std::size_t pixel = 3;
+
+  splatHalf({1, 2}, {1, 0, 0});
+  const float half = .5f + .1f * .125f;  // with what is given back to surfaces that fill pixels
+  EXPECT_NEAR(cube.coverage(pixel), half, 1e-5);
+  splatHalf({3, 4}, {0, 1, 0});  // half of what is left
+  EXPECT_NEAR(cube.coverage(pixel), 1 - (1 - half) * (1 - half), 1e-5);
+  EXPECT_NEAR(cube.radiosity(pixel).x, half, 1e-5);
+  EXPECT_NEAR(cube.radiosity(pixel).y, (1 - half) * half, 1e-5);
+
+  cube.clear();
+  splatHalf({1, 2}, {1, 0, 0});
+  splatHalf({1.5f, 2.5f}, {0, 1, 0});  // the same layer
+  EXPECT_NEAR(cube.coverage(pixel), 1, 1e-5);
+  EXPECT_NEAR(cube.radiosity(pixel).y, 1 - half, 1e-5);
+}
+
+TEST(RasterCube, ClearForgetsEverything) {
+  const RasterGeometry geometry(4);
+  RasterCube cube(geometry, true);
+  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, {5, 6}, kWhite);
+  EXPECT_GT(coveredSolidAngle(cube), 1);
+  cube.clear();
+  EXPECT_EQ(coveredSolidAngle(cube), 0);
+  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, {1, 2}, kWhite);
+  EXPECT_GT(coveredSolidAngle(cube), 1);
+}
+
+}  // namespace
+}  // namespace surfeit

@@ -1,0 +1,135 @@
+#include "sample/dice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <random>
+#include <set>
+
+#include "sample/scene_files.h"
+
+namespace surfeit {
+namespace {
+
+double area(const Micropolygon& polygon) {
+  return 0.5 * glm::length(glm::cross(polygon.corner[1] - polygon.corner[0],
+                                      polygon.corner[2] - polygon.corner[0]));
+}
+
+Mesh triangleMesh(const std::vector<glm::vec3>& corners) {
+  Mesh mesh;
+  mesh.position = corners;
+  for (std::uint32_t i = 0; i + 2 < corners.size(); i += 3) {
+    mesh.triangle.emplace_back(i, i + 1, i + 2);
+    mesh.triangle_material.push_back(0);
+  }
+  mesh.materials.emplace_back();
+  return mesh;
+}
+
+TEST(Dice, PiecesHaveEqualAreaAndTileTheTriangle) {
+  const Mesh mesh = triangleMesh({{0, 0, 0}, {3, 0, 1}, {1, 2, 0}});
+  const Micropolygon whole = wholeTriangle(mesh, 0);
+  for (const std::uint64_t count : {1, 2, 3, 7, 64, 1000}) {
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const Micropolygon part = piece(whole, count, i);
+      ASSERT_NEAR(area(part) * double(count) / area(whole), 1, 1e-9);
+      for (int k = 0; k < 3; ++k) {
+        // The weights say where the corners are
+        const glm::dvec3 from_weights = part.weight[k].x * whole.corner[0] +
+                                        part.weight[k].y * whole.corner[1] +
+                                        part.weight[k].z * whole.corner[2];
+        ASSERT_NEAR(glm::distance(from_weights, part.corner[k]), 0, 1e-12);
+      }
+    }
+  }
+}
+
+TEST(Dice, PiecesOfARoundTriangleStayRound) {
+  const Mesh mesh = triangleMesh({{0, 0, 0}, {1, 0, 0}, {0.5f, 0.866f, 0}});
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    const Micropolygon part = piece(wholeTriangle(mesh, 0), 1000, i);
+    ASSERT_LT(part.radius(), 2 * std::sqrt(area(part)));
+  }
+}
+
+TEST(Dice, NearPieceIsTheOneThatHoldsItsCentroid) {
+  const Mesh mesh = triangleMesh({{0, 0, 0}, {3, 0, 1}, {1, 2, 0}});
+  const Micropolygon whole = wholeTriangle(mesh, 0);
+  for (std::uint64_t i = 0; i < 64; ++i) {
+    const std::uint64_t near = pieceNear(whole, 64, piece(whole, 64, i).centroid());
+    ASSERT_LT(glm::distance(piece(whole, 64, near).centroid(), piece(whole, 64, i).centroid()),
+              2 * piece(whole, 64, i).radius());
+  }
+}
+
+TEST(Dice, SliversAreCutUntilTheirDisksAreSmall) {
+  for (const float apex : {0.0f, 3.3f, 5.0f, 10.0f}) {
+    const Mesh mesh = triangleMesh({{0, 0, 0}, {10, 0, 0}, {apex, 0.01f, 0}});
+    const Micropolygon whole = wholeTriangle(mesh, 0);
+    std::vector<PiecePart> parts;
+    appendParts(whole, area(whole), 0.2, parts);
+    EXPECT_LE(parts.size(), 26u);
+    double sum = 0;
+    glm::dvec3 moment(0);
+    for (const PiecePart& part : parts) {
+      EXPECT_LE(part.radius, 1.5 * 0.2);
+      EXPECT_GT(part.area, 0);
+      EXPECT_NEAR(part.weight.x + part.weight.y + part.weight.z, 1, 1e-12);
+      EXPECT_NEAR(part.weight.y * 10 + part.weight.z * double(apex), part.centroid.x, 1e-9);
+      sum += part.area;
+      moment += part.area * part.centroid;
+    }
+    EXPECT_NEAR(sum / area(whole), 1, 1e-12);
+    EXPECT_NEAR(glm::distance(moment / sum, whole.centroid()), 0, 1e-9);
+  }
+}
+
+TEST(Dice, NoSliverGivesUnboundedParts) {
+  const Mesh mesh = triangleMesh({{0, 0, 0}, {1e6f, 0, 0}, {5, 0.01f, 0}});
+  std::vector<PiecePart> parts;
+  appendParts(wholeTriangle(mesh, 0), 5000, 1e-3, parts);
+  EXPECT_EQ(parts.size(), std::size_t(kMaxSlabs));
+}
+
+TEST(DicePlan, CountsAddUpAndEveryTriangleIsCarriedOnce) {
+  // Triangles of very different area
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> unit(0, 1);
+  std::vector<glm::vec3> corners;
+  for (int i = 0; i < 500; ++i) {
+    const glm::vec3 at(unit(random), unit(random), unit(random));
+    const float size = std::pow(unit(random), 6.0f) * 0.2f + 1e-4f;
+    for (int k = 0; k < 3; ++k) {
+      corners.push_back(at + size * glm::vec3(unit(random), unit(random), unit(random)));
+    }
+  }
+  const Mesh mesh = triangleMesh(corners);
+  for (const std::uint64_t count : {1, 2, 17, 500, 12345}) {
+    DicePlan plan(mesh, count);
+    std::uint64_t pieces = 0;
+    double summed_area = 0;
+    std::set<std::uint32_t> seen;
+    DiceJob job;
+    while (plan.next(job)) {
+      EXPECT_EQ(job.first_surfel, pieces);
+      EXPECT_LE(std::abs(double(job.piece_count) - job.area / plan.totalArea() * double(count)),
+                1.0);
+      pieces += job.piece_count;
+      EXPECT_TRUE(seen.insert(job.triangle).second);
+      summed_area += job.area;
+      for (std::uint64_t i = job.carried_begin; i < job.carried_end; ++i) {
+        const std::uint32_t triangle = plan.order()[i];
+        if (triangle == job.triangle) continue;
+        EXPECT_TRUE(seen.insert(triangle).second);
+        summed_area += triangleArea(mesh, triangle);
+      }
+    }
+    EXPECT_EQ(pieces, count);
+    EXPECT_EQ(seen.size(), mesh.triangle.size());
+    EXPECT_NEAR(summed_area / plan.totalArea(), 1, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace surfeit

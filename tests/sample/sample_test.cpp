@@ -1,0 +1,219 @@
+#include "sample/sample.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <random>
+
+#include "sample/scene_files.h"
+
+namespace surfeit {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Sampling : public SceneFiles {
+ protected:
+  std::vector<Surfel> sample(const std::string& mesh, const SampleOptions& options) {
+    Result<SampleStats> stats = sampleMeshes({mesh}, path("out.ply"), options, notes_);
+    EXPECT_TRUE(stats.ok()) << stats.status().message();
+    if (!stats.ok()) return {};
+    stats_ = *stats;
+    return readCloud(path("out.ply"));
+  }
+  static double totalArea(const std::vector<Surfel>& surfels) {
+    double area = 0;
+    for (const Surfel& surfel : surfels) area += double(surfel.area);
+    return area;
+  }
+  // Is every one of `count` random points of the mesh within the radius of some surfel?
+  int holes(const std::string& path, const std::vector<Surfel>& surfels, int count) {
+    const Result<Mesh> mesh = loadMeshes({path}, glm::vec3(0.5f), notes_);
+    EXPECT_TRUE(mesh.ok());
+    std::mt19937 random(11);
+    std::uniform_real_distribution<float> unit(0, 1);
+    int missing = 0;
+    for (int i = 0; i < count; ++i) {
+      float u = unit(random), v = unit(random);
+      if (u + v > 1) u = 1 - u, v = 1 - v;
+      const std::uint32_t triangle = std::uint32_t(random() % mesh->triangle.size());
+      const glm::vec3 point = surfacePoint(*mesh, triangle, u, v).position;
+      missing += std::none_of(surfels.begin(), surfels.end(), [&](const Surfel& surfel) {
+        return glm::distance(surfel.position, point) <= surfel.radius * 1.0001f;
+      });
+    }
+    return missing;
+  }
+
+  // A bumpy grid of n x n quads, so 2 n^2 triangles of like size.
+  static std::string gridPly(int n) {
+    std::vector<glm::vec3> vertices;
+    std::vector<std::vector<int>> faces;
+    for (int i = 0; i <= n; ++i) {
+      for (int k = 0; k <= n; ++k) {
+        const float x = float(i) / float(n), z = float(k) / float(n);
+        vertices.emplace_back(x, 0.1f * std::sin(9 * x) * std::cos(7 * z), z);
+      }
+    }
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < n; ++k) {
+        const int a = i * (n + 1) + k;
+        faces.push_back({a, a + 1, a + n + 2, a + n + 1});
+      }
+    }
+    return plyText(vertices, faces);
+  }
+
+  RecordedNotes notes_;
+  SampleStats stats_;
+};
+
+TEST_F(Sampling, CountAndAreaAreExact) {
+  const std::string cube = write("cube.ply", cubePly(false));
+  for (const std::uint64_t count : {1, 5, 12, 100, 20000}) {
+    SampleOptions options;
+    options.count = count;
+    const std::vector<Surfel> surfels = sample(cube, options);
+    EXPECT_EQ(surfels.size() - stats_.sliver_surfels, count);
+    EXPECT_NEAR(totalArea(surfels), 6, 6e-5);
+    EXPECT_NEAR(stats_.area, 6, 1e-6);
+  }
+  EXPECT_EQ(stats_.sliver_surfels, 0u);
+}
+
+TEST_F(Sampling, SpacingSetsTheAreaPerSurfel) {
+  SampleOptions options;
+  options.spacing = 0.05;
+  const std::vector<Surfel> surfels = sample(write("cube.ply", cubePly(false)), options);
+  EXPECT_EQ(surfels.size(), 2400u);
+  for (const Surfel& surfel : surfels) EXPECT_NEAR(surfel.area, 0.0025f, 1e-6f);
+}
+
+TEST_F(Sampling, FewSurfelsOnManyTrianglesKeepTheArea) {
+  const std::string grid = write("grid.ply", gridPly(50));
+  SampleOptions options;
+  options.count = 317;
+  const std::vector<Surfel> surfels = sample(grid, options);
+  EXPECT_EQ(surfels.size(), 317u);
+  EXPECT_NEAR(totalArea(surfels) / stats_.area, 1, 1e-5);
+  for (const Surfel& surfel : surfels) {
+    EXPECT_LT(double(surfel.area), 2.1 * stats_.spacing * stats_.spacing);
+    EXPECT_LE(double(surfel.radius), 2.001 * stats_.spacing);
+  }
+}
+
+TEST_F(Sampling, DisksLeaveNoHoles) {
+  const std::string cube = write("cube.ply", cubePly(false));
+  const std::string grid = write("grid.ply", gridPly(30));
+  SampleOptions options;
+  options.count = 5000;  // more than triangles: the pieces' own circles
+  EXPECT_EQ(holes(cube, sample(cube, options), 2000), 0);
+  EXPECT_EQ(holes(grid, sample(grid, options), 2000), 0);
+  options.count = 1000;  // fewer than triangles: widened over those without surfels
+  EXPECT_LE(holes(grid, sample(grid, options), 2000), 2);  // where the curve jumps
+}
+
+TEST_F(Sampling, RadiusIsBoundedOnSlivers) {
+  // A fan of needles 10 long and 0.001 wide
+  std::vector<glm::vec3> vertices = {{0, 0, 0}};
+  std::vector<std::vector<int>> faces;
+  for (int i = 0; i <= 100; ++i) vertices.emplace_back(10.0f, 0.001f * float(i), 0.0f);
+  for (int i = 1; i <= 100; ++i) faces.push_back({0, i, i + 1});
+  SampleOptions options;
+  options.count = 200;
+  const std::vector<Surfel> surfels = sample(write("fan.ply", plyText(vertices, faces)), options);
+  EXPECT_GT(stats_.sliver_surfels, 0u);
+  EXPECT_NEAR(totalArea(surfels) / stats_.area, 1, 1e-5);
+  for (const Surfel& surfel : surfels) {
+    EXPECT_LE(double(surfel.radius), 1.5 * stats_.spacing);
+  }
+}
+
+TEST_F(Sampling, ThreadsDoNotChangeABit) {
+  const std::string grid = write("grid.ply", gridPly(40));
+  SampleOptions options;
+  options.count = 30000;
+  options.surroundings.ground.enabled = true;
+  options.surroundings.lights.areas.push_back(
+      {{0.5f, 2, 0.5f}, {0.5f, 0, 0}, {0, 0, 0.5f}, glm::vec3(3)});
+  std::string bytes;
+  for (const int threads : {1, 2, 5}) {
+    options.threads = threads;
+    sample(grid, options);
+    const std::string now = read(path("out.ply"));
+    EXPECT_TRUE(bytes.empty() || bytes == now) << threads << " threads";
+    bytes = now;
+  }
+}
+
+TEST_F(Sampling, RadiosityIsAlbedoTimesIrradiance) {
+  SampleOptions options;
+  options.count = 2000;
+  options.surroundings.default_albedo = {0.2f, 0.5f, 0.8f};
+  options.surroundings.lights.points.push_back({{0, 3, 0}, glm::vec3(10)});
+  for (const Surfel& surfel : sample(write("floor.ply", floorPly(4)), options)) {
+    const glm::vec3 towards = glm::vec3(0, 3, 0) - surfel.position;
+    const float irradiance = 10 * 3 / std::pow(glm::length(towards), 3.0f);
+    ASSERT_NEAR(surfel.radiosity.x, 0.2f * irradiance, 1e-5f);
+    ASSERT_NEAR(surfel.radiosity.z, 0.8f * irradiance, 1e-5f);
+    ASSERT_EQ(surfel.albedo, options.surroundings.default_albedo);
+    ASSERT_NEAR(glm::distance(surfel.normal, glm::vec3(0, 1, 0)), 0, 1e-6f);
+  }
+}
+
+TEST_F(Sampling, WithoutLightThereIsNoRadiosity) {
+  SampleOptions options;
+  options.count = 100;
+  sample(write("floor.ply", floorPly(4)), options);
+  EXPECT_EQ(read(path("out.ply")).find("radiosity_r"), std::string::npos);
+  ASSERT_EQ(notes_.notes.size(), 1u);
+  EXPECT_THAT(notes_.notes[0], HasSubstr("no light"));
+}
+
+TEST_F(Sampling, BadOptionsAreRefusedAndLeaveNothing) {
+  const std::string floor = write("floor.ply", floorPly(4));
+  const auto code = [&](const SampleOptions& options) {
+    return sampleMeshes({floor}, path("out.ply"), options, notes_).status().code();
+  };
+  SampleOptions options;
+  options.count = 0;
+  EXPECT_EQ(code(options), StatusCode::kInvalidArgument);
+  options = {};
+  options.spacing = -1;
+  EXPECT_EQ(code(options), StatusCode::kInvalidArgument);
+  options.spacing = 1e-9;
+  EXPECT_EQ(code(options), StatusCode::kInvalidArgument);
+  options = {};
+  options.surroundings.lights.areas.emplace_back();
+  EXPECT_EQ(code(options), StatusCode::kInvalidArgument);
+  options = {};
+  options.surroundings.lights.directionals.push_back({{0, 0, 0}, glm::vec3(1)});
+  EXPECT_EQ(code(options), StatusCode::kInvalidArgument);
+  options = {};
+  options.surroundings.lights.points.push_back({{0, INFINITY, 0}, glm::vec3(1)});
+  EXPECT_EQ(code(options), StatusCode::kInvalidArgument);
+  EXPECT_FALSE(std::filesystem::exists(path("out.ply")));
+}
+
+class CancelAfterAWhile : public Progress {
+ public:
+  void advance(std::uint64_t count) override { done_ += count; }
+  bool isCancelled() const override { return done_ > 10000; }
+
+ private:
+  std::atomic<std::uint64_t> done_ = 0;
+};
+
+TEST_F(Sampling, CancelledWorkLeavesNothing) {
+  CancelAfterAWhile progress;
+  const Result<SampleStats> stats =
+      sampleMeshes({write("floor.ply", floorPly(4))}, path("out.ply"), SampleOptions{}, progress);
+  EXPECT_EQ(stats.status().code(), StatusCode::kInterrupted);
+  EXPECT_FALSE(std::filesystem::exists(path("out.ply")));
+}
+
+}  // namespace
+}  // namespace surfeit

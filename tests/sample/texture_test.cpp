@@ -1,0 +1,45 @@
+#include "sample/texture.h"
+
+#include <cmath>
+
+#include "sample/scene_files.h"
+
+namespace surfeit {
+namespace {
+
+TEST(Srgb, KnownValues) {
+  EXPECT_EQ(linearFromSrgb8(0), 0);
+  EXPECT_FLOAT_EQ(linearFromSrgb8(255), 1);
+  EXPECT_NEAR(linearFromSrgb8(128), 0.2158605f, 1e-6f);
+  EXPECT_NEAR(linearFromSrgb8(10), 10 / 255.0f / 12.92f, 1e-7f);
+}
+
+TEST(Texture, TexelCentresGiveTexelsWithTheOriginAtTheBottomLeft) {
+  // Top row red, green; bottom row blue, white
+  const Texture texture(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255});
+  EXPECT_EQ(texture.lookup({0.25f, 0.75f}), glm::vec3(1, 0, 0));
+  EXPECT_EQ(texture.lookup({0.75f, 0.75f}), glm::vec3(0, 1, 0));
+  EXPECT_EQ(texture.lookup({0.25f, 0.25f}), glm::vec3(0, 0, 1));
+  EXPECT_EQ(texture.lookup({0.75f, 0.25f}), glm::vec3(1, 1, 1));
+}
+
+TEST(Texture, BlendsInLinearLightAndRepeats) {
+  const Texture texture(2, 1, {0, 0, 0, 255, 255, 255});
+  EXPECT_NEAR(texture.lookup({0.5f, 0.5f}).x, 0.5f, 1e-6f);
+  EXPECT_NEAR(texture.lookup({0.0f, 0.5f}).x, 0.5f, 1e-6f);  // between the last and the first
+  EXPECT_NEAR(texture.lookup({-3.25f, 7.5f}).x, 1, 1e-6f);
+  EXPECT_TRUE(std::isfinite(texture.lookup({1e30f, -1e30f}).x));
+  EXPECT_TRUE(std::isfinite(texture.lookup({NAN, INFINITY}).x));
+}
+
+using TextureFiles = SceneFiles;
+
+TEST_F(TextureFiles, MissingIsAnIoErrorAndGarbageIsCorruption) {
+  EXPECT_EQ(Texture::load(path("none.png")).status().code(), StatusCode::kIoError);
+  const Result<Texture> garbage = Texture::load(write("garbage.png", "not a picture"));
+  EXPECT_EQ(garbage.status().code(), StatusCode::kCorruption);
+  EXPECT_NE(garbage.status().message().find("garbage.png"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace surfeit

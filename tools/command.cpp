@@ -1,0 +1,170 @@
+#include "tools/command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <limits>
+#include <new>
+
+#include "core/job_limits.h"
+#include "io/file.h"
+
+namespace surfeit {
+namespace {
+
+constexpr int kStatsVersion = 1;
+constexpr int kMostThreads = 4096;
+
+ConsoleProgress::Style progressStyle(const CommonOptions& common) {
+  using Style = ConsoleProgress::Style;
+  if (common.quiet || common.progress == "none") return Style::kNone;
+  if (common.progress == "percent") return Style::kPercent;
+  if (common.progress == "json") return Style::kJson;
+  if (common.progress == "bar") return Style::kBar;
+  return isatty(STDERR_FILENO) ? Style::kBar : Style::kNone;
+}
+
+}  // namespace
+
+CommandContext::CommandContext() : start_(std::chrono::steady_clock::now()) {}
+CommandContext::~CommandContext() = default;
+
+void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& set) {
+  constexpr const char* kGroup = "Common";
+  if (set.threads) {
+    command.add_option("--threads", common.threads, "Threads (default: what the job may use)")
+        ->check(CLI::Range(1, kMostThreads))
+        ->group(kGroup);
+  }
+  if (set.memory) {
+    addByteSizeOption(command, "--memory", common.memory_bytes,
+                      "Memory budget of the process, such as 512M or 2G")
+        ->group(kGroup);
+  }
+  if (set.stats) {
+    command.add_option("--stats", common.stats_path, "Write statistics to this JSON file")
+        ->group(kGroup);
+  }
+  command.add_option("--progress", common.progress, "auto, bar, percent, json or none")
+      ->check(CLI::IsMember({"auto", "bar", "percent", "json", "none"}))
+      ->group(kGroup);
+  command.add_flag("-q,--quiet", common.quiet, "Say nothing but errors")->group(kGroup);
+  command.add_flag("-v,--verbose", common.verbose, "Say more")->group(kGroup);
+}
+
+void CommandContext::run(const std::function<Status()>& body) {
+  Status status;
+  progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet);
+  try {
+    status = body();
+  } catch (const std::bad_alloc&) {
+    status = Status::failed("out of memory; give the job more, or --memory a smaller budget");
+  } catch (const CLI::Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    status = Status::failed(error.what());
+  }
+  progress_->clear();
+  if (status.ok()) return;
+  fmt::print(stderr, "surfeit: {}\n", status.message());
+  exit_status = exitStatus(status.code());
+  if (status.code() == StatusCode::kInterrupted && ConsoleProgress::cancelSignal() != 0) {
+    exit_status = 128 + ConsoleProgress::cancelSignal();
+  }
+}
+
+Progress& CommandContext::progress() { return *progress_; }
+
+void CommandContext::say(const std::string& line) {
+  if (common.quiet) return;
+  progress_->clear();
+  fmt::print(stderr, "{}\n", line);
+}
+
+Status CommandContext::writeStats(nlohmann::json fields) {
+  if (common.stats_path.empty()) return {};
+  fields["stats_version"] = kStatsVersion;
+  fields["wall_seconds"] = wallSeconds();
+  fields["cpu_seconds"] = processCpuSeconds();
+  fields["peak_resident_bytes"] = peakResidentBytes();
+  fields["threads"] = threads();
+  const std::string text = fields.dump(2) + "\n";
+  SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(common.stats_path));
+  SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
+  return file.commit();
+}
+
+double CommandContext::wallSeconds() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+int CommandContext::threads() const {
+  return common.threads > 0 ? common.threads : defaultThreadCount();
+}
+
+Result<std::uint64_t> parseByteSize(const std::string& text) {
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [unit_begin, error] = std::from_chars(text.data(), end, value);
+  std::string unit(unit_begin, end);
+  for (char& c : unit) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  if (unit.size() > 1 && unit.ends_with("IB")) unit.resize(unit.size() - 2);
+  if (unit.size() > 1 && unit.ends_with("B")) unit.resize(unit.size() - 1);
+  const std::string_view units = "BKMGT";
+  const std::size_t power = unit.empty() ? 0 : units.find(unit);
+  const double bytes = std::ldexp(value, static_cast<int>(10 * std::min<std::size_t>(power, 6)));
+  if (error != std::errc() || unit.size() > 1 || power == std::string_view::npos || !(bytes >= 1) ||
+      bytes > 1e18) {
+    return Status::invalidArgument(
+        fmt::format("found \"{}\", expected a size such as 512M, 2G or 1048576", text));
+  }
+  return static_cast<std::uint64_t>(bytes);
+}
+
+std::string formatBytes(std::uint64_t bytes) {
+  constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
+  double value = double(bytes);
+  std::size_t unit = 0;
+  while (value >= 1024 && unit + 1 < std::size(kUnits)) {
+    value /= 1024;
+    ++unit;
+  }
+  return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.1f} {}", value, kUnits[unit]);
+}
+
+std::string formatCount(std::uint64_t count) {
+  std::string text = std::to_string(count);
+  for (std::ptrdiff_t at = std::ssize(text) - 3; at > 0; at -= 3) {
+    text.insert(static_cast<std::size_t>(at), ",");
+  }
+  return text;
+}
+
+CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,
+                               const std::string& help) {
+  const auto parse = [names, &target](const std::string& text) {
+    const Result<std::uint64_t> bytes = parseByteSize(text);
+    if (!bytes.ok()) throw CLI::ValidationError(names, bytes.status().message());
+    target = *bytes;
+  };
+  return command.add_option_function<std::string>(names, parse, help)->type_name("SIZE");
+}
+
+int exitStatus(StatusCode code) {
+  switch (code) {
+    case StatusCode::kOk: return 0;
+    case StatusCode::kInvalidArgument: return 2;
+    case StatusCode::kCorruption: return 3;
+    case StatusCode::kBudgetTooSmall: return 33;
+    case StatusCode::kIoError: return 74;
+    case StatusCode::kInterrupted: return 130;
+    case StatusCode::kFailed: return 1;
+  }
+  return 1;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,92 @@
+// What every subcommand of the program shares: common options, progress, statistics, messages and
+// exit status. Each subcommand lives in <name>_command.cpp and is thin over the library.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+#include "tools/console_progress.h"
+
+namespace surfeit {
+
+// The options that mean the same everywhere.
+struct CommonOptions {
+  int threads = 0;                 // 0: all that the job may use
+  std::uint64_t memory_bytes = 0;  // 0: the command's default
+  std::string stats_path;          // empty: no statistics file
+  std::string progress = "auto";   // auto, bar, percent, json or none
+  bool quiet = false;
+  bool verbose = false;
+};
+
+// Which common options a command takes beside --quiet, --verbose and --progress.
+struct CommonOptionSet {
+  bool threads = true;
+  bool memory = true;
+  bool stats = true;
+};
+
+class CommandContext {
+ public:
+  CommandContext();
+  ~CommandContext();
+
+  CommonOptions common;
+  int exit_status = 0;
+
+  void addCommonOptions(CLI::App& command, const CommonOptionSet& set = {});
+
+  // Runs a command's body; a failure is told in one line on stderr and becomes the exit status.
+  // Call from the subcommand's callback.
+  void run(const std::function<Status()>& body);
+
+  // Progress of the running command; cancelled by SIGINT and SIGTERM.
+  Progress& progress();
+
+  // A line for people, on stderr; not with --quiet.
+  void say(const std::string& line);
+
+  // Adds the fields that all statistics have (docs/stats.md) and writes the file of --stats.
+  Status writeStats(nlohmann::json fields);
+
+  // Wall seconds since the command began.
+  double wallSeconds() const;
+
+  // Threads the command works with.
+  int threads() const;
+
+ private:
+  std::unique_ptr<ConsoleProgress> progress_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+// "512M", "2G", "1.5GiB", "4096": bytes; units are powers of 1024.
+Result<std::uint64_t> parseByteSize(const std::string& text);
+// "1.5 GiB"
+std::string formatBytes(std::uint64_t bytes);
+// "1,234,567"
+std::string formatCount(std::uint64_t count);
+
+// An option that takes a byte size.
+CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,
+                               const std::string& help);
+
+// Exit status of a failure (DESIGN.md 7): 2 usage, 3 bad data, 33 budget, 74 I/O, 130 interrupted.
+int exitStatus(StatusCode code);
+
+// The subcommands, one file each.
+void addSampleCommand(CLI::App& app, CommandContext& context);
+void addIndexCommand(CLI::App& app, CommandContext& context);
+void addInfoCommand(CLI::App& app, CommandContext& context);
+void addVerifyCommand(CLI::App& app, CommandContext& context);
+void addGatherCommand(CLI::App& app, CommandContext& context);
+void addViewCommand(CLI::App& app, CommandContext& context);
+
+}  // namespace surfeit

@@ -1,0 +1,117 @@
+#include "tools/console_progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace surfeit {
+namespace {
+
+constexpr std::int64_t kDrawIntervalNs = 200'000'000;
+
+volatile std::sig_atomic_t g_cancel_signal = 0;
+
+extern "C" void onCancelSignal(int signal) {
+  if (g_cancel_signal != 0) _exit(128 + signal);
+  g_cancel_signal = signal;
+}
+
+std::int64_t nowNs() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+// "1.2 M/s"
+std::string formatRate(double per_second) {
+  if (per_second >= 1e6) return fmt::format("{:.1f} M/s", per_second / 1e6);
+  if (per_second >= 1e3) return fmt::format("{:.1f} k/s", per_second / 1e3);
+  return fmt::format("{:.1f} /s", per_second);
+}
+
+std::string formatSeconds(double seconds) {
+  const auto whole = static_cast<std::uint64_t>(std::max(seconds, 0.0));
+  return whole < 60 ? fmt::format("{} s", whole)
+                    : fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+}  // namespace
+
+ConsoleProgress::ConsoleProgress(Style style, bool quiet) : style_(style), quiet_(quiet) {
+  struct sigaction action {};
+  action.sa_handler = onCancelSignal;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+ConsoleProgress::~ConsoleProgress() { clear(); }
+
+int ConsoleProgress::cancelSignal() { return g_cancel_signal; }
+bool ConsoleProgress::isCancelled() const { return g_cancel_signal != 0; }
+
+void ConsoleProgress::beginPhase(std::string_view name, std::uint64_t total,
+                                 std::string_view unit) {
+  const std::lock_guard lock(mutex_);
+  phase_ = name;
+  unit_ = unit;
+  total_ = total;
+  done_ = 0;
+  last_percent_ = -1;
+  phase_start_ = std::chrono::steady_clock::now();
+  next_draw_ns_ = nowNs() + kDrawIntervalNs;
+}
+
+void ConsoleProgress::advance(std::uint64_t count) {
+  done_ += count;
+  if (style_ == Style::kNone) return;
+  std::int64_t due = next_draw_ns_;
+  const std::int64_t now = nowNs();
+  // One thread draws, the others go on
+  if (now < due || !next_draw_ns_.compare_exchange_strong(due, now + kDrawIntervalNs)) return;
+  const std::lock_guard lock(mutex_);
+  draw();
+}
+
+void ConsoleProgress::draw() {
+  const std::uint64_t done = done_;
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - phase_start_).count();
+  const double rate = seconds > 0 ? double(done) / seconds : 0;
+  const double part = total_ > 0 ? std::min(1.0, double(done) / double(total_)) : 0;
+  const double left = rate > 0 && total_ > done ? double(total_ - done) / rate : 0;
+  const int percent = static_cast<int>(part * 100);
+  if (style_ == Style::kBar) {
+    const auto filled = static_cast<std::size_t>(part * 30);
+    fmt::print(stderr, "\r\x1b[K{:>8} [{}{}] {:3}%  {} {}  {} left", phase_,
+               std::string(filled, '#'), std::string(30 - filled, '.'), percent, formatRate(rate),
+               unit_, formatSeconds(left));
+    bar_shown_ = true;
+  } else if (style_ == Style::kPercent) {
+    if (percent == last_percent_) return;
+    fmt::print(stderr, "{} {}% {} {}, {} left\n", phase_, percent, formatRate(rate), unit_,
+               formatSeconds(left));
+  } else if (style_ == Style::kJson) {
+    const nlohmann::json line = {{"phase", phase_},      {"done", done},
+                                 {"total", total_},      {"unit", unit_},
+                                 {"per_second", rate},   {"seconds_left", left}};
+    fmt::print(stderr, "{}\n", line.dump());
+  }
+  last_percent_ = percent;
+  std::fflush(stderr);
+}
+
+void ConsoleProgress::note(const std::string& message) {
+  if (quiet_) return;
+  clear();
+  fmt::print(stderr, "surfeit: {}\n", message);
+}
+
+void ConsoleProgress::clear() {
+  const std::lock_guard lock(mutex_);
+  if (bar_shown_) fmt::print(stderr, "\r\x1b[K");
+  bar_shown_ = false;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,90 @@
+// surfeit index: surfel clouds to a paged octree file.
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/job_limits.h"
+#include "surfeit/index.h"
+#include "tools/command.h"
+
+namespace surfeit {
+namespace {
+
+struct IndexArguments {
+  std::vector<std::string> inputs;
+  std::string output;
+  std::string precision = "quantized";
+  IndexOptions options;
+};
+
+Status runIndex(IndexArguments& arguments, CommandContext& context) {
+  IndexOptions& options = arguments.options;
+  options.threads = context.threads();
+  options.full_precision = arguments.precision == "full";
+  if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
+                                                               options, context.progress()));
+  const double seconds = context.wallSeconds();
+  const double bytes_per_surfel = double(stats.file_bytes) / double(stats.surfels);
+  context.say(fmt::format(
+      "{}: {} surfels, {} nodes, {} pages, {} ({:.1f} bytes per surfel)\n"
+      "{:.1f} s, {:.2f} M surfels/s, peak memory {}, temporary files {}",
+      arguments.output, formatCount(stats.surfels), formatCount(stats.nodes),
+      formatCount(std::uint64_t{stats.node_pages} + stats.surfel_pages),
+      formatBytes(stats.file_bytes), bytes_per_surfel, seconds,
+      double(stats.surfels) / seconds / 1e6, formatBytes(peakResidentBytes()),
+      formatBytes(stats.temporary_bytes)));
+  nlohmann::json phases = nlohmann::json::object();
+  for (const auto& [phase, phase_seconds] : stats.phase_seconds) phases[phase] = phase_seconds;
+  return context.writeStats({{"command", "index"},
+                             {"memory_bytes", options.memory_bytes},
+                             {"surfels", stats.surfels},
+                             {"skipped_records", stats.skipped_records},
+                             {"nodes", stats.nodes},
+                             {"node_pages", stats.node_pages},
+                             {"surfel_pages", stats.surfel_pages},
+                             {"file_bytes", stats.file_bytes},
+                             {"bytes_per_surfel", bytes_per_surfel},
+                             {"temporary_bytes", stats.temporary_bytes},
+                             {"surfels_per_second", double(stats.surfels) / seconds},
+                             {"phases", phases}});
+}
+
+}  // namespace
+
+void addIndexCommand(CLI::App& app, CommandContext& context) {
+  CLI::App* command =
+      app.add_subcommand("index", "Build a paged octree file (.sft) from surfel clouds");
+  const auto arguments = std::make_shared<IndexArguments>();
+  IndexOptions& options = arguments->options;
+  command->add_option("CLOUD", arguments->inputs, "Surfel clouds (PLY), in any order")->required();
+  command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
+  command
+      ->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+  command
+      ->add_option("--overlap", options.overlap,
+                   "Disk area over surfel area, where radius or area is missing")
+      ->check(CLI::Range(1.0, 16.0))
+      ->capture_default_str();
+  command->add_option("--precision", arguments->precision, "quantized, or full (floats)")
+      ->check(CLI::IsMember({"quantized", "full"}))
+      ->capture_default_str();
+  command->add_option("--temp", options.temporary_directory,
+                      "Directory of temporary files (default: beside the output)");
+  command->add_flag("--strict", options.strict, "Refuse invalid records instead of skipping them");
+  context.addCommonOptions(*command);
+  command->footer(
+      "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the overlap;\n"
+      "no radius, the distance to the neighbours; no normal, a sphere. --memory defaults to 1G.\n"
+      "Examples:\n"
+      "  surfeit index lion.ply -o lion.sft\n"
+      "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch");
+  command->callback(
+      [arguments, &context] { context.run([&] { return runIndex(*arguments, context); }); });
+}
+
+}  // namespace surfeit

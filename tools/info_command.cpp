@@ -1,0 +1,175 @@
+// surfeit info: what a scene file or a cloud says about itself.
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/bounds.h"
+#include "io/file.h"
+#include "io/ply_reader.h"
+#include "io/surfel_source.h"
+#include "surfeit/scene.h"
+#include "tools/command.h"
+
+namespace surfeit {
+namespace {
+
+struct InfoArguments {
+  std::string path;
+  bool json = false;
+};
+
+nlohmann::json vectorJson(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+
+std::vector<std::string> channelNames(const CloudChannels& channels) {
+  std::vector<std::string> names = {"position"};
+  if (channels.normal) names.emplace_back("normal");
+  if (channels.radius) names.emplace_back("radius");
+  if (channels.area) names.emplace_back("area");
+  if (channels.radiosity) names.emplace_back("radiosity");
+  if (channels.albedo) names.emplace_back("albedo");
+  if (channels.two_sided) names.emplace_back("two_sided");
+  return names;
+}
+
+nlohmann::json sceneJson(const SceneInfo& info) {
+  nlohmann::json json = {
+      {"format", "sft"},
+      {"file_bytes", info.file_bytes},
+      {"bytes_per_surfel", double(info.file_bytes) / double(info.surfels)},
+      {"surfels", info.surfels},
+      {"nodes", info.nodes},
+      {"leaf_capacity", info.leaf_capacity},
+      {"precision", info.full_precision ? "full" : "quantized"},
+      {"input_channels", channelNames(info.channels)},
+      {"bounds", {vectorJson(info.min), vectorJson(info.max)}},
+      {"node_pages", info.node_pages},
+      {"node_page_bytes", info.node_page_bytes},
+      {"node_decoded_bytes", info.node_cache_bytes},
+      {"surfel_pages", info.surfel_pages},
+      {"surfel_page_bytes", info.surfel_page_bytes},
+      {"surfel_decoded_bytes", info.surfel_cache_bytes},
+      {"node_pages_by_level", info.level_pages},
+  };
+  json["provenance"] = nlohmann::json::parse(info.provenance, nullptr, false);
+  return json;
+}
+
+std::string sceneText(const std::string& path, const SceneInfo& info) {
+  return fmt::format(
+      "{}: Surfeit scene, {} surfels, {} nodes\n"
+      "  file           {} ({:.1f} bytes per surfel)\n"
+      "  bounds         {:g} {:g} {:g} .. {:g} {:g} {:g}\n"
+      "  input had      {}\n"
+      "  precision      {}\n"
+      "  node pages     {} in {}, decoded {}\n"
+      "  surfel pages   {} in {}, decoded {}\n"
+      "  provenance     {}",
+      path, formatCount(info.surfels), formatCount(info.nodes), formatBytes(info.file_bytes),
+      double(info.file_bytes) / double(info.surfels), info.min.x, info.min.y, info.min.z,
+      info.max.x, info.max.y, info.max.z, fmt::join(channelNames(info.channels), ", "),
+      info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
+      formatBytes(info.node_page_bytes), formatBytes(info.node_cache_bytes),
+      formatCount(info.surfel_pages), formatBytes(info.surfel_page_bytes),
+      formatBytes(info.surfel_cache_bytes), info.provenance);
+}
+
+// Any PLY: elements and properties; bounds when the records are surfels.
+Result<nlohmann::json> plyJson(const std::string& path, Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(const PlyReader reader, PlyReader::open(path));
+  nlohmann::json json = {{"format", "ply"}, {"elements", nlohmann::json::array()}};
+  for (const PlyElement& element : reader.header().elements) {
+    nlohmann::json properties = nlohmann::json::array();
+    for (const PlyProperty& property : element.properties) {
+      properties.push_back(std::string(property.is_list ? "list " : "") +
+                           std::string(plyTypeName(property.type)) + " " + property.name);
+    }
+    json["elements"].push_back(
+        {{"name", element.name}, {"count", element.count}, {"properties", properties}});
+  }
+  Result<std::unique_ptr<SurfelSource>> source = openSurfelSource(path, /* strict= */ false);
+  if (!source.ok()) return json;  // a PLY without surfels is still a PLY
+  Bounds3 bounds;
+  std::uint64_t surfels = 0;
+  std::vector<Surfel> batch(16384);
+  progress.beginPhase("scan", (*source)->recordCount(), "surfels");
+  for (;;) {
+    if (progress.isCancelled()) return Status::interrupted();
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, (*source)->read(batch));
+    if (count == 0) break;
+    for (const Surfel& surfel : std::span(batch).first(count)) bounds.add(surfel.position);
+    surfels += count;
+    progress.advance(count);
+  }
+  json["surfels"] = surfels;
+  json["input_channels"] = channelNames((*source)->channels());
+  if (!bounds.isEmpty()) json["bounds"] = {vectorJson(bounds.min), vectorJson(bounds.max)};
+  const std::string defects = (*source)->defects().describe();
+  if (!defects.empty()) json["defects"] = defects;
+  return json;
+}
+
+std::string plyText(const std::string& path, const nlohmann::json& json) {
+  std::string text = fmt::format("{}: PLY", path);
+  for (const nlohmann::json& element : json["elements"]) {
+    std::string properties;
+    for (const nlohmann::json& property : element["properties"]) {
+      properties += (properties.empty() ? "" : ", ") + property.get<std::string>();
+    }
+    text += fmt::format("\n  {:14} {}: {}", element["name"].get<std::string>(),
+                        formatCount(element["count"].get<std::uint64_t>()), properties);
+  }
+  if (json.contains("bounds")) {
+    text += fmt::format("\n  surfels        {}, bounds {}",
+                        formatCount(json["surfels"].get<std::uint64_t>()), json["bounds"].dump());
+  }
+  if (json.contains("defects")) text += "\n  defects        " + json["defects"].get<std::string>();
+  return text;
+}
+
+Result<bool> startsWithPly(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+  std::byte magic[3] = {};
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, file.readSome(0, magic));
+  return got == 3 && magic[0] == std::byte{'p'} && magic[1] == std::byte{'l'} &&
+         magic[2] == std::byte{'y'};
+}
+
+Status runInfo(const InfoArguments& arguments, CommandContext& context) {
+  SURFEIT_ASSIGN_OR_RETURN(const bool is_ply, startsWithPly(arguments.path));
+  nlohmann::json json;
+  std::string text;
+  if (is_ply) {
+    SURFEIT_ASSIGN_OR_RETURN(json, plyJson(arguments.path, context.progress()));
+    text = plyText(arguments.path, json);
+  } else {
+    SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.path));
+    json = sceneJson(info);
+    text = sceneText(arguments.path, info);
+  }
+  json["path"] = arguments.path;
+  if (arguments.json) {
+    fmt::print("{}\n", json.dump(2));
+  } else {
+    context.say(text);
+  }
+  return {};
+}
+
+}  // namespace
+
+void addInfoCommand(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("info", "Tell what a scene file or a cloud holds");
+  const auto arguments = std::make_shared<InfoArguments>();
+  command->add_option("FILE", arguments->path, "Scene file (.sft) or cloud (.ply)")->required();
+  command->add_flag("--json", arguments->json, "JSON on standard output");
+  context.addCommonOptions(*command, {.threads = false, .memory = false, .stats = false});
+  command->footer(
+      "Example:\n"
+      "  surfeit info lion.sft --json");
+  command->callback(
+      [arguments, &context] { context.run([&] { return runInfo(*arguments, context); }); });
+}
+
+}  // namespace surfeit

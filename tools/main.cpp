@@ -1,0 +1,52 @@
+// The program: one subcommand a file, parsed by CLI11.
+#include <malloc.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "surfeit/version.h"
+#include "tools/command.h"
+#include "tools/suggestion.h"
+
+namespace surfeit {
+namespace {
+
+void addCommands(CLI::App& app, CommandContext& context) {
+  addSampleCommand(app, context);
+  addIndexCommand(app, context);
+  addInfoCommand(app, context);
+  addVerifyCommand(app, context);
+  addGatherCommand(app, context);
+  addViewCommand(app, context);
+}
+
+int parseAndRun(int argc, char** argv) {
+  CommandContext context;
+  CLI::App app("Surfeit: gathers over huge surfel clouds inside a memory budget", "surfeit");
+  app.set_version_flag("--version", std::string("surfeit ") + kVersion);
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(36);
+  addCommands(app, context);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    return app.exit(success);  // --help and --version
+  } catch (const CLI::ParseError& error) {
+    const std::string suggestion = suggestOption(app, std::vector<std::string>(argv + 1, argv + argc));
+    std::fprintf(stderr, "surfeit: %s%s\n", error.what(), suggestion.c_str());
+    return exitStatus(StatusCode::kInvalidArgument);
+  }
+  return context.exit_status;
+}
+
+}  // namespace
+}  // namespace surfeit
+
+int main(int argc, char** argv) {
+  // Few arenas, and large buffers given back when freed: the memory budget counts what is in use
+  mallopt(M_ARENA_MAX, 2);
+  mallopt(M_MMAP_THRESHOLD, 256 << 10);
+  return surfeit::parseAndRun(argc, argv);
+}

@@ -1,0 +1,125 @@
+#include "tools/sample_options.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "tools/number_list.h"
+
+namespace surfeit {
+namespace {
+
+template <std::size_t N>
+glm::vec3 vectorAt(const std::array<double, N>& numbers, std::size_t i) {
+  return {float(numbers[i]), float(numbers[i + 1]), float(numbers[i + 2])};
+}
+
+// Light cannot be taken away, and a surface reflects no more than it gets.
+glm::vec3 colorAt(const std::string& option, const glm::vec3& color, float max) {
+  for (int i = 0; i < 3; ++i) {
+    if (color[i] >= 0 && color[i] <= max) continue;
+    throw CLI::ValidationError(
+        option, fmt::format("color {} {} {}: expected values {}", color.x, color.y, color.z,
+                            max == 1 ? "from 0 to 1" : "of 0 or more"));
+  }
+  return color;
+}
+
+// A light option that may be given several times; each value has N numbers.
+template <std::size_t N, typename Add>
+void addLightOption(CLI::App& app, const std::string& name, const std::string& expected,
+                    const std::string& description, Add add) {
+  const auto parse = [name, expected, add](const std::vector<std::string>& values) {
+    for (const std::string& value : values)
+      add(parseNumberList<N>(name, value, "\"" + expected + "\""));
+    return true;
+  };
+  app.add_option(name, parse, description)
+      ->type_name("\"" + expected + "\"")
+      ->type_size(1)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->group("Light");
+}
+
+constexpr float kNoLimit = 3e38f;
+
+}  // namespace
+
+void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
+  Lights& lights = surroundings.lights;
+  addLightOption<6>(app, "--light-point", "x y z r g b",
+                    "Point light: position, intensity in W/sr; repeatable",
+                    [&lights](const std::array<double, 6>& n) {
+                      lights.points.push_back(
+                          {vectorAt(n, 0), colorAt("--light-point", vectorAt(n, 3), kNoLimit)});
+                    });
+  addLightOption<6>(
+      app, "--light-directional", "dx dy dz r g b",
+      "Directional light: direction it travels in, irradiance facing it; repeatable",
+      [&lights](const std::array<double, 6>& n) {
+        lights.directionals.push_back(
+            {vectorAt(n, 0), colorAt("--light-directional", vectorAt(n, 3), kNoLimit)});
+      });
+  addLightOption<12>(
+      app, "--light-area", "cx cy cz ux uy uz vx vy vz r g b",
+      "Rectangle light: centre, half edges u and v, radiance; emits towards u x v; repeatable",
+      [&lights](const std::array<double, 12>& n) {
+        lights.areas.push_back({vectorAt(n, 0), vectorAt(n, 3), vectorAt(n, 6),
+                                colorAt("--light-area", vectorAt(n, 9), kNoLimit)});
+      });
+  app.add_option("--light-samples", lights.samples,
+                 "Shadow rays per rectangle light, and for all emissive triangles")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 65536))
+      ->group("Light");
+
+  const auto color = [](const std::string& name, glm::vec3& target) {
+    return [name, &target](const std::string& value) {
+      target = colorAt(name, vectorAt(parseNumberList<3>(name, value, "\"r g b\""), 0), 1);
+    };
+  };
+  app.add_option_function<std::string>("--albedo", color("--albedo", surroundings.default_albedo),
+                                       "Reflectance of meshes without colors and materials "
+                                       "[\"0.5 0.5 0.5\"]")
+      ->type_name("\"r g b\"");
+
+  GroundPlane& ground = surroundings.ground;
+  app.add_flag("--ground-plane", ground.enabled, "Add a square below everything")->group("Ground");
+  app.add_option("--ground-size", ground.size, "Edge of the ground over the scene's diagonal")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber)
+      ->group("Ground");
+  app.add_option_function<std::string>("--ground-albedo", color("--ground-albedo", ground.albedo),
+                                       "Reflectance of the ground [\"0.5 0.5 0.5\"]")
+      ->type_name("\"r g b\"")
+      ->group("Ground");
+  app.add_option_function<std::string>(
+         "--up", [&ground](const std::string& axis) { ground.up_axis = int(axis[0] - 'x'); },
+         "Axis that points up: x, y or z [y]")
+      ->check(CLI::IsMember({"x", "y", "z"}))
+      ->type_name("AXIS")
+      ->group("Ground");
+}
+
+void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
+  app.add_option("MESH", arguments.meshes, "Triangle meshes: PLY, or OBJ with MTL")->required();
+  app.add_option("-o,--output", arguments.output, "The cloud to write (PLY)")
+      ->required()
+      ->type_name("CLOUD");
+  CLI::Option* const count =
+      app.add_option("--count", arguments.options.count,
+                     "Surfels, shared out by area; long thin triangles add some")
+          ->capture_default_str()
+          ->check(CLI::PositiveNumber);
+  app.add_option("--spacing", arguments.options.spacing,
+                 "Distance between surfels in scene units, instead of a count")
+      ->check(CLI::PositiveNumber)
+      ->excludes(count);
+  addSurroundingsOptions(app, arguments.options.surroundings);
+}
+
+}  // namespace surfeit

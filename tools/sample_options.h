@@ -1,0 +1,28 @@
+// Options of `surfeit sample`; those for what stands around the meshes are shared with the fidelity
+// bench.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "sample/sample.h"
+
+namespace surfeit {
+
+// Adds --light-*, --ground-* and --albedo; parsing fills `surroundings`, which must outlive `app`.
+// A malformed value is a usage error that names the option and what it expects.
+void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings);
+
+// What `surfeit sample` works on.
+struct SampleArguments {
+  std::vector<std::string> meshes;
+  std::string output;
+  SampleOptions options;
+};
+
+// Adds MESH..., -o, --count or --spacing, and the options above. Parsing fills `arguments`, which
+// must outlive `app`; threads are left to the program's own options.
+void addSampleOptions(CLI::App& app, SampleArguments& arguments);
+
+}  // namespace surfeit

@@ -1,0 +1,170 @@
+#include "tools/view_options.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tools/number_list.h"
+
+namespace surfeit {
+namespace {
+
+constexpr const char* kCameraGroup = "Camera";
+constexpr const char* kPictureGroup = "Picture";
+constexpr const char* kSurfelGroup = "Surfels";
+
+glm::dvec3 parseVector(const std::string& option, const std::string& text) {
+  const std::array<double, 3> v = parseNumberList<3>(option, text, "three numbers, \"x y z\"");
+  return {v[0], v[1], v[2]};
+}
+
+void addVector(CLI::App& app, const std::string& name, std::optional<glm::dvec3>& value,
+               const std::string& help) {
+  app.add_option_function<std::string>(
+         name, [&value, name](const std::string& text) { value = parseVector(name, text); }, help)
+      ->type_name("\"X Y Z\"")
+      ->group(kCameraGroup);
+}
+
+// An option whose value is one of a few words.
+template <typename Enum>
+CLI::Option* addChoice(CLI::App& app, const std::string& name, Enum& value,
+                       const std::vector<std::pair<std::string, Enum>>& choices,
+                       const std::string& help) {
+  return app.add_option_function<std::string>(
+      name,
+      [&value, name, choices](const std::string& text) {
+        std::string words;
+        for (const auto& [word, choice] : choices) {
+          if (word == text) {
+            value = choice;
+            return;
+          }
+          words += (words.empty() ? "" : ", ") + word;
+        }
+        throw CLI::ValidationError(name,
+                                   fmt::format("found \"{}\", expected one of {}", text, words));
+      },
+      help);
+}
+
+// "1280x960"
+void parseSize(const std::string& text, ViewOptions& options) {
+  const char* const end = text.data() + text.size();
+  int width = 0, height = 0;
+  auto [at, error] = std::from_chars(text.data(), end, width);
+  bool ok = error == std::errc() && at != end && (*at == 'x' || *at == 'X');
+  if (ok) {
+    const auto second = std::from_chars(at + 1, end, height);
+    ok = second.ec == std::errc() && second.ptr == end && width > 0 && height > 0;
+  }
+  if (!ok) {
+    throw CLI::ValidationError(
+        "--size", fmt::format("found \"{}\", expected WIDTHxHEIGHT, for example 1280x960", text));
+  }
+  options.width = width;
+  options.height = height;
+}
+
+void addCameraOptions(CLI::App& app, CameraOptions& camera) {
+  addVector(app, "--eye", camera.eye,
+            "Where the eye stands. Default: a three-quarter view that frames the cloud; strays "
+            "beyond three standard deviations may be cut off");
+  addVector(app, "--look-at", camera.look_at,
+            "What the eye looks at. Default: the centre of the cloud's bounds");
+  addVector(app, "--up", camera.up, "Direction that is up in the picture. Default: --up-axis");
+  addChoice<UpAxis>(app, "--up-axis", camera.up_axis,
+                    {{"x", UpAxis::kX}, {"y", UpAxis::kY}, {"z", UpAxis::kZ}},
+                    "Axis that is up: x, y or z (default y)")
+      ->type_name("AXIS")
+      ->group(kCameraGroup);
+  app.add_option("--fov", camera.fov_degrees, "Vertical field of view in degrees (default 35)")
+      ->type_name("DEGREES")
+      ->group(kCameraGroup);
+}
+
+void addSurfelOptions(CLI::App& app, ViewOptions& options) {
+  addChoice<ViewMode>(
+      app, "--mode", options.mode,
+      {{"discs", ViewMode::kDiscs}, {"points", ViewMode::kPoints}, {"normals", ViewMode::kNormals}},
+      "discs: each surfel as its disk, or as a sphere without a normal (default); "
+      "points: as a square; normals: disks colored by 0.5 n + 0.5")
+      ->type_name("MODE")
+      ->group(kSurfelGroup);
+  app.add_option("--channel", options.channel,
+                 "What to show: any property or triple (radiosity, irradiance, albedo, color, "
+                 "normal, position, ...), or lit = radiosity + albedo * irradiance, indirect = "
+                 "albedo * irradiance, ao = 1 - occlusion. Default: the first of lit, ao, "
+                 "radiosity, color, albedo, normal, position that the cloud has. Values that are "
+                 "not finite are magenta")
+      ->type_name("NAME")
+      ->group(kSurfelGroup);
+  app.add_option_function<std::string>(
+         "--range",
+         [&options](const std::string& text) {
+           const auto range = parseNumberList<2>("--range", text, "two numbers, \"black white\"");
+           options.range = glm::dvec2(range[0], range[1]);
+         },
+         "Value shown black and value shown white. Default: scalars other than occlusion are "
+         "stretched over the values they take, in PNG")
+      ->type_name("\"BLACK WHITE\"")
+      ->group(kSurfelGroup);
+  app.add_option("--radius", options.radius,
+                 "Radius of every surfel, scene units. Default: the cloud's own, else from the "
+                 "density of the cloud")
+      ->type_name("R")
+      ->check(CLI::PositiveNumber.description(""))
+      ->group(kSurfelGroup);
+  app.add_option("--radius-scale", options.radius_scale, "Multiplies every radius (default 1)")
+      ->type_name("FACTOR")
+      ->check(CLI::PositiveNumber.description(""))
+      ->group(kSurfelGroup);
+  app.add_option("--point-size", options.point_size,
+                 "Edge of a square in pixels, with --mode points (default 1)")
+      ->type_name("PIXELS")
+      ->check(CLI::PositiveNumber.description(""))
+      ->group(kSurfelGroup);
+  app.add_flag("--cull-back", options.cull_back, "Leave out disks that are seen from behind")
+      ->group(kSurfelGroup);
+}
+
+void addPictureOptions(CLI::App& app, ViewOptions& options) {
+  app.add_option_function<std::string>(
+         "--size", [&options](const std::string& text) { parseSize(text, options); },
+         "Pixels (default 1280x960)")
+      ->type_name("WxH")
+      ->group(kPictureGroup);
+  app.add_option("--samples", options.samples,
+                 "Samples along each edge of a pixel, averaged (default 2)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 8).description(""))
+      ->group(kPictureGroup);
+  app.add_option("--exposure", options.exposure,
+                 "Stops of exposure: PNG light is multiplied by 2^EV (default 0)")
+      ->type_name("EV")
+      ->group(kPictureGroup);
+  app.add_option_function<std::string>(
+         "--background",
+         [&options](const std::string& text) {
+           options.background = glm::vec3(parseVector("--background", text));
+         },
+         "Color behind the cloud in PNG, display values 0..1 (default \"0.13 0.13 0.13\"); EXR "
+         "has alpha instead")
+      ->type_name("\"R G B\"")
+      ->group(kPictureGroup);
+}
+
+}  // namespace
+
+void addViewOptions(CLI::App& app, ViewOptions& options) {
+  addCameraOptions(app, options.camera);
+  addSurfelOptions(app, options);
+  addPictureOptions(app, options);
+}
+
+}  // namespace surfeit
