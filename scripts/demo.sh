@@ -32,7 +32,9 @@ surfeit index out/cornell.ply -o out/cornell.sft --memory $memory --stats out/in
 surfeit info out/cornell.sft
 
 say "Placing $receivers receivers on the same surfaces"
-surfeit sample out/cornell.obj -o out/receivers.ply --count $receivers
+# With --emission the light itself shows in the picture; what is gathered from has no need of it
+surfeit sample out/cornell.obj -o out/receivers.ply --count $receivers --emission \
+  --light-samples 64
 
 say "Gathering ambient occlusion and color bleeding at every receiver, within $memory of memory"
 surfeit gather out/cornell.sft out/receivers.ply -o out/gathered.ply --mode bleeding \
@@ -41,7 +43,7 @@ cat out/gather.json
 
 say "Drawing the results"
 surfeit view out/gathered.ply -o out/ambient_occlusion.png --channel ao "${camera[@]}"
-surfeit view out/gathered.ply -o out/color_bleeding.png --channel lit "${camera[@]}"
+surfeit view out/gathered.ply -o out/color_bleeding.png --channel lit "${camera[@]}" --exposure -1
 
 say "Done. Ambient occlusion, and direct light with color bleeding:"
 echo "$PWD/out/ambient_occlusion.png"

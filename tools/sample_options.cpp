@@ -76,6 +76,10 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->capture_default_str()
       ->check(CLI::Range(1, 65536))
       ->group("Light");
+  app.add_flag("--emission", lights.with_emission,
+               "Emissive surfaces carry their emission; a gather from them then counts the light "
+               "that they bake into others once more")
+      ->group("Light");
 
   const auto color = [](const std::string& name, glm::vec3& target) {
     return [name, &target](const std::string& value) {

@@ -25,7 +25,7 @@ struct GatherQuality {
   // Rays and horizon start this far above the receiver, in radii of the surfel looked at.
   float bias = 0.15f;
   // Surfels closer than this many of their radii are ray traced (memo 3.4.1).
-  float near_field_radii = 4;
+  float near_field_radii = 8;
   // Surfels farther than this do not count; scene units.
   float max_distance = 1e30f;
   GatherSides sides = GatherSides::kFront;

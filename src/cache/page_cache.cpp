@@ -250,6 +250,8 @@ CacheCounters PageCache::counters() const {
   counters.bytes_read = bytes_read_;
   // Used frames are reused before untouched ones, so as many were in use at once
   counters.peak_bytes = std::uint64_t{untouched_frame_} * options_.frame_bytes;
+  counters.budget_bytes = std::uint64_t{options_.frame_count} * options_.frame_bytes;
+  counters.decoded_bytes = std::uint64_t{options_.page_count} * options_.frame_bytes;
   return counters;
 }
 

@@ -30,11 +30,13 @@ using PageNumber = std::uint32_t;
 // What a cache has done so far. hits + misses == requests.
 struct CacheCounters {
   std::uint64_t requests = 0;
-  std::uint64_t hits = 0;        // found loaded, being loaded by another thread, or in a front
-  std::uint64_t misses = 0;      // loads started
-  std::uint64_t evictions = 0;   // loaded pages given up for others
-  std::uint64_t bytes_read = 0;  // stored bytes of the pages loaded, as the loader reports them
-  std::uint64_t peak_bytes = 0;  // most frame bytes in use at any time
+  std::uint64_t hits = 0;           // found loaded, being loaded by another thread, or in a front
+  std::uint64_t misses = 0;         // loads started
+  std::uint64_t evictions = 0;      // loaded pages given up for others
+  std::uint64_t bytes_read = 0;     // stored bytes of the pages loaded, as the loader reports them
+  std::uint64_t peak_bytes = 0;     // most frame bytes in use at any time
+  std::uint64_t budget_bytes = 0;   // of all frames in the pool
+  std::uint64_t decoded_bytes = 0;  // of the frames that would hold every page
 };
 
 class PageCache {

@@ -292,16 +292,15 @@ std::vector<std::string> keptComments(const PlyHeader& header) {
   return comments;
 }
 
-GatherCacheStats cacheStats(const CacheCounters& counters, std::size_t frames, std::uint32_t pages,
-                            std::size_t frame_bytes) {
+GatherCacheStats cacheStats(const CacheCounters& counters) {
   return {.requests = counters.requests,
           .hits = counters.hits,
           .misses = counters.misses,
           .evictions = counters.evictions,
           .bytes_read = counters.bytes_read,
           .peak_bytes = counters.peak_bytes,
-          .budget_bytes = std::uint64_t{frames} * frame_bytes,
-          .decoded_bytes = std::uint64_t{pages} * frame_bytes};
+          .budget_bytes = counters.budget_bytes,
+          .decoded_bytes = counters.decoded_bytes};
 }
 
 Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
@@ -340,9 +339,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   noteInput(reader, element, mapping, progress);
   progress.beginPhase("gather", receivers.count, "receivers");
-  const SceneHeader& header = octree->file().header();
-  CloudGather gather(reader, mapping, result_rows, header.cube, receivers.row_bytes,
-                     plan.chunk_receivers, options.strict, progress);
+  CloudGather gather(reader, mapping, result_rows, octree->file().header().cube,
+                     receivers.row_bytes, plan.chunk_receivers, options.strict, progress);
   {
     ChunkGatherer gatherer(*octree, options, stats.threads, progress);
     SURFEIT_RETURN_IF_ERROR(gather.run(gatherer, writer));
@@ -356,12 +354,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
                               gather.defects().describe()));
   }
   stats.gather_seconds = gather.gatherSeconds();
-  stats.node_cache =
-      cacheStats(octree->nodeCounters(), plan.caches.node_frames, octree->file().nodePageCount(),
-                 header.node_group_capacity * sizeof(Node));
-  stats.surfel_cache =
-      cacheStats(octree->surfelCounters(), plan.caches.surfel_frames,
-                 octree->file().surfelPageCount(), header.surfel_group_capacity * sizeof(Surfel));
+  stats.node_cache = cacheStats(octree->nodeCounters());
+  stats.surfel_cache = cacheStats(octree->surfelCounters());
   return stats;
 }
 

@@ -16,6 +16,11 @@ namespace {
 // tears surfaces apart (errors double at 0.5), more joins what is apart (a tenth more at 1.5).
 constexpr float kLayerReach = 1;
 
+// A receiver without a normal is itself a sphere of a cloud without normals. Spheres of its own
+// surface, closer than this many of their radii, do not count: they overlap it at random depths,
+// and how much each sticks out is noise of the sampling (speckle), not occlusion.
+constexpr float kSphereClearance = 3;
+
 }  // namespace
 
 ReceiverRaster::ReceiverRaster(GatherMode mode, const GatherQuality& quality)
@@ -55,6 +60,11 @@ void ReceiverRaster::addSurfel(const Surfel& surfel) {
   const glm::vec3 to_surfel = surfel.position - receiver_.position;
   const float distance_sq = glm::dot(to_surfel, to_surfel);
   if (!(distance_sq <= max_distance_sq_)) return;
+
+  if (is_spherical_ && surfel.isSphere()) {
+    const float clearance = kSphereClearance * surfel.radius;
+    if (distance_sq < clearance * clearance) return;
+  }
 
   // Mid field: a patch, when its middle is above the horizon
   const float height = heightAboveHorizon(to_surfel);

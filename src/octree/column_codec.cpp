@@ -22,6 +22,8 @@ enum ColumnForm : std::uint8_t {
 };
 
 constexpr float kMaxUint16 = 65535;
+// Powers of two that 16 bits tell apart by 3e-4; wider ranges are stored as floats.
+constexpr float kMaxLogRange = 64;
 
 // The low `width` bytes of each value, plane by plane.
 template <typename T>
@@ -78,6 +80,11 @@ bool getVectorFloats(ByteReader& reader, std::span<glm::vec3> values) {
 }
 
 bool isNonNegative(const glm::vec3& v) { return v.x >= 0 && v.y >= 0 && v.z >= 0; }
+
+bool isUnitOrZero(const glm::vec3& v) {
+  const float length_sq = glm::dot(v, v);
+  return length_sq == 0 || std::abs(length_sq - 1) < 1e-3f;
+}
 
 // Bytes per axis that keep the error of a box of this extent within max_error.
 std::uint8_t positionForm(const Bounds3& box, float max_error, bool full_precision) {
@@ -192,13 +199,13 @@ float positionError(std::span<const glm::vec3> values, float max_error, bool ful
 
 void putPositive(ByteWriter& writer, std::span<const float> values, Rounding rounding,
                  bool full_precision) {
-  if (full_precision) {
+  const auto [min, max] = std::minmax_element(values.begin(), values.end());
+  const float range = values.empty() ? 0 : std::max(0.f, std::log2(*max) - std::log2(*min));
+  if (full_precision || range > kMaxLogRange) {
     writer.put(std::uint8_t{kFormFloat});
     return putFloats(writer, values);
   }
   writer.put(std::uint8_t{2});
-  const auto [min, max] = std::minmax_element(values.begin(), values.end());
-  const float range = values.empty() ? 0 : std::max(0.f, std::log2(*max / *min));
   writer.put(values.empty() ? 1.f : *min);
   writer.put(range);
   const std::span<std::uint16_t> codes = scratch<std::uint16_t>(values.size());
@@ -249,7 +256,10 @@ void putNormals(ByteWriter& writer, std::span<const glm::vec3> values, bool full
 
 bool getNormals(ByteReader& reader, std::span<glm::vec3> values) {
   const std::uint8_t form = reader.get<std::uint8_t>();
-  if (form == kFormFloat) return getVectorFloats(reader, values);
+  if (form == kFormFloat) {
+    return getVectorFloats(reader, values) &&
+           std::all_of(values.begin(), values.end(), isUnitOrZero);
+  }
   if (form != 2) return false;
   const std::span<std::uint32_t> codes = scratch<std::uint32_t>(values.size());
   if (!getPlanes<std::uint32_t>(reader, codes, 4)) return false;
@@ -272,10 +282,12 @@ void putColors(ByteWriter& writer, std::span<const glm::vec3> values, bool full_
   const int exponent = std::clamp(std::ilogb(largest) - 14, -126, 126);
   writer.put(std::uint8_t{2});
   writer.put(static_cast<std::int8_t>(exponent));
+  // Rounding the largest floats up would make them infinite: 32752 is the last half below 2^15
+  const float limit = exponent == 113 ? 32752.f : 65504.f;
   const std::span<std::uint16_t> codes = scratch<std::uint16_t>(values.size());
   for (int axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < values.size(); ++i) {
-      codes[i] = halfFromFloat(std::min(std::ldexp(values[i][axis], -exponent), 65504.f));
+      codes[i] = halfFromFloat(std::min(std::ldexp(values[i][axis], -exponent), limit));
     }
     putPlanes<std::uint16_t>(writer, codes, 2);
   }

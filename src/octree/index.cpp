@@ -28,6 +28,11 @@ constexpr std::size_t kBatch = 16384;
 constexpr std::uint64_t kOverheadBytes = 16 << 20;
 constexpr std::uint64_t kLeastMemory = 32 << 20;
 
+// Largest values of a surfel: their squares and sums must be floats (docs/format.md, "Limits").
+constexpr float kLargestLength = 1e12f;
+constexpr float kLargestArea = 1e24f;
+constexpr float kLargestRadiosity = 1e12f;
+
 // What one pass over the inputs finds out.
 struct Scan {
   Bounds3 bounds;
@@ -53,14 +58,30 @@ class PhaseClock {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+Status checkLimits(const std::string& path, const Surfel& surfel) {
+  const auto largest = [](const glm::vec3& v) {
+    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  };
+  const auto tooLarge = [&path](const char* what, float found, float expected) {
+    return Status::corruption(
+        fmt::format("{}: {} of {}, expected at most {}", path, what, found, expected));
+  };
+  const float coordinate = largest(surfel.position);
+  const float radiosity = std::max(largest(surfel.radiosity), largest(surfel.albedo));
+  if (coordinate > kLargestLength) return tooLarge("coordinate", coordinate, kLargestLength);
+  if (surfel.radius > kLargestLength) return tooLarge("radius", surfel.radius, kLargestLength);
+  if (surfel.area > kLargestArea) return tooLarge("area", surfel.area, kLargestArea);
+  if (radiosity > kLargestRadiosity) return tooLarge("color", radiosity, kLargestRadiosity);
+  return {};
+}
+
 // The rules that need no neighbourhood (docs/format.md, "Rules for what is missing").
 void applySizeRules(Surfel& surfel, float overlap) {
   if (surfel.radius > 0 && surfel.area > 0) return;
-  constexpr float kDiskPi = 3.14159265f;
   if (surfel.radius > 0) {
-    surfel.area = kDiskPi * surfel.radius * surfel.radius / overlap;
+    surfel.area = areaOfDisk(surfel.radius, overlap);
   } else if (surfel.area > 0) {
-    surfel.radius = std::sqrt(surfel.area * overlap / kDiskPi);
+    surfel.radius = std::sqrt(surfel.area * overlap / kPi);
   } else {
     surfel.radius = surfel.area = kPlaceholderSize;
     surfel.flags |= kSurfelNeedsSize;
@@ -158,7 +179,8 @@ Status Indexer::scanInput(const std::string& path) {
     if (progress_.isCancelled()) return Status::interrupted();
     SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source->read(batch));
     if (count == 0) break;
-    for (Surfel& surfel : std::span(batch).first(count)) {
+    for (const Surfel& surfel : std::span(batch).first(count)) {
+      SURFEIT_RETURN_IF_ERROR(checkLimits(path, surfel));
       scan_.missing_both += surfel.radius <= 0 && surfel.area <= 0 ? 1 : 0;
       scan_.missing_area += surfel.radius > 0 && surfel.area <= 0 ? 1 : 0;
       scan_.missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
@@ -271,6 +293,8 @@ Status Indexer::buildWithDensity(std::unique_ptr<SurfelSorter> sorter, PhaseCloc
   unlink(bare_path.c_str());
   if (!bare.ok()) return bare.status();
   const std::uint64_t bare_bytes = bare->fileBytes();
+  const std::uint64_t order_bytes = spilled + stats_.temporary_bytes + bare_bytes;
+  stats_.temporary_bytes = 0;
   clock.finish("order");
 
   const std::uint64_t cache_bytes =
@@ -283,7 +307,7 @@ Status Indexer::buildWithDensity(std::unique_ptr<SurfelSorter> sorter, PhaseCloc
   SizedSurfelStream sized(*octree, options_.overlap, threads_);
   SURFEIT_RETURN_IF_ERROR(sized.prepare());
   SURFEIT_RETURN_IF_ERROR(build(output_, sized, options_.full_precision, "build"));
-  stats_.temporary_bytes = std::max(spilled, stats_.temporary_bytes + bare_bytes);
+  stats_.temporary_bytes = std::max(order_bytes, stats_.temporary_bytes + bare_bytes);
   clock.finish("build");
   return {};
 }

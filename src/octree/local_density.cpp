@@ -8,9 +8,6 @@
 #include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
-
-#include "core/spherical_harmonics.h"
 
 namespace surfeit {
 namespace {
@@ -95,11 +92,20 @@ Result<float> localArea(const glm::vec3& position, PagedOctree::Reader& reader) 
 SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap, int threads)
     : octree_(octree), overlap_(overlap) {
   for (int i = 0; i < threads; ++i) {
-    readers_.push_back(std::make_unique<PagedOctree::Reader>(octree));
+    searchers_.push_back({std::make_unique<PagedOctree::Reader>(octree)});
   }
 }
 
 SizedSurfelStream::~SizedSurfelStream() = default;
+
+Result<float> SizedSurfelStream::Searcher::areaAt(const glm::vec3& position) {
+  if (!has_last || position != last_position) {
+    SURFEIT_ASSIGN_OR_RETURN(last_area, localArea(position, *reader));
+    last_position = position;
+    has_last = true;
+  }
+  return last_area;
+}
 
 Status SizedSurfelStream::prepare() {
   const SceneFile& file = octree_.file();
@@ -111,7 +117,7 @@ Status SizedSurfelStream::prepare() {
     SceneFile::Scratch scratch;
     SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count, file.decodeSurfels(page, scratch, page_));
     for (std::uint32_t i = 0; i < count; i += 16) {
-      SURFEIT_ASSIGN_OR_RETURN(const float area, localArea(page_[i].position, *readers_[0]));
+      SURFEIT_ASSIGN_OR_RETURN(const float area, searchers_[0].areaAt(page_[i].position));
       if (area > 0) areas.push_back(area);
     }
   }
@@ -138,15 +144,15 @@ Result<bool> SizedSurfelStream::readPage() {
   page_.resize(count);
   at_ = 0;
 
-  // One slice of the page per reader
-  std::vector<Status> statuses(readers_.size());
-  tbb::parallel_for(std::size_t{0}, readers_.size(), [&](std::size_t r) {
-    const std::size_t begin = count * r / readers_.size();
-    const std::size_t end = count * (r + 1) / readers_.size();
+  // One slice of the page per searcher
+  std::vector<Status> statuses(searchers_.size());
+  tbb::parallel_for(std::size_t{0}, searchers_.size(), [&](std::size_t r) {
+    const std::size_t begin = count * r / searchers_.size();
+    const std::size_t end = count * (r + 1) / searchers_.size();
     for (std::size_t i = begin; i < end; ++i) {
       Surfel& surfel = page_[i];
       if ((surfel.flags & kSurfelNeedsSize) == 0) continue;
-      const Result<float> area = localArea(surfel.position, *readers_[r]);
+      const Result<float> area = searchers_[r].areaAt(surfel.position);
       if (!area.ok()) {
         statuses[r] = area.status();
         return;
@@ -154,7 +160,7 @@ Result<bool> SizedSurfelStream::readPage() {
       surfel.flags &= ~kSurfelNeedsSize;
       surfel.radius = std::min(std::sqrt(*area * overlap_ / kPi), largest_radius_);
       if (!(surfel.radius > 0)) surfel.radius = largest_radius_;
-      surfel.area = kPi * surfel.radius * surfel.radius / overlap_;
+      surfel.area = areaOfDisk(surfel.radius, overlap_);
     }
   });
   for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);

@@ -2,13 +2,16 @@
 // what is missing"): the distance to the k-th nearest neighbour tells the area per surfel.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/spherical_harmonics.h"
 #include "octree/paged_octree.h"
 #include "octree/surfel_sorter.h"
 #include "surfeit/progress.h"
@@ -37,16 +40,32 @@ class SizedSurfelStream : public SortedSurfelStream {
   Result<std::size_t> next(std::span<SortedSurfel> out) override;
 
  private:
+  // A reader and what it found last: surfels at one position follow each other, and a search
+  // among a million of them should happen once.
+  struct Searcher {
+    std::unique_ptr<PagedOctree::Reader> reader;
+    bool has_last = false;
+    glm::vec3 last_position{0};
+    float last_area = 0;
+
+    Result<float> areaAt(const glm::vec3& position);
+  };
+
   Result<bool> readPage();
 
   PagedOctree& octree_;
   float overlap_;
-  std::vector<std::unique_ptr<PagedOctree::Reader>> readers_;
+  std::vector<Searcher> searchers_;
   float largest_radius_ = 0;
   std::uint32_t next_page_ = 0;
   std::vector<Surfel> page_;
   std::size_t at_ = 0;
 };
+
+// Area of a surfel whose disk has this radius. Never zero, even where the square is.
+inline float areaOfDisk(float radius, float overlap) {
+  return std::max(kPi * radius * radius / overlap, std::numeric_limits<float>::min());
+}
 
 // Area per surfel around `position`: pi d^2 / k for the k-th nearest surfel at another position,
 // shared among the surfels that lie at `position` itself. 0 when there is no other position.

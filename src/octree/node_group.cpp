@@ -71,13 +71,15 @@ int levelOfPage(std::span<const std::uint32_t> level_first_page, std::uint32_t p
 Status resolveReference(const NodeLimits& limits, int level, int child_level,
                         std::uint64_t stored_page, std::uint64_t first, Node& node) {
   if (node.isLeaf()) {
+    if (child_level != 0) return damaged("child level");
     if (stored_page >= limits.surfel_page_count || first >= limits.surfel_group_capacity ||
         node.surfel_count == 0) {
       return damaged("surfel reference");
     }
     // Only a leaf that begins a page may run over its end, and its pages must exist
     const std::uint64_t pages_after = limits.surfel_page_count - stored_page;
-    if (node.surfel_count > pages_after * limits.surfel_group_capacity) {
+    if (node.surfel_count > pages_after * limits.surfel_group_capacity ||
+        (first > 0 && node.surfel_count > limits.surfel_group_capacity - first)) {
       return damaged("surfel count");
     }
     node.page = static_cast<std::uint32_t>(stored_page);
@@ -86,7 +88,7 @@ Status resolveReference(const NodeLimits& limits, int level, int child_level,
     const std::uint64_t begin = limits.level_first_page[static_cast<std::size_t>(child_level)];
     const std::uint64_t end = limits.level_first_page[static_cast<std::size_t>(child_level) + 1];
     if (stored_page >= end - begin || node.child_count > 8 || node.child_count < 2 ||
-        first + node.child_count > limits.node_group_capacity) {
+        first > limits.node_group_capacity - node.child_count) {
       return damaged("child reference");
     }
     node.page = static_cast<std::uint32_t>(begin + stored_page);
@@ -176,11 +178,18 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::u
     out[i].flatness = numbers[i];
   }
   if (!getColors(reader, vectors)) return damaged("radiosity");
-  for (std::size_t i = 0; i < count; ++i) out[i].radiosity = vectors[i];
+  for (std::size_t i = 0; i < count; ++i) {
+    out[i].radiosity = vectors[i];
+    const float largest = std::max({vectors[i].x, vectors[i].y, vectors[i].z});
+    if (!std::isfinite(out[i].area * largest * kCoefficientLimit)) return damaged("radiosity");
+  }
 
   // References: child level and stored page wait in scratch until all parts are there
   if (!getBytes8(reader, bytes)) return damaged("flags");
-  for (std::size_t i = 0; i < count; ++i) out[i].flags = bytes[i];
+  for (std::size_t i = 0; i < count; ++i) {
+    if ((bytes[i] & ~kNodeFlat) != 0) return damaged("flags");
+    out[i].flags = bytes[i];
+  }
   if (!getBytes8(reader, bytes)) return damaged("child count");
   for (std::size_t i = 0; i < count; ++i) out[i].child_count = bytes[i];
   if (!getBytes8(reader, bytes)) return damaged("child level");

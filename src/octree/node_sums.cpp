@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 namespace surfeit {
@@ -34,8 +35,10 @@ void NodeSums::add(const Surfel& surfel) {
     area_sh[i] += lobe;
     for (int c = 0; c < 3; ++c) power_sh[c][i] += lobe * double(surfel.radiosity[c]);
   }
-  disk_bounds.add(surfel.position - glm::vec3(surfel.radius));
-  disk_bounds.add(surfel.position + glm::vec3(surfel.radius));
+  // Far from the origin a sum of position and radius rounds by more than the radius
+  const glm::vec3 half = glm::abs(surfel.position) * 0x1p-23f + surfel.radius;
+  disk_bounds.add(surfel.position - half);
+  disk_bounds.add(surfel.position + half);
 }
 
 void NodeSums::add(const NodeSums& child) {
@@ -79,7 +82,9 @@ Node NodeSums::toNode(float flatness_limit) const {
 }
 
 float radiusOfBox(const glm::vec3& centre, const Bounds3& box) {
-  return glm::length(glm::max(box.max - centre, centre - box.min));
+  // In double: squares of a float's smallest lengths are zero
+  const glm::vec3 corner = glm::max(box.max - centre, centre - box.min);
+  return float(std::hypot(double(corner.x), double(corner.y), double(corner.z)));
 }
 
 }  // namespace surfeit

@@ -36,6 +36,15 @@ class Findings {
   VerifyReport& report_;
 };
 
+// A number that differs between places of records. Sums of it over all records and over all
+// references to records are equal when every record is referenced exactly once.
+std::uint64_t placeHash(std::uint32_t page, std::uint32_t index) {
+  std::uint64_t hash = (std::uint64_t{page} << 32 | index) + 0x9e3779b97f4a7c15ull;
+  hash = (hash ^ hash >> 30) * 0xbf58476d1ce4e5b9ull;
+  hash = (hash ^ hash >> 27) * 0x94d049bb133111ebull;
+  return hash ^ hash >> 31;
+}
+
 // Checks pages one by one. Each thread has its own.
 class PageChecker {
  public:
@@ -48,14 +57,16 @@ class PageChecker {
   // Returns how many records the page holds, 0 when it is damaged; kIoError when it cannot be read.
   Result<std::uint64_t> checkSurfelPage(std::uint32_t page) {
     const Result<std::uint32_t> count = file_.decodeSurfels(page, scratch_, surfels_);
-    if (count.ok()) return std::uint64_t{*count};
-    return report(count.status());
+    if (!count.ok()) return report(count.status());
+    for (std::uint32_t i = 0; i < *count; ++i) surfel_balance_ += placeHash(page, i);
+    return std::uint64_t{*count};
   }
 
   Result<std::uint64_t> checkNodePage(std::uint32_t page) {
     const Result<std::uint32_t> count = file_.decodeNodes(page, scratch_, nodes_);
     if (!count.ok()) return report(count.status());
     for (std::uint32_t i = 0; i < *count; ++i) {
+      node_balance_ += placeHash(page, i);
       const Status status = nodes_[i].isLeaf() ? checkLeaf(nodes_[i]) : checkInterior(nodes_[i]);
       if (status.ok()) continue;
       const Status at = status.code() == StatusCode::kCorruption && !describesPage(status)
@@ -67,6 +78,11 @@ class PageChecker {
     }
     return std::uint64_t{*count};
   }
+
+  // Records minus references to them, as sums of placeHash: zero over a sound file, once the root
+  // counts as referenced.
+  std::uint64_t nodeBalance() const { return node_balance_; }
+  std::uint64_t surfelBalance() const { return surfel_balance_; }
 
  private:
   // A damaged page is a finding and the check goes on; a failing disk is not.
@@ -106,14 +122,18 @@ class PageChecker {
   }
 
   Status checkInterior(const Node& node) {
+    for (std::uint32_t i = 0; i < node.child_count; ++i) {
+      node_balance_ -= placeHash(node.page, node.first + i);
+    }
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> children, reader_.nodes(childrenOf(node)));
     Below below;
     for (const Node& child : children) {
       below.add(node, child.position, 0, child.area, child.surfel_count);
-      // A child's sphere may stick out of its parent's, its surfels' disks may not
-      if (glm::length(child.position - node.position) >
-          node.radius * (1 + kReachTolerance) + child.radius) {
-        return Status::corruption("a child lies outside the bounding sphere");
+      // A child's sphere may stick out of its parent's; its centre, a mean of surfels, may not
+      const float distance = glm::length(child.position - node.position);
+      if (distance > node.radius + (node.radius + child.radius) * kReachTolerance) {
+        return Status::corruption(fmt::format("bounding radius {}, expected at least {} for the "
+                                              "centres of its children", node.radius, distance));
       }
     }
     return compare(node, below);
@@ -121,10 +141,14 @@ class PageChecker {
 
   Status checkLeaf(const Node& node) {
     Below below;
+    std::uint32_t page = node.page, place = node.first;
     SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
       for (const Surfel& surfel : surfels) {
         below.add(node, surfel.position, surfel.radius, surfel.area, 1);
+        surfel_balance_ -= placeHash(page, place++);
       }
+      ++page;
+      place = 0;
     }));
     if (below.reach > node.radius * (1 + kReachTolerance)) {
       return Status::corruption(fmt::format("bounding radius {}, expected at least {} for the "
@@ -139,6 +163,7 @@ class PageChecker {
   SceneFile::Scratch scratch_;
   std::vector<Node> nodes_;
   std::vector<Surfel> surfels_;
+  std::uint64_t node_balance_ = 0, surfel_balance_ = 0;
 };
 
 }  // namespace
@@ -200,13 +225,14 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
 
   std::atomic<std::uint32_t> next_page{0};
   std::atomic<std::uint64_t> nodes{0}, surfels{0};
+  std::atomic<std::uint64_t> node_balance{0}, surfel_balance{0};
   std::atomic<bool> stop{false};
   std::vector<Status> statuses(static_cast<std::size_t>(threads));
   const auto work = [&](std::size_t worker) {
     PageChecker checker(file, *octree, findings);
     while (!stop && !progress.isCancelled()) {
       const std::uint32_t page = next_page++;
-      if (page >= pages) return;
+      if (page >= pages) break;
       const bool is_node_page = page < node_pages;
       const Result<std::uint64_t> count =
           is_node_page ? checker.checkNodePage(page) : checker.checkSurfelPage(page - node_pages);
@@ -218,6 +244,8 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
       (is_node_page ? nodes : surfels) += *count;
       progress.advance(1);
     }
+    node_balance += checker.nodeBalance();
+    surfel_balance += checker.surfelBalance();
   };
   std::vector<std::thread> workers;
   for (std::size_t i = 0; i < statuses.size(); ++i) workers.emplace_back(work, i);
@@ -229,6 +257,11 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
   if (report.finding_count == 0 && (nodes != expected_nodes || surfels != expected_surfels)) {
     findings.add(fmt::format("{}: {} nodes and {} surfels on the pages, the header says {} and {}",
                              path, nodes.load(), surfels.load(), expected_nodes, expected_surfels));
+  }
+  if (report.finding_count == 0 &&
+      (node_balance != placeHash(kRootRange.page, kRootRange.first) || surfel_balance != 0)) {
+    findings.add(fmt::format("{}: {} are not each referenced once", path,
+                             surfel_balance != 0 ? "surfels" : "nodes"));
   }
   report.pages_checked = pages;
   report.bytes_checked = file.fileBytes();

@@ -35,6 +35,9 @@ struct Lights {
   std::vector<AreaLight> areas;
   // Shadow rays per area light, and as many for all emissive triangles together.
   int samples = 16;
+  // Do emissive surfaces carry their own emission as radiosity? They light the others either way; a
+  // gather from surfels that carry it too would count that light twice.
+  bool with_emission = false;
 
   bool isEmpty() const { return points.empty() && directionals.empty() && areas.empty(); }
 };
@@ -52,9 +55,10 @@ class DirectLight {
   // `seed`: the same seed gives the same value, and neighbours should get different ones.
   glm::vec3 irradiance(const SurfacePoint& point, std::uint64_t seed, int samples) const;
 
-  // Radiant exitance of the front side: emission + albedo * irradiance.
+  // Radiant exitance of the front side: albedo * irradiance, and emission where lights say so.
   glm::vec3 exitance(const SurfacePoint& point, std::uint64_t seed, int samples) const {
-    return point.emission + point.albedo * irradiance(point, seed, samples);
+    const glm::vec3 reflected = point.albedo * irradiance(point, seed, samples);
+    return lights_.with_emission ? point.emission + reflected : reflected;
   }
   int samples() const { return lights_.samples; }
 

@@ -157,6 +157,8 @@ TEST(PageCache, CountersAddUp) {
   EXPECT_EQ(counters.evictions, counters.misses - 8);
   EXPECT_EQ(counters.bytes_read, counters.misses * kStoredBytes);
   EXPECT_EQ(counters.peak_bytes, 8 * kFrameBytes);
+  EXPECT_EQ(counters.budget_bytes, 8 * kFrameBytes);
+  EXPECT_EQ(counters.decoded_bytes, 50 * kFrameBytes);
 }
 
 TEST(PageCache, EveryFrameCountFromNoneToAllWorks) {

@@ -35,7 +35,9 @@ TEST_F(Reference, InsideAClosedShellTheIrradianceEqualsTheRadiosity) {
   std::string obj = "mtllib m.mtl\nusemtl a\n";
   for (int i = 0; i < 8; ++i) obj += fmt::format("v {} {} {}\n", i & 1, (i >> 1) & 1, i >> 2);
   obj += "f 2 4 3 1\nf 7 8 6 5\nf 5 6 2 1\nf 4 8 7 3\nf 3 7 5 1\nf 6 8 4 2\n";
-  const ReferenceScene scene = load(write("m.obj", obj));
+  Surroundings surroundings;
+  surroundings.lights.with_emission = true;
+  const ReferenceScene scene = load(write("m.obj", obj), surroundings);
   const glm::vec3 normal = glm::normalize(glm::vec3(1, 2, -3));
   const ReferenceGather gather = scene.gather({0.4f, 0.5f, 0.7f}, normal, 7, {});
   EXPECT_EQ(gather.occlusion_front, 1);

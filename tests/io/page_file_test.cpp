@@ -1,0 +1,306 @@
+#include "io/page_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "core/job_limits.h"
+#include "io/page_codec.h"
+#include "io/page_file_damage.h"
+#include "io/test_directory.h"
+#include "surfeit/version.h"
+
+namespace surfeit {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::uint64_t kIdentity = 0x0123456789abcdefull;
+const std::string kProvenance = "{\"program\":\"test\"}";
+
+// A payload that depends on its number, compressible like real ones.
+std::vector<std::byte> payloadOf(std::uint32_t number) {
+  std::vector<std::byte> payload(100 + 37 * (number % 5));
+  std::uint32_t state = number * 2654435761u + 1;
+  for (std::size_t i = 0; i < payload.size(); ++i) {
+    state = state * 1664525 + 1013904223;
+    payload[i] = static_cast<std::byte>(i % 4 == 0 ? state >> 24 : i / 8);
+  }
+  return payload;
+}
+
+std::vector<std::byte> sceneFields() {
+  std::vector<std::byte> fields(kSceneFieldsBytes);
+  for (std::size_t i = 0; i < fields.size(); ++i) fields[i] = static_cast<std::byte>(i * 7);
+  return fields;
+}
+
+class PageFileTest : public DirectoryTest {
+ protected:
+  // Surfel pages hold payloads 100.., node pages 0..
+  void writePages(const std::string& name, std::uint32_t node_pages, std::uint32_t surfel_pages,
+                  std::uint64_t identity = kIdentity) {
+    Result<PageFileWriter> writer = PageFileWriter::create(path(name), identity);
+    ASSERT_TRUE(writer.ok()) << writer.status().message();
+    std::vector<std::byte> stored;
+    for (std::uint32_t i = 0; i < surfel_pages; ++i) {
+      ASSERT_TRUE(compressPage(payloadOf(100 + i), stored).ok());
+      ASSERT_TRUE(writer->addSurfelPage(stored, std::uint32_t(payloadOf(100 + i).size())).ok());
+    }
+    for (std::uint32_t i = 0; i < node_pages; ++i) {
+      ASSERT_TRUE(compressPage(payloadOf(i), stored).ok());
+      ASSERT_TRUE(writer->addNodePage(stored, std::uint32_t(payloadOf(i).size())).ok());
+    }
+    EXPECT_EQ(fileCount(), 1) << "the temporary file only";
+    ASSERT_TRUE(writer->finish(sceneFields(), kProvenance).ok());
+    EXPECT_EQ(writer->fileBytes(), contents(name).size());
+  }
+
+  // Opens the file and reads every page.
+  Status readAll(const std::string& name) {
+    SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(path(name)));
+    std::vector<std::byte> stored, payload;
+    for (std::uint32_t page = 0; page < pages.pageCount(); ++page) {
+      SURFEIT_RETURN_IF_ERROR(pages.readPage(page, stored, payload));
+    }
+    return {};
+  }
+
+  // Whether reading `bytes` as a file fails as damage does, naming the file.
+  testing::AssertionResult noticed(const std::string& bytes) {
+    replaceContents(path("damaged.sft"), bytes);
+    const Status status = readAll("damaged.sft");
+    if (status.ok()) return testing::AssertionFailure() << "not noticed";
+    if (status.code() != StatusCode::kCorruption ||
+        status.message().find("damaged.sft: ") == std::string::npos) {
+      return testing::AssertionFailure() << status.message();
+    }
+    return testing::AssertionSuccess();
+  }
+
+  // A small file to damage.
+  std::string sample() {
+    writePages("sample.sft", 2, 3);
+    return contents("sample.sft");
+  }
+};
+
+TEST_F(PageFileTest, WhatIsWrittenIsRead) {
+  for (const auto& [node_pages, surfel_pages] :
+       {std::pair{0u, 0u}, {1u, 0u}, {0u, 1u}, {3u, 4u}, {40u, 300u}}) {
+    writePages("a.sft", node_pages, surfel_pages);
+    const Result<PageFile> pages = PageFile::open(path("a.sft"));
+    ASSERT_TRUE(pages.ok()) << pages.status().message();
+    EXPECT_EQ(pages->identity(), kIdentity);
+    EXPECT_EQ(pages->provenance(), kProvenance);
+    EXPECT_EQ(pages->fileBytes(), contents("a.sft").size());
+    EXPECT_EQ(std::vector<std::byte>(pages->sceneFields().begin(), pages->sceneFields().end()),
+              sceneFields());
+    ASSERT_EQ(pages->nodePageCount(), node_pages);
+    ASSERT_EQ(pages->pageCount(), node_pages + surfel_pages);
+    std::vector<std::byte> stored, payload;
+    for (std::uint32_t i = 0; i < pages->pageCount(); ++i) {
+      ASSERT_TRUE(pages->readPage(i, stored, payload).ok());
+      ASSERT_EQ(payload, payloadOf(i < node_pages ? i : 100 + i - node_pages));
+      EXPECT_LE(stored.size(), pages->maxStoredBytes());
+      EXPECT_LE(payload.size(), pages->maxPayloadBytes());
+    }
+    std::filesystem::remove(path("a.sft"));
+  }
+}
+
+TEST_F(PageFileTest, UnfinishedFileLeavesNothing) {
+  {
+    Result<PageFileWriter> writer = PageFileWriter::create(path("a.sft"), kIdentity);
+    ASSERT_TRUE(writer.ok());
+    std::vector<std::byte> stored;
+    ASSERT_TRUE(compressPage(payloadOf(1), stored).ok());
+    ASSERT_TRUE(writer->addSurfelPage(stored, std::uint32_t(payloadOf(1).size())).ok());
+  }
+  EXPECT_EQ(fileCount(), 0);
+}
+
+TEST_F(PageFileTest, EveryTruncationIsNoticed) {
+  const std::string file = sample();
+  for (std::size_t size = 0; size < file.size(); ++size) {
+    ASSERT_TRUE(noticed(file.substr(0, size))) << size << " bytes";
+  }
+}
+
+TEST_F(PageFileTest, EveryFlippedBitIsNoticed) {
+  std::string file = sample();
+  for (std::size_t at = 0; at < file.size(); ++at) {
+    const char right = file[at];
+    for (int bit = 0; bit <= 8; ++bit) {
+      file[at] = static_cast<char>(right ^ (bit == 8 ? 0xff : 1 << bit));
+      ASSERT_TRUE(noticed(file)) << "byte " << at << ", bit " << bit;
+    }
+    file[at] = right;
+  }
+}
+
+TEST_F(PageFileTest, AppendedBytesAreNoticed) {
+  const std::string file = sample();
+  for (const std::size_t size : {1, 511, 4096, 1 << 20}) {
+    EXPECT_TRUE(noticed(file + std::string(size, '\0'))) << size;
+    EXPECT_TRUE(noticed(file + std::string(size, '\xff'))) << size;
+  }
+  // Even when what is appended ends like a file
+  EXPECT_TRUE(noticed(file + file));
+  EXPECT_TRUE(noticed(file + file.substr(footerAt(file))));
+}
+
+TEST_F(PageFileTest, EveryWipedSectorIsNoticed) {
+  writePages("big.sft", 20, 100);
+  const std::string file = contents("big.sft");
+  ASSERT_GT(file.size(), 3u * 4096);
+  for (const std::size_t sector : {512u, 4096u}) {
+    for (const char fill : {'\0', '\xff'}) {
+      for (std::size_t at = 0; at < file.size(); at += sector) {
+        std::string damaged = file;
+        const std::size_t size = std::min(sector, file.size() - at);
+        damaged.replace(at, size, size, fill);
+        ASSERT_TRUE(noticed(damaged)) << sector << " bytes at " << at;
+      }
+    }
+  }
+}
+
+TEST_F(PageFileTest, SwappedPagesAreNoticed) {
+  writePages("big.sft", 20, 100);
+  const std::string file = contents("big.sft");
+  const Result<PageFile> pages = PageFile::open(path("big.sft"));
+  ASSERT_TRUE(pages.ok());
+  int swaps = 0;
+  for (std::uint32_t a = 0; a < pages->pageCount() && swaps < 300; ++a) {
+    for (std::uint32_t b = a + 1; b < pages->pageCount(); ++b) {
+      const PageEntry& first = pages->entry(a);
+      const PageEntry& second = pages->entry(b);
+      if (first.stored_bytes != second.stored_bytes) continue;
+      std::string damaged = file;
+      damaged.replace(first.offset, first.stored_bytes, file, second.offset, second.stored_bytes);
+      damaged.replace(second.offset, second.stored_bytes, file, first.offset, first.stored_bytes);
+      ASSERT_TRUE(noticed(damaged)) << "pages " << a << " and " << b;
+      ++swaps;
+    }
+  }
+  EXPECT_GT(swaps, 100);
+}
+
+TEST_F(PageFileTest, PageOfAnotherFileAtTheSameOffsetIsNoticed) {
+  writePages("a.sft", 2, 3);
+  const std::string a = contents("a.sft");
+  std::filesystem::remove(path("a.sft"));
+  writePages("b.sft", 2, 3, kIdentity + 1);
+  const std::string b = contents("b.sft");
+  ASSERT_EQ(a.size(), b.size());
+  // The pages are the same bytes; parts that hold checksums are not
+  EXPECT_EQ(a.substr(512, 200), b.substr(512, 200));
+  EXPECT_TRUE(noticed(b.substr(0, 512) + a.substr(512)));
+  EXPECT_TRUE(noticed(a.substr(0, footerAt(a)) + b.substr(footerAt(b))));
+  const Result<PageFile> pages = PageFile::open(path("b.sft"));
+  ASSERT_TRUE(pages.ok());
+  const PageEntry& first = pages->entry(2);
+  EXPECT_NE(first.checksum,
+            XXH3_64bits_withSeed(a.data() + first.offset, first.stored_bytes,
+                                 pageSeed(kIdentity, first.offset)));
+}
+
+TEST_F(PageFileTest, DamageInOnePageLeavesTheOthersReadable) {
+  std::string file = sample();
+  file[600] ^= 1;
+  write("damaged.sft", file);
+  const Result<PageFile> pages = PageFile::open(path("damaged.sft"));
+  ASSERT_TRUE(pages.ok());
+  std::vector<std::byte> stored, payload;
+  for (std::uint32_t page = 0; page < pages->pageCount(); ++page) {
+    const PageEntry& at = pages->entry(page);
+    const bool damaged = at.offset <= 600 && 600 < at.offset + at.stored_bytes;
+    const Status status = pages->readPage(page, stored, payload);
+    EXPECT_EQ(status.ok(), !damaged);
+    if (!damaged) continue;
+    EXPECT_THAT(status.message(), HasSubstr("damaged.sft: page " + std::to_string(page) + " at " +
+                                            std::to_string(at.offset) + ": checksum "));
+  }
+}
+
+TEST_F(PageFileTest, NewerVersionIsRefusedWithItsNumber) {
+  for (const std::uint32_t version : {0u, kFormatVersion + 1, 0xffffffffu}) {
+    std::string file = sample();
+    setAt(file, 8, version);
+    sealFile(file);
+    write("damaged.sft", file);
+    const Result<PageFile> pages = PageFile::open(path("damaged.sft"));
+    ASSERT_FALSE(pages.ok());
+    EXPECT_THAT(pages.status().message(), HasSubstr("version " + std::to_string(version)));
+    EXPECT_THAT(pages.status().message(), HasSubstr("up to " + std::to_string(kFormatVersion)));
+    std::filesystem::remove_all(directory_);
+    std::filesystem::create_directories(directory_);
+  }
+}
+
+TEST_F(PageFileTest, SealedFileIsReadable) {
+  const std::string file = sample();
+  std::string sealed = file;
+  sealFile(sealed);
+  EXPECT_EQ(file, sealed);
+}
+
+TEST_F(PageFileTest, HostileFieldsWithValidChecksumsDoNoHarm) {
+  const std::string file = sample();
+  const std::size_t footer = footerAt(file);
+  const std::size_t directory = getAt<std::uint64_t>(file, footer + kDirectoryOffsetAt);
+  struct Field {
+    std::size_t at;
+    std::size_t bytes;
+  };
+  std::vector<Field> fields = {{8, 4}, {12, 4}, {16, 8}};
+  for (std::size_t at = 0; at < kFooterChecksumAt; at += 8) fields.push_back({footer + at, 8});
+  for (std::size_t entry = directory; entry < footer; entry += kEntryBytes) {
+    fields.push_back({entry, 8});
+    fields.push_back({entry + 8, 4});
+    fields.push_back({entry + 12, 4});
+    fields.push_back({entry + 16, 8});
+  }
+  const std::uint64_t peak_before = peakResidentBytes();
+  const auto start = std::chrono::steady_clock::now();
+  int cases = 0;
+  for (const Field& field : fields) {
+    const std::uint64_t right = field.bytes == 4 ? getAt<std::uint32_t>(file, field.at)
+                                                 : getAt<std::uint64_t>(file, field.at);
+    for (const std::uint64_t value : hostileValues(right)) {
+      if (field.bytes == 4 && value > 0xffffffff) continue;
+      std::string damaged = file;
+      std::memcpy(damaged.data() + field.at, &value, field.bytes);
+      sealFile(damaged);
+      // The checksums that sealFile sets are not hostile then; 0 and n are met again as they are
+      if (damaged == file) continue;
+      EXPECT_TRUE(noticed(damaged)) << "field at " << field.at << ": " << value;
+      ++cases;
+    }
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  EXPECT_GT(cases, 200);
+  EXPECT_LT(seconds.count() / cases, 0.01);
+  // Nothing declared makes the reader allocate: 4 MiB is the largest payload of a page
+  EXPECT_LT(peakResidentBytes(), peak_before + (std::uint64_t{16} << 20));
+}
+
+TEST_F(PageFileTest, MissingFileAndDirectoryAreIoErrors) {
+  EXPECT_EQ(PageFile::open(path("absent.sft")).status().code(), StatusCode::kIoError);
+  EXPECT_EQ(PageFile::open(directory_.string()).status().code(), StatusCode::kIoError);
+}
+
+TEST_F(PageFileTest, OtherFilesAreNamedAsSuch) {
+  for (const std::string& text : {std::string("ply\nformat"), std::string(5000, 'x')}) {
+    write("other.sft", text);
+    EXPECT_THAT(PageFile::open(path("other.sft")).status().message(),
+                HasSubstr("not a Surfeit scene"));
+  }
+}
+
+}  // namespace
+}  // namespace surfeit

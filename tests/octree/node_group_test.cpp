@@ -1,0 +1,164 @@
+#include "octree/node_group.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/curve_key.h"
+#include "octree/node_sums.h"
+#include "octree/test_scenes.h"
+
+namespace surfeit {
+namespace {
+
+// One page on level 0, ten on each of levels 1 to 5.
+class NodeGroupTest : public testing::Test {
+ protected:
+  NodeGroupTest() {
+    for (std::uint32_t level = 0; level < kCurveLevels + 2; ++level) {
+      first_page_[level] = level == 0 ? 0 : 1 + 10 * std::min(level - 1, 5u);
+    }
+  }
+
+  // Nodes of level 1: leaves and parents of nodes on level 2, flat and rough.
+  static std::vector<LevelNode> someNodes(std::size_t count) {
+    std::vector<LevelNode> nodes;
+    for (std::size_t i = 0; i < count; ++i) {
+      NodeSums sums;
+      const auto seed = static_cast<std::uint32_t>(i);
+      const std::vector<Surfel> cloud = i % 3 == 0 ? planeCloud(4, 0.1f) : randomCloud(9, seed);
+      for (const Surfel& surfel : cloud) sums.add(surfel);
+      LevelNode node{sums.toNode(0.97f), 0};
+      node.node.radius = radiusOfBox(node.node.position, sums.disk_bounds);
+      node.node.page = seed % 10;
+      node.node.first = static_cast<std::uint16_t>(i);
+      if (i % 2 == 0) {
+        node.child_level = 2;
+        node.node.child_count = static_cast<std::uint8_t>(2 + i % 7);
+      }
+      nodes.push_back(node);
+    }
+    return nodes;
+  }
+
+  Result<std::uint32_t> decode(Bytes payload, bool full_precision, std::uint32_t page = 1) {
+    return decodeNodeGroup(payload, full_precision, page, {first_page_, 10, 128, 512}, found_);
+  }
+
+  std::uint32_t first_page_[kCurveLevels + 2];
+  std::vector<Node> found_ = std::vector<Node>(128);
+};
+
+TEST_F(NodeGroupTest, FullPrecisionIsExact) {
+  const std::vector<LevelNode> nodes = someNodes(50);
+  std::vector<std::byte> payload;
+  encodeNodeGroup(nodes, true, payload);
+  const Result<std::uint32_t> count = decode(payload, true);
+  ASSERT_TRUE(count.ok()) << count.status().message();
+  ASSERT_EQ(*count, nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Node& a = nodes[i].node;
+    const Node& b = found_[i];
+    EXPECT_EQ(a.position, b.position);
+    EXPECT_EQ(a.radius, b.radius);
+    EXPECT_EQ(a.normal, b.normal);
+    EXPECT_EQ(a.area, b.area);
+    EXPECT_EQ(a.radiosity, b.radiosity);
+    EXPECT_EQ(a.flatness, b.flatness);
+    EXPECT_EQ(a.first, b.first);
+    EXPECT_EQ(a.flags, b.flags);
+    EXPECT_EQ(a.child_count, b.child_count);
+    EXPECT_EQ(a.surfel_count, b.surfel_count);
+    EXPECT_EQ(a.area_sh, b.area_sh);
+    for (int c = 0; c < 3; ++c) EXPECT_EQ(a.power_sh[c], b.power_sh[c]);
+    // Pages count within the level of the children in the file, and through it afterwards
+    EXPECT_EQ(b.page, a.isLeaf() ? a.page : a.page + first_page_[2]);
+  }
+}
+
+TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
+  const std::vector<LevelNode> nodes = someNodes(100);
+  std::vector<std::byte> payload;
+  encodeNodeGroup(nodes, false, payload);
+  ASSERT_TRUE(decode(payload, false).ok());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Node& a = nodes[i].node;
+    const Node& b = found_[i];
+    const float moved = glm::length(a.position - b.position);
+    EXPECT_LE(moved, 1.01e-3f * a.radius);
+    EXPECT_GE(b.radius * 1.000001f, a.radius + moved);
+    EXPECT_LE(b.radius, a.radius * 1.01f);
+    EXPECT_NEAR(a.area, b.area, 1e-3f * a.area);
+    EXPECT_LE(glm::length(a.normal - b.normal), 1e-4f);
+    EXPECT_NEAR(a.flatness, b.flatness, 2e-5f);
+    for (std::size_t k = 0; k < kShCount; ++k) {
+      EXPECT_NEAR(a.area_sh[k], b.area_sh[k], 2e-3f * a.area);
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(a.power_sh[c][k], b.power_sh[c][k], 4e-3f * a.area * a.radiosity[c]);
+      }
+    }
+  }
+}
+
+TEST_F(NodeGroupTest, DecodeRejectsEveryTruncationAndExtension) {
+  for (const bool full : {false, true}) {
+    std::vector<std::byte> payload;
+    encodeNodeGroup(someNodes(20), full, payload);
+    for (std::size_t size = 0; size < payload.size(); ++size) {
+      ASSERT_EQ(decode(Bytes(payload).first(size), full).status().code(),
+                StatusCode::kCorruption) << size;
+    }
+    payload.push_back(std::byte{0});
+    EXPECT_EQ(decode(payload, full).status().code(), StatusCode::kCorruption);
+  }
+}
+
+TEST_F(NodeGroupTest, ChildrenNeverLieOnTheirParentsLevelOrAbove) {
+  std::vector<std::byte> payload;
+  encodeNodeGroup(someNodes(3), false, payload);
+  EXPECT_TRUE(decode(payload, false, 1).ok());    // level 1 points at level 2
+  EXPECT_TRUE(decode(payload, false, 10).ok());   // the last page of level 1
+  EXPECT_FALSE(decode(payload, false, 11).ok());  // level 2 at itself
+  EXPECT_FALSE(decode(payload, false, 35).ok());  // level 4 at one above
+}
+
+TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
+  TestRandom random(22);
+  for (const bool full : {false, true}) {
+    std::vector<std::byte> payload;
+    encodeNodeGroup(someNodes(6), full, payload);
+    int decoded = 0;
+    for (int i = 0; i < 50000; ++i) {
+      std::vector<std::byte> damaged = payload;
+      for (std::uint32_t k = 1 + random.bits() % 6; k > 0; --k) {
+        damaged[random.bits() % damaged.size()] = static_cast<std::byte>(random.bits());
+      }
+      const Result<std::uint32_t> count = decode(damaged, full);
+      if (!count.ok()) {
+        ASSERT_EQ(count.status().code(), StatusCode::kCorruption);
+        continue;
+      }
+      ++decoded;
+      for (const Node& node : std::span(found_).first(*count)) {
+        ASSERT_TRUE(node.radius > 0 && node.area > 0 && node.surfel_count <= 5120u * 1000);
+        ASSERT_TRUE(node.flatness >= 0 && node.flatness <= 1);
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_TRUE(std::isfinite(node.position[c]) && node.radiosity[c] >= 0);
+          for (const float k : node.power_sh[c]) ASSERT_TRUE(std::isfinite(k));
+        }
+        if (node.isLeaf()) {
+          ASSERT_LT(node.page, 10u);
+          ASSERT_LT(node.first, 512);
+        } else {
+          ASSERT_GE(node.page, first_page_[2]);
+          ASSERT_LT(node.page, first_page_[kCurveLevels + 1]);
+          ASSERT_LE(node.first + node.child_count, 128);
+        }
+      }
+    }
+    EXPECT_GT(decoded, 1000);
+  }
+}
+
+}  // namespace
+}  // namespace surfeit

@@ -1,0 +1,94 @@
+#include "octree/surfel_group.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "octree/test_scenes.h"
+
+namespace surfeit {
+namespace {
+
+constexpr PageForm kForms[] = {{false, false}, {false, true}, {true, false}, {true, true}};
+
+TEST(SurfelGroup, FullPrecisionIsExact) {
+  const std::vector<Surfel> cloud = randomCloud(300);
+  std::vector<std::byte> payload;
+  encodeSurfelGroup(cloud, {true, true}, payload);
+  std::vector<Surfel> found(512);
+  const Result<std::uint32_t> count = decodeSurfelGroup(payload, {true, true}, found);
+  ASSERT_TRUE(count.ok()) << count.status().message();
+  ASSERT_EQ(*count, cloud.size());
+  EXPECT_EQ(std::memcmp(found.data(), cloud.data(), cloud.size() * sizeof(Surfel)), 0);
+}
+
+TEST(SurfelGroup, QuantizedSurfelsAreCloseToWhatTheyWere) {
+  const std::vector<Surfel> cloud = randomCloud(300);
+  std::vector<std::byte> payload;
+  encodeSurfelGroup(cloud, {false, false}, payload);
+  EXPECT_LT(payload.size(), cloud.size() * 26);
+  std::vector<Surfel> found(300);
+  ASSERT_TRUE(decodeSurfelGroup(payload, {false, false}, found).ok());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    // The error counts against the smallest radius of the group
+    ASSERT_LE(glm::length(found[i].position - cloud[i].position), 1.01e-3f * cloud[i].radius);
+    ASSERT_LE(glm::length(found[i].normal - cloud[i].normal), 1e-4f);
+    ASSERT_EQ(found[i].flags, cloud[i].flags);
+    ASSERT_EQ(found[i].albedo, glm::vec3(0));
+    ASSERT_EQ(found[i].isSphere(), found[i].normal == glm::vec3(0));
+  }
+}
+
+TEST(SurfelGroup, DecodeRejectsEveryTruncationAndExtension) {
+  for (const PageForm& form : kForms) {
+    std::vector<std::byte> payload;
+    encodeSurfelGroup(randomCloud(20), form, payload);
+    std::vector<Surfel> found(64);
+    for (std::size_t size = 0; size < payload.size(); ++size) {
+      const auto status = decodeSurfelGroup(Bytes(payload).first(size), form, found).status();
+      ASSERT_EQ(status.code(), StatusCode::kCorruption) << size;
+    }
+    payload.push_back(std::byte{0});
+    EXPECT_EQ(decodeSurfelGroup(payload, form, found).status().code(), StatusCode::kCorruption);
+  }
+}
+
+TEST(SurfelGroup, DecodeRejectsMoreThanTheGroupHolds) {
+  std::vector<std::byte> payload;
+  encodeSurfelGroup(randomCloud(65), {false, false}, payload);
+  std::vector<Surfel> found(64);
+  EXPECT_EQ(decodeSurfelGroup(payload, {false, false}, found).status().code(),
+            StatusCode::kCorruption);
+}
+
+TEST(SurfelGroup, DamagedPayloadsDecodeToValidSurfelsOrNot) {
+  TestRandom random(21);
+  for (const PageForm& form : kForms) {
+    std::vector<std::byte> payload;
+    encodeSurfelGroup(randomCloud(12), form, payload);
+    std::vector<Surfel> found(64);
+    for (int i = 0; i < 30000; ++i) {
+      std::vector<std::byte> damaged = payload;
+      for (std::uint32_t k = 1 + random.bits() % 6; k > 0; --k) {
+        damaged[random.bits() % damaged.size()] = static_cast<std::byte>(random.bits());
+      }
+      const Result<std::uint32_t> count = decodeSurfelGroup(damaged, form, found);
+      if (!count.ok()) {
+        ASSERT_EQ(count.status().code(), StatusCode::kCorruption);
+        continue;
+      }
+      ASSERT_LE(*count, found.size());
+      for (const Surfel& surfel : std::span(found).first(*count)) {
+        ASSERT_TRUE(surfel.radius > 0 && surfel.area > 0);
+        ASSERT_TRUE(std::isfinite(glm::length(surfel.normal)));
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_TRUE(std::isfinite(surfel.position[c]) && std::isfinite(surfel.radiosity[c]));
+          ASSERT_TRUE(surfel.radiosity[c] >= 0 && surfel.albedo[c] >= 0);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace surfeit
