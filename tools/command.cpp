@@ -137,11 +137,8 @@ std::string formatBytes(std::uint64_t bytes) {
 }
 
 std::string formatCount(std::uint64_t count) {
-  std::string text = std::to_string(count);
-  for (std::ptrdiff_t at = std::ssize(text) - 3; at > 0; at -= 3) {
-    text.insert(static_cast<std::size_t>(at), ",");
-  }
-  return text;
+  if (count < 1000) return std::to_string(count);
+  return fmt::format("{},{:03}", formatCount(count / 1000), count % 1000);
 }
 
 CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,

@@ -1,4 +1,4 @@
-// Curve keys: positions along a 3D Hilbert curve, 21 bits per axis (DESIGN.md 3). Every octree
+// Curve keys: positions along a 3D Hilbert curve, 21 bits per axis. Every octree
 // cell is one contiguous run of keys, and consecutive runs are neighbours in space, which is what
 // makes pages, cuts and receivers coherent.
 //

@@ -1,4 +1,4 @@
-// What this process may use: its cgroup and batch job first, then the machine (DESIGN.md 7); and
+// What this process may use: its cgroup and batch job first, then the machine; and
 // what it has used so far.
 #pragma once
 

@@ -13,7 +13,7 @@ namespace surfeit {
 enum NodeFlags : std::uint8_t {
   // Flat: |sum A n| / sum A above the file's flatness limit. Drawn as one disk (mean normal, summed
   // area); its coefficients are not stored and are zero here. Order-2 harmonics ring on flat
-  // clusters, one disk is wrong for rough ones (anchors: pbgi_peers 4).
+  // clusters, one disk is wrong for rough ones.
   kNodeFlat = 1u << 0,
 };
 

@@ -50,13 +50,15 @@ struct DecodeScratch {
   std::vector<glm::vec3> vectors;
   std::vector<float> numbers;
   std::vector<std::uint8_t> bytes;
-  std::vector<std::uint64_t> counts;
+  std::vector<std::uint64_t> pages, firsts, counts;
 
   void resize(std::size_t size) {
     if (vectors.size() >= size) return;
     vectors.resize(size);
     numbers.resize(size);
     bytes.resize(size);
+    pages.resize(size);
+    firsts.resize(size);
     counts.resize(size);
   }
 };
@@ -94,6 +96,87 @@ Status resolveReference(const NodeLimits& limits, int level, int child_level,
     node.page = static_cast<std::uint32_t>(begin + stored_page);
   }
   node.first = static_cast<std::uint16_t>(first);
+  return {};
+}
+
+// Positions, sizes, directions and colors.
+Status decodeShapes(ByteReader& reader, bool full_precision, DecodeScratch& scratch,
+                    std::span<Node> out) {
+  const std::size_t count = out.size();
+  const std::span<glm::vec3> vectors = std::span(scratch.vectors).first(count);
+  const std::span<float> numbers = std::span(scratch.numbers).first(count);
+  if (!getPositions(reader, vectors)) return damaged("position");
+  for (std::size_t i = 0; i < count; ++i) out[i].position = vectors[i];
+  if (!getPositive(reader, numbers)) return damaged("radius");
+  for (std::size_t i = 0; i < count; ++i) out[i].radius = numbers[i];
+  if (!getPositive(reader, numbers)) return damaged("area");
+  for (std::size_t i = 0; i < count; ++i) out[i].area = numbers[i];
+  if (!getNormals(reader, vectors)) return damaged("normal");
+  for (std::size_t i = 0; i < count; ++i) out[i].normal = vectors[i];
+  if (!(full_precision ? getFloats(reader, numbers) : getSigned(reader, numbers, 1))) {
+    return damaged("flatness");
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(numbers[i] >= 0 && numbers[i] <= 1)) return damaged("flatness");
+    out[i].flatness = numbers[i];
+  }
+  if (!getColors(reader, vectors)) return damaged("radiosity");
+  for (std::size_t i = 0; i < count; ++i) {
+    out[i].radiosity = vectors[i];
+    const float largest = std::max({vectors[i].x, vectors[i].y, vectors[i].z});
+    if (!std::isfinite(out[i].area * largest * kCoefficientLimit)) return damaged("radiosity");
+  }
+  return {};
+}
+
+// What lies below each node; child levels, pages and firsts wait in scratch until all are there.
+Status decodeReferences(ByteReader& reader, const NodeLimits& limits, int level,
+                        DecodeScratch& scratch, std::span<Node> out) {
+  const std::size_t count = out.size();
+  const std::span<std::uint8_t> bytes = std::span(scratch.bytes).first(count);
+  const std::span<std::uint64_t> pages = std::span(scratch.pages).first(count);
+  const std::span<std::uint64_t> firsts = std::span(scratch.firsts).first(count);
+  const std::span<std::uint64_t> counts = std::span(scratch.counts).first(count);
+  if (!getBytes8(reader, bytes)) return damaged("flags");
+  for (std::size_t i = 0; i < count; ++i) {
+    if ((bytes[i] & ~kNodeFlat) != 0) return damaged("flags");
+    out[i].flags = bytes[i];
+  }
+  if (!getBytes8(reader, bytes)) return damaged("child count");
+  for (std::size_t i = 0; i < count; ++i) out[i].child_count = bytes[i];
+  if (!getBytes8(reader, bytes)) return damaged("child level");
+  if (!getCounts(reader, pages)) return damaged("page");
+  if (!getCounts(reader, firsts)) return damaged("first");
+  if (!getCounts(reader, counts)) return damaged("surfel count");
+  for (std::size_t i = 0; i < count; ++i) {
+    out[i].surfel_count = counts[i];
+    SURFEIT_RETURN_IF_ERROR(
+        resolveReference(limits, level, bytes[i], pages[i], firsts[i], out[i]));
+  }
+  return {};
+}
+
+// Harmonics of the nodes that are not flat.
+Status decodeCoefficients(ByteReader& reader, bool full_precision, DecodeScratch& scratch,
+                          std::span<Node> out) {
+  std::size_t rough = 0;
+  for (const Node& node : out) rough += node.isFlat() ? 0 : 1;
+  for (std::size_t i = 0; i < kCoefficientCount; ++i) {
+    const std::span<float> values = std::span(scratch.numbers).first(rough);
+    if (!(full_precision ? getFloats(reader, values)
+                         : getSigned(reader, values, kCoefficientLimit))) {
+      return damaged("coefficients");
+    }
+    std::size_t next = 0;
+    for (Node& node : out) {
+      if (node.isFlat()) continue;
+      setCoefficient(node, i, values[next++] * (full_precision ? 1 : coefficientScale(node, i)));
+    }
+  }
+  // |sum A n| is zero in these: no direction
+  for (Node& node : out) {
+    if (node.flatness == 0) node.normal = glm::vec3(0);
+  }
   return {};
 }
 
@@ -155,77 +238,13 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::u
   }
   thread_local DecodeScratch scratch;
   scratch.resize(nodes.size());
-  const std::span<glm::vec3> vectors = std::span(scratch.vectors).first(count);
-  const std::span<float> numbers = std::span(scratch.numbers).first(count);
-  const std::span<std::uint8_t> bytes = std::span(scratch.bytes).first(count);
-  const std::span<std::uint64_t> counts = std::span(scratch.counts).first(count);
   const std::span<Node> out = nodes.first(count);
   std::fill(out.begin(), out.end(), Node());
 
-  if (!getPositions(reader, vectors)) return damaged("position");
-  for (std::size_t i = 0; i < count; ++i) out[i].position = vectors[i];
-  if (!getPositive(reader, numbers)) return damaged("radius");
-  for (std::size_t i = 0; i < count; ++i) out[i].radius = numbers[i];
-  if (!getPositive(reader, numbers)) return damaged("area");
-  for (std::size_t i = 0; i < count; ++i) out[i].area = numbers[i];
-  if (!getNormals(reader, vectors)) return damaged("normal");
-  for (std::size_t i = 0; i < count; ++i) out[i].normal = vectors[i];
-  if (!(full_precision ? getFloats(reader, numbers) : getSigned(reader, numbers, 1))) {
-    return damaged("flatness");
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!(numbers[i] >= 0 && numbers[i] <= 1)) return damaged("flatness");
-    out[i].flatness = numbers[i];
-  }
-  if (!getColors(reader, vectors)) return damaged("radiosity");
-  for (std::size_t i = 0; i < count; ++i) {
-    out[i].radiosity = vectors[i];
-    const float largest = std::max({vectors[i].x, vectors[i].y, vectors[i].z});
-    if (!std::isfinite(out[i].area * largest * kCoefficientLimit)) return damaged("radiosity");
-  }
-
-  // References: child level and stored page wait in scratch until all parts are there
-  if (!getBytes8(reader, bytes)) return damaged("flags");
-  for (std::size_t i = 0; i < count; ++i) {
-    if ((bytes[i] & ~kNodeFlat) != 0) return damaged("flags");
-    out[i].flags = bytes[i];
-  }
-  if (!getBytes8(reader, bytes)) return damaged("child count");
-  for (std::size_t i = 0; i < count; ++i) out[i].child_count = bytes[i];
-  if (!getBytes8(reader, bytes)) return damaged("child level");
-  std::uint64_t first_column[1 << 12], page_column[1 << 12];
-  if (count > (1 << 12)) return damaged("count");
-  if (!getCounts(reader, counts)) return damaged("page");
-  std::copy(counts.begin(), counts.end(), page_column);
-  if (!getCounts(reader, counts)) return damaged("first");
-  std::copy(counts.begin(), counts.end(), first_column);
-  if (!getCounts(reader, counts)) return damaged("surfel count");
+  SURFEIT_RETURN_IF_ERROR(decodeShapes(reader, full_precision, scratch, out));
   const int level = levelOfPage(limits.level_first_page, page);
-  for (std::size_t i = 0; i < count; ++i) {
-    out[i].surfel_count = counts[i];
-    SURFEIT_RETURN_IF_ERROR(
-        resolveReference(limits, level, bytes[i], page_column[i], first_column[i], out[i]));
-  }
-
-  // Coefficients
-  std::size_t rough = 0;
-  for (const Node& node : out) rough += node.isFlat() ? 0 : 1;
-  for (std::size_t i = 0; i < kCoefficientCount; ++i) {
-    const std::span<float> values = numbers.first(rough);
-    if (!(full_precision ? getFloats(reader, values)
-                         : getSigned(reader, values, kCoefficientLimit))) {
-      return damaged("coefficients");
-    }
-    std::size_t next = 0;
-    for (Node& node : out) {
-      if (node.isFlat()) continue;
-      setCoefficient(node, i, values[next++] * (full_precision ? 1 : coefficientScale(node, i)));
-    }
-  }
-  // |sum A n| is zero in these: no direction
-  for (Node& node : out) {
-    if (node.flatness == 0) node.normal = glm::vec3(0);
-  }
+  SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, limits, level, scratch, out));
+  SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, scratch, out));
   if (reader.remaining() != 0) {
     return Status::corruption(
         fmt::format("node group: {} bytes after the last field", reader.remaining()));

@@ -14,7 +14,7 @@ namespace {
 //   [ count : 4 | padding : 60 | records ... ]
 constexpr std::size_t kFrameHeaderBytes = 64;
 
-// Pages a thread holds in front of each cache: the knee of the measured curve (DESIGN.md 5).
+// Pages a thread holds in front of each cache: the knee of the measured curve.
 constexpr std::size_t kFrontSlots = 64;
 // Fewest frames that let one thread hold a page, and load another.
 constexpr std::size_t kMinFramesPerThread = 2;

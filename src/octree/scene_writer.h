@@ -21,10 +21,10 @@
 namespace surfeit {
 
 // Groups by default. Node frames of 26 KiB and surfel frames of 32 KiB are what one device read
-// costs anyway (anchors: cache_reliability 2.4).
+// costs anyway.
 inline constexpr std::uint32_t kDefaultNodeGroup = 128;
 inline constexpr std::uint32_t kDefaultSurfelGroup = 512;
-// Nodes flatter than this are drawn as one disk: .97 was measured (anchors: pbgi_peers 4).
+// Nodes flatter than this are drawn as one disk: at .97 both kinds of error are equally small.
 inline constexpr float kDefaultFlatnessLimit = 0.97f;
 
 // Where a record went: a page, counted within its section (surfels) or level (nodes), and the

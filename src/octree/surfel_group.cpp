@@ -5,12 +5,16 @@
 #include <algorithm>
 
 #include "octree/column_codec.h"
+#include "octree/local_density.h"
 
 namespace surfeit {
 namespace {
 
 // Position error allowed, as a part of the smallest radius in the group (docs/format.md).
 constexpr float kPositionTolerance = 1e-3f;
+
+// Flags that a page may hold; the last only in the indexer's own temporary files.
+constexpr std::uint8_t kStoredFlags = kSurfelSphere | kSurfelTwoSided | kSurfelNeedsSize;
 
 // A column as its own array.
 template <typename T, typename Field>
@@ -79,6 +83,7 @@ Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
 
   if (!getBytes8(reader, flags)) return damaged("flags");
   for (std::size_t i = 0; i < count; ++i) {
+    if ((flags[i] & ~kStoredFlags) != 0) return damaged("flags");
     out[i] = Surfel();
     out[i].flags = flags[i];
   }

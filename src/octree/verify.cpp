@@ -26,6 +26,11 @@ class Findings {
   explicit Findings(VerifyReport& report) : report_(report) {}
   void add(const std::string& finding) {
     const std::lock_guard lock(mutex_);
+    // A damaged page is met again by every reference to it
+    if (std::find(report_.findings.begin(), report_.findings.end(), finding) !=
+        report_.findings.end()) {
+      return;
+    }
     ++report_.finding_count;
     if (report_.findings.size() < kMaxFindings) report_.findings.push_back(finding);
   }

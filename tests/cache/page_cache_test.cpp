@@ -389,7 +389,7 @@ TEST(CacheFront, FailedLookupLeavesTheFrontUsable) {
 }
 
 // Large caches hide lifetime races: what finds them is a tiny cache, many threads, and pages that
-// know their own number (anchors: cache_reliability 8.3).
+// know their own number.
 TEST(PageCache, TortureGivesNoWrongPage) {
   constexpr int kThreads = 4;
   constexpr PageNumber kPages = 2000;

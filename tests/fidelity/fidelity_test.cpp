@@ -1,4 +1,4 @@
-// The gate on every change (DESIGN.md 8): occlusion and irradiance at 2,000 receivers a scene,
+// The gate on every change: occlusion and irradiance at 2,000 receivers a scene,
 // against 1,024 rays each on the true triangles. The errors are printed; the limits stand a third
 // above what was measured when they were set, and may only go down.
 #include <fmt/format.h>
