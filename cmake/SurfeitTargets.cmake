@@ -34,5 +34,7 @@ function(surfeit_add_test layer)
   target_compile_definitions(${layer}_test PRIVATE
     SURFEIT_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}/tests"
     SURFEIT_SHARED_DATA_DIR="${PROJECT_SOURCE_DIR}/../shared/data")
-  gtest_discover_tests(${layer}_test TEST_PREFIX "${layer}." DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
+  gtest_discover_tests(${layer}_test TEST_PREFIX "${layer}." DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT 600
+    ENVIRONMENT "TSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/cmake/tsan.supp")
 endfunction()

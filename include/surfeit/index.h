@@ -18,7 +18,7 @@ struct IndexOptions {
   float overlap = 2;                  // disk area over surfel area where one must be made up
   bool full_precision = false;        // keep floats instead of quantized values
   bool strict = false;                // refuse invalid records instead of skipping them
-  std::string temporary_directory;    // empty: beside the output
+  std::string temporary_directory{};  // empty: beside the output
 };
 
 struct IndexStats {

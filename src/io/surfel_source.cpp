@@ -58,6 +58,7 @@ constexpr KindName kKindNames[] = {
     {&SurfelDefects::bad_area, "an area that is not positive"},
     {&SurfelDefects::short_normal, "a normal too short to point"},
     {&SurfelDefects::negative_color, "a negative radiosity or albedo"},
+    {&SurfelDefects::out_of_range, "a value too large to calculate with"},
 };
 
 }  // namespace
@@ -209,6 +210,13 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     return {&SurfelDefects::bad_area, area_.name, area, "more than 0"};
   }
 
+  if (surfel.radius > kLargestLength) {
+    return {&SurfelDefects::out_of_range, radius_.name, radius_.read(row), "at most 1e12"};
+  }
+  if (surfel.area > kLargestArea) {
+    return {&SurfelDefects::out_of_range, area_.name, area, "at most 1e24"};
+  }
+
   // The squares of floats fit doubles, so that the length is neither lost nor infinite
   const double length =
       std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
@@ -227,6 +235,13 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     }
     if (albedo[i] < 0) {
       return {&SurfelDefects::negative_color, albedo_[i].name, albedo[i], "0 or more"};
+    }
+    if (std::abs(position[i]) > kLargestLength) {
+      return {&SurfelDefects::out_of_range, position_[i].name, position[i], "at most 1e12"};
+    }
+    if (std::max(radiosity[i], albedo[i]) > kLargestColor) {
+      return {&SurfelDefects::out_of_range, "color", std::max(radiosity[i], albedo[i]),
+              "at most 1e12"};
     }
     surfel.position[i] = static_cast<float>(position[i]);
     surfel.radiosity[i] = static_cast<float>(radiosity[i]);

@@ -15,6 +15,12 @@
 
 namespace surfeit {
 
+// Largest values of a surfel: their squares and the sums over a cloud must be floats
+// (docs/format.md, "Limits").
+inline constexpr float kLargestLength = 1e12f;  // coordinates and radii
+inline constexpr float kLargestArea = 1e24f;
+inline constexpr float kLargestColor = 1e12f;  // radiosity and albedo
+
 // Records that hold no valid surfel, by kind, each with the number of the first (from 0).
 struct SurfelDefects {
   struct Kind {
@@ -26,6 +32,7 @@ struct SurfelDefects {
   Kind bad_area;        // area zero or negative, where the cloud has areas
   Kind short_normal;    // a normal that is not zero (a sphere) but too short (< 1e-6) to point
   Kind negative_color;  // negative radiosity or albedo
+  Kind out_of_range;    // beyond kLargestLength, kLargestArea or kLargestColor
 
   std::uint64_t total() const;
   // "3 records with a non-finite value (first: record 17), ..."; empty when total() is 0.

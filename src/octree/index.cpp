@@ -28,11 +28,6 @@ constexpr std::size_t kBatch = 16384;
 constexpr std::uint64_t kOverheadBytes = 16 << 20;
 constexpr std::uint64_t kLeastMemory = 32 << 20;
 
-// Largest values of a surfel: their squares and sums must be floats (docs/format.md, "Limits").
-constexpr float kLargestLength = 1e12f;
-constexpr float kLargestArea = 1e24f;
-constexpr float kLargestRadiosity = 1e12f;
-
 // What one pass over the inputs finds out.
 struct Scan {
   Bounds3 bounds;
@@ -57,23 +52,6 @@ class PhaseClock {
   IndexStats& stats_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
-
-Status checkLimits(const std::string& path, const Surfel& surfel) {
-  const auto largest = [](const glm::vec3& v) {
-    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  };
-  const auto tooLarge = [&path](const char* what, float found, float expected) {
-    return Status::corruption(
-        fmt::format("{}: {} of {}, expected at most {}", path, what, found, expected));
-  };
-  const float coordinate = largest(surfel.position);
-  const float radiosity = std::max(largest(surfel.radiosity), largest(surfel.albedo));
-  if (coordinate > kLargestLength) return tooLarge("coordinate", coordinate, kLargestLength);
-  if (surfel.radius > kLargestLength) return tooLarge("radius", surfel.radius, kLargestLength);
-  if (surfel.area > kLargestArea) return tooLarge("area", surfel.area, kLargestArea);
-  if (radiosity > kLargestRadiosity) return tooLarge("color", radiosity, kLargestRadiosity);
-  return {};
-}
 
 // The rules that need no neighbourhood (docs/format.md, "Rules for what is missing").
 void applySizeRules(Surfel& surfel, float overlap) {
@@ -180,7 +158,6 @@ Status Indexer::scanInput(const std::string& path) {
     SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source->read(batch));
     if (count == 0) break;
     for (const Surfel& surfel : std::span(batch).first(count)) {
-      SURFEIT_RETURN_IF_ERROR(checkLimits(path, surfel));
       scan_.missing_both += surfel.radius <= 0 && surfel.area <= 0 ? 1 : 0;
       scan_.missing_area += surfel.radius > 0 && surfel.area <= 0 ? 1 : 0;
       scan_.missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
