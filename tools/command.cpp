@@ -153,13 +153,20 @@ CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std:
 
 int exitStatus(StatusCode code) {
   switch (code) {
-    case StatusCode::kOk: return 0;
-    case StatusCode::kInvalidArgument: return 2;
-    case StatusCode::kCorruption: return 3;
-    case StatusCode::kBudgetTooSmall: return 33;
-    case StatusCode::kIoError: return 74;
-    case StatusCode::kInterrupted: return 130;
-    case StatusCode::kFailed: return 1;
+    case StatusCode::kOk:
+      return 0;
+    case StatusCode::kInvalidArgument:
+      return 2;
+    case StatusCode::kCorruption:
+      return 3;
+    case StatusCode::kBudgetTooSmall:
+      return 33;
+    case StatusCode::kIoError:
+      return 74;
+    case StatusCode::kInterrupted:
+      return 130;
+    case StatusCode::kFailed:
+      return 1;
   }
   return 1;
 }

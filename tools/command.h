@@ -78,7 +78,8 @@ std::string formatCount(std::uint64_t count);
 CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,
                                const std::string& help);
 
-// Exit status of a failure (docs/architecture.md): 2 usage, 3 bad data, 33 budget, 74 I/O, 130 interrupted.
+// Exit status of a failure (docs/architecture.md): 2 usage, 3 bad data, 33 budget, 74 I/O, 130
+// interrupted.
 int exitStatus(StatusCode code);
 
 // The subcommands, one file each.

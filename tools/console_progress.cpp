@@ -93,9 +93,8 @@ void ConsoleProgress::draw() {
     fmt::print(stderr, "{} {}% {} {}, {} left\n", phase_, percent, formatRate(rate), unit_,
                formatSeconds(left));
   } else if (style_ == Style::kJson) {
-    const nlohmann::json line = {{"phase", phase_},      {"done", done},
-                                 {"total", total_},      {"unit", unit_},
-                                 {"per_second", rate},   {"seconds_left", left}};
+    const nlohmann::json line = {{"phase", phase_}, {"done", done},       {"total", total_},
+                                 {"unit", unit_},   {"per_second", rate}, {"seconds_left", left}};
     fmt::print(stderr, "{}\n", line.dump());
   }
   last_percent_ = percent;

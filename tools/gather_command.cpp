@@ -18,10 +18,14 @@ struct GatherArguments {
 };
 
 nlohmann::json cacheJson(const GatherCacheStats& cache) {
-  return {{"requests", cache.requests},         {"hits", cache.hits},
-          {"misses", cache.misses},             {"evictions", cache.evictions},
-          {"bytes_read", cache.bytes_read},     {"peak_bytes", cache.peak_bytes},
-          {"budget_bytes", cache.budget_bytes}, {"decoded_bytes", cache.decoded_bytes}};
+  return {{"requests", cache.requests},
+          {"hits", cache.hits},
+          {"misses", cache.misses},
+          {"evictions", cache.evictions},
+          {"bytes_read", cache.bytes_read},
+          {"peak_bytes", cache.peak_bytes},
+          {"budget_bytes", cache.budget_bytes},
+          {"decoded_bytes", cache.decoded_bytes}};
 }
 
 std::string cacheRow(const char* name, const GatherCacheStats& cache) {
@@ -41,26 +45,27 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
                            gatherCloud(arguments.scene, arguments.receivers, arguments.result,
                                        options, context.progress()));
   const double rate = double(stats.receivers) / std::max(stats.gather_seconds, 1e-9);
-  context.say(fmt::format(
-      "{}: {} receivers in {:.1f} s, {} receivers/s with {} threads\n"
-      "memory: budget {}, peak resident {}\n"
-      "  {:8}{:>18}{:>11}{:>14}{:>14}{:>12}{:>12}{:>12}\n{}\n{}",
-      arguments.result, formatCount(stats.receivers), context.wallSeconds(),
-      formatCount(static_cast<std::uint64_t>(rate)), stats.threads,
-      formatBytes(stats.memory_bytes), formatBytes(peakResidentBytes()), "cache", "requests",
-      "hits %", "misses", "evictions", "read", "peak", "decoded", cacheRow("nodes", stats.node_cache),
-      cacheRow("surfels", stats.surfel_cache)));
-  return context.writeStats({{"command", "gather"},
-                             {"mode", options.mode == GatherMode::kBleeding ? "bleeding" : "occlusion"},
-                             {"max_solid_angle", options.quality.max_solid_angle},
-                             {"raster_resolution", options.quality.raster_resolution},
-                             {"memory_bytes", stats.memory_bytes},
-                             {"receivers", stats.receivers},
-                             {"invalid_receivers", stats.invalid_receivers},
-                             {"receivers_per_second", rate},
-                             {"gather_seconds", stats.gather_seconds},
-                             {"node_cache", cacheJson(stats.node_cache)},
-                             {"surfel_cache", cacheJson(stats.surfel_cache)}});
+  context.say(
+      fmt::format("{}: {} receivers in {:.1f} s, {} receivers/s with {} threads\n"
+                  "memory: budget {}, peak resident {}\n"
+                  "  {:8}{:>18}{:>11}{:>14}{:>14}{:>12}{:>12}{:>12}\n{}\n{}",
+                  arguments.result, formatCount(stats.receivers), context.wallSeconds(),
+                  formatCount(static_cast<std::uint64_t>(rate)), stats.threads,
+                  formatBytes(stats.memory_bytes), formatBytes(peakResidentBytes()), "cache",
+                  "requests", "hits %", "misses", "evictions", "read", "peak", "decoded",
+                  cacheRow("nodes", stats.node_cache), cacheRow("surfels", stats.surfel_cache)));
+  return context.writeStats(
+      {{"command", "gather"},
+       {"mode", options.mode == GatherMode::kBleeding ? "bleeding" : "occlusion"},
+       {"max_solid_angle", options.quality.max_solid_angle},
+       {"raster_resolution", options.quality.raster_resolution},
+       {"memory_bytes", stats.memory_bytes},
+       {"receivers", stats.receivers},
+       {"invalid_receivers", stats.invalid_receivers},
+       {"receivers_per_second", rate},
+       {"gather_seconds", stats.gather_seconds},
+       {"node_cache", cacheJson(stats.node_cache)},
+       {"surfel_cache", cacheJson(stats.surfel_cache)}});
 }
 
 void addQualityOptions(CLI::App& command, GatherQuality& quality) {
@@ -77,8 +82,7 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
       ->check(CLI::Range(2, 64))
       ->capture_default_str()
       ->group(kGroup);
-  command
-      .add_option("--bias", quality.bias, "Start of rays above the receiver, in surfel radii")
+  command.add_option("--bias", quality.bias, "Start of rays above the receiver, in surfel radii")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str()
       ->group(kGroup);
@@ -93,11 +97,9 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
                   "Surfels farther away do not count, in scene units")
       ->check(CLI::PositiveNumber)
       ->group(kGroup);
-  command
-      .add_option("--sides", quality.sides, "Sides of surfels that cover: front or both")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, GatherSides>{{"front", GatherSides::kFront},
-                                             {"both", GatherSides::kBoth}}))
+  command.add_option("--sides", quality.sides, "Sides of surfels that cover: front or both")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, GatherSides>{
+          {"front", GatherSides::kFront}, {"both", GatherSides::kBoth}}))
       ->default_str("front")
       ->group(kGroup);
 }
@@ -113,9 +115,8 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
       ->required();
   command->add_option("-o,--output", arguments->result, "Result cloud (PLY)")->required();
   command->add_option("--mode", arguments->options.mode, "occlusion or bleeding")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, GatherMode>{{"occlusion", GatherMode::kOcclusion},
-                                            {"bleeding", GatherMode::kBleeding}}))
+      ->transform(CLI::CheckedTransformer(std::map<std::string, GatherMode>{
+          {"occlusion", GatherMode::kOcclusion}, {"bleeding", GatherMode::kBleeding}}))
       ->default_str("occlusion");
   command->add_flag("--strict", arguments->options.strict,
                     "Refuse invalid receivers instead of writing NaN for them");

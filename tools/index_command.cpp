@@ -28,14 +28,14 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                                                                options, context.progress()));
   const double seconds = context.wallSeconds();
   const double bytes_per_surfel = double(stats.file_bytes) / double(stats.surfels);
-  context.say(fmt::format(
-      "{}: {} surfels, {} nodes, {} pages, {} ({:.1f} bytes per surfel)\n"
-      "{:.1f} s, {:.2f} M surfels/s, peak memory {}, temporary files {}",
-      arguments.output, formatCount(stats.surfels), formatCount(stats.nodes),
-      formatCount(std::uint64_t{stats.node_pages} + stats.surfel_pages),
-      formatBytes(stats.file_bytes), bytes_per_surfel, seconds,
-      double(stats.surfels) / seconds / 1e6, formatBytes(peakResidentBytes()),
-      formatBytes(stats.temporary_bytes)));
+  context.say(
+      fmt::format("{}: {} surfels, {} nodes, {} pages, {} ({:.1f} bytes per surfel)\n"
+                  "{:.1f} s, {:.2f} M surfels/s, peak memory {}, temporary files {}",
+                  arguments.output, formatCount(stats.surfels), formatCount(stats.nodes),
+                  formatCount(std::uint64_t{stats.node_pages} + stats.surfel_pages),
+                  formatBytes(stats.file_bytes), bytes_per_surfel, seconds,
+                  double(stats.surfels) / seconds / 1e6, formatBytes(peakResidentBytes()),
+                  formatBytes(stats.temporary_bytes)));
   nlohmann::json phases = nlohmann::json::object();
   for (const auto& [phase, phase_seconds] : stats.phase_seconds) phases[phase] = phase_seconds;
   return context.writeStats({{"command", "index"},
@@ -61,8 +61,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   IndexOptions& options = arguments->options;
   command->add_option("CLOUD", arguments->inputs, "Surfel clouds (PLY), in any order")->required();
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
-  command
-      ->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
+  command->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   command
@@ -78,7 +77,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->add_flag("--strict", options.strict, "Refuse invalid records instead of skipping them");
   context.addCommonOptions(*command);
   command->footer(
-      "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the overlap;\n"
+      "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
+      "overlap;\n"
       "no radius, the distance to the neighbours; no normal, a sphere. --memory defaults to 1G.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"

@@ -34,7 +34,8 @@ int parseAndRun(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);  // --help and --version
   } catch (const CLI::ParseError& error) {
-    const std::string suggestion = suggestOption(app, std::vector<std::string>(argv + 1, argv + argc));
+    const std::string suggestion =
+        suggestOption(app, std::vector<std::string>(argv + 1, argv + argc));
     std::fprintf(stderr, "surfeit: %s%s\n", error.what(), suggestion.c_str());
     return exitStatus(StatusCode::kInvalidArgument);
   }

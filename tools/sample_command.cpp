@@ -12,9 +12,9 @@ namespace {
 
 Status runSample(SampleArguments& arguments, CommandContext& context) {
   arguments.options.threads = context.threads();
-  SURFEIT_ASSIGN_OR_RETURN(const SampleStats stats,
-                           sampleMeshes(arguments.meshes, arguments.output, arguments.options,
-                                        context.progress()));
+  SURFEIT_ASSIGN_OR_RETURN(
+      const SampleStats stats,
+      sampleMeshes(arguments.meshes, arguments.output, arguments.options, context.progress()));
   context.say(fmt::format("{}: {} surfels from {} triangles in {:.1f} s ({:.2f} M surfels/s)",
                           arguments.output, formatCount(stats.surfels),
                           formatCount(stats.triangles), context.wallSeconds(),
@@ -46,9 +46,8 @@ void addSampleCommand(CLI::App& app, CommandContext& context) {
       "  surfeit sample cornell.obj -o cornell.ply --count 1000000\n"
       "  surfeit sample lion.ply -o lion.ply --spacing 0.01 --ground-plane --up z \\\n"
       "      --light-directional \"-1 -1 -2  3 3 3\"");
-  command->callback([arguments, &context] {
-    context.run([&] { return runSample(*arguments, context); });
-  });
+  command->callback(
+      [arguments, &context] { context.run([&] { return runSample(*arguments, context); }); });
 }
 
 }  // namespace surfeit

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "tools/command.h"
-#include "view/view.h"
 #include "tools/view_options.h"
+#include "view/view.h"
 
 namespace surfeit {
 namespace {

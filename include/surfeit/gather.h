@@ -34,9 +34,10 @@ struct GatherQuality {
 struct GatherOptions {
   GatherMode mode = GatherMode::kOcclusion;
   GatherQuality quality;
-  std::uint64_t memory_bytes = 0;  // budget of the process; 0: three quarters of what the job may use
-  int threads = 0;                 // 0: all that the job may use
-  bool strict = false;             // refuse invalid receivers instead of writing NaN for them
+  std::uint64_t memory_bytes =
+      0;                // budget of the process; 0: three quarters of what the job may use
+  int threads = 0;      // 0: all that the job may use
+  bool strict = false;  // refuse invalid receivers instead of writing NaN for them
 };
 
 struct GatherCacheStats {

@@ -17,13 +17,13 @@ struct SceneInfo {
   std::uint64_t nodes = 0;
   std::uint32_t leaf_capacity = 0;
   std::uint32_t node_pages = 0, surfel_pages = 0;
-  std::uint64_t node_page_bytes = 0, surfel_page_bytes = 0;  // stored
+  std::uint64_t node_page_bytes = 0, surfel_page_bytes = 0;    // stored
   std::uint64_t node_cache_bytes = 0, surfel_cache_bytes = 0;  // all pages decoded
-  glm::vec3 min{0}, max{0};     // bounds of the surfel positions
-  CloudChannels channels;       // what the input brought
+  glm::vec3 min{0}, max{0};                                    // bounds of the surfel positions
+  CloudChannels channels;                                      // what the input brought
   bool full_precision = false;
   std::vector<std::uint32_t> level_pages;  // node pages of levels 0..21
-  std::string provenance;       // JSON
+  std::string provenance;                  // JSON
 };
 
 // Reads header and directory, but no page. Errors: kIoError, kCorruption.

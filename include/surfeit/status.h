@@ -54,8 +54,8 @@ class [[nodiscard]] Status {
 template <typename T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : value_(std::move(value)) {}            // NOLINT: implicit on purpose
-  Result(Status status) : status_(std::move(status)) {}    // NOLINT: implicit on purpose
+  Result(T value) : value_(std::move(value)) {}          // NOLINT: implicit on purpose
+  Result(Status status) : status_(std::move(status)) {}  // NOLINT: implicit on purpose
 
   bool ok() const { return value_.has_value(); }
   const Status& status() const { return status_; }
@@ -77,10 +77,10 @@ class [[nodiscard]] Result {
 #define SURFEIT_CONCAT(a, b) SURFEIT_CONCAT_INNER(a, b)
 
 // Returns the Status of `expression` from the enclosing function unless it is ok.
-#define SURFEIT_RETURN_IF_ERROR(expression)                      \
-  do {                                                           \
-    ::surfeit::Status surfeit_status = (expression);             \
-    if (!surfeit_status.ok()) return surfeit_status;             \
+#define SURFEIT_RETURN_IF_ERROR(expression)          \
+  do {                                               \
+    ::surfeit::Status surfeit_status = (expression); \
+    if (!surfeit_status.ok()) return surfeit_status; \
   } while (false)
 
 // Declares `target` with the value of the Result `expression`, or returns its Status.

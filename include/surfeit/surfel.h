@@ -14,13 +14,13 @@ enum SurfelFlags : std::uint32_t {
 
 // Plain data, 64 bytes without padding, so that a surfel can be spilled and compared as bytes.
 struct Surfel {
-  glm::vec3 position{0};   // world units
-  float radius = 0;        // > 0; circumscribes the micropolygon, so that disks leave no gaps
-  glm::vec3 normal{0};     // unit length; zero when kSurfelSphere is set
-  float area = 0;          // > 0; exact area of the micropolygon; of a sphere: its cross-section
-  glm::vec3 radiosity{0};  // radiant exitance, scene-linear rgb, >= 0
-  std::uint32_t flags = 0; // SurfelFlags
-  glm::vec3 albedo{0};     // diffuse reflectance, scene-linear rgb, for further bounces
+  glm::vec3 position{0};    // world units
+  float radius = 0;         // > 0; circumscribes the micropolygon, so that disks leave no gaps
+  glm::vec3 normal{0};      // unit length; zero when kSurfelSphere is set
+  float area = 0;           // > 0; exact area of the micropolygon; of a sphere: its cross-section
+  glm::vec3 radiosity{0};   // radiant exitance, scene-linear rgb, >= 0
+  std::uint32_t flags = 0;  // SurfelFlags
+  glm::vec3 albedo{0};      // diffuse reflectance, scene-linear rgb, for further bounces
   std::uint32_t reserved = 0;
 
   bool isSphere() const { return (flags & kSurfelSphere) != 0; }

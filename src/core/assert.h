@@ -5,12 +5,12 @@
 #include <cstdio>
 #include <cstdlib>
 
-#define SURFEIT_CHECK(condition)                                                              \
-  do {                                                                                        \
-    if (!(condition)) {                                                                       \
-      std::fprintf(stderr, "surfeit bug: %s:%d: %s\n", __FILE__, __LINE__, #condition);       \
-      std::abort();                                                                           \
-    }                                                                                         \
+#define SURFEIT_CHECK(condition)                                                        \
+  do {                                                                                  \
+    if (!(condition)) {                                                                 \
+      std::fprintf(stderr, "surfeit bug: %s:%d: %s\n", __FILE__, __LINE__, #condition); \
+      std::abort();                                                                     \
+    }                                                                                   \
   } while (false)
 
 #ifdef NDEBUG

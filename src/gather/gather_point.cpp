@@ -37,6 +37,7 @@ Status PointGatherer::selectCut(PagedOctree::Reader& octree) {
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings,
                              octree.nodes(stack_[--stack_count]));
     work_.nodes_visited += siblings.size();
+    SURFEIT_RETURN_IF_ERROR(octree.checkVisits(work_.nodes_visited, work_.surfels_visited));
     for (const Node& node : siblings) {
       // Skip nodes wholly below the horizon or out of reach
       const glm::vec3 to_node = node.position - receiver.position;

@@ -185,7 +185,8 @@ Status AtomicFile::commit() {
 Result<TemporaryFile> TemporaryFile::create(const std::string& directory) {
   TemporaryFile file;
   file.directory_ = directory;
-  file.descriptor_ = FileDescriptor(::open(directory.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
+  file.descriptor_ =
+      FileDescriptor(::open(directory.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
   if (!file.descriptor_.isOpen()) {
     // Not every file system has O_TMPFILE: create a named file and unlink it at once
     std::string name = directory + "/surfeit-XXXXXX";

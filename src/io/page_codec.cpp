@@ -38,8 +38,7 @@ Status decompressPage(Bytes stored, std::span<std::byte> payload) {
     return Status::corruption(fmt::format("zstd: {}", ZSTD_getErrorName(bytes)));
   }
   if (bytes != payload.size()) {
-    return Status::corruption(
-        fmt::format("decoded size {}, expected {}", bytes, payload.size()));
+    return Status::corruption(fmt::format("decoded size {}, expected {}", bytes, payload.size()));
   }
   return {};
 }

@@ -65,8 +65,8 @@ Result<PageFile> PageFile::open(const std::string& path) {
   }
   const std::uint64_t directory_bytes = pages.fileBytes() - kFileFooterBytes - directory_offset;
   pages.directory_.resize(directory_bytes / sizeof(PageEntry));
-  SURFEIT_RETURN_IF_ERROR(pages.file_.readAt(
-      directory_offset, std::as_writable_bytes(std::span(pages.directory_))));
+  SURFEIT_RETURN_IF_ERROR(
+      pages.file_.readAt(directory_offset, std::as_writable_bytes(std::span(pages.directory_))));
   if (const std::uint64_t found = hash(bytesOf(pages.directory_), pages.identity_);
       found != directory_checksum) {
     return pages.partError("directory", checksumMismatch(found, directory_checksum));
@@ -82,8 +82,8 @@ Status PageFile::readHeader() {
     return partError("header", "not a Surfeit scene: the first bytes are not those of a .sft file");
   }
   if (got < kFileHeaderBytes) {
-    return partError("header", fmt::format("file ends after {} bytes, expected {}", got,
-                                           kFileHeaderBytes));
+    return partError("header",
+                     fmt::format("file ends after {} bytes, expected {}", got, kFileHeaderBytes));
   }
   ByteReader reader(header);
   reader.take(sizeof kHeaderMagic);
@@ -101,8 +101,8 @@ Status PageFile::readHeader() {
     return partError("header", checksumMismatch(found, stored_checksum));
   }
   if (header_bytes != kFileHeaderBytes) {
-    return partError("header",
-                     fmt::format("header of {} bytes, expected {}", header_bytes, kFileHeaderBytes));
+    return partError(
+        "header", fmt::format("header of {} bytes, expected {}", header_bytes, kFileHeaderBytes));
   }
   scene_fields_.assign(header.begin() + kSceneFieldsOffset,
                        header.begin() + kSceneFieldsOffset + kSceneFieldsBytes);
@@ -114,7 +114,8 @@ Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& prov
   constexpr std::uint64_t kFrameBytes = kFileHeaderBytes + kFileFooterBytes;
   if (fileBytes() < kFrameBytes) {
     return partError("footer", fmt::format("file of {} bytes, expected at least {}: it was not "
-                                           "finished or was cut", fileBytes(), kFrameBytes));
+                                           "finished or was cut",
+                                           fileBytes(), kFrameBytes));
   }
   std::byte footer[kFileFooterBytes];
   SURFEIT_RETURN_IF_ERROR(file_.readAt(fileBytes() - kFileFooterBytes, footer));
@@ -127,14 +128,16 @@ Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& prov
   const std::uint64_t node_pages = reader.get<std::uint64_t>();
   const std::uint64_t checksum = reader.get<std::uint64_t>();
   if (std::memcmp(reader.take(8).data(), kFooterMagic, 8) != 0) {
-    return partError("footer", "missing: the file was not finished, was cut, or has bytes appended");
+    return partError("footer",
+                     "missing: the file was not finished, was cut, or has bytes appended");
   }
   if (const std::uint64_t found = hash(Bytes(footer).first(kFileFooterBytes - 16), identity_);
       found != checksum) {
     return partError("footer", checksumMismatch(found, checksum));
   }
   if (file_bytes != fileBytes()) {
-    return partError("footer", fmt::format("file of {} bytes, expected {}", fileBytes(), file_bytes));
+    return partError("footer",
+                     fmt::format("file of {} bytes, expected {}", fileBytes(), file_bytes));
   }
 
   // Parts lie in order and the directory holds whole entries
@@ -142,14 +145,15 @@ Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& prov
   if (provenance_offset < kFileHeaderBytes || provenance_offset > directory_offset ||
       directory_offset > directory_end) {
     return partError("footer", fmt::format("provenance at {} and directory at {} do not fit a file "
-                                           "of {} bytes", provenance_offset, directory_offset,
-                                           fileBytes()));
+                                           "of {} bytes",
+                                           provenance_offset, directory_offset, fileBytes()));
   }
   const std::uint64_t directory_bytes = directory_end - directory_offset;
   const std::uint64_t pages = directory_bytes / sizeof(PageEntry);
   if (directory_bytes % sizeof(PageEntry) != 0 || pages > kMaxPages || node_pages > pages) {
     return partError("footer", fmt::format("directory of {} bytes with {} node pages is no whole "
-                                           "number of entries", directory_bytes, node_pages));
+                                           "number of entries",
+                                           directory_bytes, node_pages));
   }
   node_page_count_ = static_cast<std::uint32_t>(node_pages);
   return {};
@@ -161,9 +165,10 @@ Status PageFile::checkDirectory(std::uint64_t pages_end) {
   const auto check = [&](std::uint32_t page) -> Status {
     const PageEntry& at = directory_[page];
     if (at.offset != expected_offset || at.stored_bytes > pages_end - at.offset) {
-      return partError("directory", fmt::format("page {} at {} with {} bytes, expected at {} and "
-                                                "before {}", page, at.offset, at.stored_bytes,
-                                                expected_offset, pages_end));
+      return partError("directory",
+                       fmt::format("page {} at {} with {} bytes, expected at {} and "
+                                   "before {}",
+                                   page, at.offset, at.stored_bytes, expected_offset, pages_end));
     }
     if (at.payload_bytes > kMaxPayloadBytes) {
       return partError("directory", fmt::format("page {} decodes to {} bytes, expected at most {}",
@@ -181,8 +186,8 @@ Status PageFile::checkDirectory(std::uint64_t pages_end) {
     SURFEIT_RETURN_IF_ERROR(check(page));
   }
   if (expected_offset != pages_end) {
-    return partError("directory", fmt::format("pages end at {}, expected {}", expected_offset,
-                                              pages_end));
+    return partError("directory",
+                     fmt::format("pages end at {}, expected {}", expected_offset, pages_end));
   }
   return {};
 }

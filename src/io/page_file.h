@@ -59,7 +59,8 @@ class PageFile {
   std::uint32_t maxPayloadBytes() const { return max_payload_bytes_; }
 
   // Reads, checks and decompresses a page into `payload`, with `stored` as scratch. page must be
-  // below pageCount(). Messages read "scene.sft: page 1832 at 30015488: checksum ..., expected ...".
+  // below pageCount(). Messages read "scene.sft: page 1832 at 30015488: checksum ..., expected
+  // ...".
   Status readPage(std::uint32_t page, std::vector<std::byte>& stored,
                   std::vector<std::byte>& payload) const;
   // Prefixes a message about a page's contents with file, page and offset, as kCorruption.

@@ -16,8 +16,8 @@ namespace {
 
 // First byte of a column that has several forms.
 enum ColumnForm : std::uint8_t {
-  kFormZero = 0,    // all values zero, nothing follows
-  kFormFloat = 4,   // floats
+  kFormZero = 0,   // all values zero, nothing follows
+  kFormFloat = 4,  // floats
   // 2 and 3: quantized to that many bytes
 };
 
@@ -211,8 +211,8 @@ void putPositive(ByteWriter& writer, std::span<const float> values, Rounding rou
   const std::span<std::uint16_t> codes = scratch<std::uint16_t>(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     const float at = range > 0 ? std::log2(values[i] / *min) / range * kMaxUint16 : 0;
-    const float code = rounding == Rounding::kUp ? std::ceil(at) + (at > 0 ? 1 : 0)
-                                                 : std::nearbyintf(at);
+    const float code =
+        rounding == Rounding::kUp ? std::ceil(at) + (at > 0 ? 1 : 0) : std::nearbyintf(at);
     codes[i] = static_cast<std::uint16_t>(std::clamp(code, 0.f, kMaxUint16));
   }
   putPlanes<std::uint16_t>(writer, codes, 2);
@@ -235,7 +235,8 @@ bool getPositive(ByteReader& reader, std::span<float> values) {
     return true;
   }
   const float step = range / kMaxUint16;
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = min * std::exp2(float(codes[i]) * step);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = min * std::exp2(float(codes[i]) * step);
   return true;
 }
 

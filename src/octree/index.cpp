@@ -126,9 +126,10 @@ Status Indexer::checkOptions() const {
         fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
   }
   if (options_.memory_bytes < kLeastMemory) {
-    return Status::budgetTooSmall(fmt::format("--memory of {} MiB is too small to index: {} MiB is "
-                                              "the least that works",
-                                              options_.memory_bytes >> 20, kLeastMemory >> 20));
+    return Status::budgetTooSmall(
+        fmt::format("--memory of {} MiB is too small to index: {} MiB is "
+                    "the least that works",
+                    options_.memory_bytes >> 20, kLeastMemory >> 20));
   }
   return {};
 }
@@ -142,8 +143,8 @@ Status Indexer::scan() {
   progress_.beginPhase("scan", records, "surfels");
   for (const std::string& path : inputs_) SURFEIT_RETURN_IF_ERROR(scanInput(path));
   if (scan_.surfels == 0) {
-    return Status::corruption(fmt::format("{}: no valid surfel in {} records", inputs_.front(),
-                                          records));
+    return Status::corruption(
+        fmt::format("{}: no valid surfel in {} records", inputs_.front(), records));
   }
   stats_.skipped_records = scan_.skipped;
   noteRules();
@@ -184,8 +185,10 @@ Status Indexer::scanInput(const std::string& path) {
 
 void Indexer::noteRules() const {
   if (scan_.missing_both > 0) {
-    progress_.note(fmt::format("{} surfels have neither radius nor area: both follow from the "
-                               "distance to their neighbours", scan_.missing_both));
+    progress_.note(
+        fmt::format("{} surfels have neither radius nor area: both follow from the "
+                    "distance to their neighbours",
+                    scan_.missing_both));
   }
   if (scan_.missing_area > 0) {
     progress_.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", scan_.missing_area,
@@ -196,8 +199,10 @@ void Indexer::noteRules() const {
                                scan_.missing_radius, options_.overlap));
   }
   if (scan_.spheres > 0) {
-    progress_.note(fmt::format("warning: {} surfels have no normal: they are spheres, which look "
-                               "the same from everywhere", scan_.spheres));
+    progress_.note(
+        fmt::format("warning: {} surfels have no normal: they are spheres, which look "
+                    "the same from everywhere",
+                    scan_.spheres));
   }
 }
 
@@ -243,9 +248,10 @@ Status Indexer::build(const std::string& path, SortedSurfelStream& stream, bool 
   OctreeBuilder builder(*writer);
   SURFEIT_RETURN_IF_ERROR(builder.build(stream, progress_));
   if (writer->header().surfel_count != scan_.surfels) {
-    return Status::failed(fmt::format("{}: {} surfels in the second pass, {} in the first: an "
-                                      "input changed meanwhile", output_,
-                                      writer->header().surfel_count, scan_.surfels));
+    return Status::failed(
+        fmt::format("{}: {} surfels in the second pass, {} in the first: an "
+                    "input changed meanwhile",
+                    output_, writer->header().surfel_count, scan_.surfels));
   }
   SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
   stats_.surfels = writer->header().surfel_count;
@@ -274,9 +280,8 @@ Status Indexer::buildWithDensity(std::unique_ptr<SurfelSorter> sorter, PhaseCloc
   stats_.temporary_bytes = 0;
   clock.finish("order");
 
-  const std::uint64_t cache_bytes =
-      std::min<std::uint64_t>(options_.memory_bytes - kOverheadBytes,
-                              PagedOctree::unlimitedCacheBytes(*bare));
+  const std::uint64_t cache_bytes = std::min<std::uint64_t>(
+      options_.memory_bytes - kOverheadBytes, PagedOctree::unlimitedCacheBytes(*bare));
   SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
                            PagedOctree::planMemory(*bare, cache_bytes, threads_));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
@@ -303,17 +308,16 @@ std::uint64_t Indexer::identity(bool full_precision) const {
 // Only what the surfels themselves do not say, and nothing that differs between equal runs: no
 // time, no paths, no order.
 std::string Indexer::provenance() const {
-  const nlohmann::json json = {
-      {"program", "surfeit"},
-      {"version", kVersion},
-      {"leaf_capacity", options_.leaf_capacity},
-      {"overlap", options_.overlap},
-      {"precision", options_.full_precision ? "full" : "quantized"},
-      {"skipped_records", scan_.skipped},
-      {"sizes_from_neighbours", scan_.missing_both},
-      {"areas_from_radius", scan_.missing_area},
-      {"radii_from_area", scan_.missing_radius},
-      {"spheres", scan_.spheres}};
+  const nlohmann::json json = {{"program", "surfeit"},
+                               {"version", kVersion},
+                               {"leaf_capacity", options_.leaf_capacity},
+                               {"overlap", options_.overlap},
+                               {"precision", options_.full_precision ? "full" : "quantized"},
+                               {"skipped_records", scan_.skipped},
+                               {"sizes_from_neighbours", scan_.missing_both},
+                               {"areas_from_radius", scan_.missing_area},
+                               {"radii_from_area", scan_.missing_radius},
+                               {"spheres", scan_.spheres}};
   return json.dump();
 }
 

@@ -25,13 +25,13 @@ struct Node {
   float area;           // sum of the surfel areas
   glm::vec3 radiosity;  // area-weighted mean
   float flatness;       // |sum A n| / sum A, 0..1
-  std::uint32_t page;   // interior: node page of the children; leaf: surfel page of its first surfel
-  std::uint16_t first;  // index of the first child or surfel in that page
-  std::uint8_t child_count;     // 0: a leaf
-  std::uint8_t flags;           // NodeFlags
-  std::uint64_t surfel_count;   // below this node; those of a leaf may run on into following pages
-  ShCoefficients area_sh;       // projected area, clamped cosine (memo 3.2)
-  ShCoefficients power_sh[3];   // projected power, rgb
+  std::uint32_t page;  // interior: node page of the children; leaf: surfel page of its first surfel
+  std::uint16_t first;         // index of the first child or surfel in that page
+  std::uint8_t child_count;    // 0: a leaf
+  std::uint8_t flags;          // NodeFlags
+  std::uint64_t surfel_count;  // below this node; those of a leaf may run on into following pages
+  ShCoefficients area_sh;      // projected area, clamped cosine (memo 3.2)
+  ShCoefficients power_sh[3];  // projected power, rgb
 
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }

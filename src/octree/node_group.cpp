@@ -150,8 +150,7 @@ Status decodeReferences(ByteReader& reader, const NodeLimits& limits, int level,
   if (!getCounts(reader, counts)) return damaged("surfel count");
   for (std::size_t i = 0; i < count; ++i) {
     out[i].surfel_count = counts[i];
-    SURFEIT_RETURN_IF_ERROR(
-        resolveReference(limits, level, bytes[i], pages[i], firsts[i], out[i]));
+    SURFEIT_RETURN_IF_ERROR(resolveReference(limits, level, bytes[i], pages[i], firsts[i], out[i]));
   }
   return {};
 }

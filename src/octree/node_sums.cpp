@@ -63,8 +63,8 @@ Node NodeSums::toNode(float flatness_limit) const {
   node.position = centre();
   node.area = float(area);
   node.surfel_count = surfel_count;
-  const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] +
-                                  normal[2] * normal[2]);
+  const double length =
+      std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   node.flatness = float(std::min(length / area, 1.0));
   for (int axis = 0; axis < 3; ++axis) {
     node.normal[axis] = length > 0 ? float(normal[axis] / length) : 0;

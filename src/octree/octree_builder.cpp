@@ -40,8 +40,7 @@ Status OctreeBuilder::build(SortedSurfelStream& stream, Progress& progress) {
       SURFEIT_RETURN_IF_ERROR(takeEqualKeys(stream, leaf));
     }
     SURFEIT_RETURN_IF_ERROR(refill(stream));
-    boundary_level =
-        at_ < window_.size() ? firstDifferentLevel(last_key, window_[at_].key) : 0;
+    boundary_level = at_ < window_.size() ? firstDifferentLevel(last_key, window_[at_].key) : 0;
     SURFEIT_RETURN_IF_ERROR(place(std::move(leaf), boundary_level));
     progress.advance(surfels_taken_ - taken_before);
   }

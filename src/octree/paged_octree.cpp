@@ -100,8 +100,7 @@ struct PagedOctree::Reader::State {
 
 std::size_t PagedOctree::fixedBytes(const SceneFile& file, int threads) {
   const PageFile& pages = file.pages();
-  const std::size_t per_thread =
-      pages.maxStoredBytes() + pages.maxPayloadBytes() + kDecoderBytes;
+  const std::size_t per_thread = pages.maxStoredBytes() + pages.maxPayloadBytes() + kDecoderBytes;
   return pages.pageCount() * sizeof(PageEntry) + static_cast<std::size_t>(threads) * per_thread;
 }
 
@@ -120,7 +119,8 @@ Result<PagedOctree::Memory> PagedOctree::planMemory(const SceneFile& file, std::
   const std::size_t half = cache_bytes / 2;
   const std::size_t node_bytes =
       std::min(all_nodes, std::max(half, cache_bytes - std::min(all_surfels, cache_bytes)));
-  const std::size_t surfel_bytes = std::min(all_surfels, cache_bytes - std::min(node_bytes, cache_bytes));
+  const std::size_t surfel_bytes =
+      std::min(all_surfels, cache_bytes - std::min(node_bytes, cache_bytes));
   Memory memory;
   memory.node_frames = framesWithin(nodeOptions(file, 0), node_bytes);
   memory.surfel_frames = framesWithin(surfelOptions(file, 0), surfel_bytes);
@@ -133,21 +133,22 @@ Result<PagedOctree::Memory> PagedOctree::planMemory(const SceneFile& file, std::
   const std::size_t least_nodes = least(file.nodePageCount());
   const std::size_t least_surfels = least(file.surfelPageCount());
   if (memory.node_frames < least_nodes || memory.surfel_frames < least_surfels) {
-    const std::size_t needed = 2 * std::max(PageCache::memoryBytes(nodeOptions(file, least_nodes)),
-                                            PageCache::memoryBytes(surfelOptions(file, least_surfels)));
-    return Status::budgetTooSmall(fmt::format(
-        "{}: {} bytes for the caches of {} threads, expected at least {}", file.path(),
-        cache_bytes, threads, needed));
+    const std::size_t needed =
+        2 * std::max(PageCache::memoryBytes(nodeOptions(file, least_nodes)),
+                     PageCache::memoryBytes(surfelOptions(file, least_surfels)));
+    return Status::budgetTooSmall(
+        fmt::format("{}: {} bytes for the caches of {} threads, expected at least {}", file.path(),
+                    cache_bytes, threads, needed));
   }
 
   // At most half of each cache may be pinned by fronts, so that LRU keeps something to choose from
   const auto slots = [&](std::size_t frames, std::uint32_t pages) {
     return frames >= pages ? kFrontSlots : frames / (2 * static_cast<std::size_t>(threads));
   };
-  memory.front_slots = std::clamp<std::size_t>(
-      std::min(slots(memory.node_frames, file.nodePageCount()),
-               slots(memory.surfel_frames, file.surfelPageCount())),
-      1, kFrontSlots);
+  memory.front_slots =
+      std::clamp<std::size_t>(std::min(slots(memory.node_frames, file.nodePageCount()),
+                                       slots(memory.surfel_frames, file.surfelPageCount())),
+                              1, kFrontSlots);
   return memory;
 }
 
@@ -155,22 +156,22 @@ Result<std::unique_ptr<PagedOctree>> PagedOctree::create(SceneFile file, const M
   auto state = std::make_unique<State>(std::move(file));
   state->memory = memory;
   const SceneFile& scene = state->file;
+  SURFEIT_ASSIGN_OR_RETURN(state->nodes,
+                           PageCache::create(nodeOptions(scene, memory.node_frames),
+                                             [&scene](PageNumber page, std::span<std::byte> frame) {
+                                               return finishLoad(
+                                                   scene.decodeNodes(page, threadScratch(),
+                                                                     writableRecords<Node>(frame)),
+                                                   frame, scene.nodePageBytes(page));
+                                             }));
   SURFEIT_ASSIGN_OR_RETURN(
-      state->nodes,
-      PageCache::create(nodeOptions(scene, memory.node_frames),
-                        [&scene](PageNumber page, std::span<std::byte> frame) {
-                          return finishLoad(scene.decodeNodes(page, threadScratch(),
-                                                              writableRecords<Node>(frame)),
-                                            frame, scene.nodePageBytes(page));
-                        }));
-  SURFEIT_ASSIGN_OR_RETURN(
-      state->surfels,
-      PageCache::create(surfelOptions(scene, memory.surfel_frames),
-                        [&scene](PageNumber page, std::span<std::byte> frame) {
-                          return finishLoad(scene.decodeSurfels(page, threadScratch(),
-                                                                writableRecords<Surfel>(frame)),
-                                            frame, scene.surfelPageBytes(page));
-                        }));
+      state->surfels, PageCache::create(surfelOptions(scene, memory.surfel_frames),
+                                        [&scene](PageNumber page, std::span<std::byte> frame) {
+                                          return finishLoad(
+                                              scene.decodeSurfels(page, threadScratch(),
+                                                                  writableRecords<Surfel>(frame)),
+                                              frame, scene.surfelPageBytes(page));
+                                        }));
   return std::unique_ptr<PagedOctree>(new PagedOctree(std::move(state)));
 }
 
@@ -184,6 +185,14 @@ CacheCounters PagedOctree::surfelCounters() const { return state_->surfels->coun
 PagedOctree::Reader::Reader(PagedOctree& octree)
     : state_(std::make_unique<State>(*octree.state_)) {}
 PagedOctree::Reader::~Reader() = default;
+
+Status PagedOctree::Reader::checkVisits(std::uint64_t nodes, std::uint64_t surfels) const {
+  const SceneHeader& header = state_->file.header();
+  if (nodes <= header.node_count && surfels <= header.surfel_count) return {};
+  return Status::corruption(fmt::format(
+      "{}: a traversal met more than its {} nodes and {} surfels: references form no tree",
+      state_->file.path(), header.node_count, header.surfel_count));
+}
 
 Result<std::span<const Node>> PagedOctree::Reader::nodes(const NodeRange& range) {
   SURFEIT_ASSIGN_OR_RETURN(const std::byte* frame, state_->nodes.lookup(range.page));

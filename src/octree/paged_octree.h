@@ -49,6 +49,10 @@ class PagedOctree {
     explicit Reader(PagedOctree& octree);
     ~Reader();
 
+    // kCorruption when a traversal has met more nodes or surfels than the file holds: references
+    // that share or repeat what lies below, which would make it endless for all practical purposes.
+    Status checkVisits(std::uint64_t nodes, std::uint64_t surfels) const;
+
     // The siblings of a range. Valid until the next call of nodes() on this reader; surfels() does
     // not invalidate it. kCorruption when a page does not decode.
     Result<std::span<const Node>> nodes(const NodeRange& range);

@@ -11,8 +11,8 @@ namespace surfeit {
 Result<SceneFile> SceneFile::open(const std::string& path) {
   SceneFile scene;
   SURFEIT_ASSIGN_OR_RETURN(scene.pages_, PageFile::open(path));
-  Result<SceneHeader> header = decodeSceneHeader(scene.pages_.sceneFields(), scene.nodePageCount(),
-                                                 scene.surfelPageCount());
+  Result<SceneHeader> header =
+      decodeSceneHeader(scene.pages_.sceneFields(), scene.nodePageCount(), scene.surfelPageCount());
   if (!header.ok()) {
     return Status(header.status().code(), fmt::format("{}: {}", path, header.status().message()));
   }
@@ -39,11 +39,10 @@ std::uint32_t SceneFile::surfelPageBytes(std::uint32_t page) const {
 Result<std::uint32_t> SceneFile::decodeNodes(std::uint32_t page, Scratch& scratch,
                                              std::span<Node> nodes) const {
   SURFEIT_RETURN_IF_ERROR(pages_.readPage(page, scratch.stored, scratch.payload));
-  const NodeLimits limits{header_.level_first_page, surfelPageCount(),
-                          header_.node_group_capacity, header_.surfel_group_capacity};
-  Result<std::uint32_t> count =
-      decodeNodeGroup(scratch.payload, header_.full_precision, page, limits,
-                      nodes.first(header_.node_group_capacity));
+  const NodeLimits limits{header_.level_first_page, surfelPageCount(), header_.node_group_capacity,
+                          header_.surfel_group_capacity};
+  Result<std::uint32_t> count = decodeNodeGroup(scratch.payload, header_.full_precision, page,
+                                                limits, nodes.first(header_.node_group_capacity));
   if (!count.ok()) return pages_.pageError(page, count.status().message());
   return count;
 }

@@ -47,8 +47,7 @@ CloudChannels channelsFromBits(std::uint32_t bits) {
 
 template <typename T>
 Status wrongField(const char* field, const T& found, const std::string& expected) {
-  return Status::corruption(
-      fmt::format("header: {} is {}, expected {}", field, found, expected));
+  return Status::corruption(fmt::format("header: {} is {}, expected {}", field, found, expected));
 }
 
 Status checkGeometry(const SceneHeader& header) {

@@ -66,9 +66,7 @@ Status SceneWriter::flushNodes(Level& level) {
   return node_file_.append(stored_);
 }
 
-std::uint32_t SceneWriter::nodePages() const {
-  return header_.level_first_page[kCurveLevels + 1];
-}
+std::uint32_t SceneWriter::nodePages() const { return header_.level_first_page[kCurveLevels + 1]; }
 
 Status SceneWriter::finish(const std::string& provenance) {
   SURFEIT_RETURN_IF_ERROR(flushSurfels());

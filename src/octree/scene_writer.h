@@ -68,7 +68,7 @@ class SceneWriter {
     std::uint32_t stored_bytes = 0, payload_bytes = 0;
   };
   struct Level {
-    std::vector<LevelNode> open;       // the group being filled
+    std::vector<LevelNode> open;  // the group being filled
     std::vector<SpilledPage> pages;
   };
 

@@ -46,8 +46,9 @@ void encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
   float min_radius = surfels.front().radius;
   for (const Surfel& surfel : surfels) min_radius = std::min(min_radius, surfel.radius);
   const bool full = form.full_precision;
-  putBytes8(writer, column<std::uint8_t>(
-                        surfels, [](const Surfel& s) { return static_cast<std::uint8_t>(s.flags); }));
+  putBytes8(writer, column<std::uint8_t>(surfels, [](const Surfel& s) {
+              return static_cast<std::uint8_t>(s.flags);
+            }));
   putPositions(writer, column<glm::vec3>(surfels, [](const Surfel& s) { return s.position; }),
                min_radius * kPositionTolerance, full);
   putNormals(writer, column<glm::vec3>(surfels, [](const Surfel& s) { return s.normal; }), full);

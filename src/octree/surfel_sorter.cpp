@@ -25,7 +25,8 @@ Result<std::unique_ptr<SurfelSorter>> SurfelSorter::create(std::size_t capacity,
   capacity = std::max(capacity, kMinCapacity);
   std::unique_ptr<SurfelSorter> sorter(
       new SurfelSorter(capacity, cube, std::move(temporary_directory)));
-  const std::size_t room = static_cast<std::size_t>(std::min<std::uint64_t>(capacity, expected_count));
+  const std::size_t room =
+      static_cast<std::size_t>(std::min<std::uint64_t>(capacity, expected_count));
   sorter->surfels_.reserve(room);
   sorter->tickets_.reserve(room);
   return sorter;
@@ -93,12 +94,11 @@ Status SurfelSorter::finish() {
 }
 
 Status SurfelSorter::refill(Run& run) {
-  const std::size_t count = static_cast<std::size_t>(
-      std::min<std::uint64_t>(run.window.capacity(), run.records_left));
+  const std::size_t count =
+      static_cast<std::size_t>(std::min<std::uint64_t>(run.window.capacity(), run.records_left));
   run.window.resize(count);
   run.at = 0;
-  SURFEIT_RETURN_IF_ERROR(
-      file_->readAt(run.offset, std::as_writable_bytes(std::span(run.window))));
+  SURFEIT_RETURN_IF_ERROR(file_->readAt(run.offset, std::as_writable_bytes(std::span(run.window))));
   run.offset += count * sizeof(SortedSurfel);
   run.records_left -= count;
   return {};

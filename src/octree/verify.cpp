@@ -74,10 +74,10 @@ class PageChecker {
       node_balance_ += placeHash(page, i);
       const Status status = nodes_[i].isLeaf() ? checkLeaf(nodes_[i]) : checkInterior(nodes_[i]);
       if (status.ok()) continue;
-      const Status at = status.code() == StatusCode::kCorruption && !describesPage(status)
-                            ? file_.pages().pageError(page, fmt::format("node {}: {}", i,
-                                                                        status.message()))
-                            : status;
+      const Status at =
+          status.code() == StatusCode::kCorruption && !describesPage(status)
+              ? file_.pages().pageError(page, fmt::format("node {}: {}", i, status.message()))
+              : status;
       SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t none, report(at));
       static_cast<void>(none);
     }
@@ -120,8 +120,8 @@ class PageChecker {
                                             node.surfel_count, below.surfels));
     }
     if (std::abs(below.area - double(node.area)) > double(kAreaTolerance * node.area)) {
-      return Status::corruption(fmt::format("area {}, expected {} from what lies below", node.area,
-                                            below.area));
+      return Status::corruption(
+          fmt::format("area {}, expected {} from what lies below", node.area, below.area));
     }
     return {};
   }
@@ -137,8 +137,10 @@ class PageChecker {
       // A child's sphere may stick out of its parent's; its centre, a mean of surfels, may not
       const float distance = glm::length(child.position - node.position);
       if (distance > node.radius + (node.radius + child.radius) * kReachTolerance) {
-        return Status::corruption(fmt::format("bounding radius {}, expected at least {} for the "
-                                              "centres of its children", node.radius, distance));
+        return Status::corruption(
+            fmt::format("bounding radius {}, expected at least {} for the "
+                        "centres of its children",
+                        node.radius, distance));
       }
     }
     return compare(node, below);
@@ -156,8 +158,10 @@ class PageChecker {
       place = 0;
     }));
     if (below.reach > node.radius * (1 + kReachTolerance)) {
-      return Status::corruption(fmt::format("bounding radius {}, expected at least {} for the "
-                                            "disks of its surfels", node.radius, below.reach));
+      return Status::corruption(
+          fmt::format("bounding radius {}, expected at least {} for the "
+                      "disks of its surfels",
+                      node.radius, below.reach));
     }
     return compare(node, below);
   }
@@ -187,7 +191,8 @@ Result<SceneInfo> readSceneInfo(const std::string& path) {
   for (std::uint32_t i = 0; i < info.surfel_pages; ++i) {
     info.surfel_page_bytes += file.surfelPageBytes(i);
   }
-  info.node_cache_bytes = std::uint64_t{info.node_pages} * header.node_group_capacity * sizeof(Node);
+  info.node_cache_bytes =
+      std::uint64_t{info.node_pages} * header.node_group_capacity * sizeof(Node);
   info.surfel_cache_bytes =
       std::uint64_t{info.surfel_pages} * header.surfel_group_capacity * sizeof(Surfel);
   info.min = header.bounds.min;
@@ -220,9 +225,8 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
   constexpr std::size_t kCacheBytes = 64 << 20;
   SURFEIT_ASSIGN_OR_RETURN(
       const PagedOctree::Memory memory,
-      PagedOctree::planMemory(*opened,
-                              std::max(kCacheBytes, static_cast<std::size_t>(threads) << 20),
-                              threads));
+      PagedOctree::planMemory(
+          *opened, std::max(kCacheBytes, static_cast<std::size_t>(threads) << 20), threads));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(*opened), memory));
   const SceneFile& file = octree->file();

@@ -1,6 +1,6 @@
 // Direct light on a mesh: what a renderer would bake into the surfels before the gather
-// (memo 08-01, section 3.1): radiosity = emission + albedo * irradiance. Exitance and irradiance are
-// in W/m2, radiance in W/(m2 sr), all scene-linear rgb.
+// (memo 08-01, section 3.1): radiosity = emission + albedo * irradiance. Exitance and irradiance
+// are in W/m2, radiance in W/(m2 sr), all scene-linear rgb.
 #pragma once
 
 #include <cstdint>

@@ -43,8 +43,9 @@ TEST(CurveKey, OctreeCellsAreContiguousRuns) {
     const int level = int(random() % 21) + 1;
     const std::uint32_t below = (1u << (kCurveLevels - level)) - 1;
     const CurveKey a = curveKey(x, y, z);
-    const CurveKey b = curveKey((x & ~below) | (random() & below), (y & ~below) | (random() & below),
-                                (z & ~below) | (random() & below));
+    const CurveKey b =
+        curveKey((x & ~below) | (random() & below), (y & ~below) | (random() & below),
+                 (z & ~below) | (random() & below));
     ASSERT_GT(firstDifferentLevel(a, b), level);
     const CurveKey c = curveKey(x ^ (below + 1), y, z);
     ASSERT_LE(firstDifferentLevel(a, c), level);

@@ -46,8 +46,8 @@ class Fidelity : public DirectoryTest {
     ASSERT_TRUE(indexClouds({path("cloud.ply")}, path("scene.sft"), {}, progress_).ok());
     GatherOptions gather;
     gather.mode = GatherMode::kBleeding;
-    const Result<GatherStats> stats = gatherCloud(path("scene.sft"), path("receivers.ply"),
-                                                  path("baked.ply"), gather, progress_);
+    const Result<GatherStats> stats =
+        gatherCloud(path("scene.sft"), path("receivers.ply"), path("baked.ply"), gather, progress_);
     ASSERT_TRUE(stats.ok()) << stats.status().message();
     const Result<ReferenceScene> reference =
         ReferenceScene::load({mesh}, surroundings, 2, progress_);
@@ -64,7 +64,8 @@ class Fidelity : public DirectoryTest {
       const ReferenceGather truth =
           reference.gather(baked[i].position, baked[i].normal, i, ReferenceQuality());
       const double error = double(baked[i].occlusion) - double(truth.occlusion_front);
-      const double color = average(baked[i].irradiance), true_color = average(truth.irradiance_front);
+      const double color = average(baked[i].irradiance),
+                   true_color = average(truth.irradiance_front);
       mean += double(truth.occlusion_front);
       mean_color += true_color;
       square += error * error;
@@ -78,10 +79,11 @@ class Fidelity : public DirectoryTest {
     mean_color /= n;
     const double rmse = std::sqrt(square / n), bias = sum / n;
     const double color_rmse = std::sqrt(color_square / n) / mean_color;
-    fmt::print("{}: {} receivers, occlusion mean {:.4f} RMSE {:.4f} bias {:+.4f} p95 {:.4f} max "
-               "{:.4f}; irradiance relative RMSE {:.4f} bias {:+.4f}\n",
-               name, baked.size(), mean / n, rmse, bias, errors[errors.size() * 95 / 100],
-               errors.back(), color_rmse, color_sum / n / mean_color);
+    fmt::print(
+        "{}: {} receivers, occlusion mean {:.4f} RMSE {:.4f} bias {:+.4f} p95 {:.4f} max "
+        "{:.4f}; irradiance relative RMSE {:.4f} bias {:+.4f}\n",
+        name, baked.size(), mean / n, rmse, bias, errors[errors.size() * 95 / 100], errors.back(),
+        color_rmse, color_sum / n / mean_color);
     EXPECT_LE(rmse, limits.occlusion_rmse);
     EXPECT_LE(std::abs(bias), limits.occlusion_bias);
     EXPECT_LE(color_rmse, limits.irradiance_rmse);

@@ -204,9 +204,8 @@ TEST_F(PageFileTest, PageOfAnotherFileAtTheSameOffsetIsNoticed) {
   const Result<PageFile> pages = PageFile::open(path("b.sft"));
   ASSERT_TRUE(pages.ok());
   const PageEntry& first = pages->entry(2);
-  EXPECT_NE(first.checksum,
-            XXH3_64bits_withSeed(a.data() + first.offset, first.stored_bytes,
-                                 pageSeed(kIdentity, first.offset)));
+  EXPECT_NE(first.checksum, XXH3_64bits_withSeed(a.data() + first.offset, first.stored_bytes,
+                                                 pageSeed(kIdentity, first.offset)));
 }
 
 TEST_F(PageFileTest, DamageInOnePageLeavesTheOthersReadable) {

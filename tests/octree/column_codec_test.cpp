@@ -90,13 +90,17 @@ TEST(ColumnCodec, FullPrecisionIsExact) {
   std::vector<float> positive = {1, 2, 3e-40f, kLargest, 1e-20f};
   const std::vector<glm::vec3> expected_points = points, expected_normals = normals;
   const std::vector<float> expected_positive = positive;
-  roundTrip(points, [](ByteWriter& w, auto& v) { putPositions(w, v, 1, true); }, getPositions);
+  roundTrip(
+      points, [](ByteWriter& w, auto& v) { putPositions(w, v, 1, true); }, getPositions);
   EXPECT_EQ(points, expected_points);
-  roundTrip(points, [](ByteWriter& w, auto& v) { putColors(w, v, true); }, getColors);
+  roundTrip(
+      points, [](ByteWriter& w, auto& v) { putColors(w, v, true); }, getColors);
   EXPECT_EQ(points, expected_points);
-  roundTrip(points, [](ByteWriter& w, auto& v) { putReflectances(w, v, true); }, getReflectances);
+  roundTrip(
+      points, [](ByteWriter& w, auto& v) { putReflectances(w, v, true); }, getReflectances);
   EXPECT_EQ(points, expected_points);
-  roundTrip(normals, [](ByteWriter& w, auto& v) { putNormals(w, v, true); }, getNormals);
+  roundTrip(
+      normals, [](ByteWriter& w, auto& v) { putNormals(w, v, true); }, getNormals);
   EXPECT_EQ(normals, expected_normals);
   roundTrip(
       positive, [](ByteWriter& w, auto& v) { putPositive(w, v, Rounding::kUp, true); },
@@ -114,8 +118,7 @@ TEST(ColumnCodec, PositiveNumbersKeepTheirRelativeError) {
       }
       const std::vector<float> expected = values;
       roundTrip(
-          values, [&](ByteWriter& w, auto& v) { putPositive(w, v, rounding, false); },
-          getPositive);
+          values, [&](ByteWriter& w, auto& v) { putPositive(w, v, rounding, false); }, getPositive);
       // Half a step to either side, or up to two steps upwards; and the rounding of exp2
       const float half_step = 0.5f * std::log(2.f) * std::min(range, 64.f) / 65535;
       const float below = rounding == Rounding::kUp ? 0 : half_step + 5e-6f;
@@ -138,8 +141,7 @@ TEST(ColumnCodec, PositiveNumbersOfAnyRangeComeBack) {
     for (const float value : {kLargest, kSmallest, 1e-45f, 1.f}) {
       values.assign(3, value);
       roundTrip(
-          values, [&](ByteWriter& w, auto& v) { putPositive(w, v, rounding, false); },
-          getPositive);
+          values, [&](ByteWriter& w, auto& v) { putPositive(w, v, rounding, false); }, getPositive);
       EXPECT_EQ(values, std::vector<float>(3, value));
     }
   }
@@ -156,7 +158,8 @@ TEST(ColumnCodec, NormalsTurnByLessThanATenThousandth) {
     }
   }
   const std::vector<glm::vec3> expected = values;
-  roundTrip(values, [](ByteWriter& w, auto& v) { putNormals(w, v, false); }, getNormals);
+  roundTrip(
+      values, [](ByteWriter& w, auto& v) { putNormals(w, v, false); }, getNormals);
   for (std::size_t i = 0; i < values.size(); ++i) {
     ASSERT_LE(glm::length(values[i] - expected[i]), 1e-4f) << i;
     ASSERT_NEAR(glm::length(values[i]), 1, 1e-6f);
@@ -165,7 +168,8 @@ TEST(ColumnCodec, NormalsTurnByLessThanATenThousandth) {
 
 TEST(ColumnCodec, ZeroNormalComesBackAsAUnitVector) {
   std::vector<glm::vec3> values(4, glm::vec3(0));
-  roundTrip(values, [](ByteWriter& w, auto& v) { putNormals(w, v, false); }, getNormals);
+  roundTrip(
+      values, [](ByteWriter& w, auto& v) { putNormals(w, v, false); }, getNormals);
   for (const glm::vec3& value : values) EXPECT_NEAR(glm::length(value), 1, 1e-6f);
 }
 
@@ -174,7 +178,8 @@ TEST(ColumnCodec, ColorsKeepElevenBitsAtAnyScale) {
     std::vector<glm::vec3> values = randomPoints(300, scale);
     values.push_back(glm::vec3(0));
     const std::vector<glm::vec3> expected = values;
-    roundTrip(values, [](ByteWriter& w, auto& v) { putColors(w, v, false); }, getColors);
+    roundTrip(
+        values, [](ByteWriter& w, auto& v) { putColors(w, v, false); }, getColors);
     for (std::size_t i = 0; i < values.size(); ++i) {
       for (int c = 0; c < 3; ++c) {
         const float small = std::max(scale * 0x1p-37f, kSmallest * 0x1p-10f);
@@ -186,7 +191,8 @@ TEST(ColumnCodec, ColorsKeepElevenBitsAtAnyScale) {
 
 TEST(ColumnCodec, LargestColorStaysFinite) {
   std::vector<glm::vec3> values = {{kLargest, 0, 1}, {kLargest, kLargest, kLargest}};
-  roundTrip(values, [](ByteWriter& w, auto& v) { putColors(w, v, false); }, getColors);
+  roundTrip(
+      values, [](ByteWriter& w, auto& v) { putColors(w, v, false); }, getColors);
   EXPECT_NEAR(values[0].x, kLargest, kLargest * 0x1p-10f);
 }
 
@@ -234,17 +240,20 @@ TEST(ColumnCodec, CountsAreExactAtAnyWidth) {
     const std::uint64_t largest = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
     std::vector<std::uint64_t> values = {0, largest, largest / 2, largest / 3};
     const std::vector<std::uint64_t> expected = values;
-    roundTrip(values, [](ByteWriter& w, auto& v) { putCounts(w, v); }, getCounts);
+    roundTrip(
+        values, [](ByteWriter& w, auto& v) { putCounts(w, v); }, getCounts);
     EXPECT_EQ(values, expected);
   }
 }
 
 TEST(ColumnCodec, BytesAndFloatsAreExact) {
   std::vector<std::uint8_t> bytes = {0, 1, 128, 255};
-  roundTrip(bytes, [](ByteWriter& w, auto& v) { putBytes8(w, v); }, getBytes8);
+  roundTrip(
+      bytes, [](ByteWriter& w, auto& v) { putBytes8(w, v); }, getBytes8);
   EXPECT_EQ(bytes, (std::vector<std::uint8_t>{0, 1, 128, 255}));
   std::vector<float> floats = {0, -1, kLargest, 1e-45f};
-  roundTrip(floats, [](ByteWriter& w, auto& v) { putFloats(w, v); }, getFloats);
+  roundTrip(
+      floats, [](ByteWriter& w, auto& v) { putFloats(w, v); }, getFloats);
   EXPECT_EQ(floats, (std::vector<float>{0, -1, kLargest, 1e-45f}));
 }
 

@@ -58,8 +58,7 @@ class IndexTest : public SceneTest {
     }
     EXPECT_EQ(node.isFlat(), node.area_sh[0] == 0);
     for (const Surfel& surfel : surfels) {
-      ASSERT_LE(glm::length(surfel.position - node.position) + surfel.radius,
-                node.radius * 1.002f);
+      ASSERT_LE(glm::length(surfel.position - node.position) + surfel.radius, node.radius * 1.002f);
     }
   }
 
@@ -91,7 +90,8 @@ TEST_F(IndexTest, CloudsOfManyShapesMakeSoundScenes) {
       {"huge", moved(sphereCloud(3000), 1e9f, {1e9f, 0, 0})},
       {"largest", moved(randomCloud(3000), 1e12f, {0, 0, 0})},
       {"tiny", moved(randomCloud(3000), 1e-9f, {0, 0, 0})},
-      {"line", [] {
+      {"line",
+       [] {
          std::vector<Surfel> line = randomCloud(3000);
          for (Surfel& surfel : line) surfel.position.y = surfel.position.z = 0;
          return line;
@@ -144,7 +144,8 @@ TEST_F(IndexTest, LeafCapacityIsKept) {
   const std::vector<Surfel> cloud = randomCloud(5000);
   for (const std::uint32_t capacity : {1u, 2u, 7u, 64u, 512u, 700u, 4096u}) {
     SCOPED_TRACE(capacity);
-    const std::string scene = index(cloud, kAllChannels, optionsWith(&IndexOptions::leaf_capacity, capacity));
+    const std::string scene =
+        index(cloud, kAllChannels, optionsWith(&IndexOptions::leaf_capacity, capacity));
     expectSound(scene, cloud.size());
     const Result<ReadScene> read = readScene(scene);
     ASSERT_TRUE(read.ok());
@@ -205,8 +206,7 @@ TEST_F(IndexTest, OrderThreadsAndMemoryDoNotChangeTheFile) {
     small.threads = 1;
     const IndexStats spilled = indexFiles({path("b.ply")}, path("b.sft"), small);
     EXPECT_GT(spilled.temporary_bytes, in_memory.temporary_bytes + cloud.size() * 64);
-    indexFiles({path("b.ply")}, path("c.sft"),
-               optionsWith(&IndexOptions::threads, 2));
+    indexFiles({path("b.ply")}, path("c.sft"), optionsWith(&IndexOptions::threads, 2));
     const std::string expected = contents("a.sft");
     EXPECT_TRUE(contents("b.sft") == expected);
     EXPECT_TRUE(contents("c.sft") == expected);
@@ -228,9 +228,8 @@ TEST_F(IndexTest, SeveralInputsAreAsGoodAsOne) {
 
 TEST_F(IndexTest, NodesAreTheSumsOfTheirSurfels) {
   for (const bool full : {true, false}) {
-    const Result<ReadScene> scene =
-        readScene(index(randomCloud(3000), kAllChannels,
-                        optionsWith(&IndexOptions::full_precision, full)));
+    const Result<ReadScene> scene = readScene(
+        index(randomCloud(3000), kAllChannels, optionsWith(&IndexOptions::full_precision, full)));
     ASSERT_TRUE(scene.ok());
     const double tolerance = full ? 1e-5 : 5e-3;
     for (const auto& [node, first] : scene->nodes) {
@@ -388,14 +387,29 @@ TEST_F(IndexTest, FailuresSayWhyAndLeaveNothing) {
       {{}, {}, StatusCode::kInvalidArgument, "no input"},
       {{path("empty.ply")}, {}, StatusCode::kCorruption, "empty.ply: no valid surfel in 0 records"},
       {{path("bad.ply")}, {}, StatusCode::kCorruption, "bad.ply: no valid surfel in 10 records"},
-      {{path("bad.ply")}, optionsWith(&IndexOptions::strict, true), StatusCode::kCorruption, "radius"},
+      {{path("bad.ply")},
+       optionsWith(&IndexOptions::strict, true),
+       StatusCode::kCorruption,
+       "radius"},
       {{path("text.ply")}, {}, StatusCode::kCorruption, "text.ply"},
       {{path("absent.ply")}, {}, StatusCode::kIoError, "absent.ply"},
       {{path("good.ply"), path("absent.ply")}, {}, StatusCode::kIoError, "absent.ply"},
-      {{path("good.ply")}, optionsWith(&IndexOptions::memory_bytes, std::uint64_t{31} << 20), StatusCode::kBudgetTooSmall, "32 MiB"},
-      {{path("good.ply")}, optionsWith(&IndexOptions::memory_bytes, std::uint64_t{0}), StatusCode::kBudgetTooSmall, "32 MiB"},
-      {{path("good.ply")}, optionsWith(&IndexOptions::leaf_capacity, 0u), StatusCode::kInvalidArgument, "leaf capacity"},
-      {{path("good.ply")}, optionsWith(&IndexOptions::overlap, NAN), StatusCode::kInvalidArgument, "overlap"},
+      {{path("good.ply")},
+       optionsWith(&IndexOptions::memory_bytes, std::uint64_t{31} << 20),
+       StatusCode::kBudgetTooSmall,
+       "32 MiB"},
+      {{path("good.ply")},
+       optionsWith(&IndexOptions::memory_bytes, std::uint64_t{0}),
+       StatusCode::kBudgetTooSmall,
+       "32 MiB"},
+      {{path("good.ply")},
+       optionsWith(&IndexOptions::leaf_capacity, 0u),
+       StatusCode::kInvalidArgument,
+       "leaf capacity"},
+      {{path("good.ply")},
+       optionsWith(&IndexOptions::overlap, NAN),
+       StatusCode::kInvalidArgument,
+       "overlap"},
       {{path("good.ply")},
        optionsWith(&IndexOptions::temporary_directory, path("nowhere")),
        StatusCode::kIoError,

@@ -105,8 +105,8 @@ TEST_F(NodeGroupTest, DecodeRejectsEveryTruncationAndExtension) {
     std::vector<std::byte> payload;
     encodeNodeGroup(someNodes(20), full, payload);
     for (std::size_t size = 0; size < payload.size(); ++size) {
-      ASSERT_EQ(decode(Bytes(payload).first(size), full).status().code(),
-                StatusCode::kCorruption) << size;
+      ASSERT_EQ(decode(Bytes(payload).first(size), full).status().code(), StatusCode::kCorruption)
+          << size;
     }
     payload.push_back(std::byte{0});
     EXPECT_EQ(decode(payload, full).status().code(), StatusCode::kCorruption);

@@ -22,10 +22,9 @@ class SurfelSorterTest : public DirectoryTest {
       EXPECT_TRUE((*sorter)->add(std::span(cloud).subspan(at, count)).ok());
     }
     EXPECT_TRUE((*sorter)->finish().ok());
-    EXPECT_EQ((*sorter)->temporaryBytes(),
-              cloud.size() > std::max<std::size_t>(capacity, 1024)
-                  ? cloud.size() * sizeof(SortedSurfel)
-                  : 0);
+    EXPECT_EQ((*sorter)->temporaryBytes(), cloud.size() > std::max<std::size_t>(capacity, 1024)
+                                               ? cloud.size() * sizeof(SortedSurfel)
+                                               : 0);
     std::vector<SortedSurfel> all, batch(step);
     for (;;) {
       const Result<std::size_t> count = (*sorter)->next(batch);

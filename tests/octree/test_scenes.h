@@ -92,8 +92,8 @@ inline std::vector<Surfel> planeCloud(int side, float spacing) {
   std::vector<Surfel> cloud;
   for (int y = 0; y < side; ++y) {
     for (int x = 0; x < side; ++x) {
-      cloud.push_back(surfelAt(glm::vec3(float(x), float(y), 0) * spacing, {0, 0, 1},
-                               0.7f * spacing, random));
+      cloud.push_back(
+          surfelAt(glm::vec3(float(x), float(y), 0) * spacing, {0, 0, 1}, 0.7f * spacing, random));
     }
   }
   return cloud;

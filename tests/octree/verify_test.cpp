@@ -119,8 +119,8 @@ TEST_F(VerifyTest, DamagedPageIsNamedAndTheRestChecked) {
   ASSERT_TRUE(report.ok());
   EXPECT_EQ(report->pages_checked, pages->pageCount());
   EXPECT_EQ(report->bytes_checked, file.size());
-  EXPECT_THAT(report->findings, Contains(HasSubstr("damaged.sft: page " + std::to_string(last) +
-                                                   " at ")));
+  EXPECT_THAT(report->findings,
+              Contains(HasSubstr("damaged.sft: page " + std::to_string(last) + " at ")));
 }
 
 TEST_F(VerifyTest, NewerVersionIsRefusedWithItsNumber) {
@@ -148,12 +148,12 @@ TEST_F(VerifyTest, HostileSceneFieldsWithValidChecksumsDoNoHarm) {
   for (std::size_t at = kSceneFieldsOffset; at < kHeaderChecksumAt; at += 4) {
     for (const std::size_t bytes : {4u, 8u}) {
       if (at + bytes > kHeaderChecksumAt) continue;
-      const std::uint64_t right = bytes == 4 ? getAt<std::uint32_t>(file, at)
-                                             : getAt<std::uint64_t>(file, at);
+      const std::uint64_t right =
+          bytes == 4 ? getAt<std::uint32_t>(file, at) : getAt<std::uint64_t>(file, at);
       std::vector<std::uint64_t> values = hostileValues(right);
-      values.push_back(0x7fc00000);            // NaN
-      values.push_back(0x7f800000);            // infinity
-      values.push_back(0x7ff0000000000000);    // infinity of a double
+      values.push_back(0x7fc00000);          // NaN
+      values.push_back(0x7f800000);          // infinity
+      values.push_back(0x7ff0000000000000);  // infinity of a double
       for (const std::uint64_t value : values) {
         std::string damaged = file;
         std::memcpy(damaged.data() + at, &value, bytes);
@@ -206,9 +206,16 @@ TEST_F(VerifyTest, ReferencesThatLeadNowhereAreCorruption) {
       {"radius NaN", [](LevelNode& n) { n.node.radius = NAN; }},
       {"area infinite", [](LevelNode& n) { n.node.area = INFINITY; }},
       {"position NaN", [](LevelNode& n) { n.node.position.y = NAN; }},
-      {"normal of length 2", [](LevelNode& n) { n.node.normal = {0, 0, 2}; }},
+      {"normal of length 2",
+       [](LevelNode& n) {
+         n.node.normal = {0, 0, 2};
+       }},
       {"radiosity -1", [](LevelNode& n) { n.node.radiosity.x = -1; }},
-      {"power that overflows", [](LevelNode& n) { n.node.radiosity.x = 3e38f; n.node.area = 10; }},
+      {"power that overflows",
+       [](LevelNode& n) {
+         n.node.radiosity.x = 3e38f;
+         n.node.area = 10;
+       }},
       {"flatness 2", [](LevelNode& n) { n.node.flatness = 2; }},
       {"coefficient NaN", [](LevelNode& n) { n.node.power_sh[2][8] = NAN; }},
   };
@@ -293,7 +300,11 @@ TEST_F(VerifyTest, SurfelsThatAreNoneAreCorruption) {
       {"radius -1", [](Surfel& s) { s.radius = -1; }},
       {"area NaN", [](Surfel& s) { s.area = NAN; }},
       {"position infinite", [](Surfel& s) { s.position.z = -INFINITY; }},
-      {"normal of length 3", [](Surfel& s) { s.flags = 0; s.normal = {3, 0, 0}; }},
+      {"normal of length 3",
+       [](Surfel& s) {
+         s.flags = 0;
+         s.normal = {3, 0, 0};
+       }},
       {"radiosity -1", [](Surfel& s) { s.radiosity.y = -1; }},
       {"radiosity NaN", [](Surfel& s) { s.radiosity.y = NAN; }},
       {"albedo -1", [](Surfel& s) { s.albedo.y = -1; }},
@@ -303,8 +314,8 @@ TEST_F(VerifyTest, SurfelsThatAreNoneAreCorruption) {
   };
   for (const auto& edit : edits) {
     SCOPED_TRACE(edit.name);
-    const Status status = editSurfels(scene, path("edited.sft"), 0,
-                                      [&](auto& surfels) { edit.edit(surfels[7]); });
+    const Status status =
+        editSurfels(scene, path("edited.sft"), 0, [&](auto& surfels) { edit.edit(surfels[7]); });
     ASSERT_TRUE(status.ok()) << status.message();
     EXPECT_THAT(findingsOf(path("edited.sft")), Contains(HasSubstr("edited.sft: page ")));
   }
