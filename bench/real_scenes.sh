@@ -32,7 +32,7 @@ mesh_scene() {
   fidelity "$out/$name.baked.ply" "$mesh" "$@" --receivers 2000 --rays 1024
   for channel in ao lit; do
     surfeit view "$out/$name.baked.ply" -o "$out/$name.$channel.png" --channel $channel \
-      --radius-scale 0.7 "${camera[@]}"
+      "${camera[@]}"
   done
 }
 
