@@ -53,12 +53,13 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
       ->check(CLI::IsMember({"auto", "bar", "percent", "json", "none"}))
       ->group(kGroup);
   command.add_flag("-q,--quiet", common.quiet, "Say nothing but errors")->group(kGroup);
-  command.add_flag("-v,--verbose", common.verbose, "Say more")->group(kGroup);
+  command.add_flag("-v,--verbose", common.verbose, "Say which phase begins")->group(kGroup);
 }
 
 void CommandContext::run(const std::function<Status()>& body) {
   Status status;
-  progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet);
+  progress_ =
+      std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose);
   try {
     status = body();
   } catch (const std::bad_alloc&) {

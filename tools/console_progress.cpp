@@ -39,7 +39,8 @@ std::string formatSeconds(double seconds) {
 
 }  // namespace
 
-ConsoleProgress::ConsoleProgress(Style style, bool quiet) : style_(style), quiet_(quiet) {
+ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose)
+    : style_(style), quiet_(quiet), verbose_(verbose) {
   struct sigaction action {};
   action.sa_handler = onCancelSignal;
   sigaction(SIGINT, &action, nullptr);
@@ -53,6 +54,7 @@ bool ConsoleProgress::isCancelled() const { return g_cancel_signal != 0; }
 
 void ConsoleProgress::beginPhase(std::string_view name, std::uint64_t total,
                                  std::string_view unit) {
+  if (verbose_) note(fmt::format("phase {}: {} {}", name, total, unit));
   const std::lock_guard lock(mutex_);
   phase_ = name;
   unit_ = unit;

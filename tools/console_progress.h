@@ -19,7 +19,8 @@ class ConsoleProgress : public Progress {
   enum class Style : std::uint8_t { kNone, kBar, kPercent, kJson };
 
   // SIGINT and SIGTERM cancel from now on; a second one ends the program at once.
-  ConsoleProgress(Style style, bool quiet);
+  // With `verbose` every phase is told as it begins.
+  ConsoleProgress(Style style, bool quiet, bool verbose);
   ~ConsoleProgress() override;
 
   void beginPhase(std::string_view name, std::uint64_t total, std::string_view unit) override;
@@ -37,6 +38,7 @@ class ConsoleProgress : public Progress {
 
   const Style style_;
   const bool quiet_;
+  const bool verbose_;
   std::mutex mutex_;  // guards what is below, but not done_ and next_draw_ns_
   std::string phase_, unit_;
   std::uint64_t total_ = 0;

@@ -320,7 +320,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path));
   SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(receivers_path));
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t element,
-                           findReceivers(reader.header(), receivers_path));
+                           findSurfelElement(reader.header(), receivers_path));
   const PlyElement& receivers = reader.header().elements[element];
   SURFEIT_ASSIGN_OR_RETURN(const ReceiverMapping mapping,
                            ReceiverMapping::create(receivers, receivers_path));

@@ -13,7 +13,6 @@
 namespace surfeit {
 namespace {
 
-constexpr std::array<std::string_view, 4> kElementNames = {"vertex", "point", "points", "surfel"};
 constexpr std::array<std::string_view, 6> kGeometryNames = {"x", "y", "z", "nx", "ny", "nz"};
 // Numbered as ResultRows::make has the values
 constexpr std::array<std::string_view, 4> kResultNames = {"occlusion", "irradiance_r",
@@ -25,15 +24,6 @@ std::span<const std::string_view> resultNames(GatherMode mode) {
 }
 
 }  // namespace
-
-Result<std::size_t> findReceivers(const PlyHeader& header, const std::string& path) {
-  for (const std::string_view name : kElementNames) {
-    if (const std::optional<std::size_t> index = header.findElement(name)) return *index;
-  }
-  return Status::corruption(fmt::format("{}: found no element of receivers among {}, expected {}",
-                                        path, header.elements.size(),
-                                        fmt::join(kElementNames, ", ")));
-}
 
 Result<ReceiverMapping> ReceiverMapping::create(const PlyElement& element,
                                                 const std::string& path) {

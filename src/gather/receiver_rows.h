@@ -17,10 +17,6 @@
 
 namespace surfeit {
 
-// Index of the element whose rows are the receivers: the one that holds surfels in a surfel cloud.
-// kCorruption when there is none.
-Result<std::size_t> findReceivers(const PlyHeader& header, const std::string& path);
-
 // Finds position and normal in the rows of an element, by the names of docs/format.md, "Surfel
 // clouds in PLY". What else a receiver holds (a radius of zero, say) is no concern of the gather
 // and never makes it invalid. Immutable; safe from any thread.

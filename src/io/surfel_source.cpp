@@ -63,6 +63,16 @@ constexpr KindName kKindNames[] = {
 
 }  // namespace
 
+Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string& path) {
+  for (const char* name : kElementNames) {
+    if (const std::optional<std::size_t> index = header.findElement(name)) return *index;
+  }
+  const std::vector<PlyElement>& elements = header.elements;
+  return Status::corruption(fmt::format(
+      "{}: found {} elements, first {}, expected one named vertex, point, points or surfel", path,
+      elements.size(), elements.empty() ? "none" : elements.front().name));
+}
+
 std::uint64_t SurfelDefects::total() const {
   std::uint64_t sum = 0;
   for (const KindName& row : kKindNames) sum += (this->*row.kind).count;
@@ -337,19 +347,12 @@ class PlySurfelSource : public SurfelSource {
 
 Result<std::unique_ptr<SurfelSource>> openPly(const std::string& path, bool strict) {
   SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
-  for (const char* name : kElementNames) {
-    const std::optional<std::size_t> index = reader.header().findElement(name);
-    if (!index) continue;
-    SURFEIT_ASSIGN_OR_RETURN(SurfelMapping mapping,
-                             SurfelMapping::create(reader.header().elements[*index], path));
-    SURFEIT_RETURN_IF_ERROR(reader.seekElement(*index));
-    return std::unique_ptr<SurfelSource>(
-        std::make_unique<PlySurfelSource>(std::move(reader), std::move(mapping), *index, strict));
-  }
-  const std::vector<PlyElement>& elements = reader.header().elements;
-  return Status::corruption(fmt::format(
-      "{}: found {} elements, first {}, expected one named vertex, point, points or surfel", path,
-      elements.size(), elements.empty() ? "none" : elements.front().name));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t index, findSurfelElement(reader.header(), path));
+  SURFEIT_ASSIGN_OR_RETURN(SurfelMapping mapping,
+                           SurfelMapping::create(reader.header().elements[index], path));
+  SURFEIT_RETURN_IF_ERROR(reader.seekElement(index));
+  return std::unique_ptr<SurfelSource>(
+      std::make_unique<PlySurfelSource>(std::move(reader), std::move(mapping), index, strict));
 }
 
 }  // namespace

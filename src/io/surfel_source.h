@@ -39,6 +39,10 @@ struct SurfelDefects {
   std::string describe() const;
 };
 
+// Index of the element that holds surfels or receivers: the first of vertex, point, points, surfel.
+// kCorruption when there is none.
+Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string& path);
+
 // Turns rows of an element into surfels by property name:
 //   x y z                      position (required)
 //   nx ny nz                   normal, normalised here; zero means sphere; absent: sphere
