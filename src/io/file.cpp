@@ -7,8 +7,11 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
+
+#include "core/assert.h"
 
 namespace surfeit {
 namespace {
@@ -61,6 +64,16 @@ Status endsEarly(const std::string& path, std::uint64_t offset, std::size_t expe
 
 }  // namespace
 
+AlignedBuffer::~AlignedBuffer() { std::free(data_); }
+
+void AlignedBuffer::reserve(std::size_t bytes) {
+  if (bytes <= capacity_) return;
+  std::free(data_);
+  capacity_ = (bytes + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
+  data_ = static_cast<std::byte*>(std::aligned_alloc(kDirectAlignment, capacity_));
+  SURFEIT_CHECK(data_ != nullptr);
+}
+
 FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)) {}
 
@@ -101,6 +114,13 @@ Status InputFile::readAt(std::uint64_t offset, std::span<std::byte> bytes) const
 
 Result<std::size_t> InputFile::readSome(std::uint64_t offset, std::span<std::byte> bytes) const {
   return readFully(descriptor_.get(), path_, offset, bytes);
+}
+
+Result<Bytes> InputFile::readView(std::uint64_t offset, std::size_t size,
+                                  AlignedBuffer& buffer) const {
+  buffer.reserve(size);
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, readSome(offset, {buffer.data(), size}));
+  return Bytes(buffer.data(), got);
 }
 
 Result<AtomicFile> AtomicFile::create(const std::string& path) {

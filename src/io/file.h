@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "surfeit/status.h"
@@ -13,6 +14,31 @@
 namespace surfeit {
 
 using Bytes = std::span<const std::byte>;
+
+// Memory that direct I/O can reach: begins at a multiple of kDirectAlignment. Grows only, and is
+// reused: first touch of fresh memory costs more than the disk. Move-only.
+inline constexpr std::size_t kDirectAlignment = 4096;
+class AlignedBuffer {
+ public:
+  AlignedBuffer() = default;
+  explicit AlignedBuffer(std::size_t bytes) { reserve(bytes); }
+  AlignedBuffer(AlignedBuffer&& other) noexcept
+      : data_(std::exchange(other.data_, nullptr)), capacity_(std::exchange(other.capacity_, 0)) {}
+  AlignedBuffer& operator=(AlignedBuffer&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(capacity_, other.capacity_);
+    return *this;
+  }
+  ~AlignedBuffer();
+  // Room for `bytes` at least; what was there is lost when it must grow.
+  void reserve(std::size_t bytes);
+  std::byte* data() const { return data_; }
+  std::size_t capacity() const { return capacity_; }
+
+ private:
+  std::byte* data_ = nullptr;
+  std::size_t capacity_ = 0;
+};
 
 // An open descriptor, closed when it goes. Move-only.
 class FileDescriptor {
@@ -43,6 +69,9 @@ class InputFile {
   Status readAt(std::uint64_t offset, std::span<std::byte> bytes) const;
   // Reads up to bytes.size() bytes at `offset`; fewer only at the end of the file.
   Result<std::size_t> readSome(std::uint64_t offset, std::span<std::byte> bytes) const;
+  // The bytes [offset, offset + size) as a view into `buffer`, which grows as needed; shorter only
+  // at the end of the file.
+  Result<Bytes> readView(std::uint64_t offset, std::size_t size, AlignedBuffer& buffer) const;
 
  private:
   std::string path_;
