@@ -84,6 +84,7 @@ int exitStatus(StatusCode code);
 
 // The subcommands, one file each.
 void addSampleCommand(CLI::App& app, CommandContext& context);
+void addGenerateCommand(CLI::App& app, CommandContext& context);
 void addIndexCommand(CLI::App& app, CommandContext& context);
 void addInfoCommand(CLI::App& app, CommandContext& context);
 void addVerifyCommand(CLI::App& app, CommandContext& context);

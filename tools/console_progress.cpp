@@ -60,6 +60,7 @@ void ConsoleProgress::beginPhase(std::string_view name, std::uint64_t total,
   unit_ = unit;
   total_ = total;
   done_ = 0;
+  bytes_ = 0;
   last_percent_ = -1;
   phase_start_ = std::chrono::steady_clock::now();
   next_draw_ns_ = nowNs() + kDrawIntervalNs;
@@ -83,20 +84,24 @@ void ConsoleProgress::draw() {
   const double rate = seconds > 0 ? double(done) / seconds : 0;
   const double part = total_ > 0 ? std::min(1.0, double(done) / double(total_)) : 0;
   const double left = rate > 0 && total_ > done ? double(total_ - done) / rate : 0;
+  const double byte_rate = seconds > 0 ? double(bytes_) / seconds : 0;
+  const std::string bytes = byte_rate > 0 ? fmt::format(" {:.0f} MB/s", byte_rate / 1e6) : "";
   const int percent = static_cast<int>(part * 100);
   if (style_ == Style::kBar) {
     const auto filled = static_cast<std::size_t>(part * 30);
-    fmt::print(stderr, "\r\x1b[K{:>8} [{}{}] {:3}%  {} {}  {} left", phase_,
+    fmt::print(stderr, "\r\x1b[K{:>8} [{}{}] {:3}%  {} {}{}  {} left", phase_,
                std::string(filled, '#'), std::string(30 - filled, '.'), percent, formatRate(rate),
-               unit_, formatSeconds(left));
+               unit_, bytes, formatSeconds(left));
     bar_shown_ = true;
   } else if (style_ == Style::kPercent) {
     if (percent == last_percent_) return;
-    fmt::print(stderr, "{} {}% {} {}, {} left\n", phase_, percent, formatRate(rate), unit_,
+    fmt::print(stderr, "{} {}% {} {}{}, {} left\n", phase_, percent, formatRate(rate), unit_, bytes,
                formatSeconds(left));
   } else if (style_ == Style::kJson) {
-    const nlohmann::json line = {{"phase", phase_}, {"done", done},       {"total", total_},
-                                 {"unit", unit_},   {"per_second", rate}, {"seconds_left", left}};
+    const nlohmann::json line = {{"phase", phase_},     {"done", done},
+                                 {"total", total_},     {"unit", unit_},
+                                 {"per_second", rate},  {"bytes_per_second", byte_rate},
+                                 {"seconds_left", left}};
     fmt::print(stderr, "{}\n", line.dump());
   }
   last_percent_ = percent;

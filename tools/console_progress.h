@@ -25,6 +25,7 @@ class ConsoleProgress : public Progress {
 
   void beginPhase(std::string_view name, std::uint64_t total, std::string_view unit) override;
   void advance(std::uint64_t count) override;
+  void advanceBytes(std::uint64_t count) override { bytes_ += count; }
   void note(const std::string& message) override;
   bool isCancelled() const override;
 
@@ -39,13 +40,13 @@ class ConsoleProgress : public Progress {
   const Style style_;
   const bool quiet_;
   const bool verbose_;
-  std::mutex mutex_;  // guards what is below, but not done_ and next_draw_ns_
+  std::mutex mutex_;  // guards what is below, but not the atomic ones
   std::string phase_, unit_;
   std::uint64_t total_ = 0;
   int last_percent_ = -1;
   bool bar_shown_ = false;
   std::chrono::steady_clock::time_point phase_start_;
-  std::atomic<std::uint64_t> done_{0};
+  std::atomic<std::uint64_t> done_{0}, bytes_{0};
   std::atomic<std::int64_t> next_draw_ns_{0};
 };
 

@@ -28,18 +28,24 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                                                                options, context.progress()));
   const double seconds = context.wallSeconds();
   const double bytes_per_surfel = double(stats.file_bytes) / double(stats.surfels);
+  std::string phases_text;
+  for (const auto& [phase, phase_seconds] : stats.phase_seconds) {
+    phases_text +=
+        fmt::format("{}{} {:.1f} s", phases_text.empty() ? "" : ", ", phase, phase_seconds);
+  }
   context.say(
       fmt::format("{}: {} surfels, {} nodes, {} pages, {} ({:.1f} bytes per surfel)\n"
-                  "{:.1f} s, {:.2f} M surfels/s, peak memory {}, temporary files {}",
+                  "{:.1f} s ({}), {:.2f} M surfels/s, peak memory {}, temporary files {}",
                   arguments.output, formatCount(stats.surfels), formatCount(stats.nodes),
                   formatCount(std::uint64_t{stats.node_pages} + stats.surfel_pages),
-                  formatBytes(stats.file_bytes), bytes_per_surfel, seconds,
+                  formatBytes(stats.file_bytes), bytes_per_surfel, seconds, phases_text,
                   double(stats.surfels) / seconds / 1e6, formatBytes(peakResidentBytes()),
                   formatBytes(stats.temporary_bytes)));
   nlohmann::json phases = nlohmann::json::object();
   for (const auto& [phase, phase_seconds] : stats.phase_seconds) phases[phase] = phase_seconds;
   return context.writeStats({{"command", "index"},
                              {"memory_bytes", options.memory_bytes},
+                             {"input_bytes", stats.input_bytes},
                              {"surfels", stats.surfels},
                              {"skipped_records", stats.skipped_records},
                              {"nodes", stats.nodes},

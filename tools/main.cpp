@@ -15,6 +15,7 @@ namespace {
 
 void addCommands(CLI::App& app, CommandContext& context) {
   addSampleCommand(app, context);
+  addGenerateCommand(app, context);
   addIndexCommand(app, context);
   addInfoCommand(app, context);
   addVerifyCommand(app, context);

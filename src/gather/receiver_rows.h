@@ -11,7 +11,7 @@
 
 #include "gather/receiver_raster.h"
 #include "io/ply_format.h"
-#include "io/surfel_source.h"
+#include "io/surfel_mapping.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
 

@@ -1,87 +1,56 @@
-// Files through system calls: positional reads, buffered appends, and files that appear whole or
-// not at all. Every message names the path, the offset and the system's reason.
+// The files of a user: read at positions, written to appear whole or not at all, and scratch space
+// without a name. Every message names the path, the place and the system's reason.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
-#include <utility>
-#include <vector>
 
+#include "io/positional_file.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
 
-using Bytes = std::span<const std::byte>;
-
-// Memory that direct I/O can reach: begins at a multiple of kDirectAlignment. Grows only, and is
-// reused: first touch of fresh memory costs more than the disk. Move-only.
-inline constexpr std::size_t kDirectAlignment = 4096;
-class AlignedBuffer {
- public:
-  AlignedBuffer() = default;
-  explicit AlignedBuffer(std::size_t bytes) { reserve(bytes); }
-  AlignedBuffer(AlignedBuffer&& other) noexcept
-      : data_(std::exchange(other.data_, nullptr)), capacity_(std::exchange(other.capacity_, 0)) {}
-  AlignedBuffer& operator=(AlignedBuffer&& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(capacity_, other.capacity_);
-    return *this;
-  }
-  ~AlignedBuffer();
-  // Room for `bytes` at least; what was there is lost when it must grow.
-  void reserve(std::size_t bytes);
-  std::byte* data() const { return data_; }
-  std::size_t capacity() const { return capacity_; }
-
- private:
-  std::byte* data_ = nullptr;
-  std::size_t capacity_ = 0;
-};
-
-// An open descriptor, closed when it goes. Move-only.
-class FileDescriptor {
- public:
-  FileDescriptor() = default;
-  explicit FileDescriptor(int descriptor) : descriptor_(descriptor) {}
-  FileDescriptor(FileDescriptor&& other) noexcept;
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
-  ~FileDescriptor();
-  int get() const { return descriptor_; }
-  bool isOpen() const { return descriptor_ >= 0; }
-  void close();
-
- private:
-  int descriptor_ = -1;
-};
-
-// A file open for reading. readAt is safe from any thread.
+// A file open for reading. Reads are safe from any thread.
 class InputFile {
  public:
-  // kIoError when the path cannot be opened or is not a regular file.
-  static Result<InputFile> open(const std::string& path);
+  // kIoError when the path cannot be opened or is not a regular file. `access` decides how readView
+  // reads; the other reads, which have no alignment, are cached.
+  static Result<InputFile> open(const std::string& path, Access access = Access::kCached);
 
-  const std::string& path() const { return path_; }
+  const std::string& path() const { return file_.name(); }
   std::uint64_t size() const { return size_; }
 
   // Reads exactly bytes.size() bytes at `offset`. kCorruption when the file ends before that.
-  Status readAt(std::uint64_t offset, std::span<std::byte> bytes) const;
+  Status readAt(std::uint64_t offset, std::span<std::byte> bytes) const {
+    return file_.readAt(offset, bytes);
+  }
   // Reads up to bytes.size() bytes at `offset`; fewer only at the end of the file.
-  Result<std::size_t> readSome(std::uint64_t offset, std::span<std::byte> bytes) const;
-  // The bytes [offset, offset + size) as a view into `buffer`, which grows as needed; shorter only
-  // at the end of the file.
-  Result<Bytes> readView(std::uint64_t offset, std::size_t size, AlignedBuffer& buffer) const;
+  Result<std::size_t> readSome(std::uint64_t offset, std::span<std::byte> bytes) const {
+    return file_.readSome(offset, bytes);
+  }
+  // The bytes [offset, offset + size) as a view into `buffer`, which grows as needed, by up to two
+  // alignments more than size; shorter only at the end of the file.
+  Result<Bytes> readView(std::uint64_t offset, std::size_t size, AlignedBuffer& buffer) const {
+    return file_.readView(offset, size, buffer);
+  }
 
  private:
-  std::string path_;
-  FileDescriptor descriptor_;
+  friend class AtomicFile;
+  static Result<InputFile> fromOpen(PositionalFile file, Access access);
+
+  PositionalFile file_;
   std::uint64_t size_ = 0;
 };
 
-// A file that appears under its final name only when complete: written to a temporary file beside
-// it, synced, renamed, and the directory synced. Destroyed without commit() it leaves nothing.
-// One thread at a time.
+// A file that appears under its final name only when complete. Until then it has no name, where the
+// file system allows that (O_TMPFILE), else that of a temporary file beside it
+// (io/temporary_name.h); commit() syncs it, renames it, and syncs the directory. Destroyed without
+// commit() it leaves nothing; killed, it leaves at most the temporary file, which the next writer
+// of the path removes. Of two writers of one path at once, the last to commit wins. Takes up to
+// BlockWriter::kDefaultBlocks blocks of memory. One thread at a time.
 class AtomicFile {
  public:
   static Result<AtomicFile> create(const std::string& path);
@@ -89,43 +58,67 @@ class AtomicFile {
   AtomicFile& operator=(AtomicFile&& other) noexcept;
   ~AtomicFile();
 
-  const std::string& path() const { return path_; }
+  const std::string& path() const;
   // Bytes appended so far, buffered ones included.
-  std::uint64_t size() const { return size_; }
+  std::uint64_t size() const;
 
+  // The first failure of any of these is final, and the only answer of every later call: in
+  // particular a sync that failed is not tried again, since the system may have dropped the bytes.
   Status append(Bytes bytes);
   // Overwrites bytes that were appended before.
   Status writeAt(std::uint64_t offset, Bytes bytes);
+  // The file appears. Nothing may be written after it. When this fails, what was under the name
+  // before is still there; except that when only the directory could not be synced, the new file
+  // is, and may be lost with the power.
   Status commit();
 
- private:
-  AtomicFile() = default;
-  Status flush();
-  void discard();
+  // Ends the file without ever giving it a name: it lasts as long as it is open. It goes by `name`
+  // in messages. Not synced. Nothing may be written after it.
+  Result<InputFile> finishUnnamed(const std::string& name, Access access = Access::kDirect);
 
-  std::string path_, temporary_path_;
-  FileDescriptor descriptor_;
-  std::vector<std::byte> buffer_;
-  std::uint64_t size_ = 0;
+ private:
+  struct State;
+  explicit AtomicFile(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
 };
 
-// Scratch space on disk that has no name and goes when the process does. append by one thread at
-// a time; readAt from any thread once written.
+// Scratch space on disk that has no name and goes when the process does. Written and read by direct
+// I/O where the file system allows. Safe from any thread. Takes `blocks` blocks of
+// BlockWriter::kBlockBytes while appending, none before the first append.
 class TemporaryFile {
  public:
-  // In `directory`, which must exist.
-  static Result<TemporaryFile> create(const std::string& directory);
-  std::uint64_t size() const { return size_; }
-  Status append(Bytes bytes);
+  // In `directory`, which must exist. Costs little until the first block is full.
+  static Result<TemporaryFile> create(const std::string& directory, std::size_t blocks = 4);
+  TemporaryFile(TemporaryFile&& other) noexcept;
+  TemporaryFile& operator=(TemporaryFile&& other) noexcept;
+  ~TemporaryFile();
+
+  // Bytes appended so far.
+  std::uint64_t size() const;
+
+  // Returns the offset at which the bytes lie. A failed write is the answer of some later append or
+  // flush, and of all that follow; it is not tried again.
+  Result<std::uint64_t> append(Bytes bytes);
+  // Waits until all that was appended is in the file.
+  Status flush();
+
+  // Read exactly the bytes asked for, as their counterparts of InputFile; kCorruption when fewer
+  // were appended. What has not been flushed, they flush.
   Status readAt(std::uint64_t offset, std::span<std::byte> bytes) const;
+  Result<Bytes> readView(std::uint64_t offset, std::size_t size, AlignedBuffer& buffer) const;
 
  private:
-  std::string directory_;
-  FileDescriptor descriptor_;
-  std::uint64_t size_ = 0;
+  struct State;
+  explicit TemporaryFile(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
 };
 
 // The directory part of a path, "." when there is none.
 std::string directoryOf(const std::string& path);
+
+// Bytes that the file system of `directory` still takes from this user.
+Result<std::uint64_t> availableBytes(const std::string& directory);
 
 }  // namespace surfeit

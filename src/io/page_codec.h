@@ -1,5 +1,5 @@
-// Compression of pages: one zstd frame per page, without zstd's own checksum (every page has its
-// XXH3, io/page_file.h).
+// Compression of pages: the front of the payload as one zstd frame, the rest as it is. There is no
+// zstd checksum: every page has its XXH3 (io/page_file.h).
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,14 @@
 
 namespace surfeit {
 
-// Compresses `payload` into `stored` (replaced). Safe from any thread.
-Status compressPage(Bytes payload, std::vector<std::byte>& stored);
+// Compresses the first `packed_bytes` of `payload` into `stored` (replaced); what follows looks
+// like noise and is appended. Safe from any thread.
+Status compressPage(Bytes payload, std::size_t packed_bytes, std::vector<std::byte>& stored);
+
+// Compresses all of it.
+inline Status compressPage(Bytes payload, std::vector<std::byte>& stored) {
+  return compressPage(payload, payload.size(), stored);
+}
 
 // Decompresses into exactly payload.size() bytes. Safe on arbitrary bytes and from any thread.
 // kCorruption says what was wrong, without naming the file.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "core/assert.h"
 #include "io/byte_coding.h"
@@ -48,8 +49,13 @@ Status PageFile::pageError(std::uint32_t page, const std::string& message) const
 }
 
 Result<PageFile> PageFile::open(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(InputFile file, InputFile::open(path));
+  return open(std::move(file));
+}
+
+Result<PageFile> PageFile::open(InputFile file) {
   PageFile pages;
-  SURFEIT_ASSIGN_OR_RETURN(pages.file_, InputFile::open(path));
+  pages.file_ = std::move(file);
   SURFEIT_RETURN_IF_ERROR(pages.readHeader());
 
   std::uint64_t directory_offset, provenance_offset, directory_checksum, provenance_checksum;
@@ -159,35 +165,43 @@ Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& prov
   return {};
 }
 
-// Pages must fill the space between header and provenance exactly, surfel pages first.
+// Pages lie between header and provenance, and take as many bytes as there are.
 Status PageFile::checkDirectory(std::uint64_t pages_end) {
-  std::uint64_t expected_offset = kFileHeaderBytes;
-  const auto check = [&](std::uint32_t page) -> Status {
+  std::uint64_t bytes = 0;
+  for (std::uint32_t page = 0; page < pageCount(); ++page) {
     const PageEntry& at = directory_[page];
-    if (at.offset != expected_offset || at.stored_bytes > pages_end - at.offset) {
+    if (at.offset < kFileHeaderBytes || at.offset > pages_end ||
+        at.stored_bytes > pages_end - at.offset) {
       return partError("directory",
-                       fmt::format("page {} at {} with {} bytes, expected at {} and "
-                                   "before {}",
-                                   page, at.offset, at.stored_bytes, expected_offset, pages_end));
+                       fmt::format("page {} at {} with {} bytes, expected between {} and {}", page,
+                                   at.offset, at.stored_bytes, kFileHeaderBytes, pages_end));
     }
     if (at.payload_bytes > kMaxPayloadBytes) {
       return partError("directory", fmt::format("page {} decodes to {} bytes, expected at most {}",
                                                 page, at.payload_bytes, kMaxPayloadBytes));
     }
-    expected_offset += at.stored_bytes;
+    bytes += at.stored_bytes;
     max_stored_bytes_ = std::max(max_stored_bytes_, at.stored_bytes);
     max_payload_bytes_ = std::max(max_payload_bytes_, at.payload_bytes);
-    return {};
-  };
-  for (std::uint32_t page = node_page_count_; page < pageCount(); ++page) {
-    SURFEIT_RETURN_IF_ERROR(check(page));
   }
-  for (std::uint32_t page = 0; page < node_page_count_; ++page) {
-    SURFEIT_RETURN_IF_ERROR(check(page));
+  if (bytes != pages_end - kFileHeaderBytes) {
+    return partError("directory", fmt::format("pages of {} bytes, expected {}", bytes,
+                                              pages_end - kFileHeaderBytes));
   }
-  if (expected_offset != pages_end) {
-    return partError("directory",
-                     fmt::format("pages end at {}, expected {}", expected_offset, pages_end));
+  return {};
+}
+
+Status PageFile::checkTiling() const {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> order(pageCount());  // offset, page
+  for (std::uint32_t page = 0; page < pageCount(); ++page) order[page] = {entry(page).offset, page};
+  std::sort(order.begin(), order.end());
+  std::uint64_t expected_offset = kFileHeaderBytes;
+  for (const auto& [offset, page] : order) {
+    if (offset != expected_offset) {
+      return partError("directory",
+                       fmt::format("page {} at {}, expected at {}", page, offset, expected_offset));
+    }
+    expected_offset += entry(page).stored_bytes;
   }
   return {};
 }
@@ -216,11 +230,12 @@ Result<PageFileWriter> PageFileWriter::create(const std::string& path, std::uint
 }
 
 Status PageFileWriter::addPage(Bytes stored, std::uint32_t payload_bytes,
-                               std::vector<PageEntry>& pages) {
+                               std::deque<PageEntry>& pages) {
   SURFEIT_CHECK(payload_bytes <= kMaxPayloadBytes);
-  if (surfel_pages_.size() + node_pages_.size() >= kMaxPages) {
+  if (page_count_ >= kMaxPages) {
     return Status::failed(fmt::format("{}: more than {} pages", file_.path(), kMaxPages));
   }
+  ++page_count_;
   const std::uint64_t offset = file_.size();
   pages.push_back({offset, static_cast<std::uint32_t>(stored.size()), payload_bytes,
                    hash(stored, pageSeed(identity_, offset))});
@@ -228,24 +243,59 @@ Status PageFileWriter::addPage(Bytes stored, std::uint32_t payload_bytes,
 }
 
 Status PageFileWriter::addSurfelPage(Bytes stored, std::uint32_t payload_bytes) {
-  SURFEIT_CHECK(node_pages_.empty());
   return addPage(stored, payload_bytes, surfel_pages_);
 }
 
-Status PageFileWriter::addNodePage(Bytes stored, std::uint32_t payload_bytes) {
-  return addPage(stored, payload_bytes, node_pages_);
+Status PageFileWriter::addNodePage(Bytes stored, std::uint32_t payload_bytes, std::size_t level) {
+  SURFEIT_CHECK(level < kMaxNodeLevels);
+  return addPage(stored, payload_bytes, node_pages_[level]);
+}
+
+// Node pages level by level, then surfel pages.
+Status PageFileWriter::appendDirectory(std::uint64_t& checksum) {
+  XXH3_state_t* const state = XXH3_createState();
+  if (state == nullptr) return Status::failed("no memory for a checksum");
+  XXH3_64bits_reset_withSeed(state, identity_);
+  Status status;
+  const auto append = [&](const std::deque<PageEntry>& pages) {
+    for (auto entry = pages.begin(); entry != pages.end() && status.ok(); ++entry) {
+      const Bytes bytes = std::as_bytes(std::span(&*entry, 1));
+      XXH3_64bits_update(state, bytes.data(), bytes.size());
+      status = file_.append(bytes);
+    }
+  };
+  for (const std::deque<PageEntry>& level : node_pages_) append(level);
+  append(surfel_pages_);
+  checksum = XXH3_64bits_digest(state);
+  XXH3_freeState(state);
+  return status;
 }
 
 Status PageFileWriter::finish(Bytes scene_fields, const std::string& provenance) {
+  SURFEIT_RETURN_IF_ERROR(complete(scene_fields, provenance));
+  return file_.commit();
+}
+
+Result<PageFile> PageFileWriter::finishUnnamed(Bytes scene_fields, const std::string& provenance) {
+  SURFEIT_RETURN_IF_ERROR(complete(scene_fields, provenance));
+  SURFEIT_ASSIGN_OR_RETURN(
+      InputFile file,
+      file_.finishUnnamed(fmt::format("temporary scene in {}", directoryOf(file_.path()))));
+  return PageFile::open(std::move(file));
+}
+
+// Writes all that follows the pages, and the header.
+Status PageFileWriter::complete(Bytes scene_fields, const std::string& provenance) {
   SURFEIT_CHECK(scene_fields.size() <= kSceneFieldsBytes);
   // Provenance and directory
   const std::uint64_t provenance_offset = file_.size();
   const Bytes text = std::as_bytes(std::span(provenance));
   SURFEIT_RETURN_IF_ERROR(file_.append(text));
   const std::uint64_t directory_offset = file_.size();
-  const std::uint64_t node_pages = node_pages_.size();
-  node_pages_.insert(node_pages_.end(), surfel_pages_.begin(), surfel_pages_.end());
-  SURFEIT_RETURN_IF_ERROR(file_.append(bytesOf(node_pages_)));
+  std::uint64_t directory_checksum = 0;
+  SURFEIT_RETURN_IF_ERROR(appendDirectory(directory_checksum));
+  std::uint64_t node_pages = 0;
+  for (const std::deque<PageEntry>& level : node_pages_) node_pages += level.size();
 
   // Footer
   std::vector<std::byte> footer;
@@ -253,7 +303,7 @@ Status PageFileWriter::finish(Bytes scene_fields, const std::string& provenance)
   writer.put(provenance_offset);
   writer.put(directory_offset);
   writer.put(hash(text, identity_));
-  writer.put(hash(bytesOf(node_pages_), identity_));
+  writer.put(directory_checksum);
   writer.put(file_.size() + kFileFooterBytes);
   writer.put(node_pages);
   writer.put(hash(footer, identity_));
@@ -271,8 +321,7 @@ Status PageFileWriter::finish(Bytes scene_fields, const std::string& provenance)
   head.putBytes(scene_fields);
   header.resize(kFileHeaderBytes - 8);
   head.put(hash(header, 0));
-  SURFEIT_RETURN_IF_ERROR(file_.writeAt(0, header));
-  return file_.commit();
+  return file_.writeAt(0, header);
 }
 
 }  // namespace surfeit

@@ -1,13 +1,17 @@
 // The container of a .sft file: header, pages, provenance, directory, footer. It knows offsets,
 // sizes and checksums, not what the pages hold. docs/format.md, "Container", has every byte.
 //
-//   [ header : 512 | surfel pages | node pages | provenance | directory | footer : 64 ]
+//   [ header : 512 | pages | provenance | directory | footer : 64 ]
 //
-// Nothing lies between the parts, so that every byte of the file is under one checksum.
+// Nothing lies between parts or pages, so that every byte of the file is under one checksum. Pages
+// lie in the order in which they were finished, node pages among surfel pages of their region; the
+// directory has them by number.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <string>
 #include <vector>
@@ -43,6 +47,7 @@ class PageFile {
   // Checks everything but the pages. kCorruption names file, part, found and expected; a newer
   // version is refused with its number. Allocates no more than the file's own directory.
   static Result<PageFile> open(const std::string& path);
+  static Result<PageFile> open(InputFile file);
 
   const std::string& path() const { return file_.path(); }
   std::uint64_t fileBytes() const { return file_.size(); }
@@ -63,6 +68,9 @@ class PageFile {
   // ...".
   Status readPage(std::uint32_t page, std::vector<std::byte>& stored,
                   std::vector<std::byte>& payload) const;
+  // Whether the pages fill the space between header and provenance without gap or overlap: that
+  // they do in sum, open has checked. Takes memory of 16 bytes per page.
+  Status checkTiling() const;
   // Prefixes a message about a page's contents with file, page and offset, as kCorruption.
   Status pageError(std::uint32_t page, const std::string& message) const;
 
@@ -83,33 +91,43 @@ class PageFile {
   std::uint32_t max_payload_bytes_ = 0;
 };
 
-// Writes a file, surfel pages first, then node pages; it appears when finish() succeeds. One thread
-// at a time.
+// Writes a file; it appears when finish() succeeds. One thread at a time; 24 bytes per page.
 class PageFileWriter {
  public:
   // `identity` must differ between files of different content and be the same for the same content.
   static Result<PageFileWriter> create(const std::string& path, std::uint64_t identity);
 
-  // `stored` is a page that compressPage made of payload_bytes bytes.
+  // `stored` is a page that compressPage made of payload_bytes bytes. Surfel pages are numbered as
+  // they come, node pages level by level (below kMaxNodeLevels); the kinds and the levels may take
+  // turns.
+  static constexpr std::size_t kMaxNodeLevels = 22;
   Status addSurfelPage(Bytes stored, std::uint32_t payload_bytes);
-  Status addNodePage(Bytes stored, std::uint32_t payload_bytes);
+  Status addNodePage(Bytes stored, std::uint32_t payload_bytes, std::size_t level = 0);
+
+  std::uint64_t surfelPageCount() const { return surfel_pages_.size(); }
+  std::uint64_t nodePageCount(std::size_t level) const { return node_pages_[level].size(); }
 
   // Writes what remains. scene_fields: at most kSceneFieldsBytes.
   Status finish(Bytes scene_fields, const std::string& provenance);
+  // The same, but the file gets no name: it is returned, opened and checked, and goes with its last
+  // reader.
+  Result<PageFile> finishUnnamed(Bytes scene_fields, const std::string& provenance);
 
   std::uint64_t fileBytes() const { return file_.size(); }
-  std::size_t directoryBytes() const {
-    return (surfel_pages_.size() + node_pages_.size()) * sizeof(PageEntry);
-  }
 
  private:
   PageFileWriter(AtomicFile file, std::uint64_t identity)
       : file_(std::move(file)), identity_(identity) {}
-  Status addPage(Bytes stored, std::uint32_t payload_bytes, std::vector<PageEntry>& pages);
+  Status addPage(Bytes stored, std::uint32_t payload_bytes, std::deque<PageEntry>& pages);
+  Status appendDirectory(std::uint64_t& checksum);
+  Status complete(Bytes scene_fields, const std::string& provenance);
 
   AtomicFile file_;
   std::uint64_t identity_;
-  std::vector<PageEntry> surfel_pages_, node_pages_;
+  // Lists that do not move when they grow
+  std::deque<PageEntry> surfel_pages_;
+  std::array<std::deque<PageEntry>, kMaxNodeLevels> node_pages_;
+  std::uint64_t page_count_ = 0;
 };
 
 }  // namespace surfeit

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 #include <limits>
 #include <string_view>
 #include <utility>
 
-#include "io/file.h"
+#include "io/file_stamp.h"
+#include "io/ply_number.h"
 
 namespace surfeit {
 namespace {
@@ -17,9 +17,6 @@ namespace {
 constexpr std::size_t kBufferBytes = 256 << 10;
 constexpr std::size_t kUsualHeaderBytes = 16 << 10;
 constexpr std::size_t kMaxListItems = 1 << 20;
-// Longest number in an ascii file. With at most this many digits the sign of the exponent tells
-// whether a number that from_chars finds out of range is too large or too small.
-constexpr std::size_t kMaxNumberChars = 256;
 constexpr std::size_t kNoList = std::numeric_limits<std::size_t>::max();
 
 bool isBlank(std::byte byte) {
@@ -29,69 +26,12 @@ bool isBlank(std::byte byte) {
 
 bool isLineEnd(std::byte byte) { return static_cast<char>(byte) == '\n'; }
 
-template <typename T>
-bool storeInteger(std::string_view text, std::byte* out) {
-  T value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return false;
-  std::memcpy(out, &value, sizeof value);
-  return true;
-}
-
-// Numbers too large for the type become infinite and numbers too small become zero, as in C.
-template <typename T>
-bool storeReal(std::string_view text, std::byte* out) {
-  T value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (end != text.data() + text.size()) return false;
-  if (error == std::errc::result_out_of_range) {
-    // A float may be small without an exponent; a double of kMaxNumberChars digits may not
-    double wide = 0;
-    const auto [wide_end, wide_error] =
-        std::from_chars(text.data(), text.data() + text.size(), wide);
-    const bool is_tiny = wide_error == std::errc::result_out_of_range
-                             ? text.find("e-") != text.npos || text.find("E-") != text.npos
-                             : wide > -1 && wide < 1;
-    value = is_tiny ? T{0} : std::numeric_limits<T>::infinity();
-    if (text.front() == '-') value = -value;
-  } else if (error != std::errc{}) {
-    return false;
-  }
-  std::memcpy(out, &value, sizeof value);
-  return true;
-}
-
-// Stores the number that `text` spells; false when it spells no number of that type.
-bool storeNumber(std::string_view text, PlyType type, std::byte* out) {
-  if (text.size() > kMaxNumberChars) return false;
-  // from_chars reads no plus sign
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  switch (type) {
-    case PlyType::kInt8:
-      return storeInteger<std::int8_t>(text, out);
-    case PlyType::kUint8:
-      return storeInteger<std::uint8_t>(text, out);
-    case PlyType::kInt16:
-      return storeInteger<std::int16_t>(text, out);
-    case PlyType::kUint16:
-      return storeInteger<std::uint16_t>(text, out);
-    case PlyType::kInt32:
-      return storeInteger<std::int32_t>(text, out);
-    case PlyType::kUint32:
-      return storeInteger<std::uint32_t>(text, out);
-    case PlyType::kFloat32:
-      return storeReal<float>(text, out);
-    case PlyType::kFloat64:
-      break;
-  }
-  return storeReal<double>(text, out);
-}
-
 }  // namespace
 
 // The file behind a buffer, and where in the file we are.
 struct PlyReader::State {
   InputFile file;
+  FileStamp stamp;  // when it was opened
   PlyHeader header;
   Status failure;  // of the last read, until the next seek
 
@@ -182,7 +122,7 @@ struct PlyReader::State {
   void skipBlanks() {
     for (;;) {
       while (begin < end && isBlank(buffer[begin])) ++begin;
-      if (end - begin > kMaxNumberChars || at_end) return;
+      if (end - begin > kMaxPlyNumberChars || at_end) return;
       refill();
     }
   }
@@ -190,7 +130,7 @@ struct PlyReader::State {
   // Moves `token` to the next number of the line; empty at the end of the line.
   void nextToken() {
     skipBlanks();
-    const std::size_t limit = std::min(end, begin + kMaxNumberChars + 1);
+    const std::size_t limit = std::min(end, begin + kMaxPlyNumberChars + 1);
     std::size_t last = begin;
     while (last < limit && !isBlank(buffer[last]) && !isLineEnd(buffer[last])) ++last;
     token = {reinterpret_cast<const char*>(buffer.data()) + begin, last - begin};
@@ -219,7 +159,7 @@ struct PlyReader::State {
       const PlyProperty& property = properties[i];
       nextToken();
       if (!property.is_list) {
-        if (!storeNumber(token, property.type, scalars + property.offset)) {
+        if (!parsePlyNumber(token, property.type, scalars + property.offset)) {
           return badToken(property, property.type);
         }
         continue;
@@ -227,7 +167,7 @@ struct PlyReader::State {
 
       // The length of a list, then its items
       std::byte value[8];
-      if (!storeNumber(token, property.count_type, value)) {
+      if (!parsePlyNumber(token, property.count_type, value)) {
         return badToken(property, property.count_type);
       }
       const bool is_wanted = i == wanted_list;
@@ -235,7 +175,7 @@ struct PlyReader::State {
                                listLength(property, value, is_wanted));
       for (std::uint64_t item = 0; item < item_count; ++item) {
         nextToken();
-        if (!storeNumber(token, property.type, value)) return badToken(property, property.type);
+        if (!parsePlyNumber(token, property.type, value)) return badToken(property, property.type);
         if (is_wanted) list->push_back(plyValue(value, property.type));
       }
     }
@@ -307,7 +247,9 @@ struct PlyReader::State {
 
   // At the end of an element, notes where the next begins; the last must end with the file.
   Status endElement() {
-    if (row < element().count || element_begin.size() > element_index + 1) return {};
+    if (row < element().count) return {};
+    SURFEIT_RETURN_IF_ERROR(checkUnchanged(file.path(), stamp));
+    if (element_begin.size() > element_index + 1) return {};
     const std::uint64_t next_begin = offset();
     const bool is_last = std::all_of(
         header.elements.begin() + static_cast<std::ptrdiff_t>(element_index) + 1,
@@ -318,6 +260,7 @@ struct PlyReader::State {
   }
 
   Status checkEnd() {
+    if (offset() >= file.size()) return {};
     // Only so few bytes can be a line end rather than data
     if (isAscii() || file.size() - offset() <= 2) skipEmptyLines();
     SURFEIT_RETURN_IF_ERROR(failure);
@@ -373,7 +316,7 @@ struct PlyReader::State {
 
     // Rows of fixed size are passed by arithmetic, others must be read
     while (element_index < index) {
-      if (!isAscii() && !element().hasLists()) {
+      if (hasFixedRows()) {
         SURFEIT_RETURN_IF_ERROR(skipBytes((element().count - row) * element().row_bytes));
         row = element().count;
       }
@@ -393,7 +336,7 @@ struct PlyReader::State {
     const std::size_t row_count = static_cast<std::size_t>(
         std::min<std::uint64_t>(element().count - row, rows.size() / row_bytes));
     rows = rows.first(row_count * row_bytes);
-    if (isAscii() || element().hasLists()) {
+    if (!hasFixedRows()) {
       for (std::size_t i = 0; i < row_count; ++i) {
         SURFEIT_RETURN_IF_ERROR(readRow(rows.data() + i * row_bytes, kNoList, nullptr));
       }
@@ -405,6 +348,43 @@ struct PlyReader::State {
     }
     SURFEIT_RETURN_IF_ERROR(endElement());
     return row_count;
+  }
+
+  bool hasFixedRows() const { return !isAscii() && !element().hasLists(); }
+
+  Result<Bytes> readRowView(std::size_t max_rows, AlignedBuffer& view_buffer) {
+    const std::size_t row_bytes = element().row_bytes;
+    const std::size_t row_count =
+        static_cast<std::size_t>(std::min<std::uint64_t>(element().count - row, max_rows));
+    const std::size_t size = row_count * row_bytes;
+    if (!hasFixedRows()) {
+      view_buffer.reserve(size);
+      const std::span<std::byte> rows(view_buffer.data(), size);
+      SURFEIT_RETURN_IF_ERROR(readRows(rows).status());
+      return Bytes(rows);
+    }
+
+    // The rows of the file are the packed rows
+    const std::uint64_t at = offset();
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes view, file.readView(at, size, view_buffer));
+    if (view.size() < size) {
+      row += view.size() / row_bytes;
+      return damaged(
+          fmt::format("file ends early: {} bytes at {}, expected {}", view.size(), at, size));
+    }
+    if (needsByteSwap(header.encoding)) {
+      swapPlyRows(element(), {view_buffer.data() + (view.data() - view_buffer.data()), size});
+    }
+    jumpTo(at + size);
+    row += row_count;
+    SURFEIT_RETURN_IF_ERROR(endElement());
+    return view;
+  }
+
+  void seekRow(std::uint64_t new_row) {
+    row = new_row;
+    jumpTo(element_begin[element_index] + row * element().row_bytes);
+    failure = {};
   }
 
   Result<bool> readRowWithList(std::span<std::byte> scalars, std::size_t list_property,
@@ -421,9 +401,10 @@ struct PlyReader::State {
   }
 };
 
-Result<PlyReader> PlyReader::open(const std::string& path) {
+Result<PlyReader> PlyReader::open(const std::string& path, Access access) {
   auto state = std::make_unique<State>();
-  SURFEIT_ASSIGN_OR_RETURN(state->file, InputFile::open(path));
+  SURFEIT_ASSIGN_OR_RETURN(state->file, InputFile::open(path, access));
+  SURFEIT_ASSIGN_OR_RETURN(state->stamp, FileStamp::of(path));
 
   // Headers are short; only one that does not parse gets the room that it may have at most
   for (const std::size_t header_bytes : {kUsualHeaderBytes, kMaxPlyHeaderBytes}) {
@@ -477,6 +458,31 @@ Result<std::size_t> PlyReader::readRows(std::span<std::byte> rows) {
   Result<std::size_t> count = state_->readRows(rows);
   if (!count.ok()) state_->failure = count.status();
   return count;
+}
+
+Result<Bytes> PlyReader::readRowView(std::size_t max_rows, AlignedBuffer& buffer) {
+  if (state_->header.elements.empty()) return state_->invalidCall("no element to read");
+  if (state_->element().row_bytes == 0 || max_rows == 0) {
+    return state_->invalidCall(
+        fmt::format("{} rows of {} bytes asked for", max_rows, state_->element().row_bytes));
+  }
+  SURFEIT_RETURN_IF_ERROR(state_->failure);
+  Result<Bytes> rows = state_->readRowView(max_rows, buffer);
+  if (!rows.ok()) state_->failure = rows.status();
+  return rows;
+}
+
+bool PlyReader::hasFixedRows() const {
+  return !state_->header.elements.empty() && state_->hasFixedRows();
+}
+
+Status PlyReader::seekRow(std::uint64_t row) {
+  if (!hasFixedRows() || row > state_->element().count) {
+    return state_->invalidCall(
+        fmt::format("seek to row {}, expected an element of fixed rows, at least as many", row));
+  }
+  state_->seekRow(row);
+  return {};
 }
 
 Result<bool> PlyReader::readRowWithList(std::span<std::byte> scalars, std::size_t list_property,

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "io/file.h"
 #include "io/ply_format.h"
 #include "surfeit/status.h"
 
@@ -19,11 +20,13 @@ namespace surfeit {
 // bytes after its last element (a final newline is fine) or holds a token that is no number of its
 // type is kCorruption. open refuses counts that the size of the file cannot hold, before anything
 // is allocated; bytes after the last element are noticed there when all rows have a fixed size,
-// else when the last row has been read. After a failure every read fails the same way until
-// seekElement. In ascii files a row is a line; empty lines are skipped.
+// else when the last row has been read. A file that was written to since open is kCorruption when
+// the last row of an element has been read. After a failure every read fails the same way until
+// seekElement or seekRow. In ascii files a row is a line; empty lines are skipped.
 class PlyReader {
  public:
-  static Result<PlyReader> open(const std::string& path);
+  // With kDirect, readRowView of fixed rows goes past the page cache; all else is cached.
+  static Result<PlyReader> open(const std::string& path, Access access = Access::kCached);
   PlyReader(PlyReader&&) noexcept;
   PlyReader& operator=(PlyReader&&) noexcept;
   ~PlyReader();
@@ -38,6 +41,17 @@ class PlyReader {
   // byte order at the offsets of the header; list properties are read and dropped. Returns the
   // number of rows; 0 at the end of the element.
   Result<std::size_t> readRows(std::span<std::byte> rows);
+
+  // The next rows of the current element, max_rows or as many as are left, packed as by readRows.
+  // The view lies in `buffer`, which grows to hold them, and is empty at the end of the element.
+  // Rows that the file has packed are not copied.
+  Result<Bytes> readRowView(std::size_t max_rows, AlignedBuffer& buffer);
+
+  // Whether the rows of the current element can be found by arithmetic: binary, without lists.
+  bool hasFixedRows() const;
+  // Moves to row `row` of the current element, at most its count. kInvalidArgument unless
+  // hasFixedRows().
+  Status seekRow(std::uint64_t row);
 
   // Reads one row of the current element: its scalars into `scalars` (row_bytes long) and the list
   // property number `list_property` (index into properties) into `list`, as doubles. A list longer

@@ -3,49 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 #include <utility>
 
 #include "io/file.h"
+#include "io/ply_number.h"
 
 namespace surfeit {
 namespace {
 
 constexpr std::size_t kScratchBytes = 64 << 10;
 constexpr std::size_t kMaxCountDigits = 20;  // of 2^64 - 1
-// The longest shortest double is -2.2250738585072014e-308
-constexpr std::size_t kMaxNumberChars = 32;
-
-template <typename T>
-char* formatAs(const std::byte* bytes, char* out) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return std::to_chars(out, out + kMaxNumberChars, value).ptr;
-}
-
-// Writes the shortest text that reads back as the same value; returns its end.
-char* formatNumber(const std::byte* bytes, PlyType type, char* out) {
-  switch (type) {
-    case PlyType::kInt8:
-      return formatAs<std::int8_t>(bytes, out);
-    case PlyType::kUint8:
-      return formatAs<std::uint8_t>(bytes, out);
-    case PlyType::kInt16:
-      return formatAs<std::int16_t>(bytes, out);
-    case PlyType::kUint16:
-      return formatAs<std::uint16_t>(bytes, out);
-    case PlyType::kInt32:
-      return formatAs<std::int32_t>(bytes, out);
-    case PlyType::kUint32:
-      return formatAs<std::uint32_t>(bytes, out);
-    case PlyType::kFloat32:
-      return formatAs<float>(bytes, out);
-    case PlyType::kFloat64:
-      break;
-  }
-  return formatAs<double>(bytes, out);
-}
 
 // The header with its count padded to a fixed size. Parsers split lines at blanks in different
 // ways, but all of them skip comments: the room is a comment behind the element line.
@@ -109,12 +77,12 @@ struct PlyWriter::State {
     std::size_t size = 0;
     for (; !rows.empty(); rows = rows.subspan(element().row_bytes)) {
       for (const PlyProperty& property : element().properties) {
-        if (scratch.size() - size <= kMaxNumberChars) {
+        if (scratch.size() - size <= kLongestPlyNumber) {
           SURFEIT_RETURN_IF_ERROR(file.append(Bytes(scratch).first(size)));
           size = 0;
         }
         char* const begin = reinterpret_cast<char*>(scratch.data()) + size;
-        char* const end = formatNumber(&rows[property.offset], property.type, begin);
+        char* const end = formatPlyNumber(&rows[property.offset], property.type, begin);
         *end = &property == &element().properties.back() ? '\n' : ' ';
         size += static_cast<std::size_t>(end - begin) + 1;
       }

@@ -1,65 +1,79 @@
-// Columns of page payloads: one property of all surfels or nodes of a page, quantized, stored byte
-// plane by byte plane (all low bytes, then all next ones), which is what zstd compresses best.
-// docs/format.md, "Columns", has the bytes; the names are the same.
+// Columns of page payloads: one property of all surfels or nodes of a page, quantized to integers,
+// of which the differences of neighbours on the curve are stored as byte planes. docs/format.md,
+// "Columns", has the bytes; the names are the same.
+//
+// Everything here is integer arithmetic or single IEEE 754 operations, so that equal values give
+// equal bytes on every machine. Loops run over flat arrays, one per axis, for the compiler to
+// vectorise: with SSE2 a surfel takes 15 ns to encode and 10 ns to decode.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/vec3.hpp>
 #include <span>
-#include <string>
-#include <vector>
 
-#include "io/byte_coding.h"
-#include "surfeit/status.h"
+#include "octree/byte_planes.h"
 
 namespace surfeit {
 
+// The x, y and z, or r, g and b, of all records.
+using Axes = std::array<std::span<const float>, 3>;
+using MutableAxes = std::array<std::span<float>, 3>;
+
 // Column encoders append; decoders take from the front and return false when the column is damaged:
 // it ends early, a range is not finite, or a value that must be finite is not. Every decoder fills
-// all of `values` or returns false.
+// all of `values` or returns false. Safe from any thread, each with its own writer or reader.
 
-// Positions: 2 or 3 bytes per axis within the column's box, or floats when `max_error` (or
-// `full_precision`) asks for more.
-void putPositions(ByteWriter& writer, std::span<const glm::vec3> values, float max_error,
-                  bool full_precision);
-bool getPositions(ByteReader& reader, std::span<glm::vec3> values);
+// Positions: multiples of a step, from the least coordinate on, in 2 or 3 bytes per axis, as
+// coarse as `max_error` allows; or floats when that or `full_precision` asks for more.
+void putPositions(PayloadWriter& writer, const Axes& values, float max_error, bool full_precision);
+bool getPositions(PayloadReader& reader, const MutableAxes& values);
 // Largest distance between a position and its stored form, for values that putPositions would
 // store with this max_error.
-float positionError(std::span<const glm::vec3> values, float max_error, bool full_precision);
+float positionError(const Axes& values, float max_error, bool full_precision);
 
-// Positive numbers: 2 bytes on a logarithmic scale between the smallest and the largest, or
-// floats. With kUp no value decodes to less than it was.
+// Positive numbers: the leading 16 bits of how far their bit patterns lie above that of the
+// smallest, which is a logarithmic scale; or floats. With kUp no value decodes to less than it was.
 enum class Rounding : std::uint8_t { kNearest, kUp };
-void putPositive(ByteWriter& writer, std::span<const float> values, Rounding rounding,
+void putPositive(PayloadWriter& writer, std::span<const float> values, Rounding rounding,
                  bool full_precision);
-bool getPositive(ByteReader& reader, std::span<float> values);
+bool getPositive(PayloadReader& reader, std::span<float> values);
 
 // Unit vectors: octahedral, 2 x 16 bits, or floats. A zero vector comes back as some unit vector:
 // whoever needs zero stores a flag.
-void putNormals(ByteWriter& writer, std::span<const glm::vec3> values, bool full_precision);
-bool getNormals(ByteReader& reader, std::span<glm::vec3> values);
+void putNormals(PayloadWriter& writer, const Axes& values, bool full_precision);
+bool getNormals(PayloadReader& reader, const MutableAxes& values);
 
 // Colors >= 0: three half floats under a common power of two, or floats; one byte when all are 0.
-void putColors(ByteWriter& writer, std::span<const glm::vec3> values, bool full_precision);
-bool getColors(ByteReader& reader, std::span<glm::vec3> values);
+void putColors(PayloadWriter& writer, const Axes& values, bool full_precision);
+bool getColors(PayloadReader& reader, const MutableAxes& values);
 
 // Reflectances in 0..1: three bytes holding square roots, or floats. Larger ones become 1.
-void putReflectances(ByteWriter& writer, std::span<const glm::vec3> values, bool full_precision);
-bool getReflectances(ByteReader& reader, std::span<glm::vec3> values);
+void putReflectances(PayloadWriter& writer, const Axes& values, bool full_precision);
+bool getReflectances(PayloadReader& reader, const MutableAxes& values);
 
 // Floats in -limit..limit as 16-bit integers; limit itself is not stored.
-void putSigned(ByteWriter& writer, std::span<const float> values, float limit);
-bool getSigned(ByteReader& reader, std::span<float> values, float limit);
+inline std::int16_t signedCode(float value, float limit) {
+  const float scaled = value * (32767 / limit);
+  const float above = scaled > -32767 ? scaled : -32767;  // NaN too
+  const float clamped = above < 32767 ? above : 32767;
+  return static_cast<std::int16_t>(static_cast<std::int32_t>(clamped + 32768.5f) - 32768);
+}
+void putSigned(PayloadWriter& writer, std::span<const float> values, float limit);
+bool getSigned(PayloadReader& reader, std::span<float> values, float limit);
+
+// 16-bit integers that are small, of either sign, as they are (no differences).
+void putSmallIntegers(PayloadWriter& writer, std::span<const std::int16_t> values);
+bool getSmallIntegers(PayloadReader& reader, std::span<std::int16_t> values);
 
 // Integers, in the fewest of 1, 2, 4 or 8 bytes that hold the largest.
-void putCounts(ByteWriter& writer, std::span<const std::uint64_t> values);
-bool getCounts(ByteReader& reader, std::span<std::uint64_t> values);
+void putCounts(PayloadWriter& writer, std::span<const std::uint64_t> values);
+bool getCounts(PayloadReader& reader, std::span<std::uint64_t> values);
 
 // Bytes and floats as they are; floats must be finite.
-void putBytes8(ByteWriter& writer, std::span<const std::uint8_t> values);
-bool getBytes8(ByteReader& reader, std::span<std::uint8_t> values);
-void putFloats(ByteWriter& writer, std::span<const float> values);
-bool getFloats(ByteReader& reader, std::span<float> values);
+void putBytes8(PayloadWriter& writer, std::span<const std::uint8_t> values);
+bool getBytes8(PayloadReader& reader, std::span<std::uint8_t> values);
+void putFloats(PayloadWriter& writer, std::span<const float> values);
+bool getFloats(PayloadReader& reader, std::span<float> values);
 
 }  // namespace surfeit

@@ -2,56 +2,40 @@
 
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <chrono>
+#include <atomic>
 #include <cmath>
 #include <memory>
+#include <new>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/job_limits.h"
-#include "io/surfel_source.h"
+#include "octree/bucket_stream.h"
+#include "octree/cloud_reader.h"
+#include "octree/index_plan.h"
 #include "octree/local_density.h"
 #include "octree/octree_builder.h"
 #include "octree/paged_octree.h"
+#include "octree/phase_clock.h"
 #include "octree/scene_writer.h"
-#include "octree/surfel_sorter.h"
 #include "surfeit/version.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kBatch = 16384;
-// What the process takes beside sorter and caches: program, readers, builder, encoder.
-constexpr std::uint64_t kOverheadBytes = 16 << 20;
-constexpr std::uint64_t kLeastMemory = 32 << 20;
-
-// What one pass over the inputs finds out.
-struct Scan {
-  Bounds3 bounds;
-  std::uint64_t surfels = 0;
-  std::uint64_t skipped = 0;
-  std::uint64_t content = 0;  // sum of the surfels' hashes: the same in any order
-  CloudChannels channels;
-  std::uint64_t missing_both = 0, missing_area = 0, missing_radius = 0, spheres = 0;
-};
-
-// Seconds by phase.
-class PhaseClock {
- public:
-  explicit PhaseClock(IndexStats& stats) : stats_(stats) {}
-  void finish(const char* phase) {
-    const auto now = std::chrono::steady_clock::now();
-    stats_.phase_seconds.emplace_back(phase, std::chrono::duration<double>(now - last_).count());
-    last_ = now;
+// Whether the positions lie in the cube.
+bool contains(const RootCube& cube, const Bounds3& bounds) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (double(bounds.min[axis]) < cube.origin[axis] ||
+        double(bounds.max[axis]) > cube.origin[axis] + cube.size) {
+      return false;
+    }
   }
-
- private:
-  IndexStats& stats_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
+  return true;
+}
 
 // The rules that need no neighbourhood (docs/format.md, "Rules for what is missing").
 void applySizeRules(Surfel& surfel, float overlap) {
@@ -69,51 +53,68 @@ void applySizeRules(Surfel& surfel, float overlap) {
 class Indexer {
  public:
   Indexer(const std::vector<std::string>& inputs, const std::string& output,
-          const IndexOptions& options, Progress& progress)
-      : inputs_(inputs), output_(output), options_(options), progress_(progress) {
-    threads_ = options.threads > 0 ? options.threads : defaultThreadCount();
+          const IndexOptions& options, int threads, Progress& progress)
+      : inputs_(inputs),
+        output_(output),
+        options_(options),
+        threads_(threads),
+        progress_(progress),
+        clock_(stats_) {
     temporary_directory_ =
         options.temporary_directory.empty() ? directoryOf(output) : options.temporary_directory;
   }
 
-  Result<IndexStats> run() {
-    SURFEIT_RETURN_IF_ERROR(checkOptions());
-    PhaseClock clock(stats_);
-    SURFEIT_RETURN_IF_ERROR(scan());
-    clock.finish("scan");
-    SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelSorter> sorter, sort());
-    clock.finish("sort");
-    if (scan_.missing_both > 0) {
-      SURFEIT_RETURN_IF_ERROR(buildWithDensity(std::move(sorter), clock));
-    } else {
-      SURFEIT_RETURN_IF_ERROR(build(output_, *sorter, options_.full_precision, "build"));
-      clock.finish("build");
-      stats_.temporary_bytes += sorter->temporaryBytes();
-    }
-    return stats_;
-  }
+  Result<IndexStats> run();
 
  private:
   Status checkOptions() const;
-  Status scan();
-  Status scanInput(const std::string& path);
+  Status openInputs();
+  Status checkFreeSpace() const;
+  Result<std::unique_ptr<SurfelStore>> readInputs();
+  Result<std::unique_ptr<SurfelStore>> readInto(const std::optional<RootCube>& cube);
   void noteRules() const;
-  Result<std::unique_ptr<SurfelSorter>> sort();
-  Status build(const std::string& path, SortedSurfelStream& stream, bool full_precision,
-               const char* phase);
-  Status buildWithDensity(std::unique_ptr<SurfelSorter> sorter, PhaseClock& clock);
+  Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
+  Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path, bool full_precision);
+  Status buildWithDensity(std::unique_ptr<BucketStream> buckets);
   std::uint64_t identity(bool full_precision) const;
   std::string provenance() const;
 
   const std::vector<std::string>& inputs_;
   const std::string& output_;
   const IndexOptions& options_;
+  const int threads_;
   Progress& progress_;
-  int threads_;
   std::string temporary_directory_;
-  Scan scan_;
+  std::optional<CloudReader> reader_;
+  std::vector<Surfel> sample_;
+  IndexPlan plan_;
+  CloudTotals totals_;
   IndexStats stats_;
+  PhaseClock clock_;
 };
+
+Result<IndexStats> Indexer::run() {
+  SURFEIT_RETURN_IF_ERROR(checkOptions());
+  SURFEIT_RETURN_IF_ERROR(openInputs());
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
+  noteRules();
+  stats_.skipped_records = totals_.skipped;
+
+  auto buckets = std::make_unique<BucketStream>(std::move(store), rootCube(totals_.bounds),
+                                                plan_.bucket_capacity, temporary_directory_);
+  if (totals_.missing_both > 0) {
+    SURFEIT_RETURN_IF_ERROR(buildWithDensity(std::move(buckets)));
+    return stats_;
+  }
+  SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
+  SURFEIT_RETURN_IF_ERROR(build(*writer, *buckets, "build"));
+  stats_.temporary_bytes = buckets->temporaryBytes();
+  buckets.reset();
+  SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
+  stats_.file_bytes = writer->fileBytes();
+  clock_.finish("finish");
+  return stats_;
+}
 
 Status Indexer::checkOptions() const {
   if (inputs_.empty()) return Status::invalidArgument("index: no input cloud");
@@ -125,183 +126,207 @@ Status Indexer::checkOptions() const {
     return Status::invalidArgument(
         fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
   }
-  if (options_.memory_bytes < kLeastMemory) {
+  if (options_.memory_bytes < kLeastIndexMemory) {
     return Status::budgetTooSmall(
         fmt::format("--memory of {} MiB is too small to index: {} MiB is "
                     "the least that works",
-                    options_.memory_bytes >> 20, kLeastMemory >> 20));
+                    options_.memory_bytes >> 20, kLeastIndexMemory >> 20));
   }
   return {};
 }
 
-Status Indexer::scan() {
-  std::uint64_t records = 0;
-  for (const std::string& path : inputs_) {
-    SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, options_.strict));
-    records += source->recordCount();
+// Opens the inputs, takes a sample where that is possible, and plans.
+Status Indexer::openInputs() {
+  const std::size_t read_bytes = planIndex(options_.memory_bytes, threads_, 0, 0).read_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(reader_, CloudReader::open(inputs_, options_.strict, read_bytes));
+  const std::uint64_t records = reader_->recordCount();
+  if (records > kReadBatch && reader_->isSeekable()) {
+    SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample());
+    for (Surfel& surfel : sample_) applySizeRules(surfel, options_.overlap);
   }
-  progress_.beginPhase("scan", records, "surfels");
-  for (const std::string& path : inputs_) SURFEIT_RETURN_IF_ERROR(scanInput(path));
-  if (scan_.surfels == 0) {
+  plan_ = planIndex(options_.memory_bytes, threads_, records, packedBytesPerSurfel(sample_));
+  stats_.input_bytes = reader_->fileBytes();
+  SURFEIT_RETURN_IF_ERROR(checkFreeSpace());
+  clock_.finish("sample");
+  return {};
+}
+
+// Refuses what cannot end well, before hours are spent on it.
+Status Indexer::checkFreeSpace() const {
+  // The least that a finished file takes, and what blocks are expected to take
+  constexpr double kLeastOutputBytes = 6;
+  const double records = double(reader_->recordCount());
+  const auto check = [](const std::string& directory, double needed, const char* advice) -> Status {
+    SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t available, availableBytes(directory));
+    if (double(available) >= needed) return {};
+    return Status::ioError(fmt::format("{}: {:.0f} MiB are free, expected at least {:.0f} MiB: {}",
+                                       directory, double(available >> 20), needed / (1 << 20),
+                                       advice));
+  };
+  const double spilled = plan_.spills ? records * packedBytesPerSurfel(sample_) * 0.9 : 0;
+  SURFEIT_RETURN_IF_ERROR(check(temporary_directory_, spilled,
+                                "make room, or choose another place for temporary files (--temp)"));
+  return check(directoryOf(output_), records * kLeastOutputBytes,
+               "make room, or write the scene elsewhere");
+}
+
+// All surfels, distributed. The curve needs the bounds of the cloud: a sample nearly always gives
+// the right cube; when it did not, what was read tells the bounds, and all is read again.
+Result<std::unique_ptr<SurfelStore>> Indexer::readInputs() {
+  std::optional<RootCube> cube;
+  if (!sample_.empty()) {
+    Bounds3 bounds;
+    for (const Surfel& surfel : sample_) bounds.add(surfel.position);
+    cube = rootCube(bounds);
+  }
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInto(cube));
+  if (totals_.surfels == 0) {
     return Status::corruption(
-        fmt::format("{}: no valid surfel in {} records", inputs_.front(), records));
+        fmt::format("{}: no valid surfel in {} records", inputs_.front(), reader_->recordCount()));
   }
-  stats_.skipped_records = scan_.skipped;
-  noteRules();
-  return {};
+  clock_.finish("read");
+  if (store != nullptr) return store;
+  sample_ = totals_.sample;
+  const CloudTotals first = std::move(totals_);
+  SURFEIT_ASSIGN_OR_RETURN(store, readInto(rootCube(first.bounds)));
+  clock_.finish("read again");
+  if (store == nullptr || totals_.content != first.content || totals_.surfels != first.surfels) {
+    return Status::failed(
+        fmt::format("{}: {} surfels in the second pass, {} in the first, or "
+                    "other ones: an input changed meanwhile",
+                    output_, totals_.surfels, first.surfels));
+  }
+  return store;
 }
 
-Status Indexer::scanInput(const std::string& path) {
-  SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, options_.strict));
-  std::vector<Surfel> batch(kBatch);
-  for (;;) {
-    if (progress_.isCancelled()) return Status::interrupted();
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source->read(batch));
-    if (count == 0) break;
-    for (const Surfel& surfel : std::span(batch).first(count)) {
-      scan_.missing_both += surfel.radius <= 0 && surfel.area <= 0 ? 1 : 0;
-      scan_.missing_area += surfel.radius > 0 && surfel.area <= 0 ? 1 : 0;
-      scan_.missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
-      scan_.spheres += surfel.isSphere() ? 1 : 0;
-      scan_.bounds.add(surfel.position);
-      scan_.content += XXH3_64bits(&surfel, sizeof surfel);
+// Reads all inputs and distributes the surfels along the curve of `cube`, unless that turns out not
+// to be the cloud's cube: then no store. Without a cube this works as long as there is one bucket.
+Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootCube>& cube) {
+  SurfelStore::Plan store_plan;
+  std::atomic<bool> distributing{plan_.bucket_count == 1 || cube.has_value()};
+  if (plan_.bucket_count > 1 && cube) {
+    store_plan.splitters = splittersOf(sample_, *cube, plan_.bucket_count);
+  }
+  store_plan.block_surfels = plan_.block_surfels;
+  store_plan.memory_bytes = plan_.block_memory;
+  store_plan.temporary_directory = temporary_directory_;
+  auto store = std::make_unique<SurfelStore>(std::move(store_plan));
+  const bool needs_cube = store->bucketCount() > 1;
+
+  const auto consume = [&](std::span<Surfel> surfels) -> Status {
+    if (surfels.empty() || !distributing) return {};
+    thread_local std::vector<CurveKey> keys;
+    keys.resize(surfels.size());
+    if (needs_cube) {
+      Bounds3 bounds;
+      for (const Surfel& surfel : surfels) bounds.add(surfel.position);
+      if (!contains(*cube, bounds)) {
+        distributing = false;
+        return {};
+      }
+      curveKeys(&surfels.front().position, sizeof(Surfel), *cube, keys);
     }
-    scan_.surfels += count;
-    progress_.advance(count);
+    for (Surfel& surfel : surfels) applySizeRules(surfel, options_.overlap);
+    return store->add(surfels, keys);
+  };
+  progress_.beginPhase("read", reader_->recordCount(), "surfels");
+  SURFEIT_ASSIGN_OR_RETURN(totals_, reader_->readAll(consume, progress_));
+  if (!distributing || (needs_cube && !(rootCube(totals_.bounds) == *cube))) {
+    return std::unique_ptr<SurfelStore>();
   }
-  const CloudChannels channels = source->channels();
-  scan_.channels.normal |= channels.normal;
-  scan_.channels.radius |= channels.radius;
-  scan_.channels.area |= channels.area;
-  scan_.channels.radiosity |= channels.radiosity;
-  scan_.channels.albedo |= channels.albedo;
-  scan_.channels.two_sided |= channels.two_sided;
-  if (const std::string defects = source->defects().describe(); !defects.empty()) {
-    progress_.note(fmt::format("{}: skipped {}", path, defects));
-  }
-  scan_.skipped += source->defects().total();
-  return {};
+  SURFEIT_RETURN_IF_ERROR(store->finish());
+  return store;
 }
 
 void Indexer::noteRules() const {
-  if (scan_.missing_both > 0) {
+  const CloudTotals& totals = totals_;
+  if (totals.missing_both > 0) {
     progress_.note(
         fmt::format("{} surfels have neither radius nor area: both follow from the "
                     "distance to their neighbours",
-                    scan_.missing_both));
+                    totals.missing_both));
   }
-  if (scan_.missing_area > 0) {
-    progress_.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", scan_.missing_area,
+  if (totals.missing_area > 0) {
+    progress_.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area,
                                options_.overlap));
   }
-  if (scan_.missing_radius > 0) {
+  if (totals.missing_radius > 0) {
     progress_.note(fmt::format("{} surfels have no radius: a disk of {} times the area is used",
-                               scan_.missing_radius, options_.overlap));
+                               totals.missing_radius, options_.overlap));
   }
-  if (scan_.spheres > 0) {
+  if (totals.spheres > 0) {
     progress_.note(
         fmt::format("warning: {} surfels have no normal: they are spheres, which look "
                     "the same from everywhere",
-                    scan_.spheres));
+                    totals.spheres));
   }
 }
 
-Result<std::unique_ptr<SurfelSorter>> Indexer::sort() {
-  const std::uint64_t sorter_bytes = options_.memory_bytes - kOverheadBytes;
-  SURFEIT_ASSIGN_OR_RETURN(
-      std::unique_ptr<SurfelSorter> sorter,
-      SurfelSorter::create(sorter_bytes / SurfelSorter::kBytesPerSurfel, scan_.surfels,
-                           rootCube(scan_.bounds), temporary_directory_));
-  progress_.beginPhase("sort", scan_.surfels, "surfels");
-  std::vector<Surfel> batch(kBatch);
-  for (const std::string& path : inputs_) {
-    SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, options_.strict));
-    for (;;) {
-      if (progress_.isCancelled()) return Status::interrupted();
-      SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source->read(batch));
-      if (count == 0) break;
-      const std::span<Surfel> surfels = std::span(batch).first(count);
-      for (Surfel& surfel : surfels) applySizeRules(surfel, options_.overlap);
-      SURFEIT_RETURN_IF_ERROR(sorter->add(surfels));
-      progress_.advance(count);
-    }
-  }
-  SURFEIT_RETURN_IF_ERROR(sorter->finish());
-  return sorter;
-}
-
-Status Indexer::build(const std::string& path, SortedSurfelStream& stream, bool full_precision,
-                      const char* phase) {
+Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& path,
+                                                           bool full_precision) {
   SceneHeader header;
   header.leaf_capacity = options_.leaf_capacity;
   header.node_group_capacity = kDefaultNodeGroup;
   header.surfel_group_capacity = kDefaultSurfelGroup;
   header.flatness_limit = kDefaultFlatnessLimit;
-  header.bounds = scan_.bounds;
-  header.cube = rootCube(scan_.bounds);
-  header.channels = scan_.channels;
+  header.bounds = totals_.bounds;
+  header.cube = rootCube(totals_.bounds);
+  header.channels = totals_.channels;
   header.full_precision = full_precision;
-  SURFEIT_ASSIGN_OR_RETURN(
-      const std::unique_ptr<SceneWriter> writer,
-      SceneWriter::create(path, header, identity(full_precision), temporary_directory_));
-  progress_.beginPhase(phase, scan_.surfels, "surfels");
-  OctreeBuilder builder(*writer);
-  SURFEIT_RETURN_IF_ERROR(builder.build(stream, progress_));
-  if (writer->header().surfel_count != scan_.surfels) {
-    return Status::failed(
-        fmt::format("{}: {} surfels in the second pass, {} in the first: an "
-                    "input changed meanwhile",
-                    output_, writer->header().surfel_count, scan_.surfels));
+  return SceneWriter::create(path, header, identity(full_precision));
+}
+
+Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase) {
+  progress_.beginPhase(phase, totals_.surfels, "surfels");
+  SURFEIT_RETURN_IF_ERROR(buildOctree(stream, writer, threads_, progress_));
+  if (writer.header().surfel_count != totals_.surfels) {
+    return Status::failed(fmt::format("{}: {} surfels written, expected {}: this is a bug", output_,
+                                      writer.header().surfel_count, totals_.surfels));
   }
-  SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
-  stats_.surfels = writer->header().surfel_count;
-  stats_.nodes = writer->header().node_count;
-  stats_.node_pages = writer->nodePages();
-  stats_.surfel_pages = writer->surfelPages();
-  stats_.file_bytes = writer->fileBytes();
-  stats_.temporary_bytes = std::max(stats_.temporary_bytes, writer->temporaryBytes());
+  stats_.surfels = writer.header().surfel_count;
+  stats_.nodes = writer.header().node_count;
+  stats_.node_pages = writer.nodePages();
+  stats_.surfel_pages = writer.surfelPages();
+  clock_.finish(phase);
   return {};
 }
 
 // Without sizes, an octree over the bare positions is built first; its neighbour searches give
 // every surfel its size, and its curve order is the input of the real build.
-Status Indexer::buildWithDensity(std::unique_ptr<SurfelSorter> sorter, PhaseClock& clock) {
-  const std::string bare_path =
-      fmt::format("{}/surfeit-density-{}.sft", temporary_directory_, getpid());
-  SURFEIT_RETURN_IF_ERROR(build(bare_path, *sorter, /* full_precision= */ true, "order"));
-  const std::uint64_t spilled = sorter->temporaryBytes();
-  sorter.reset();
-  Result<SceneFile> bare = SceneFile::open(bare_path);
-  // The open file stays readable without its name, and goes with this process
-  unlink(bare_path.c_str());
-  if (!bare.ok()) return bare.status();
-  const std::uint64_t bare_bytes = bare->fileBytes();
-  const std::uint64_t order_bytes = spilled + stats_.temporary_bytes + bare_bytes;
-  stats_.temporary_bytes = 0;
-  clock.finish("order");
+Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
+  const std::string bare_path = temporary_directory_ + "/surfeit-density.sft";
+  SURFEIT_ASSIGN_OR_RETURN(auto bare_writer, createWriter(bare_path, /* full_precision= */ true));
+  SURFEIT_RETURN_IF_ERROR(build(*bare_writer, *buckets, "order"));
+  const std::uint64_t bucket_bytes = buckets->temporaryBytes();
+  buckets.reset();
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, bare_writer->finishUnnamed(provenance()));
+  bare_writer.reset();
+  stats_.temporary_bytes = bucket_bytes + bare.fileBytes();
 
-  const std::uint64_t cache_bytes = std::min<std::uint64_t>(
-      options_.memory_bytes - kOverheadBytes, PagedOctree::unlimitedCacheBytes(*bare));
+  const std::uint64_t building = buildOctreeBytes(threads_);
+  const std::uint64_t cache_bytes =
+      std::min<std::uint64_t>(std::max(options_.memory_bytes - building, kLeastIndexMemory / 4),
+                              PagedOctree::unlimitedCacheBytes(bare));
   SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
-                           PagedOctree::planMemory(*bare, cache_bytes, threads_));
+                           PagedOctree::planMemory(bare, cache_bytes, threads_));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
-                           PagedOctree::create(std::move(*bare), memory));
+                           PagedOctree::create(std::move(bare), memory));
   SizedSurfelStream sized(*octree, options_.overlap, threads_);
   SURFEIT_RETURN_IF_ERROR(sized.prepare());
-  SURFEIT_RETURN_IF_ERROR(build(output_, sized, options_.full_precision, "build"));
-  stats_.temporary_bytes = std::max(order_bytes, stats_.temporary_bytes + bare_bytes);
-  clock.finish("build");
+  SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
+  SURFEIT_RETURN_IF_ERROR(build(*writer, sized, "build"));
+  SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
+  stats_.file_bytes = writer->fileBytes();
+  clock_.finish("finish");
   return {};
 }
 
 // Two files of one identity hold the same surfels built the same way.
 std::uint64_t Indexer::identity(bool full_precision) const {
-  const std::uint64_t parts[] = {scan_.content,
-                                 scan_.surfels,
-                                 kFormatVersion,
-                                 options_.leaf_capacity,
-                                 full_precision ? 1u : 0u,
-                                 static_cast<std::uint64_t>(double(options_.overlap) * 65536)};
+  const std::uint64_t parts[] = {
+      totals_.content,          totals_.surfels,
+      kFormatVersion,           options_.leaf_capacity,
+      full_precision ? 1u : 0u, static_cast<std::uint64_t>(double(options_.overlap) * 65536)};
   return XXH3_64bits(parts, sizeof parts);
 }
 
@@ -313,11 +338,11 @@ std::string Indexer::provenance() const {
                                {"leaf_capacity", options_.leaf_capacity},
                                {"overlap", options_.overlap},
                                {"precision", options_.full_precision ? "full" : "quantized"},
-                               {"skipped_records", scan_.skipped},
-                               {"sizes_from_neighbours", scan_.missing_both},
-                               {"areas_from_radius", scan_.missing_area},
-                               {"radii_from_area", scan_.missing_radius},
-                               {"spheres", scan_.spheres}};
+                               {"skipped_records", totals_.skipped},
+                               {"sizes_from_neighbours", totals_.missing_both},
+                               {"areas_from_radius", totals_.missing_area},
+                               {"radii_from_area", totals_.missing_radius},
+                               {"spheres", totals_.spheres}};
   return json.dump();
 }
 
@@ -325,11 +350,15 @@ std::string Indexer::provenance() const {
 
 Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
                                const IndexOptions& options, Progress& progress) {
-  Indexer indexer(inputs, output, options, progress);
   const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
   tbb::task_arena arena(threads);
   Result<IndexStats> result = Status::failed("index: not run");
-  arena.execute([&] { result = indexer.run(); });
+  try {
+    arena.execute([&] { result = Indexer(inputs, output, options, threads, progress).run(); });
+  } catch (const std::bad_alloc&) {
+    return Status::failed(
+        fmt::format("{}: the system gave no more memory; try a smaller --memory", output));
+  }
   return result;
 }
 

@@ -17,6 +17,8 @@ constexpr std::size_t kNeighbours = 8;
 // Strays: radii are limited to this many times the cloud's median.
 constexpr float kStrayLimit = 8;
 constexpr std::size_t kSamplePages = 64;
+// Pages whose surfels are sized at once.
+constexpr std::uint32_t kBatchPages = 32;
 
 // Squared distances to the nearest surfels at other positions, ascending.
 struct Nearest {
@@ -112,15 +114,15 @@ Status SizedSurfelStream::prepare() {
   const std::uint32_t step = std::max<std::uint32_t>(1, pages / kSamplePages);
   std::vector<float> areas;
   for (std::uint32_t page = 0; page < pages; page += step) {
-    page_.resize(file.header().surfel_group_capacity);
+    surfels_.resize(file.header().surfel_group_capacity);
     SceneFile::Scratch scratch;
-    SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count, file.decodeSurfels(page, scratch, page_));
+    SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
+                             file.decodeSurfels(page, scratch, surfels_));
     for (std::uint32_t i = 0; i < count; i += 16) {
-      SURFEIT_ASSIGN_OR_RETURN(const float area, searchers_[0].areaAt(page_[i].position));
+      SURFEIT_ASSIGN_OR_RETURN(const float area, searchers_[0].areaAt(surfels_[i].position));
       if (area > 0) areas.push_back(area);
     }
   }
-  page_.clear();
   // One position for all: any size will do, so take a thousandth of the scene
   const float fallback = float(file.header().cube.size) * 1e-3f;
   if (areas.empty()) {
@@ -133,49 +135,57 @@ Status SizedSurfelStream::prepare() {
   return {};
 }
 
-Result<bool> SizedSurfelStream::readPage() {
+// The surfels of pages up to end_page, into surfels_.
+Status SizedSurfelStream::readPages(std::uint32_t end_page) {
   const SceneFile& file = octree_.file();
-  if (next_page_ == file.surfelPageCount()) return false;
-  page_.resize(file.header().surfel_group_capacity);
+  const std::size_t capacity = file.header().surfel_group_capacity;
   SceneFile::Scratch scratch;
-  SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
-                           file.decodeSurfels(next_page_++, scratch, page_));
-  page_.resize(count);
-  at_ = 0;
-
-  // One slice of the page per searcher
-  std::vector<Status> statuses(searchers_.size());
-  tbb::parallel_for(std::size_t{0}, searchers_.size(), [&](std::size_t r) {
-    const std::size_t begin = count * r / searchers_.size();
-    const std::size_t end = count * (r + 1) / searchers_.size();
-    for (std::size_t i = begin; i < end; ++i) {
-      Surfel& surfel = page_[i];
-      if ((surfel.flags & kSurfelNeedsSize) == 0) continue;
-      const Result<float> area = searchers_[r].areaAt(surfel.position);
-      if (!area.ok()) {
-        statuses[r] = area.status();
-        return;
-      }
-      surfel.flags &= ~kSurfelNeedsSize;
-      surfel.radius = std::min(std::sqrt(*area * overlap_ / kPi), largest_radius_);
-      if (!(surfel.radius > 0)) surfel.radius = largest_radius_;
-      surfel.area = areaOfDisk(surfel.radius, overlap_);
-    }
-  });
-  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
-  return true;
+  surfels_.clear();
+  for (; next_page_ < end_page; ++next_page_) {
+    const std::size_t size = surfels_.size();
+    surfels_.resize(size + capacity);
+    SURFEIT_ASSIGN_OR_RETURN(
+        const std::uint32_t count,
+        file.decodeSurfels(next_page_, scratch, std::span(surfels_).subspan(size)));
+    surfels_.resize(size + count);
+  }
+  return {};
 }
 
-Result<std::size_t> SizedSurfelStream::next(std::span<SortedSurfel> out) {
-  if (at_ == page_.size()) {
-    SURFEIT_ASSIGN_OR_RETURN(const bool more, readPage());
-    if (!more) return std::size_t{0};
+Status SizedSurfelStream::fillSizes(Searcher& searcher, std::span<Surfel> surfels) const {
+  for (Surfel& surfel : surfels) {
+    if ((surfel.flags & kSurfelNeedsSize) == 0) continue;
+    SURFEIT_ASSIGN_OR_RETURN(const float area, searcher.areaAt(surfel.position));
+    surfel.flags &= ~kSurfelNeedsSize;
+    surfel.radius = std::min(std::sqrt(area * overlap_ / kPi), largest_radius_);
+    if (!(surfel.radius > 0)) surfel.radius = largest_radius_;
+    surfel.area = areaOfDisk(surfel.radius, overlap_);
   }
-  const std::size_t count = std::min(out.size(), page_.size() - at_);
-  for (std::size_t i = 0; i < count; ++i, ++at_) {
-    out[i] = {curveKey(page_[at_].position, octree_.file().header().cube), page_[at_]};
+  return {};
+}
+
+Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
+  const SceneFile& file = octree_.file();
+  if (next_page_ == file.surfelPageCount()) return std::shared_ptr<const SortedBatch>();
+  SURFEIT_RETURN_IF_ERROR(
+      readPages(std::min<std::uint32_t>(next_page_ + kBatchPages, file.surfelPageCount())));
+
+  // One slice per searcher, in order: neighbours find the same pages
+  std::vector<Status> statuses(searchers_.size());
+  tbb::parallel_for(std::size_t{0}, searchers_.size(), [&](std::size_t r) {
+    const std::size_t begin = surfels_.size() * r / searchers_.size();
+    const std::size_t end = surfels_.size() * (r + 1) / searchers_.size();
+    statuses[r] = fillSizes(searchers_[r], std::span(surfels_).subspan(begin, end - begin));
+  });
+  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
+
+  const auto batch = std::make_shared<SortedBatch>();
+  batch->resize(surfels_.size());
+  std::copy(surfels_.begin(), surfels_.end(), batch->surfels.begin());
+  for (std::size_t i = 0; i < surfels_.size(); ++i) {
+    batch->tickets[i] = {curveKey(surfels_[i].position, file.header().cube), i};
   }
-  return count;
+  return std::shared_ptr<const SortedBatch>(batch);
 }
 
 }  // namespace surfeit

@@ -12,7 +12,7 @@
 
 #include "core/spherical_harmonics.h"
 #include "octree/paged_octree.h"
-#include "octree/surfel_sorter.h"
+#include "octree/sorted_surfels.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -36,7 +36,7 @@ class SizedSurfelStream : public SortedSurfelStream {
   // No radius becomes larger than this: strays far from everything would cover the scene.
   float largestRadius() const { return largest_radius_; }
 
-  Result<std::size_t> next(std::span<SortedSurfel> out) override;
+  Result<std::shared_ptr<const SortedBatch>> next() override;
 
  private:
   // A reader and what it found last: surfels at one position follow each other, and a search
@@ -50,15 +50,15 @@ class SizedSurfelStream : public SortedSurfelStream {
     Result<float> areaAt(const glm::vec3& position);
   };
 
-  Result<bool> readPage();
+  Status readPages(std::uint32_t end_page);
+  Status fillSizes(Searcher& searcher, std::span<Surfel> surfels) const;
 
   PagedOctree& octree_;
   float overlap_;
   std::vector<Searcher> searchers_;
   float largest_radius_ = 0;
   std::uint32_t next_page_ = 0;
-  std::vector<Surfel> page_;
-  std::size_t at_ = 0;
+  std::vector<Surfel> surfels_;  // of the pages being sized
 };
 
 // Area of a surfel whose disk has this radius. Never zero, even where the square is.

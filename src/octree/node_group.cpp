@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "core/curve_key.h"
 #include "octree/column_codec.h"
@@ -18,50 +20,122 @@ constexpr float kPositionTolerance = 1e-3f;
 // Coefficients are stored over area (times mean radiosity): largest for spheres, 4 pi Y00 = 3.54.
 constexpr float kCoefficientLimit = 4;
 
-// Coefficients of a rough node: 9 of area and 27 of power.
-constexpr std::size_t kCoefficientCount = 4 * kShCount;
-
-template <typename T, typename Field>
-std::vector<T> column(std::span<const LevelNode> nodes, Field field) {
-  std::vector<T> values(nodes.size());
-  std::transform(nodes.begin(), nodes.end(), values.begin(), field);
-  return values;
-}
+// Of a rough node: 9 of projected area, and 9 of projected power in each color.
+constexpr std::size_t kCoefficientKinds = 4;
 
 Status damaged(const char* field) {
   return Status::corruption(fmt::format("node group: damaged field {}", field));
 }
 
-float coefficient(const Node& node, std::size_t i) {
-  return i < kShCount ? node.area_sh[i] : node.power_sh[i / kShCount - 1][i % kShCount];
-}
+Axes constAxes(const MutableAxes& axes) { return {axes[0], axes[1], axes[2]}; }
 
-void setCoefficient(Node& node, std::size_t i, float value) {
-  (i < kShCount ? node.area_sh[i] : node.power_sh[i / kShCount - 1][i % kShCount]) = value;
-}
+// The nodes of a page as columns. Every page of a thread uses the same.
+class Columns {
+ public:
+  explicit Columns(std::size_t count) {
+    thread_local std::vector<float> floats;
+    thread_local std::vector<std::uint8_t> bytes;
+    thread_local std::vector<std::uint64_t> integers;
+    if (bytes.size() < kByteColumns * count) {
+      floats.resize(kFloatColumns * count);
+      bytes.resize(kByteColumns * count);
+      integers.resize(kIntegerColumns * count);
+    }
+    const auto column = [&](auto& values, std::size_t i) {
+      return std::span(values).subspan(i * count, count);
+    };
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      position[axis] = column(floats, axis);
+      normal[axis] = column(floats, 3 + axis);
+      radiosity[axis] = column(floats, 6 + axis);
+    }
+    radius = column(floats, 9);
+    area = column(floats, 10);
+    flatness = column(floats, 11);
+    flags = column(bytes, 0);
+    child_count = column(bytes, 1);
+    child_level = column(bytes, 2);
+    page = column(integers, 0);
+    first = column(integers, 1);
+    surfel_count = column(integers, 2);
+  }
 
-// What coefficient i is stored relative to.
-float coefficientScale(const Node& node, std::size_t i) {
-  return i < kShCount ? node.area : node.area * node.radiosity[static_cast<int>(i / kShCount) - 1];
-}
+  void gather(std::span<const LevelNode> nodes) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const Node& node = nodes[i].node;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        position[axis][i] = node.position[static_cast<int>(axis)];
+        normal[axis][i] = node.normal[static_cast<int>(axis)];
+        radiosity[axis][i] = node.radiosity[static_cast<int>(axis)];
+      }
+      radius[i] = node.radius;
+      area[i] = node.area;
+      flatness[i] = node.flatness;
+      flags[i] = node.flags;
+      child_count[i] = node.child_count;
+      child_level[i] = nodes[i].child_level;
+      page[i] = node.page;
+      first[i] = node.first;
+      surfel_count[i] = node.surfel_count;
+    }
+  }
 
-// Scratch of decodeNodeGroup, per thread.
-struct DecodeScratch {
-  std::vector<glm::vec3> vectors;
-  std::vector<float> numbers;
-  std::vector<std::uint8_t> bytes;
-  std::vector<std::uint64_t> pages, firsts, counts;
+  // All but the reference: page and first depend on the limits.
+  void scatter(std::span<Node> nodes) const {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      Node& node = nodes[i];
+      node.position = at(position, i);
+      node.radius = radius[i];
+      // |sum A n| is zero in these: no direction
+      node.normal = flatness[i] == 0 ? glm::vec3(0) : at(normal, i);
+      node.area = area[i];
+      node.radiosity = at(radiosity, i);
+      node.flatness = flatness[i];
+      node.child_count = child_count[i];
+      node.flags = flags[i];
+      node.surfel_count = surfel_count[i];
+    }
+  }
 
-  void resize(std::size_t size) {
-    if (vectors.size() >= size) return;
-    vectors.resize(size);
-    numbers.resize(size);
-    bytes.resize(size);
-    pages.resize(size);
-    firsts.resize(size);
-    counts.resize(size);
+  MutableAxes position, normal, radiosity;
+  std::span<float> radius, area, flatness;
+  std::span<std::uint8_t> flags, child_count, child_level;
+  std::span<std::uint64_t> page, first, surfel_count;
+
+ private:
+  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 3, kIntegerColumns = 3;
+
+  static glm::vec3 at(const MutableAxes& axes, std::size_t i) {
+    return {axes[0][i], axes[1][i], axes[2][i]};
   }
 };
+
+// The coefficients of the rough nodes of a page, kind by kind: projected area, then projected power
+// in red, green and blue. Every page of a thread uses the same.
+template <typename T>
+std::array<std::span<T>, kCoefficientKinds> coefficientColumns(std::size_t rough_count) {
+  thread_local std::vector<T> values;
+  const std::size_t count = rough_count * kShCount;
+  if (values.size() < kCoefficientKinds * count) values.resize(kCoefficientKinds * count);
+  std::array<std::span<T>, kCoefficientKinds> columns;
+  for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
+    columns[kind] = std::span(values).subspan(kind * count, count);
+  }
+  return columns;
+}
+
+const ShCoefficients& coefficientsOf(const Node& node, std::size_t kind) {
+  return kind == 0 ? node.area_sh : node.power_sh[kind - 1];
+}
+
+ShCoefficients& coefficientsOf(Node& node, std::size_t kind) {
+  return kind == 0 ? node.area_sh : node.power_sh[kind - 1];
+}
+
+// What coefficients of a kind are stored relative to.
+float coefficientScale(const Node& node, std::size_t kind) {
+  return kind == 0 ? node.area : node.area * node.radiosity[static_cast<int>(kind) - 1];
+}
 
 // The level that a node page belongs to.
 int levelOfPage(std::span<const std::uint32_t> level_first_page, std::uint32_t page) {
@@ -99,151 +173,153 @@ Status resolveReference(const NodeLimits& limits, int level, int child_level,
   return {};
 }
 
-// Positions, sizes, directions and colors.
-Status decodeShapes(ByteReader& reader, bool full_precision, DecodeScratch& scratch,
-                    std::span<Node> out) {
-  const std::size_t count = out.size();
-  const std::span<glm::vec3> vectors = std::span(scratch.vectors).first(count);
-  const std::span<float> numbers = std::span(scratch.numbers).first(count);
-  if (!getPositions(reader, vectors)) return damaged("position");
-  for (std::size_t i = 0; i < count; ++i) out[i].position = vectors[i];
-  if (!getPositive(reader, numbers)) return damaged("radius");
-  for (std::size_t i = 0; i < count; ++i) out[i].radius = numbers[i];
-  if (!getPositive(reader, numbers)) return damaged("area");
-  for (std::size_t i = 0; i < count; ++i) out[i].area = numbers[i];
-  if (!getNormals(reader, vectors)) return damaged("normal");
-  for (std::size_t i = 0; i < count; ++i) out[i].normal = vectors[i];
-  if (!(full_precision ? getFloats(reader, numbers) : getSigned(reader, numbers, 1))) {
+// The columns of a page but for the coefficients, checked one by one.
+Status decodeColumns(PayloadReader& reader, bool full_precision, const Columns& columns) {
+  if (!getPositions(reader, columns.position)) return damaged("position");
+  if (!getPositive(reader, columns.radius)) return damaged("radius");
+  if (!getPositive(reader, columns.area)) return damaged("area");
+  if (!getNormals(reader, columns.normal)) return damaged("normal");
+  if (!(full_precision ? getFloats(reader, columns.flatness)
+                       : getSigned(reader, columns.flatness, 1))) {
     return damaged("flatness");
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!(numbers[i] >= 0 && numbers[i] <= 1)) return damaged("flatness");
-    out[i].flatness = numbers[i];
-  }
-  if (!getColors(reader, vectors)) return damaged("radiosity");
-  for (std::size_t i = 0; i < count; ++i) {
-    out[i].radiosity = vectors[i];
-    const float largest = std::max({vectors[i].x, vectors[i].y, vectors[i].z});
-    if (!std::isfinite(out[i].area * largest * kCoefficientLimit)) return damaged("radiosity");
+  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  if (!getBytes8(reader, columns.flags)) return damaged("flags");
+  if (!getBytes8(reader, columns.child_count)) return damaged("child count");
+  if (!getBytes8(reader, columns.child_level)) return damaged("child level");
+  if (!getCounts(reader, columns.page)) return damaged("page");
+  if (!getCounts(reader, columns.first)) return damaged("first");
+  if (!getCounts(reader, columns.surfel_count)) return damaged("surfel count");
+  return {};
+}
+
+// What columns cannot tell by themselves.
+Status checkNodes(std::span<const Node> nodes) {
+  for (const Node& node : nodes) {
+    if (!(node.flatness >= 0 && node.flatness <= 1)) return damaged("flatness");
+    if ((node.flags & ~kNodeFlat) != 0) return damaged("flags");
+    const float largest = std::max({node.radiosity.x, node.radiosity.y, node.radiosity.z});
+    // Twice: the largest code is a little more than the limit
+    if (!std::isfinite(node.area * largest * (2 * kCoefficientLimit))) return damaged("radiosity");
   }
   return {};
 }
 
-// What lies below each node; child levels, pages and firsts wait in scratch until all are there.
-Status decodeReferences(ByteReader& reader, const NodeLimits& limits, int level,
-                        DecodeScratch& scratch, std::span<Node> out) {
-  const std::size_t count = out.size();
-  const std::span<std::uint8_t> bytes = std::span(scratch.bytes).first(count);
-  const std::span<std::uint64_t> pages = std::span(scratch.pages).first(count);
-  const std::span<std::uint64_t> firsts = std::span(scratch.firsts).first(count);
-  const std::span<std::uint64_t> counts = std::span(scratch.counts).first(count);
-  if (!getBytes8(reader, bytes)) return damaged("flags");
-  for (std::size_t i = 0; i < count; ++i) {
-    if ((bytes[i] & ~kNodeFlat) != 0) return damaged("flags");
-    out[i].flags = bytes[i];
-  }
-  if (!getBytes8(reader, bytes)) return damaged("child count");
-  for (std::size_t i = 0; i < count; ++i) out[i].child_count = bytes[i];
-  if (!getBytes8(reader, bytes)) return damaged("child level");
-  if (!getCounts(reader, pages)) return damaged("page");
-  if (!getCounts(reader, firsts)) return damaged("first");
-  if (!getCounts(reader, counts)) return damaged("surfel count");
-  for (std::size_t i = 0; i < count; ++i) {
-    out[i].surfel_count = counts[i];
-    SURFEIT_RETURN_IF_ERROR(resolveReference(limits, level, bytes[i], pages[i], firsts[i], out[i]));
-  }
-  return {};
-}
-
-// Harmonics of the nodes that are not flat.
-Status decodeCoefficients(ByteReader& reader, bool full_precision, DecodeScratch& scratch,
-                          std::span<Node> out) {
+// Harmonics of the nodes that are not flat; zeros for the others.
+Status decodeCoefficients(PayloadReader& reader, bool full_precision, std::span<Node> nodes) {
   std::size_t rough = 0;
-  for (const Node& node : out) rough += node.isFlat() ? 0 : 1;
-  for (std::size_t i = 0; i < kCoefficientCount; ++i) {
-    const std::span<float> values = std::span(scratch.numbers).first(rough);
-    if (!(full_precision ? getFloats(reader, values)
-                         : getSigned(reader, values, kCoefficientLimit))) {
+  for (const Node& node : nodes) rough += node.isFlat() ? 0 : 1;
+  const auto floats = coefficientColumns<float>(rough);
+  const auto codes = coefficientColumns<std::int16_t>(rough);
+  for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
+    if (!(full_precision ? getFloats(reader, floats[kind])
+                         : getSmallIntegers(reader, codes[kind]))) {
       return damaged("coefficients");
     }
     std::size_t next = 0;
-    for (Node& node : out) {
-      if (node.isFlat()) continue;
-      setCoefficient(node, i, values[next++] * (full_precision ? 1 : coefficientScale(node, i)));
+    for (Node& node : nodes) {
+      ShCoefficients& coefficients = coefficientsOf(node, kind);
+      if (node.isFlat()) {
+        coefficients.fill(0);
+        continue;
+      }
+      if (full_precision) {
+        std::copy_n(&floats[kind][next], kShCount, coefficients.begin());
+      } else {
+        const float scale = coefficientScale(node, kind) * (kCoefficientLimit / 32767);
+        for (std::size_t i = 0; i < kShCount; ++i) {
+          // Each kind is stored as what it differs from the one before
+          std::int16_t& code = codes[kind][next + i];
+          if (kind > 0) code = static_cast<std::int16_t>(code + codes[kind - 1][next + i]);
+          coefficients[i] = float(code) * scale;
+        }
+      }
+      next += kShCount;
     }
   }
-  // |sum A n| is zero in these: no direction
-  for (Node& node : out) {
-    if (node.flatness == 0) node.normal = glm::vec3(0);
-  }
   return {};
+}
+
+void encodeCoefficients(std::span<const LevelNode> nodes, bool full_precision,
+                        PayloadWriter& writer) {
+  std::size_t rough = 0;
+  for (const LevelNode& n : nodes) rough += n.node.isFlat() ? 0 : 1;
+  const auto floats = coefficientColumns<float>(rough);
+  const auto codes = coefficientColumns<std::int16_t>(rough);
+  std::size_t next = 0;
+  for (const LevelNode& n : nodes) {
+    if (n.node.isFlat()) continue;
+    std::array<std::int16_t, kShCount> before{};
+    for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
+      const ShCoefficients& coefficients = coefficientsOf(n.node, kind);
+      if (full_precision) {
+        std::copy(coefficients.begin(), coefficients.end(), &floats[kind][next]);
+        continue;
+      }
+      const float scale = coefficientScale(n.node, kind);
+      const float inverse = scale >= std::numeric_limits<float>::min() ? 1 / scale : 0;
+      for (std::size_t i = 0; i < kShCount; ++i) {
+        const std::int16_t code = signedCode(coefficients[i] * inverse, kCoefficientLimit);
+        codes[kind][next + i] = static_cast<std::int16_t>(code - before[i]);
+        before[i] = code;
+      }
+    }
+    next += kShCount;
+  }
+  for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
+    full_precision ? putFloats(writer, floats[kind]) : putSmallIntegers(writer, codes[kind]);
+  }
 }
 
 }  // namespace
 
-void encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precision,
-                     std::vector<std::byte>& payload) {
-  payload.clear();
-  ByteWriter writer(payload);
-  writer.put(static_cast<std::uint32_t>(nodes.size()));
-
-  const auto positions =
-      column<glm::vec3>(nodes, [](const LevelNode& n) { return n.node.position; });
-  auto radii = column<float>(nodes, [](const LevelNode& n) { return n.node.radius; });
-  const float max_error = *std::min_element(radii.begin(), radii.end()) * kPositionTolerance;
+std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precision,
+                            std::vector<std::byte>& payload) {
+  Columns columns(nodes.size());
+  columns.gather(nodes);
+  const Axes positions = constAxes(columns.position);
+  const float max_error =
+      *std::min_element(columns.radius.begin(), columns.radius.end()) * kPositionTolerance;
   const float error = positionError(positions, max_error, full_precision);
-  for (float& radius : radii) radius += error;
+  for (float& radius : columns.radius) radius += error;
+
+  PayloadWriter writer(payload, static_cast<std::uint32_t>(nodes.size()));
   putPositions(writer, positions, max_error, full_precision);
-  putPositive(writer, radii, Rounding::kUp, full_precision);
-  putPositive(writer, column<float>(nodes, [](const LevelNode& n) { return n.node.area; }),
-              Rounding::kNearest, full_precision);
-  putNormals(writer, column<glm::vec3>(nodes, [](const LevelNode& n) { return n.node.normal; }),
-             full_precision);
-  const auto flatness = column<float>(nodes, [](const LevelNode& n) { return n.node.flatness; });
-  full_precision ? putFloats(writer, flatness) : putSigned(writer, flatness, 1);
-  putColors(writer, column<glm::vec3>(nodes, [](const LevelNode& n) { return n.node.radiosity; }),
-            full_precision);
-
-  // References
-  putBytes8(writer, column<std::uint8_t>(nodes, [](const LevelNode& n) { return n.node.flags; }));
-  putBytes8(writer,
-            column<std::uint8_t>(nodes, [](const LevelNode& n) { return n.node.child_count; }));
-  putBytes8(writer, column<std::uint8_t>(nodes, [](const LevelNode& n) { return n.child_level; }));
-  putCounts(writer, column<std::uint64_t>(nodes, [](const LevelNode& n) { return n.node.page; }));
-  putCounts(writer, column<std::uint64_t>(nodes, [](const LevelNode& n) { return n.node.first; }));
-  putCounts(writer,
-            column<std::uint64_t>(nodes, [](const LevelNode& n) { return n.node.surfel_count; }));
-
-  // Coefficients of the nodes that are not flat, relative to what a reader decodes
-  std::vector<float> values;
-  for (std::size_t i = 0; i < kCoefficientCount; ++i) {
-    values.clear();
-    for (const LevelNode& n : nodes) {
-      if (n.node.isFlat()) continue;
-      const float scale = full_precision ? 1 : coefficientScale(n.node, i);
-      values.push_back(scale > 0 ? coefficient(n.node, i) / scale : 0);
-    }
-    full_precision ? putFloats(writer, values) : putSigned(writer, values, kCoefficientLimit);
-  }
+  putPositive(writer, columns.radius, Rounding::kUp, full_precision);
+  putPositive(writer, columns.area, Rounding::kNearest, full_precision);
+  putNormals(writer, constAxes(columns.normal), full_precision);
+  full_precision ? putFloats(writer, columns.flatness) : putSigned(writer, columns.flatness, 1);
+  putColors(writer, constAxes(columns.radiosity), full_precision);
+  putBytes8(writer, columns.flags);
+  putBytes8(writer, columns.child_count);
+  putBytes8(writer, columns.child_level);
+  putCounts(writer, columns.page);
+  putCounts(writer, columns.first);
+  putCounts(writer, columns.surfel_count);
+  encodeCoefficients(nodes, full_precision, writer);
+  return writer.finish();
 }
 
 Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::uint32_t page,
                                       const NodeLimits& limits, std::span<Node> nodes) {
-  ByteReader reader(payload);
-  const std::uint32_t count = reader.get<std::uint32_t>();
-  if (!reader.ok() || count == 0 || count > nodes.size()) {
+  PayloadReader reader(payload);
+  if (!reader.ok()) return damaged("bytes of the packed part");
+  const std::uint32_t count = reader.recordCount();
+  if (count == 0 || count > nodes.size()) {
     return Status::corruption(
         fmt::format("node group: {} nodes, expected 1 to {}", count, nodes.size()));
   }
-  thread_local DecodeScratch scratch;
-  scratch.resize(nodes.size());
+  const Columns columns(count);
   const std::span<Node> out = nodes.first(count);
-  std::fill(out.begin(), out.end(), Node());
-
-  SURFEIT_RETURN_IF_ERROR(decodeShapes(reader, full_precision, scratch, out));
+  SURFEIT_RETURN_IF_ERROR(decodeColumns(reader, full_precision, columns));
+  columns.scatter(out);
+  SURFEIT_RETURN_IF_ERROR(checkNodes(out));
   const int level = levelOfPage(limits.level_first_page, page);
-  SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, limits, level, scratch, out));
-  SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, scratch, out));
+  for (std::size_t i = 0; i < count; ++i) {
+    SURFEIT_RETURN_IF_ERROR(resolveReference(limits, level, columns.child_level[i], columns.page[i],
+                                             columns.first[i], out[i]));
+  }
+  SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
   if (reader.remaining() != 0) {
     return Status::corruption(
         fmt::format("node group: {} bytes after the last field", reader.remaining()));

@@ -28,9 +28,10 @@ struct NodeLimits {
   std::uint32_t surfel_group_capacity = 0;
 };
 
-// The payload of a page with these nodes (at least one), replaced.
-void encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precision,
-                     std::vector<std::byte>& payload);
+// The payload of a page with these nodes (at least one), replaced. Returns how many bytes at its
+// front are worth compressing, for compressPage. Safe from any thread.
+std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precision,
+                            std::vector<std::byte>& payload);
 
 // Decodes node page number `page` into `nodes` (the file's group capacity) and returns how many
 // there are. Children always lie on a deeper level, so that damaged links cannot form a loop. Safe

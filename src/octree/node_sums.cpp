@@ -18,22 +18,24 @@ const ZonalFactors& lobeOf(const Surfel& surfel) {
 
 void NodeSums::add(const Surfel& surfel) {
   const double a = double(surfel.area);
+  const double area_and_power[4] = {1, double(surfel.radiosity[0]), double(surfel.radiosity[1]),
+                                    double(surfel.radiosity[2])};
   surfel_count += 1;
   area += a;
   for (int axis = 0; axis < 3; ++axis) {
     position[axis] += a * double(surfel.position[axis]);
-    radiosity[axis] += a * double(surfel.radiosity[axis]);
+    radiosity[axis] += a * area_and_power[axis + 1];
     // Both sides of a two-sided disk face everywhere: it gives a node no direction
     if (!surfel.isTwoSided()) normal[axis] += a * double(surfel.normal[axis]);
   }
   const ZonalFactors& factors = lobeOf(surfel);
+  const double bands[3] = {a * double(factors[0]), a * double(factors[1]), a * double(factors[2])};
   const ShCoefficients basis = shBasis(surfel.normal);
-  for (int i = 0; i < kShCount; ++i) {
-    // A sphere has no normal, and only band 0
-    if (surfel.isSphere() && i > 0) break;
-    const double lobe = a * double(factors[kShBand[i]]) * double(basis[i]);
-    area_sh[i] += lobe;
-    for (int c = 0; c < 3; ++c) power_sh[c][i] += lobe * double(surfel.radiosity[c]);
+  // A sphere has no normal, and only band 0
+  const int count = surfel.isSphere() ? 1 : kShCount;
+  for (int i = 0; i < count; ++i) {
+    const double lobe = bands[kShBand[i]] * double(basis[i]);
+    for (int k = 0; k < 4; ++k) sh[i][k] += lobe * area_and_power[k];
   }
   // Far from the origin a sum of position and radius rounds by more than the radius
   const glm::vec3 half = glm::abs(surfel.position) * 0x1p-23f + surfel.radius;
@@ -48,9 +50,10 @@ void NodeSums::add(const NodeSums& child) {
     position[axis] += child.position[axis];
     normal[axis] += child.normal[axis];
     radiosity[axis] += child.radiosity[axis];
-    for (int i = 0; i < kShCount; ++i) power_sh[axis][i] += child.power_sh[axis][i];
   }
-  for (int i = 0; i < kShCount; ++i) area_sh[i] += child.area_sh[i];
+  for (int i = 0; i < kShCount; ++i) {
+    for (int k = 0; k < 4; ++k) sh[i][k] += child.sh[i][k];
+  }
   disk_bounds.add(child.disk_bounds);
 }
 
@@ -75,16 +78,16 @@ Node NodeSums::toNode(float flatness_limit) const {
     return node;
   }
   for (int i = 0; i < kShCount; ++i) {
-    node.area_sh[i] = float(area_sh[i]);
-    for (int c = 0; c < 3; ++c) node.power_sh[c][i] = float(power_sh[c][i]);
+    node.area_sh[i] = float(sh[i][0]);
+    for (int c = 0; c < 3; ++c) node.power_sh[c][i] = float(sh[i][c + 1]);
   }
   return node;
 }
 
 float radiusOfBox(const glm::vec3& centre, const Bounds3& box) {
-  // In double: squares of a float's smallest lengths are zero
-  const glm::vec3 corner = glm::max(box.max - centre, centre - box.min);
-  return float(std::hypot(double(corner.x), double(corner.y), double(corner.z)));
+  // In double: squares of a float's smallest lengths are zero, of its largest infinite
+  const glm::dvec3 corner(glm::max(box.max - centre, centre - box.min));
+  return float(std::sqrt(corner.x * corner.x + corner.y * corner.y + corner.z * corner.z));
 }
 
 }  // namespace surfeit

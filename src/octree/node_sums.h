@@ -15,13 +15,12 @@ namespace surfeit {
 // Sums over surfels i with area A, position x, normal n, radiosity B. Plain data.
 struct NodeSums {
   std::uint64_t surfel_count = 0;
-  double area = 0;                    // sum A
-  double position[3] = {};            // sum A x
-  double normal[3] = {};              // sum A n over one-sided disks
-  double radiosity[3] = {};           // sum A B
-  double area_sh[kShCount] = {};      // sum A K_l Y_lm(n)
-  double power_sh[3][kShCount] = {};  // the same, times B
-  Bounds3 disk_bounds;                // boxes around every surfel's bounding sphere
+  double area = 0;              // sum A
+  double position[3] = {};      // sum A x
+  double normal[3] = {};        // sum A n over one-sided disks
+  double radiosity[3] = {};     // sum A B
+  double sh[kShCount][4] = {};  // sum A K_l Y_lm(n) times 1, B_r, B_g and B_b
+  Bounds3 disk_bounds;          // boxes around every surfel's bounding sphere
 
   void add(const Surfel& surfel);
   void add(const NodeSums& child);

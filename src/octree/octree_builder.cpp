@@ -1,183 +1,215 @@
-// The sweep rests on one fact: a cell of level k is a run of keys that share k digits, so two
-// neighbours on the curve whose keys first differ at level d close every open cell of level d and
-// deeper, and nothing else.
 #include "octree/octree_builder.h"
 
-#include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
+#include <tbb/parallel_pipeline.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <utility>
 
 #include "core/assert.h"
 
 namespace surfeit {
 namespace {
 
-// Sorted surfels taken from the stream at once.
-constexpr std::size_t kWindow = 4096;
+// A slab on its way through the stages.
+struct Work {
+  Slab slab;
+  BuiltSlab built;
+  std::vector<FullNodePage> full_pages;
+  std::vector<EncodedPages> node_pages;  // one each
+};
+using WorkPtr = std::shared_ptr<Work>;
 
-// How far surfels or children reach from `centre`: the radius of a sphere around it that holds
-// them all. Rounding of the sums is made up for in the last digits.
-float reach(const glm::vec3& centre, const glm::vec3& at, float radius) {
-  return (glm::length(at - centre) + radius) * 1.000001f;
+// Slabs on their way: enough that stages do not wait for each other.
+std::size_t slabsInFlight(int threads) { return 2 * static_cast<std::size_t>(threads) + 2; }
+
+// The stages. What fails first ends the work: later stages pass what they get.
+class OctreePipeline {
+ public:
+  OctreePipeline(SortedSurfelStream& stream, SceneWriter& writer, Progress& progress)
+      : cutter_(stream),
+        writer_(writer),
+        // The writer's header changes while slabs are built
+        header_(writer.header()),
+        stitcher_(writer),
+        progress_(progress) {}
+
+  Status run(int threads);
+
+ private:
+  WorkPtr cut();
+  void build(Work& work);
+  void stitch(Work& work);
+  void encode(Work& work);
+  void write(Work& work);
+  void note(const Status& status);
+
+  SlabCutter cutter_;
+  SceneWriter& writer_;
+  const SceneHeader header_;
+  SlabStitcher stitcher_;
+  Progress& progress_;
+  std::mutex mutex_;  // guards status_
+  Status status_;
+  std::atomic<bool> failed_{false};
+};
+
+void OctreePipeline::note(const Status& status) {
+  if (status.ok()) return;
+  const std::lock_guard lock(mutex_);
+  if (status_.ok()) status_ = status;
+  failed_ = true;
+}
+
+WorkPtr OctreePipeline::cut() {
+  if (progress_.isCancelled()) note(Status::interrupted());
+  if (failed_) return nullptr;
+  Result<std::optional<Slab>> slab = cutter_.next();
+  note(slab.status());
+  if (!slab.ok() || !slab->has_value()) return nullptr;
+  const WorkPtr work = std::make_shared<Work>();
+  work->slab = std::move(**slab);
+  return work;
+}
+
+void OctreePipeline::build(Work& work) {
+  if (failed_) return;
+  Result<BuiltSlab> built = buildSlab(work.slab, header_);
+  note(built.status());
+  if (built.ok()) work.built = std::move(*built);
+  work.slab = {};
+}
+
+void OctreePipeline::stitch(Work& work) {
+  if (failed_) return;
+  stitcher_.add(work.built);
+  work.full_pages = writer_.takeFullNodePages();
+}
+
+void OctreePipeline::encode(Work& work) {
+  if (failed_) return;
+  work.node_pages.resize(work.full_pages.size());
+  for (std::size_t i = 0; i < work.full_pages.size(); ++i) {
+    note(encodeNodePage(work.full_pages[i], header_.full_precision, work.node_pages[i]));
+    work.full_pages[i].nodes = {};
+  }
+}
+
+void OctreePipeline::write(Work& work) {
+  if (failed_) return;
+  note(writer_.addSurfelPages(work.built.surfel_pages, work.built.surfel_count));
+  for (std::size_t i = 0; i < work.node_pages.size() && !failed_; ++i) {
+    note(writer_.addNodePage(work.full_pages[i].level, work.node_pages[i].bytes,
+                             work.node_pages[i].pages.front().payload_bytes));
+  }
+  progress_.advance(work.built.surfel_count);
+  progress_.advanceBytes(work.built.surfel_pages.bytes.size());
+}
+
+Status OctreePipeline::run(int threads) {
+  using tbb::filter_mode;
+  const auto stage = [](auto&& function) {
+    return [function](WorkPtr work) {
+      function(*work);
+      return work;
+    };
+  };
+  const auto source = [this](tbb::flow_control& control) {
+    WorkPtr work = cut();
+    if (work == nullptr) control.stop();
+    return work;
+  };
+  tbb::parallel_pipeline(
+      slabsInFlight(threads),
+      tbb::make_filter<void, WorkPtr>(filter_mode::serial_in_order, source) &
+          tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel,
+                                             stage([this](Work& work) { build(work); })) &
+          tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::serial_in_order,
+                                             stage([this](Work& work) { stitch(work); })) &
+          tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel,
+                                             stage([this](Work& work) { encode(work); })) &
+          tbb::make_filter<WorkPtr, void>(filter_mode::serial_in_order,
+                                          [this](const WorkPtr& work) { write(*work); }));
+  if (failed_) return status_;
+  SURFEIT_CHECK(stitcher_.isComplete());
+
+  // Pages that never became full
+  Work rest;
+  rest.full_pages = writer_.takeOpenNodePages();
+  encode(rest);
+  write(rest);
+  return status_;
 }
 
 }  // namespace
 
-Status OctreeBuilder::build(SortedSurfelStream& stream, Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(refill(stream));
-  int boundary_level = 0;  // the first leaf may be the root
-  while (at_ < window_.size()) {
-    if (progress.isCancelled()) return Status::interrupted();
-    Pending leaf;
-    const std::uint64_t taken_before = surfels_taken_;
-    const CurveKey first_key = window_[at_].key;
-    const std::size_t size = leafSize(boundary_level);
-    CurveKey last_key = first_key;
-    if (size > 0) {
-      last_key = window_[at_ + size - 1].key;
-      SURFEIT_RETURN_IF_ERROR(takeLeaf(size, leaf));
-    } else {
-      SURFEIT_RETURN_IF_ERROR(takeEqualKeys(stream, leaf));
+void SlabStitcher::add(BuiltSlab& slab) {
+  places_.clear();
+  std::size_t node = 0;
+  for (BuiltSlab::Root& root : slab.roots) {
+    while (places_.size() < root.siblings_end) {
+      const BuiltSlab::Siblings& siblings = slab.siblings[places_.size()];
+      const std::span<LevelNode> nodes = std::span(slab.nodes).subspan(node, siblings.count);
+      for (LevelNode& sibling : nodes) resolve(sibling);
+      places_.push_back(writer_.addSiblings(siblings.level, nodes));
+      node += siblings.count;
     }
-    SURFEIT_RETURN_IF_ERROR(refill(stream));
-    boundary_level = at_ < window_.size() ? firstDifferentLevel(last_key, window_[at_].key) : 0;
-    SURFEIT_RETURN_IF_ERROR(place(std::move(leaf), boundary_level));
-    progress.advance(surfels_taken_ - taken_before);
+    resolve(root.node.node);
+    if (slab.is_giant) {
+      addGiantPiece(slab, root);
+    } else {
+      join(root.node, root.boundary_level);
+    }
   }
-  SURFEIT_CHECK(cells_.empty());
-  return {};
+  surfel_pages_ += static_cast<std::uint32_t>(slab.surfel_pages.pages.size());
 }
 
-// Keeps more surfels than a leaf holds in the window, until the stream ends.
-Status OctreeBuilder::refill(SortedSurfelStream& stream) {
-  const std::size_t needed = writer_.header().leaf_capacity + 1;
-  if (stream_ended_ || window_.size() - at_ >= needed) return {};
-  window_.erase(window_.begin(), window_.begin() + static_cast<std::ptrdiff_t>(at_));
-  at_ = 0;
-  while (!stream_ended_ && window_.size() < needed) {
-    const std::size_t before = window_.size();
-    window_.resize(std::max(kWindow, needed));
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t got,
-                             stream.next(std::span(window_).subspan(before)));
-    window_.resize(before + got);
-    stream_ended_ = got == 0;
+// From numbers in the slab to places in the file.
+void SlabStitcher::resolve(LevelNode& node) const {
+  if (node.node.isLeaf()) {
+    node.node.page += surfel_pages_;
+  } else {
+    const GroupPlace& place = places_[node.node.page];
+    node.node.page = place.page;
+    node.node.first = place.first;
   }
-  return {};
 }
 
-// The leaf's cell is the largest that begins here and holds no more than a leaf may. It begins here
-// when its level is at least the boundary's; it holds few enough when the surfel after the last
-// one that fits lies outside.
-std::size_t OctreeBuilder::leafSize(int boundary_level) const {
-  const std::size_t capacity = writer_.header().leaf_capacity;
-  const std::size_t available = window_.size() - at_;
-  const CurveKey first_key = window_[at_].key;
-  int level = boundary_level;
-  if (available > capacity) {
-    level = std::max(level, firstDifferentLevel(first_key, window_[at_ + capacity].key));
+// The sums of a giant leaf add up piece by piece; its sphere is that around their box.
+void SlabStitcher::addGiantPiece(BuiltSlab& slab, BuiltSlab::Root& root) {
+  if (slab.giant_begins) {
+    giant_ = root.node;
+  } else {
+    giant_.sums.add(root.node.sums);
   }
-  if (level > kCurveLevels) return 0;
-  std::size_t size = 1;
-  while (size < std::min(available, capacity) &&
-         firstDifferentLevel(first_key, window_[at_ + size].key) > level) {
-    ++size;
-  }
-  return size;
+  if (!slab.giant_ends) return;
+  const Node first = giant_.node.node;
+  Node& node = giant_.node.node;
+  node = giant_.sums.toNode(writer_.header().flatness_limit);
+  node.radius = radiusOfBox(node.position, giant_.sums.disk_bounds) * 1.000001f;
+  node.page = first.page;
+  node.first = first.first;
+  join(giant_, root.boundary_level);
 }
 
-Status OctreeBuilder::takeSurfels(std::size_t size, std::vector<glm::vec4>& disks, Pending& leaf) {
-  for (std::size_t i = 0; i < size; ++i) {
-    const Surfel& surfel = window_[at_ + i].surfel;
-    leaf.sums.add(surfel);
-    disks.emplace_back(surfel.position, surfel.radius);
-    SURFEIT_RETURN_IF_ERROR(writer_.addSurfel(surfel));
-  }
-  at_ += size;
-  surfels_taken_ += size;
-  return {};
+void SlabStitcher::join(FinishedNode& node, int boundary_level) {
+  if (!sweep_.place(node, boundary_level, 0)) return;
+  writer_.addSiblings(0, {&node.node, 1});
+  complete_ = true;
 }
 
-Status OctreeBuilder::takeLeaf(std::size_t size, Pending& leaf) {
-  SURFEIT_ASSIGN_OR_RETURN(const GroupPlace place, writer_.beginLeaf(size));
-  std::vector<glm::vec4> disks;
-  SURFEIT_RETURN_IF_ERROR(takeSurfels(size, disks, leaf));
-  Node& node = leaf.node.node;
-  node = leaf.sums.toNode(writer_.header().flatness_limit);
-  for (const glm::vec4& disk : disks) {
-    node.radius = std::max(node.radius, reach(node.position, glm::vec3(disk), disk.w));
-  }
-  node.page = place.page;
-  node.first = place.first;
-  return {};
+Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, int threads,
+                   Progress& progress) {
+  return OctreePipeline(stream, writer, progress).run(threads);
 }
 
-// More surfels than a leaf holds in one cell of the finest level: a leaf of any size. It begins a
-// page, so that only whole pages follow.
-Status OctreeBuilder::takeEqualKeys(SortedSurfelStream& stream, Pending& leaf) {
-  SURFEIT_ASSIGN_OR_RETURN(const GroupPlace place,
-                           writer_.beginLeaf(writer_.header().surfel_group_capacity));
-  const CurveKey key = window_[at_].key;
-  std::vector<glm::vec4> disks;
-  while (at_ < window_.size() && window_[at_].key == key) {
-    SURFEIT_RETURN_IF_ERROR(takeSurfels(1, disks, leaf));
-    disks.clear();
-    SURFEIT_RETURN_IF_ERROR(refill(stream));
-  }
-  Node& node = leaf.node.node;
-  node = leaf.sums.toNode(writer_.header().flatness_limit);
-  node.radius = radiusOfBox(node.position, leaf.sums.disk_bounds) * 1.000001f;
-  node.page = place.page;
-  node.first = place.first;
-  return {};
-}
-
-Status OctreeBuilder::place(Pending node, int boundary_level) {
-  // Close the cells that end here; each takes the node and becomes the node
-  while (!cells_.empty() && cells_.back().level >= boundary_level) {
-    OpenCell& cell = cells_.back();
-    cell.children[static_cast<std::size_t>(cell.child_count++)] = std::move(node);
-    SURFEIT_ASSIGN_OR_RETURN(node, closeCell(cell));
-    cells_.pop_back();
-  }
-  // No more surfels: what is left is the root
-  if (boundary_level == 0) {
-    return writer_.addSiblings(0, std::span(&node.node, 1)).status();
-  }
-  // The node and the next one are children of one cell of the level above the boundary
-  if (cells_.empty() || cells_.back().level < boundary_level - 1) {
-    cells_.push_back({boundary_level - 1, 0, {}});
-  }
-  OpenCell& cell = cells_.back();
-  cell.children[static_cast<std::size_t>(cell.child_count++)] = std::move(node);
-  return {};
-}
-
-Result<OctreeBuilder::Pending> OctreeBuilder::closeCell(OpenCell& cell) {
-  const std::span<const Pending> children =
-      std::span(cell.children).first(static_cast<std::size_t>(cell.child_count));
-  Pending parent;
-  std::array<LevelNode, 8> siblings;
-  for (std::size_t i = 0; i < children.size(); ++i) {
-    parent.sums.add(children[i].sums);
-    siblings[i] = children[i].node;
-  }
-  SURFEIT_ASSIGN_OR_RETURN(
-      const GroupPlace place,
-      writer_.addSiblings(cell.level + 1, std::span(siblings).first(children.size())));
-
-  Node& node = parent.node.node;
-  node = parent.sums.toNode(writer_.header().flatness_limit);
-  for (const Pending& child : children) {
-    const Node& below = child.node.node;
-    node.radius = std::max(node.radius, reach(node.position, below.position, below.radius));
-  }
-  node.radius =
-      std::min(node.radius, radiusOfBox(node.position, parent.sums.disk_bounds) * 1.000001f);
-  node.page = place.page;
-  node.first = place.first;
-  node.child_count = static_cast<std::uint8_t>(children.size());
-  parent.node.child_level = static_cast<std::uint8_t>(cell.level + 1);
-  return parent;
+std::uint64_t buildOctreeBytes(int threads) {
+  // A slab has at most 2 * kBrickSurfels surfels, a node for every fourth, and pages of 24 bytes
+  // per surfel; a thread fetches one slab at a time
+  constexpr std::uint64_t kSlabBytes = 2 * kBrickSurfels * (sizeof(LevelNode) / 4 + 24);
+  constexpr std::uint64_t kFetchBytes = 2 * kBrickSurfels * (sizeof(Surfel) + sizeof(CurveKey));
+  return slabsInFlight(threads) * kSlabBytes + static_cast<std::uint64_t>(threads) * kFetchBytes;
 }
 
 }  // namespace surfeit

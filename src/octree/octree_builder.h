@@ -1,63 +1,50 @@
-// Builds the octree bottom-up in one sweep over sorted surfels, and hands its groups to a
-// SceneWriter. Nothing grows with the cloud: open cells (one per level) and one open group per
-// level. docs/architecture.md, "Building", explains the sweep.
+// Builds the octree bottom-up in one sweep over sorted surfels, slab by slab: threads build slabs,
+// one stitches their octrees together and numbers pages, threads encode node pages, one writes.
+// Nothing grows with the cloud: slabs on their way, open cells and an open node page per level.
+// docs/architecture.md, "Building", explains the stages.
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
-#include <glm/vec4.hpp>
-#include <span>
 #include <vector>
 
-#include "core/curve_key.h"
-#include "octree/node_sums.h"
+#include "octree/cell_sweep.h"
 #include "octree/scene_writer.h"
-#include "octree/surfel_sorter.h"
+#include "octree/slab_builder.h"
+#include "octree/sorted_surfels.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
 
-// One thread at a time.
-class OctreeBuilder {
+// Joins the octrees of slabs, in order. One thread at a time.
+class SlabStitcher {
  public:
-  explicit OctreeBuilder(SceneWriter& writer) : writer_(writer) {}
+  explicit SlabStitcher(SceneWriter& writer)
+      : writer_(writer), sweep_(writer, writer.header().flatness_limit) {}
 
-  // Takes every surfel of the stream and finishes the root. kInterrupted when cancelled.
-  Status build(SortedSurfelStream& stream, Progress& progress);
+  // Places the slab's nodes in the file and joins its roots to the tree.
+  void add(BuiltSlab& slab);
+  bool isComplete() const { return complete_; }
 
  private:
-  // A finished node that waits for its parent.
-  struct Pending {
-    LevelNode node;
-    NodeSums sums;
-  };
-  // An octree cell whose last children have not come yet.
-  struct OpenCell {
-    int level = 0;
-    int child_count = 0;
-    std::array<Pending, 8> children;
-  };
-
-  Status refill(SortedSurfelStream& stream);
-  // Surfels at the front of the window that make the next leaf; its cell must begin at or below
-  // `boundary_level`, where it differs from the cell before. 0: more than a leaf holds share one
-  // curve cell.
-  std::size_t leafSize(int boundary_level) const;
-  Status takeLeaf(std::size_t size, Pending& leaf);
-  Status takeEqualKeys(SortedSurfelStream& stream, Pending& leaf);
-  Status takeSurfels(std::size_t size, std::vector<glm::vec4>& disks, Pending& leaf);
-  // Puts a finished node under the cell that it and the next one share, closing deeper cells.
-  Status place(Pending node, int boundary_level);
-  Result<Pending> closeCell(OpenCell& cell);
+  void addGiantPiece(BuiltSlab& slab, BuiltSlab::Root& root);
+  void resolve(LevelNode& node) const;
+  void join(FinishedNode& node, int boundary_level);
 
   SceneWriter& writer_;
-  std::vector<SortedSurfel> window_;  // sorted surfels not yet in a leaf begin at at_
-  std::size_t at_ = 0;
-  bool stream_ended_ = false;
-  std::vector<OpenCell> cells_;  // levels rise
-  std::uint64_t surfels_taken_ = 0;
+  CellSweep sweep_;
+  std::uint32_t surfel_pages_ = 0;  // of all slabs before
+  std::vector<GroupPlace> places_;  // of the slab's sibling groups
+  FinishedNode giant_;              // pieces so far
+  bool complete_ = false;
 };
+
+// Takes every surfel of the stream and hands all pages to the writer, with the threads of the
+// current arena; `threads` of them bound what is on its way. kInterrupted when cancelled.
+Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, int threads,
+                   Progress& progress);
+
+// Memory that buildOctree takes at most, beside stream and writer.
+std::uint64_t buildOctreeBytes(int threads);
 
 }  // namespace surfeit

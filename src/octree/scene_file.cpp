@@ -9,12 +9,18 @@
 namespace surfeit {
 
 Result<SceneFile> SceneFile::open(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(PageFile pages, PageFile::open(path));
+  return open(std::move(pages));
+}
+
+Result<SceneFile> SceneFile::open(PageFile pages) {
   SceneFile scene;
-  SURFEIT_ASSIGN_OR_RETURN(scene.pages_, PageFile::open(path));
+  scene.pages_ = std::move(pages);
   Result<SceneHeader> header =
       decodeSceneHeader(scene.pages_.sceneFields(), scene.nodePageCount(), scene.surfelPageCount());
   if (!header.ok()) {
-    return Status(header.status().code(), fmt::format("{}: {}", path, header.status().message()));
+    return Status(header.status().code(),
+                  fmt::format("{}: {}", scene.path(), header.status().message()));
   }
   scene.header_ = *header;
   return scene;

@@ -39,6 +39,7 @@ class SceneFile {
  public:
   // Checks header, footer, directory and provenance, but reads no page.
   static Result<SceneFile> open(const std::string& path);
+  static Result<SceneFile> open(PageFile pages);
 
   const std::string& path() const;
   std::uint64_t fileBytes() const;

@@ -16,98 +16,135 @@ constexpr float kPositionTolerance = 1e-3f;
 // Flags that a page may hold; the last only in the indexer's own temporary files.
 constexpr std::uint8_t kStoredFlags = kSurfelSphere | kSurfelTwoSided | kSurfelNeedsSize;
 
-// A column as its own array.
-template <typename T, typename Field>
-std::vector<T> column(std::span<const Surfel> surfels, Field field) {
-  std::vector<T> values(surfels.size());
-  std::transform(surfels.begin(), surfels.end(), values.begin(), field);
-  return values;
-}
-
 Status damaged(const char* field) {
   return Status::corruption(fmt::format("surfel group: damaged field {}", field));
 }
 
-// Scratch of decodeSurfelGroup, per thread.
-struct DecodeScratch {
-  std::vector<glm::vec3> vectors;
-  std::vector<float> numbers;
-  std::vector<std::uint8_t> bytes;
+// The surfels of a page as columns. Every page of a thread uses the same.
+class Columns {
+ public:
+  explicit Columns(std::size_t count) {
+    thread_local std::vector<float> floats;
+    thread_local std::vector<std::uint8_t> bytes;
+    if (bytes.size() < count) {
+      floats.resize(kFloatColumns * count);
+      bytes.resize(count);
+    }
+    std::span<float> rest(floats);
+    const auto take = [&] {
+      const std::span<float> column = rest.first(count);
+      rest = rest.subspan(count);
+      return column;
+    };
+    for (MutableAxes* axes : {&position, &normal, &radiosity, &albedo}) {
+      *axes = {take(), take(), take()};
+    }
+    radius = take();
+    area = take();
+    flags = std::span(bytes).first(count);
+  }
+
+  void gather(std::span<const Surfel> surfels) {
+    // A loop for each quarter of a surfel: more columns than registers are slower
+    gatherVectors(surfels, &Surfel::position, position);
+    gatherVectors(surfels, &Surfel::normal, normal);
+    gatherVectors(surfels, &Surfel::radiosity, radiosity);
+    gatherVectors(surfels, &Surfel::albedo, albedo);
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      radius[i] = surfels[i].radius;
+      area[i] = surfels[i].area;
+      flags[i] = static_cast<std::uint8_t>(surfels[i].flags);
+    }
+  }
+
+  void scatter(bool has_albedo, std::span<Surfel> surfels) const {
+    scatterVectors(position, &Surfel::position, surfels);
+    scatterVectors(normal, &Surfel::normal, surfels);
+    scatterVectors(radiosity, &Surfel::radiosity, surfels);
+    if (has_albedo) scatterVectors(albedo, &Surfel::albedo, surfels);
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      Surfel& surfel = surfels[i];
+      surfel.radius = radius[i];
+      surfel.area = area[i];
+      surfel.flags = flags[i];
+      surfel.reserved = 0;
+      if (surfel.isSphere()) surfel.normal = glm::vec3(0);
+      if (!has_albedo) surfel.albedo = glm::vec3(0);
+    }
+  }
+
+  MutableAxes position, normal, radiosity, albedo;
+  std::span<float> radius, area;
+  std::span<std::uint8_t> flags;
+
+ private:
+  static constexpr std::size_t kFloatColumns = 14;
+
+  static void gatherVectors(std::span<const Surfel> surfels, glm::vec3 Surfel::*field,
+                            const MutableAxes& axes) {
+    float *const x = axes[0].data(), *const y = axes[1].data(), *const z = axes[2].data();
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      const glm::vec3& value = surfels[i].*field;
+      x[i] = value.x;
+      y[i] = value.y;
+      z[i] = value.z;
+    }
+  }
+
+  static void scatterVectors(const MutableAxes& axes, glm::vec3 Surfel::*field,
+                             std::span<Surfel> surfels) {
+    const float *const x = axes[0].data(), *const y = axes[1].data(), *const z = axes[2].data();
+    for (std::size_t i = 0; i < surfels.size(); ++i) surfels[i].*field = {x[i], y[i], z[i]};
+  }
 };
+
+Axes constAxes(const MutableAxes& axes) { return {axes[0], axes[1], axes[2]}; }
 
 }  // namespace
 
-void encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
-                       std::vector<std::byte>& payload) {
-  payload.clear();
-  ByteWriter writer(payload);
-  writer.put(static_cast<std::uint32_t>(surfels.size()));
-
-  float min_radius = surfels.front().radius;
-  for (const Surfel& surfel : surfels) min_radius = std::min(min_radius, surfel.radius);
+std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
+                              std::vector<std::byte>& payload) {
+  Columns columns(surfels.size());
+  columns.gather(surfels);
+  const float min_radius = *std::min_element(columns.radius.begin(), columns.radius.end());
   const bool full = form.full_precision;
-  putBytes8(writer, column<std::uint8_t>(surfels, [](const Surfel& s) {
-              return static_cast<std::uint8_t>(s.flags);
-            }));
-  putPositions(writer, column<glm::vec3>(surfels, [](const Surfel& s) { return s.position; }),
-               min_radius * kPositionTolerance, full);
-  putNormals(writer, column<glm::vec3>(surfels, [](const Surfel& s) { return s.normal; }), full);
-  putPositive(writer, column<float>(surfels, [](const Surfel& s) { return s.radius; }),
-              Rounding::kNearest, full);
-  putPositive(writer, column<float>(surfels, [](const Surfel& s) { return s.area; }),
-              Rounding::kNearest, full);
-  putColors(writer, column<glm::vec3>(surfels, [](const Surfel& s) { return s.radiosity; }), full);
-  if (form.has_albedo) {
-    putReflectances(writer, column<glm::vec3>(surfels, [](const Surfel& s) { return s.albedo; }),
-                    full);
-  }
+
+  PayloadWriter writer(payload, static_cast<std::uint32_t>(surfels.size()));
+  putBytes8(writer, columns.flags);
+  putPositions(writer, constAxes(columns.position), min_radius * kPositionTolerance, full);
+  putNormals(writer, constAxes(columns.normal), full);
+  putPositive(writer, columns.radius, Rounding::kNearest, full);
+  putPositive(writer, columns.area, Rounding::kNearest, full);
+  putColors(writer, constAxes(columns.radiosity), full);
+  if (form.has_albedo) putReflectances(writer, constAxes(columns.albedo), full);
+  return writer.finish();
 }
 
 Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
                                         std::span<Surfel> surfels) {
-  ByteReader reader(payload);
-  const std::uint32_t count = reader.get<std::uint32_t>();
-  if (!reader.ok() || count == 0 || count > surfels.size()) {
+  PayloadReader reader(payload);
+  if (!reader.ok()) return damaged("bytes of the packed part");
+  const std::uint32_t count = reader.recordCount();
+  if (count == 0 || count > surfels.size()) {
     return Status::corruption(
         fmt::format("surfel group: {} surfels, expected 1 to {}", count, surfels.size()));
   }
-  thread_local DecodeScratch scratch;
-  if (scratch.vectors.size() < count) {
-    scratch.vectors.resize(surfels.size());
-    scratch.numbers.resize(surfels.size());
-    scratch.bytes.resize(surfels.size());
+  const Columns columns(count);
+  if (!getBytes8(reader, columns.flags)) return damaged("flags");
+  for (const std::uint8_t flags : columns.flags) {
+    if ((flags & ~kStoredFlags) != 0) return damaged("flags");
   }
-  const std::span<glm::vec3> vectors = std::span(scratch.vectors).first(count);
-  const std::span<float> numbers = std::span(scratch.numbers).first(count);
-  const std::span<std::uint8_t> flags = std::span(scratch.bytes).first(count);
-  const std::span<Surfel> out = surfels.first(count);
-
-  if (!getBytes8(reader, flags)) return damaged("flags");
-  for (std::size_t i = 0; i < count; ++i) {
-    if ((flags[i] & ~kStoredFlags) != 0) return damaged("flags");
-    out[i] = Surfel();
-    out[i].flags = flags[i];
-  }
-  if (!getPositions(reader, vectors)) return damaged("position");
-  for (std::size_t i = 0; i < count; ++i) out[i].position = vectors[i];
-  if (!getNormals(reader, vectors)) return damaged("normal");
-  for (std::size_t i = 0; i < count; ++i) {
-    out[i].normal = out[i].isSphere() ? glm::vec3(0) : vectors[i];
-  }
-  if (!getPositive(reader, numbers)) return damaged("radius");
-  for (std::size_t i = 0; i < count; ++i) out[i].radius = numbers[i];
-  if (!getPositive(reader, numbers)) return damaged("area");
-  for (std::size_t i = 0; i < count; ++i) out[i].area = numbers[i];
-  if (!getColors(reader, vectors)) return damaged("radiosity");
-  for (std::size_t i = 0; i < count; ++i) out[i].radiosity = vectors[i];
-  if (form.has_albedo) {
-    if (!getReflectances(reader, vectors)) return damaged("albedo");
-    for (std::size_t i = 0; i < count; ++i) out[i].albedo = vectors[i];
-  }
+  if (!getPositions(reader, columns.position)) return damaged("position");
+  if (!getNormals(reader, columns.normal)) return damaged("normal");
+  if (!getPositive(reader, columns.radius)) return damaged("radius");
+  if (!getPositive(reader, columns.area)) return damaged("area");
+  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  if (form.has_albedo && !getReflectances(reader, columns.albedo)) return damaged("albedo");
   if (reader.remaining() != 0) {
     return Status::corruption(
         fmt::format("surfel group: {} bytes after the last field", reader.remaining()));
   }
+  columns.scatter(form.has_albedo, surfels.first(count));
   return count;
 }
 

@@ -19,9 +19,10 @@ struct PageForm {
   bool has_albedo = false;
 };
 
-// The payload of a page with these surfels (at least one), replaced.
-void encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
-                       std::vector<std::byte>& payload);
+// The payload of a page with these surfels (at least one), replaced. Returns how many bytes at its
+// front are worth compressing, for compressPage. Safe from any thread.
+std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
+                              std::vector<std::byte>& payload);
 
 // Decodes into `surfels` (the file's group capacity) and returns how many there are. Safe on
 // arbitrary bytes; kCorruption names the field, but not the file.

@@ -231,6 +231,9 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
                            PagedOctree::create(std::move(*opened), memory));
   const SceneFile& file = octree->file();
   progress.beginPhase("verify", pages, "pages");
+  if (const Status tiling = file.pages().checkTiling(); !tiling.ok()) {
+    findings.add(tiling.message());
+  }
 
   std::atomic<std::uint32_t> next_page{0};
   std::atomic<std::uint64_t> nodes{0}, surfels{0};

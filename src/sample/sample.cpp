@@ -16,7 +16,7 @@
 
 #include "core/job_limits.h"
 #include "core/spherical_harmonics.h"
-#include "io/surfel_source.h"
+#include "io/surfel_writer.h"
 #include "sample/dice.h"
 #include "sample/ray_scene.h"
 

@@ -104,7 +104,7 @@ readmeCommandsWork() {
 
 resultsDoNotDependOnThreadsOrMemory() {
   makeScene 20000
-  run 0 index cornell.ply -o other.sft --memory 32M --threads 1
+  run 0 index cornell.ply -o other.sft --memory 64M --threads 1
   sameBytes cornell.sft other.sft
   run 0 sample cornell.obj -o receivers.ply --count 300 --light-samples 1
   run 0 gather cornell.sft receivers.ply -o one.ply --mode bleeding --threads 1 --memory 1G
@@ -118,9 +118,12 @@ statisticsHaveTheDocumentedFields() {
   run 0 sample cornell.obj -o again.ply --count 1000 --stats sample.json
   jsonHas sample.json "${common[@]}" triangles surfels area spacing phases
   run 0 index cornell.ply -o again.sft --stats index.json
-  jsonHas index.json "${common[@]}" memory_bytes surfels skipped_records nodes node_pages \
+  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records nodes node_pages \
     surfel_pages file_bytes bytes_per_surfel temporary_bytes surfels_per_second phases \
-    scan sort build
+    sample read build finish
+  run 0 generate --surfels 1k -o city.ply --stats generate.json
+  jsonHas generate.json "${common[@]}" kind scene_surfels seed order surfels scene_area \
+    surfels_per_second
   run 0 verify cornell.sft --stats verify.json
   jsonHas verify.json "${common[@]}" pages bytes finding_count findings
   run 0 gather cornell.sft again.ply -o lit.ply --memory 64M --stats gather.json
@@ -136,9 +139,34 @@ helpAndVersionExitWithZero() {
   run 0 --version
   says "surfeit 0."
   run 0 --help
-  says sample index info verify gather view
+  says sample generate index info verify gather view
   local command
-  for command in sample index info verify gather view; do run 0 "$command" --help; done
+  for command in sample generate index info verify gather view; do run 0 "$command" --help; done
+}
+
+generatedScenesAreTheSameByEveryWay() {
+  run 0 generate --surfels 20k -o a.ply
+  run 0 generate --surfels 20k --threads 1 -o b.ply
+  sameBytes a.ply b.ply
+  run 0 generate --surfels 20k --recipe -o a.recipe
+  run 0 index a.recipe -o recipe.sft
+  run 0 index a.ply -o whole.sft
+  sameBytes recipe.sft whole.sft
+  local k
+  for k in 1 2 3; do run 0 generate --surfels 20k --part "$k/3" -o "part$k.ply"; done
+  run 0 index part3.ply part1.ply part2.ply -o parts.sft
+  sameBytes parts.sft whole.sft
+  run 0 generate --surfels 20k --order shuffled -o shuffled.ply
+  run 0 index shuffled.ply -o shuffled.sft
+  sameBytes shuffled.sft whole.sft
+  run 2 generate --surfels 0 -o none.ply
+  run 2 generate --surfels 10x -o none.ply
+  run 2 generate --part 7/5 -o none.ply
+  run 2 generate --kind town -o none.ply
+  run 2 generate --duplicates 101 -o none.ply
+  sed 's/^kind .*/kind town/' a.recipe > town.recipe
+  run 3 index town.recipe -o none.sft
+  says town.recipe
 }
 
 missingFileIsAnIoError() {
@@ -294,6 +322,11 @@ PLY
   leavesNothing result
 }
 
+# Whether a process has a file open that has no name (yet), or a temporary one.
+resultIsOpen() {
+  ls -l "/proc/$1/fd" 2> /dev/null | grep -q -e '(deleted)' -e '\.tmp$'
+}
+
 interruptLeavesNoFile() {
   makeScene 60000
   local signal expected process status
@@ -304,10 +337,10 @@ interruptLeavesNoFile() {
       --max-solid-angle 0.002 --raster-resolution 32 --threads 1 &
     process=$!
     for ((i = 0; i < 300; ++i)); do
-      compgen -G 'result.ply*.tmp' > /dev/null && break
+      resultIsOpen "$process" && break
       sleep 0.1
     done
-    compgen -G 'result.ply*.tmp' > /dev/null || fail "the gather did not begin"
+    resultIsOpen "$process" || fail "the gather did not begin"
     kill -"$signal" "$process"
     status=0
     wait "$process" || status=$?

@@ -16,6 +16,7 @@
 #include "gather/brute_force.h"
 #include "gather/test_clouds.h"
 #include "io/surfel_source.h"
+#include "io/surfel_writer.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
 #include "surfeit/index.h"

@@ -5,10 +5,12 @@
 #include <array>
 
 #include "gather/gather_point.h"
+#include "io/page_codec.h"
 #include "io/test_directory.h"
 #include "octree/node_sums.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_writer.h"
+#include "octree/surfel_group.h"
 
 namespace surfeit {
 namespace {
@@ -27,8 +29,7 @@ class HostileScene : public DirectoryTest {
     header.bounds.add(glm::vec3(1));
     header.cube = rootCube(header.bounds);
     header.full_precision = true;
-    Result<std::unique_ptr<SceneWriter>> writer =
-        SceneWriter::create(path("scene.sft"), header, 1, path(""));
+    Result<std::unique_ptr<SceneWriter>> writer = SceneWriter::create(path("scene.sft"), header, 1);
     ASSERT_TRUE(writer.ok()) << writer.status().message();
 
     Surfel surfel;
@@ -40,16 +41,26 @@ class HostileScene : public DirectoryTest {
     LevelNode node;
     node.node = sums.toNode(kDefaultFlatnessLimit);
     node.node.radius = 10;  // holds every receiver, so that nothing is far enough
-    Result<GroupPlace> place = (*writer)->beginLeaf(1);
-    ASSERT_TRUE(place.ok() && (*writer)->addSurfel(surfel).ok());
+    std::vector<std::byte> payload, stored;
+    encodeSurfelGroup({&surfel, 1}, {header.full_precision, false}, payload);
+    ASSERT_TRUE(compressPage(payload, stored).ok());
+    EncodedPages surfel_page;
+    surfel_page.add(stored, payload.size());
+    ASSERT_TRUE((*writer)->addSurfelPages(surfel_page, 1).ok());
+    GroupPlace place;
     for (int level = kCurveLevels; level >= 0; --level) {
-      node.node.page = place->page;
-      node.node.first = place->first;
+      node.node.page = place.page;
+      node.node.first = place.first;
       const std::array<LevelNode, 2> pair = {node, node};
       place = (*writer)->addSiblings(level, std::span(pair).first(level == 0 ? 1 : 2));
-      ASSERT_TRUE(place.ok());
       node.node.child_count = 2;
       node.child_level = static_cast<std::uint8_t>(level);
+    }
+    for (const FullNodePage& page : (*writer)->takeOpenNodePages()) {
+      EncodedPages encoded;
+      ASSERT_TRUE(encodeNodePage(page, header.full_precision, encoded).ok());
+      ASSERT_TRUE(
+          (*writer)->addNodePage(page.level, encoded.bytes, encoded.pages[0].payload_bytes).ok());
     }
     ASSERT_TRUE((*writer)->finish("{}").ok());
   }

@@ -1,11 +1,18 @@
 #include "io/file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <cstring>
 #include <filesystem>
 #include <string>
+#include <thread>
 #include <utility>
+#include <vector>
 
+#include "io/block_writer.h"
+#include "io/fault_injector.h"
+#include "io/page_file.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -59,6 +66,39 @@ TEST_F(InputFileTest, ReadSomeIsShortOnlyAtTheEnd) {
   EXPECT_EQ(*file->readSome(0, bytes), 8u);
   EXPECT_EQ(*file->readSome(7, bytes), 3u);
   EXPECT_EQ(*file->readSome(10, bytes), 0u);
+}
+
+TEST_F(InputFileTest, ViewsHoldTheBytesAndEndWithTheFile) {
+  std::string text(3 * kDirectAlignment + 10, ' ');
+  for (std::size_t i = 0; i < text.size(); ++i) text[i] = static_cast<char>(i * 31 % 251);
+  write("a", text);
+  for (const Access access : {Access::kCached, Access::kDirect}) {
+    const Result<InputFile> file = InputFile::open(path("a"), access);
+    ASSERT_TRUE(file.ok());
+    AlignedBuffer buffer;
+    for (const std::size_t offset : {0u, 1u, 4095u, 4096u, 8192u, 12290u, 12298u, 20000u}) {
+      for (const std::size_t size : {0u, 1u, 4096u, 4097u, 100'000u}) {
+        const Result<Bytes> view = file->readView(offset, size, buffer);
+        ASSERT_TRUE(view.ok()) << view.status().message();
+        const std::string expected =
+            offset < text.size() ? text.substr(offset, size) : std::string();
+        ASSERT_EQ(view->size(), expected.size()) << offset << ' ' << size;
+        EXPECT_EQ(std::memcmp(view->data(), expected.data(), expected.size()), 0);
+      }
+    }
+    EXPECT_LE(buffer.capacity(), 100'000 + 2 * kDirectAlignment);
+  }
+}
+
+TEST_F(InputFileTest, FileKeepsItsBytesWhenItsPathGoes) {
+  write("a", "0123456789");
+  const Result<InputFile> file = InputFile::open(path("a"), Access::kDirect);
+  ASSERT_TRUE(file.ok());
+  fs::remove(path("a"));
+  AlignedBuffer buffer;
+  const Result<Bytes> view = file->readView(2, 5, buffer);
+  ASSERT_TRUE(view.ok() && view->size() == 5);
+  EXPECT_EQ(std::memcmp(view->data(), "23456", 5), 0);
 }
 
 TEST_F(AtomicFileTest, NothingAppearsBeforeCommit) {
@@ -154,6 +194,119 @@ TEST_F(AtomicFileTest, DirectoryUnderTheFinalNameIsAnIoError) {
   EXPECT_EQ(fileCount(), 1);
 }
 
+// Calls `check` for files without a name while they are written, and with one.
+template <typename Check>
+void withAndWithoutName(Check check) {
+  check();
+  RefuseUnnamed refuse;
+  const Faults faults{&refuse};
+  check();
+}
+
+TEST_F(AtomicFileTest, FileHasTheModeOfTheUsersMask) {
+  withAndWithoutName([&] {
+    const mode_t mask = ::umask(027);
+    Result<AtomicFile> file = AtomicFile::create(path("a"));
+    ::umask(mask);
+    ASSERT_TRUE(file.ok() && file->commit().ok());
+    struct ::stat info {};
+    ASSERT_EQ(::stat(path("a").c_str(), &info), 0);
+    EXPECT_EQ(info.st_mode & 0777, 0640u);
+  });
+}
+
+TEST_F(AtomicFileTest, NamesOfAnyLengthThatTheSystemTakesWork) {
+  withAndWithoutName([&] {
+    const std::string name(255, 'n');
+    Result<AtomicFile> file = AtomicFile::create(path(name));
+    ASSERT_TRUE(file.ok()) << file.status().message();
+    ASSERT_TRUE(file->append(bytesOf("hello")).ok() && file->commit().ok());
+    EXPECT_EQ(contents(name), "hello");
+  });
+}
+
+TEST_F(AtomicFileTest, PathWithoutDirectoryIsInTheWorkingDirectory) {
+  const fs::path before = fs::current_path();
+  fs::current_path(directory_);
+  withAndWithoutName([&] {
+    Result<AtomicFile> file = AtomicFile::create("a");
+    ASSERT_TRUE(file.ok() && file->append(bytesOf("hello")).ok() && file->commit().ok());
+  });
+  fs::current_path(before);
+  EXPECT_EQ(contents("a"), "hello");
+}
+
+TEST_F(AtomicFileTest, LastOfTwoWritersOfOnePathWins) {
+  withAndWithoutName([&] {
+    Result<AtomicFile> first = AtomicFile::create(path("a"));
+    Result<AtomicFile> second = AtomicFile::create(path("a"));
+    ASSERT_TRUE(first.ok() && first->append(bytesOf("first")).ok());
+    ASSERT_TRUE(second.ok() && second->append(bytesOf("second")).ok());
+    ASSERT_TRUE(second->commit().ok());
+    EXPECT_EQ(contents("a"), "second");
+    ASSERT_TRUE(first->commit().ok());
+    EXPECT_EQ(contents("a"), "first");
+    EXPECT_EQ(fileCount(), 1);
+  });
+}
+
+TEST_F(AtomicFileTest, ManyWritersOfOnePathAtOnceEachPublishAWholeFile) {
+  withAndWithoutName([&] {
+    std::vector<std::thread> writers;
+    for (char letter = 'a'; letter < 'e'; ++letter) {
+      writers.emplace_back([&, letter] {
+        for (int i = 0; i < 5; ++i) {
+          Result<AtomicFile> file = AtomicFile::create(path("a"));
+          ASSERT_TRUE(file.ok()) << file.status().message();
+          ASSERT_TRUE(file->append(bytesOf(std::string(300'000, letter))).ok());
+          const Status status = file->commit();
+          ASSERT_TRUE(status.ok()) << status.message();
+        }
+      });
+    }
+    for (std::thread& writer : writers) writer.join();
+    const std::string text = contents("a");
+    ASSERT_EQ(text.size(), 300'000u);
+    EXPECT_EQ(text.find_first_not_of(text[0]), text.npos);
+    EXPECT_EQ(fileCount(), 1);
+  });
+}
+
+TEST_F(AtomicFileTest, FinishedUnnamedItIsReadableAndGoesWithItsReader) {
+  for (const std::size_t size : {std::size_t{100}, BlockWriter::kBlockBytes + 100}) {
+    withAndWithoutName([&] {
+      std::string text(size, '.');
+      Result<AtomicFile> file = AtomicFile::create(path("a"));
+      ASSERT_TRUE(file.ok() && file->append(bytesOf(text)).ok());
+      ASSERT_TRUE(file->writeAt(5, bytesOf("hello")).ok());
+      text.replace(5, 5, "hello");
+      const Result<InputFile> input = file->finishUnnamed("scratch");
+      ASSERT_TRUE(input.ok()) << input.status().message();
+      EXPECT_EQ(fileCount(), 0);
+      EXPECT_EQ(input->path(), "scratch");
+      EXPECT_EQ(input->size(), size);
+      EXPECT_EQ(file->size(), size);
+      AlignedBuffer buffer;
+      const Result<Bytes> view = input->readView(0, size + 1, buffer);
+      ASSERT_TRUE(view.ok() && view->size() == size);
+      EXPECT_EQ(std::memcmp(view->data(), text.data(), size), 0);
+    });
+  }
+}
+
+TEST_F(AtomicFileTest, SceneFinishedUnnamedIsCheckedAndReadable) {
+  withAndWithoutName([&] {
+    Result<PageFileWriter> writer = PageFileWriter::create(path("a"), 7);
+    ASSERT_TRUE(writer.ok() && writer->addSurfelPage(bytesOf("page"), 4).ok());
+    const Result<PageFile> pages = writer->finishUnnamed({}, "provenance");
+    ASSERT_TRUE(pages.ok()) << pages.status().message();
+    EXPECT_EQ(fileCount(), 0);
+    EXPECT_EQ(pages->path(), "temporary scene in " + directory_.string());
+    EXPECT_EQ(pages->pageCount(), 1u);
+    EXPECT_EQ(pages->provenance(), "provenance");
+  });
+}
+
 TEST_F(TemporaryFileTest, ReadsBackAndHasNoName) {
   Result<TemporaryFile> file = TemporaryFile::create(directory_.string());
   ASSERT_TRUE(file.ok());
@@ -175,8 +328,52 @@ TEST_F(TemporaryFileTest, ReadAtBeyondTheEndIsCorruption) {
             StatusCode::kCorruption);
 }
 
-TEST_F(TemporaryFileTest, MissingDirectoryIsAnIoError) {
-  EXPECT_EQ(TemporaryFile::create(path("missing")).status().code(), StatusCode::kIoError);
+TEST_F(TemporaryFileTest, MissingDirectoryIsAnIoErrorThatNamesIt) {
+  EXPECT_EQ(TemporaryFile::create(path("missing")).status().message(),
+            path("missing") + ": cannot create a temporary file: No such file or directory");
+}
+
+TEST_F(TemporaryFileTest, PaddingIsNoPartOfIt) {
+  Result<TemporaryFile> file = TemporaryFile::create(directory_.string());
+  ASSERT_TRUE(file.ok() && file->append(bytesOf("hello")).ok() && file->flush().ok());
+  AlignedBuffer buffer;
+  EXPECT_EQ(file->readView(1, 5, buffer).status().code(), StatusCode::kCorruption);
+  EXPECT_TRUE(file->readView(1, 4, buffer).ok());
+}
+
+TEST_F(TemporaryFileTest, SeveralThreadsAppendAndReadAtOnce) {
+  constexpr std::size_t kThreads = 4, kRecords = 60;
+  Result<TemporaryFile> file = TemporaryFile::create(directory_.string(), 2);
+  ASSERT_TRUE(file.ok());
+  const auto record = [](std::size_t thread, std::size_t i) {
+    return std::string(20'000 + 7919 * (i + thread) % 70'000, static_cast<char>('a' + i % 26));
+  };
+  std::vector<std::thread> threads;
+  for (std::size_t t = 0; t < kThreads; ++t) {
+    threads.emplace_back([&, t] {
+      std::vector<std::uint64_t> offsets;
+      AlignedBuffer buffer;
+      const auto read = [&](std::size_t i) {
+        const std::string expected = record(t, i);
+        const Result<Bytes> view = file->readView(offsets[i], expected.size(), buffer);
+        ASSERT_TRUE(view.ok()) << view.status().message();
+        ASSERT_EQ(std::memcmp(view->data(), expected.data(), expected.size()), 0);
+      };
+      for (std::size_t i = 0; i < kRecords; ++i) {
+        const Result<std::uint64_t> offset = file->append(bytesOf(record(t, i)));
+        ASSERT_TRUE(offset.ok());
+        offsets.push_back(*offset);
+        if (i % 20 == 19) read(i / 2);
+      }
+      for (std::size_t i = 0; i < kRecords; ++i) read(i);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST(AvailableBytes, TellsOfADirectoryThatExists) {
+  EXPECT_GT(*availableBytes("."), 0u);
+  EXPECT_EQ(availableBytes("/no/such").status().code(), StatusCode::kIoError);
 }
 
 TEST(DirectoryOf, IsThePartBeforeTheLastSlash) {

@@ -335,10 +335,65 @@ TEST_F(PlyReaderTest, CallsThatCannotWorkAreInvalidArguments) {
   EXPECT_EQ(code(reader->readRowWithList(row, 9, list)), StatusCode::kInvalidArgument);
   EXPECT_EQ(*reader->readRows(row), 1u);  // and nothing was lost
 
+  AlignedBuffer buffer;
+  EXPECT_EQ(reader->readRowView(0, buffer).status().code(), StatusCode::kInvalidArgument);
+
   Result<PlyReader> empty = open("ply\nformat ascii 1.0\nend_header\n");
+  EXPECT_EQ(empty->readRowView(1, buffer).status().code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(empty->seekRow(0).code(), StatusCode::kInvalidArgument);
+  EXPECT_FALSE(empty->hasFixedRows());
   ASSERT_TRUE(empty.ok());
   EXPECT_EQ(code(empty->readRows(row)), StatusCode::kInvalidArgument);
   EXPECT_EQ(empty->seekElement(0).code(), StatusCode::kInvalidArgument);
+}
+
+TEST_F(PlyReaderTest, ViewsHoldTheRowsThatAreReadOtherwise) {
+  for (const PlyEncoding encoding : kEncodings) {
+    Result<PlyReader> reader = open(smallMesh(encoding));
+    ASSERT_TRUE(reader.ok()) << reader.status().message();
+    AlignedBuffer buffer;
+    for (std::size_t element = 0; element < 3; ++element) {
+      ASSERT_TRUE(reader->seekElement(element).ok());
+      std::vector<std::byte> rows(100);
+      const std::size_t count = *reader->readRows(rows);
+      const std::size_t row_bytes = reader->header().elements[element].row_bytes;
+      for (const std::size_t max_rows : {1u, 2u, 100u}) {
+        ASSERT_TRUE(reader->seekElement(element).ok());
+        std::vector<std::byte> views;
+        for (;;) {
+          const Result<Bytes> view = reader->readRowView(max_rows, buffer);
+          ASSERT_TRUE(view.ok()) << view.status().message();
+          if (view->empty()) break;
+          views.insert(views.end(), view->begin(), view->end());
+        }
+        ASSERT_EQ(views.size(), count * row_bytes);
+        EXPECT_TRUE(std::equal(views.begin(), views.end(), rows.begin()));
+      }
+      EXPECT_EQ(reader->hasFixedRows(), encoding != PlyEncoding::kAscii && element != 1);
+    }
+  }
+}
+
+TEST_F(PlyReaderTest, SeekRowGoesToFixedRowsOnly) {
+  Result<PlyReader> reader = open(smallMesh(PlyEncoding::kBinaryBigEndian));
+  ASSERT_TRUE(reader.ok());
+  AlignedBuffer buffer;
+  ASSERT_TRUE(reader->seekRow(2).ok());
+  Result<Bytes> view = reader->readRowView(5, buffer);
+  ASSERT_TRUE(view.ok());
+  ASSERT_EQ(view->size(), reader->header().elements[0].row_bytes);
+  EXPECT_EQ(plyValue(view->data(), PlyType::kFloat32), 2.5);
+  EXPECT_EQ(reader->seekRow(4).code(), StatusCode::kInvalidArgument);
+  ASSERT_TRUE(reader->seekElement(1).ok());
+  EXPECT_EQ(reader->seekRow(0).code(), StatusCode::kInvalidArgument);
+
+  // The elements behind are found all the same
+  ASSERT_TRUE(reader->seekElement(0).ok());
+  ASSERT_TRUE(reader->seekRow(1).ok());
+  ASSERT_TRUE(reader->seekElement(2).ok());
+  view = reader->readRowView(5, buffer);
+  ASSERT_TRUE(view.ok());
+  EXPECT_EQ(plyValue(view->data(), PlyType::kUint32), 4000000000.0);
 }
 
 TEST_F(PlyReaderTest, FailureLastsUntilTheNextSeek) {

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <functional>
+#include <array>
+#include <bit>
+#include <cstring>
 #include <limits>
 
 #include "octree/test_scenes.h"
@@ -16,21 +18,63 @@ using Buffer = std::vector<std::byte>;
 constexpr float kLargest = std::numeric_limits<float>::max();
 constexpr float kSmallest = std::numeric_limits<float>::min();
 
-// Encodes with `put`, checks that every truncation is refused, and decodes into `values`.
+// Encodes with `put`, checks that every truncation is refused, and decodes into `values`. Returns
+// the payload.
 template <typename T, typename Put, typename Get>
-void roundTrip(std::vector<T>& values, const Put& put, const Get& get) {
+Buffer roundTrip(std::vector<T>& values, const Put& put, const Get& get) {
   Buffer buffer;
-  ByteWriter writer(buffer);
+  PayloadWriter writer(buffer, static_cast<std::uint32_t>(values.size()));
   put(writer, values);
+  writer.finish();
   for (std::size_t size = 0; size < buffer.size(); ++size) {
-    ByteReader cut(std::span<const std::byte>(buffer).first(size));
+    PayloadReader cut(std::span<const std::byte>(buffer).first(size));
     std::vector<T> scratch(values.size());
-    ASSERT_FALSE(get(cut, std::span<T>(scratch)) && cut.ok()) << size << " bytes";
+    EXPECT_FALSE(get(cut, std::span<T>(scratch)) && cut.ok()) << size << " bytes";
   }
-  buffer.push_back(std::byte{0x5a});
-  ByteReader reader(buffer);
-  ASSERT_TRUE(get(reader, std::span<T>(values)));
+  Buffer extended = buffer;
+  extended.push_back(std::byte{0x5a});
+  PayloadReader reader(extended);
+  EXPECT_EQ(reader.recordCount(), values.size());
+  EXPECT_TRUE(get(reader, std::span<T>(values)));
   EXPECT_EQ(reader.remaining(), 1u);
+  return buffer;
+}
+
+// Vectors as the columns of their axes.
+struct AxisColumns {
+  explicit AxisColumns(std::size_t count) {
+    for (std::vector<float>& axis : values) axis.resize(count);
+  }
+  explicit AxisColumns(std::span<const glm::vec3> vectors) : AxisColumns(vectors.size()) {
+    for (std::size_t i = 0; i < vectors.size(); ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        values[axis][i] = vectors[i][static_cast<int>(axis)];
+      }
+    }
+  }
+  Axes axes() const { return {values[0], values[1], values[2]}; }
+  MutableAxes mutableAxes() { return {values[0], values[1], values[2]}; }
+  std::array<std::vector<float>, 3> values;
+};
+
+// putNormals and the like for vectors.
+template <typename Put, typename... Arguments>
+auto putVectors(const Put& put, Arguments... arguments) {
+  return [=](PayloadWriter& writer, std::span<const glm::vec3> vectors) {
+    put(writer, AxisColumns(vectors).axes(), arguments...);
+  };
+}
+
+template <typename Get>
+auto getVectors(const Get& get) {
+  return [=](PayloadReader& reader, std::span<glm::vec3> vectors) {
+    AxisColumns columns(vectors.size());
+    if (!get(reader, columns.mutableAxes())) return false;
+    for (std::size_t i = 0; i < vectors.size(); ++i) {
+      vectors[i] = {columns.values[0][i], columns.values[1][i], columns.values[2][i]};
+    }
+    return true;
+  };
 }
 
 std::vector<glm::vec3> randomPoints(std::size_t count, float scale = 1) {
@@ -46,14 +90,9 @@ TEST(ColumnCodec, PositionsStayWithinTheErrorAskedFor) {
       std::vector<glm::vec3> values = randomPoints(300);
       for (glm::vec3& value : values) value += offset;
       const std::vector<glm::vec3> expected = values;
-      const float error = positionError(values, max_error, false);
+      const float error = positionError(AxisColumns(values).axes(), max_error, false);
       EXPECT_LE(error, max_error);
-      roundTrip(
-          values,
-          [&](ByteWriter& writer, std::span<const glm::vec3> v) {
-            putPositions(writer, v, max_error, false);
-          },
-          getPositions);
+      roundTrip(values, putVectors(putPositions, max_error, false), getVectors(getPositions));
       // A position is a float again in the end: half a unit in the last place on each axis
       const float rounding = 0x1p-24f * glm::length(glm::abs(offset) + 1.f);
       for (std::size_t i = 0; i < values.size(); ++i) {
@@ -68,12 +107,7 @@ TEST(ColumnCodec, PositionsOfAnyExtentComeBack) {
     std::vector<glm::vec3> values = randomPoints(50, scale);
     values.push_back(-values.back());
     const std::vector<glm::vec3> expected = values;
-    roundTrip(
-        values,
-        [&](ByteWriter& writer, std::span<const glm::vec3> v) {
-          putPositions(writer, v, scale * 1e-3f, false);
-        },
-        getPositions);
+    roundTrip(values, putVectors(putPositions, scale * 1e-3f, false), getVectors(getPositions));
     for (std::size_t i = 0; i < values.size(); ++i) {
       for (int axis = 0; axis < 3; ++axis) {
         ASSERT_NEAR(values[i][axis], expected[i][axis], scale * 1e-3f + 1e-45f);
@@ -90,20 +124,16 @@ TEST(ColumnCodec, FullPrecisionIsExact) {
   std::vector<float> positive = {1, 2, 3e-40f, kLargest, 1e-20f};
   const std::vector<glm::vec3> expected_points = points, expected_normals = normals;
   const std::vector<float> expected_positive = positive;
-  roundTrip(
-      points, [](ByteWriter& w, auto& v) { putPositions(w, v, 1, true); }, getPositions);
+  roundTrip(points, putVectors(putPositions, 1.f, true), getVectors(getPositions));
   EXPECT_EQ(points, expected_points);
-  roundTrip(
-      points, [](ByteWriter& w, auto& v) { putColors(w, v, true); }, getColors);
+  roundTrip(points, putVectors(putColors, true), getVectors(getColors));
   EXPECT_EQ(points, expected_points);
-  roundTrip(
-      points, [](ByteWriter& w, auto& v) { putReflectances(w, v, true); }, getReflectances);
+  roundTrip(points, putVectors(putReflectances, true), getVectors(getReflectances));
   EXPECT_EQ(points, expected_points);
-  roundTrip(
-      normals, [](ByteWriter& w, auto& v) { putNormals(w, v, true); }, getNormals);
+  roundTrip(normals, putVectors(putNormals, true), getVectors(getNormals));
   EXPECT_EQ(normals, expected_normals);
   roundTrip(
-      positive, [](ByteWriter& w, auto& v) { putPositive(w, v, Rounding::kUp, true); },
+      positive, [](PayloadWriter& w, auto& v) { putPositive(w, v, Rounding::kUp, true); },
       getPositive);
   EXPECT_EQ(positive, expected_positive);
 }
@@ -118,11 +148,12 @@ TEST(ColumnCodec, PositiveNumbersKeepTheirRelativeError) {
       }
       const std::vector<float> expected = values;
       roundTrip(
-          values, [&](ByteWriter& w, auto& v) { putPositive(w, v, rounding, false); }, getPositive);
-      // Half a step to either side, or up to two steps upwards; and the rounding of exp2
-      const float half_step = 0.5f * std::log(2.f) * std::min(range, 64.f) / 65535;
-      const float below = rounding == Rounding::kUp ? 0 : half_step + 5e-6f;
-      const float above = (rounding == Rounding::kUp ? 4 * half_step : half_step) + 1e-5f;
+          values, [&](PayloadWriter& w, auto& v) { putPositive(w, v, rounding, false); },
+          getPositive);
+      // A step is at most twice a 65535th of the range
+      const float step = 2 * range / 65535 + 1e-9f;
+      const float below = rounding == Rounding::kUp ? 0 : step / 2;
+      const float above = rounding == Rounding::kUp ? step : step / 2;
       for (std::size_t i = 0; i < values.size(); ++i) {
         ASSERT_GE(values[i], expected[i] * (1 - below)) << range << ' ' << i;
         ASSERT_LE(values[i], expected[i] * (1 + above)) << range << ' ' << i;
@@ -136,12 +167,14 @@ TEST(ColumnCodec, PositiveNumbersOfAnyRangeComeBack) {
     std::vector<float> values = {kLargest, kSmallest, 1e-45f, 1, 1e30f, 1e-30f};
     const std::vector<float> expected = values;
     roundTrip(
-        values, [&](ByteWriter& w, auto& v) { putPositive(w, v, rounding, false); }, getPositive);
+        values, [&](PayloadWriter& w, auto& v) { putPositive(w, v, rounding, false); },
+        getPositive);
     EXPECT_EQ(values, expected);
     for (const float value : {kLargest, kSmallest, 1e-45f, 1.f}) {
       values.assign(3, value);
       roundTrip(
-          values, [&](ByteWriter& w, auto& v) { putPositive(w, v, rounding, false); }, getPositive);
+          values, [&](PayloadWriter& w, auto& v) { putPositive(w, v, rounding, false); },
+          getPositive);
       EXPECT_EQ(values, std::vector<float>(3, value));
     }
   }
@@ -158,18 +191,24 @@ TEST(ColumnCodec, NormalsTurnByLessThanATenThousandth) {
     }
   }
   const std::vector<glm::vec3> expected = values;
-  roundTrip(
-      values, [](ByteWriter& w, auto& v) { putNormals(w, v, false); }, getNormals);
+  roundTrip(values, putVectors(putNormals, false), getVectors(getNormals));
   for (std::size_t i = 0; i < values.size(); ++i) {
     ASSERT_LE(glm::length(values[i] - expected[i]), 1e-4f) << i;
     ASSERT_NEAR(glm::length(values[i]), 1, 1e-6f);
   }
 }
 
+TEST(ColumnCodec, NormalsAlongAnAxisAreExact) {
+  std::vector<glm::vec3> values = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},
+                                   {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+  const std::vector<glm::vec3> expected = values;
+  roundTrip(values, putVectors(putNormals, false), getVectors(getNormals));
+  EXPECT_EQ(values, expected);
+}
+
 TEST(ColumnCodec, ZeroNormalComesBackAsAUnitVector) {
   std::vector<glm::vec3> values(4, glm::vec3(0));
-  roundTrip(
-      values, [](ByteWriter& w, auto& v) { putNormals(w, v, false); }, getNormals);
+  roundTrip(values, putVectors(putNormals, false), getVectors(getNormals));
   for (const glm::vec3& value : values) EXPECT_NEAR(glm::length(value), 1, 1e-6f);
 }
 
@@ -178,8 +217,7 @@ TEST(ColumnCodec, ColorsKeepElevenBitsAtAnyScale) {
     std::vector<glm::vec3> values = randomPoints(300, scale);
     values.push_back(glm::vec3(0));
     const std::vector<glm::vec3> expected = values;
-    roundTrip(
-        values, [](ByteWriter& w, auto& v) { putColors(w, v, false); }, getColors);
+    roundTrip(values, putVectors(putColors, false), getVectors(getColors));
     for (std::size_t i = 0; i < values.size(); ++i) {
       for (int c = 0; c < 3; ++c) {
         const float small = std::max(scale * 0x1p-37f, kSmallest * 0x1p-10f);
@@ -191,20 +229,17 @@ TEST(ColumnCodec, ColorsKeepElevenBitsAtAnyScale) {
 
 TEST(ColumnCodec, LargestColorStaysFinite) {
   std::vector<glm::vec3> values = {{kLargest, 0, 1}, {kLargest, kLargest, kLargest}};
-  roundTrip(
-      values, [](ByteWriter& w, auto& v) { putColors(w, v, false); }, getColors);
+  roundTrip(values, putVectors(putColors, false), getVectors(getColors));
   EXPECT_NEAR(values[0].x, kLargest, kLargest * 0x1p-10f);
 }
 
 TEST(ColumnCodec, BlackTakesOneByte) {
-  Buffer buffer;
-  ByteWriter writer(buffer);
   std::vector<glm::vec3> values(100, glm::vec3(0));
-  putColors(writer, values, false);
-  EXPECT_EQ(buffer.size(), 1u);
+  const Buffer buffer = roundTrip(values, putVectors(putColors, false), getVectors(getColors));
+  EXPECT_EQ(buffer.size(), 9u);  // with the 8 of the payload
   values.assign(100, glm::vec3(1));
-  ByteReader reader(buffer);
-  ASSERT_TRUE(getColors(reader, values));
+  PayloadReader reader(buffer);
+  ASSERT_TRUE(getVectors(getColors)(reader, values));
   EXPECT_EQ(values, std::vector<glm::vec3>(100, glm::vec3(0)));
 }
 
@@ -212,8 +247,7 @@ TEST(ColumnCodec, ReflectancesStayWithinHalfAStepOfTheirRoots) {
   std::vector<glm::vec3> values = randomPoints(500);
   values.push_back({0, 1, 7});
   const std::vector<glm::vec3> expected = values;
-  roundTrip(
-      values, [](ByteWriter& w, auto& v) { putReflectances(w, v, false); }, getReflectances);
+  roundTrip(values, putVectors(putReflectances, false), getVectors(getReflectances));
   for (std::size_t i = 0; i + 1 < values.size(); ++i) {
     for (int c = 0; c < 3; ++c) {
       ASSERT_NEAR(std::sqrt(values[i][c]), std::sqrt(expected[i][c]), 0.5f / 255 + 1e-6f);
@@ -228,11 +262,58 @@ TEST(ColumnCodec, SignedNumbersStayWithinHalfAStep) {
   for (int i = 0; i < 500; ++i) values.push_back(random.between(-4, 4));
   const std::vector<float> expected = values;
   roundTrip(
-      values, [](ByteWriter& w, auto& v) { putSigned(w, v, 4); },
-      [](ByteReader& r, std::span<float> v) { return getSigned(r, v, 4); });
+      values, [](PayloadWriter& w, auto& v) { putSigned(w, v, 4); },
+      [](PayloadReader& r, std::span<float> v) { return getSigned(r, v, 4); });
   for (std::size_t i = 0; i < values.size(); ++i) {
     ASSERT_NEAR(values[i], std::clamp(expected[i], -4.f, 4.f), 2.f / 32767 + 1e-6f);
   }
+}
+
+TEST(ColumnCodec, SmallIntegersAreExact) {
+  std::vector<std::int16_t> values = {0, 1, -1, 32767, -32768, 255, -256};
+  const std::vector<std::int16_t> expected = values;
+  roundTrip(
+      values, [](PayloadWriter& w, auto& v) { putSmallIntegers(w, v); }, getSmallIntegers);
+  EXPECT_EQ(values, expected);
+}
+
+// Numbers of records that are no multiple of what a loop takes at once.
+TEST(ColumnCodec, AnyNumberOfRecordsComesBack) {
+  for (std::size_t count = 0; count < 70; ++count) {
+    TestRandom random(static_cast<std::uint32_t>(count));
+    std::vector<std::uint64_t> counts;
+    std::vector<float> numbers;
+    for (std::size_t i = 0; i < count; ++i) {
+      counts.push_back(random.bits() >> 8);
+      numbers.push_back(std::bit_cast<float>(0x3f800000 + (random.bits() & 0xffff)));
+    }
+    const std::vector<std::uint64_t> expected_counts = counts;
+    const std::vector<float> expected_numbers = numbers;
+    roundTrip(
+        counts, [](PayloadWriter& w, auto& v) { putCounts(w, v); }, getCounts);
+    EXPECT_EQ(counts, expected_counts);
+    roundTrip(
+        numbers, [](PayloadWriter& w, auto& v) { putPositive(w, v, Rounding::kNearest, false); },
+        getPositive);
+    EXPECT_EQ(numbers, expected_numbers);
+  }
+}
+
+TEST(ColumnCodec, NoiseGoesToThePlainPartAndRepetitionToThePackedOne) {
+  TestRandom random(4);
+  std::vector<std::uint64_t> noise(500), runs(500);
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    noise[i] = random.bits() & 0xffff;
+    runs[i] = 40000 + i / 100;
+  }
+  Buffer buffer;
+  PayloadWriter noise_writer(buffer, 500);
+  putCounts(noise_writer, noise);
+  EXPECT_EQ(noise_writer.finish(), 8u + 2);
+  EXPECT_EQ(buffer.size(), 8u + 2 + 1000);
+  PayloadWriter runs_writer(buffer, 500);
+  putCounts(runs_writer, runs);
+  EXPECT_EQ(runs_writer.finish(), buffer.size());
 }
 
 TEST(ColumnCodec, CountsAreExactAtAnyWidth) {
@@ -241,7 +322,7 @@ TEST(ColumnCodec, CountsAreExactAtAnyWidth) {
     std::vector<std::uint64_t> values = {0, largest, largest / 2, largest / 3};
     const std::vector<std::uint64_t> expected = values;
     roundTrip(
-        values, [](ByteWriter& w, auto& v) { putCounts(w, v); }, getCounts);
+        values, [](PayloadWriter& w, auto& v) { putCounts(w, v); }, getCounts);
     EXPECT_EQ(values, expected);
   }
 }
@@ -249,11 +330,11 @@ TEST(ColumnCodec, CountsAreExactAtAnyWidth) {
 TEST(ColumnCodec, BytesAndFloatsAreExact) {
   std::vector<std::uint8_t> bytes = {0, 1, 128, 255};
   roundTrip(
-      bytes, [](ByteWriter& w, auto& v) { putBytes8(w, v); }, getBytes8);
+      bytes, [](PayloadWriter& w, auto& v) { putBytes8(w, v); }, getBytes8);
   EXPECT_EQ(bytes, (std::vector<std::uint8_t>{0, 1, 128, 255}));
   std::vector<float> floats = {0, -1, kLargest, 1e-45f};
   roundTrip(
-      floats, [](ByteWriter& w, auto& v) { putFloats(w, v); }, getFloats);
+      floats, [](PayloadWriter& w, auto& v) { putFloats(w, v); }, getFloats);
   EXPECT_EQ(floats, (std::vector<float>{0, -1, kLargest, 1e-45f}));
 }
 
@@ -269,23 +350,26 @@ TEST(ColumnCodec, RandomBytesDecodeToValidValuesOrNot) {
     return isFinite(v) && v.x >= 0 && v.y >= 0 && v.z >= 0;
   };
   for (int i = 0; i < 200000; ++i) {
-    Buffer buffer(random.bits() % 80);
+    // A sound beginning: records, bytes of the packed part; then a form or a width
+    Buffer buffer(8 + random.bits() % 80);
     for (std::byte& byte : buffer) byte = static_cast<std::byte>(random.bits());
-    if (!buffer.empty()) buffer[0] = static_cast<std::byte>(random.bits() % 6);
-    ByteReader positions(buffer), normals(buffer), colors(buffer), reflectances(buffer);
-    if (getPositions(positions, vectors)) {
+    const auto packed = static_cast<std::uint32_t>(8 + random.bits() % (buffer.size() - 7));
+    std::memcpy(&buffer[4], &packed, sizeof packed);
+    if (buffer.size() > 8) buffer[8] = static_cast<std::byte>(random.bits() % 6);
+    PayloadReader positions(buffer), normals(buffer), colors(buffer), reflectances(buffer);
+    if (getVectors(getPositions)(positions, vectors)) {
       ASSERT_TRUE(std::all_of(vectors.begin(), vectors.end(), isFinite));
     }
-    if (getNormals(normals, vectors)) {
+    if (getVectors(getNormals)(normals, vectors)) {
       ASSERT_TRUE(std::all_of(vectors.begin(), vectors.end(), isFinite));
     }
-    if (getColors(colors, vectors)) {
+    if (getVectors(getColors)(colors, vectors)) {
       ASSERT_TRUE(std::all_of(vectors.begin(), vectors.end(), isColor));
     }
-    if (getReflectances(reflectances, vectors)) {
+    if (getVectors(getReflectances)(reflectances, vectors)) {
       ASSERT_TRUE(std::all_of(vectors.begin(), vectors.end(), isColor));
     }
-    ByteReader positive(buffer);
+    PayloadReader positive(buffer);
     if (getPositive(positive, numbers)) {
       for (const float v : numbers) ASSERT_TRUE(v > 0 && std::isfinite(v));
     }

@@ -14,8 +14,8 @@ namespace surfeit {
 namespace {
 
 // Of what v1.sft decodes to.
-constexpr std::uint64_t kSurfelHash = 6231462378462830309ull;
-constexpr std::uint64_t kNodeHash = 6065158161953486061ull;
+constexpr std::uint64_t kSurfelHash = 12531938469041694647ull;
+constexpr std::uint64_t kNodeHash = 8909698455433171338ull;
 // The zstd that compressed it: another one may store the same payloads in other bytes.
 constexpr unsigned kZstdVersion = 10504;
 

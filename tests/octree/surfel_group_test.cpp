@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "io/page_codec.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {
@@ -51,6 +52,36 @@ TEST(SurfelGroup, DecodeRejectsEveryTruncationAndExtension) {
     payload.push_back(std::byte{0});
     EXPECT_EQ(decodeSurfelGroup(payload, form, found).status().code(), StatusCode::kCorruption);
   }
+}
+
+TEST(SurfelGroup, StoredPagesComeBackAndDamagedOnesDoNot) {
+  for (const PageForm& form : kForms) {
+    std::vector<std::byte> payload, stored;
+    const std::size_t packed = encodeSurfelGroup(randomCloud(200), form, payload);
+    EXPECT_LT(packed, payload.size());  // random surfels are mostly noise
+    ASSERT_TRUE(compressPage(payload, packed, stored).ok());
+    EXPECT_LT(stored.size(), payload.size());
+    std::vector<std::byte> found(payload.size());
+    ASSERT_TRUE(decompressPage(stored, found).ok());
+    EXPECT_EQ(found, payload);
+    // The frame is cut as well: the rest is counted from the end
+    for (std::size_t size = 0; size < stored.size(); ++size) {
+      ASSERT_EQ(decompressPage(Bytes(stored).first(size), found).code(), StatusCode::kCorruption);
+    }
+    stored.push_back(std::byte{0});
+    EXPECT_EQ(decompressPage(stored, found).code(), StatusCode::kCorruption);
+    stored.pop_back();
+    std::vector<std::byte> short_payload(packed - 1);
+    EXPECT_EQ(decompressPage(stored, short_payload).code(), StatusCode::kCorruption);
+  }
+}
+
+TEST(SurfelGroup, EncodingDoesNotDependOnWhatTheThreadEncodedBefore) {
+  std::vector<std::byte> expected, found, other;
+  encodeSurfelGroup(randomCloud(100), {false, true}, expected);
+  encodeSurfelGroup(randomCloud(512, 7), {true, true}, other);
+  encodeSurfelGroup(randomCloud(100), {false, true}, found);
+  EXPECT_EQ(found, expected);
 }
 
 TEST(SurfelGroup, DecodeRejectsMoreThanTheGroupHolds) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "io/surfel_source.h"
+#include "io/surfel_writer.h"
 #include "io/test_directory.h"
 #include "octree/paged_octree.h"
 #include "surfeit/index.h"

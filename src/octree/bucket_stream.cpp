@@ -1,0 +1,261 @@
+#include "octree/bucket_stream.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstring>
+#include <mutex>
+
+#include "core/assert.h"
+#include "octree/surfel_block.h"
+
+namespace surfeit {
+namespace {
+
+// Threads that read a bucket's blocks: two keep the device busy with blocks of 100 KiB.
+constexpr std::size_t kReaders = 2;
+constexpr int kContentWords = sizeof(Surfel) / sizeof(SortWord);
+// Words that splitters are chosen from, when a bucket is distributed again.
+constexpr std::size_t kSampleWords = 65536;
+constexpr std::size_t kMaxBuckets = 1024;
+
+// The first failure of several threads.
+class FirstFailure {
+ public:
+  void note(const Status& status) {
+    if (status.ok()) return;
+    const std::lock_guard lock(mutex_);
+    if (status_.ok()) status_ = status;
+  }
+  const Status& status() const { return status_; }
+
+ private:
+  std::mutex mutex_;
+  Status status_;
+};
+
+}  // namespace
+
+BucketStream::BucketStream(std::unique_ptr<SurfelStore> store, const RootCube& cube,
+                           std::size_t capacity, std::string temporary_directory)
+    : cube_(cube), capacity_(capacity), temporary_directory_(std::move(temporary_directory)) {
+  levels_.push_back({std::move(store), 0, 0});
+  noteTemporaryBytes();
+}
+
+BucketStream::~BucketStream() = default;
+
+void BucketStream::noteTemporaryBytes() {
+  std::uint64_t bytes = 0;
+  for (const Level& level : levels_) bytes += level.store->temporaryBytes();
+  peak_temporary_bytes_ = std::max(peak_temporary_bytes_, bytes);
+}
+
+Result<std::shared_ptr<const SortedBatch>> BucketStream::next() {
+  while (!levels_.empty()) {
+    if (equal_store_ != nullptr) {
+      SURFEIT_ASSIGN_OR_RETURN(const std::shared_ptr<const SortedBatch> batch, nextOfEqual());
+      if (batch != nullptr) return batch;
+      continue;
+    }
+    Level& level = levels_.back();
+    if (level.next_bucket == level.store->bucketCount()) {
+      levels_.pop_back();
+      continue;
+    }
+    const SurfelStore& store = *level.store;
+    const std::size_t bucket = level.next_bucket++;
+    if (store.surfelCount(bucket) == 0) continue;
+    if (store.surfelCount(bucket) <= capacity_) return load(store, bucket);
+    SURFEIT_RETURN_IF_ERROR(distribute(store, bucket, level.word));
+  }
+  return std::shared_ptr<const SortedBatch>();
+}
+
+// The next block of a bucket of equal surfels, which need no order; nullptr after the last.
+Result<std::shared_ptr<const SortedBatch>> BucketStream::nextOfEqual() {
+  const std::span<const SurfelStore::Block> blocks = equal_store_->blocks(equal_bucket_);
+  if (equal_block_ == blocks.size()) {
+    equal_store_ = nullptr;
+    return std::shared_ptr<const SortedBatch>();
+  }
+  AlignedBuffer buffer;
+  SURFEIT_ASSIGN_OR_RETURN(const Bytes block, equal_store_->fetch(blocks[equal_block_++], buffer));
+  const std::shared_ptr<SortedBatch> batch = freshBatch();
+  SURFEIT_RETURN_IF_ERROR(unpack({&block, 1}, *batch));
+  return std::shared_ptr<const SortedBatch>(batch);
+}
+
+void BucketStream::startReading(const SurfelStore& store, std::size_t bucket) {
+  const std::span<const SurfelStore::Block> blocks = store.blocks(bucket);
+  reading_.store = &store;
+  reading_.bucket = bucket;
+  reading_.views.assign(blocks.size(), {});
+  if (reading_.buffers.size() < blocks.size()) reading_.buffers.resize(blocks.size());
+  for (std::size_t part = 0; part < kReaders; ++part) {
+    const std::size_t begin = blocks.size() * part / kReaders;
+    const std::size_t end = blocks.size() * (part + 1) / kReaders;
+    const auto read = [this, &store, blocks, begin, end]() -> Status {
+      for (std::size_t i = begin; i < end; ++i) {
+        SURFEIT_ASSIGN_OR_RETURN(reading_.views[i], store.fetch(blocks[i], reading_.buffers[i]));
+      }
+      return {};
+    };
+    reading_.parts.push_back(std::async(std::launch::async, read));
+  }
+}
+
+Status BucketStream::finishReading() {
+  Status status;
+  for (std::future<Status>& part : reading_.parts) {
+    const Status part_status = part.get();
+    if (status.ok()) status = part_status;
+  }
+  reading_.parts.clear();
+  reading_.store = nullptr;
+  return status;
+}
+
+// Starts on the bucket that follows, when it is one that can be loaded.
+void BucketStream::readAhead() {
+  const Level& level = levels_.back();
+  for (std::size_t b = level.next_bucket; b < level.store->bucketCount(); ++b) {
+    if (level.store->surfelCount(b) == 0) continue;
+    if (level.store->surfelCount(b) <= capacity_) startReading(*level.store, b);
+    return;
+  }
+}
+
+Result<std::shared_ptr<const SortedBatch>> BucketStream::load(const SurfelStore& store,
+                                                              std::size_t bucket) {
+  if (reading_.store == nullptr) startReading(store, bucket);
+  SURFEIT_CHECK(reading_.store == &store && reading_.bucket == bucket);
+  SURFEIT_RETURN_IF_ERROR(finishReading());
+  const std::shared_ptr<SortedBatch> batch = freshBatch();
+  SURFEIT_RETURN_IF_ERROR(unpack(reading_.views, *batch));
+  // The buffers are free: the device works while we sort and build
+  readAhead();
+  sort(*batch);
+  return std::shared_ptr<const SortedBatch>(batch);
+}
+
+// A batch that nobody holds any more, so that its memory is not touched for the first time again.
+std::shared_ptr<SortedBatch> BucketStream::freshBatch() {
+  for (const std::shared_ptr<SortedBatch>& batch : batches_) {
+    if (batch.use_count() == 1) return batch;
+  }
+  batches_.push_back(std::make_shared<SortedBatch>());
+  return batches_.back();
+}
+
+Status BucketStream::unpack(std::span<const Bytes> blocks, SortedBatch& batch) {
+  std::vector<std::size_t> begin(blocks.size() + 1, 0);
+  for (std::size_t i = 0; i < blocks.size(); ++i) begin[i + 1] = begin[i] + packedCount(blocks[i]);
+  batch.resize(begin.back());
+  FirstFailure failure;
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    const std::size_t size = begin[i + 1] - begin[i];
+    const std::span<Surfel> surfels = batch.surfels.subspan(begin[i], size);
+    failure.note(unpackSurfels(blocks[i], surfels));
+    for (std::size_t s = 0; s < size; ++s) {
+      batch.tickets[begin[i] + s] = {curveKey(surfels[s].position, cube_), begin[i] + s};
+    }
+  });
+  if (failure.status().ok()) return {};
+  return Status::ioError(
+      fmt::format("{} (temporary file): {}", temporary_directory_, failure.status().message()));
+}
+
+void BucketStream::sort(SortedBatch& batch) {
+  if (scratch_.size() < batch.tickets.size()) scratch_.resize(batch.tickets.size());
+  sortAlongCurve(batch.tickets, std::span(scratch_).first(batch.tickets.size()), batch.surfels);
+}
+
+SortWord BucketStream::wordOf(const Surfel& surfel, int word) const {
+  if (word == 0) return curveKey(surfel.position, cube_);
+  // Bytes compare from the front, as contentLess does
+  SortWord content;
+  std::memcpy(&content,
+              reinterpret_cast<const std::byte*>(&surfel) + sizeof content * std::size_t(word - 1),
+              sizeof content);
+  return __builtin_bswap64(content);
+}
+
+// Splitters for a bucket that is too large, and the word in which its surfels differ: one more than
+// the last word when they do not differ at all.
+Result<std::vector<SortWord>> BucketStream::chooseSplitters(const SurfelStore& store,
+                                                            std::size_t bucket, int& word) {
+  const std::uint64_t count = store.surfelCount(bucket);
+  const std::uint64_t step = std::max<std::uint64_t>(1, count / kSampleWords);
+  AlignedBuffer buffer;
+  std::vector<Surfel> surfels;
+  for (; word <= kContentWords; ++word) {
+    SortWord least = ~SortWord{0}, most = 0;
+    std::vector<SortWord> sample;
+    std::uint64_t record = 0;
+    for (const SurfelStore::Block& block : store.blocks(bucket)) {
+      SURFEIT_ASSIGN_OR_RETURN(const Bytes packed, store.fetch(block, buffer));
+      surfels.resize(block.surfels);
+      SURFEIT_RETURN_IF_ERROR(unpackSurfels(packed, surfels));
+      for (const Surfel& surfel : surfels) {
+        const SortWord at = wordOf(surfel, word);
+        least = std::min(least, at);
+        most = std::max(most, at);
+        if (record++ % step == 0) sample.push_back(at);
+      }
+    }
+    if (least == most) continue;
+    // Every value that fills a bucket by itself gets one of its own, so that what is left shrinks
+    std::sort(sample.begin(), sample.end());
+    const std::size_t buckets =
+        std::min<std::size_t>(kMaxBuckets, static_cast<std::size_t>(2 * count / capacity_ + 2));
+    std::vector<SortWord> splitters = {least + 1};
+    for (std::size_t b = 1; b < buckets; ++b) {
+      const SortWord value = sample[sample.size() * b / buckets];
+      splitters.push_back(value);
+      if (value < most) splitters.push_back(value + 1);
+    }
+    std::sort(splitters.begin(), splitters.end());
+    splitters.erase(std::unique(splitters.begin(), splitters.end()), splitters.end());
+    return splitters;
+  }
+  return std::vector<SortWord>();
+}
+
+Status BucketStream::distribute(const SurfelStore& store, std::size_t bucket, int word) {
+  SurfelStore::Plan plan;
+  SURFEIT_ASSIGN_OR_RETURN(plan.splitters, chooseSplitters(store, bucket, word));
+  if (word > kContentWords) {
+    equal_store_ = &store;
+    equal_bucket_ = bucket;
+    equal_block_ = 0;
+    return {};
+  }
+  // Open blocks of all buckets take no more than the bucket itself would have
+  plan.block_surfels = std::clamp<std::size_t>(capacity_ / (plan.splitters.size() + 1), 64, 2048);
+  plan.temporary_directory = temporary_directory_;
+  auto finer = std::make_unique<SurfelStore>(std::move(plan));
+  const std::span<const SurfelStore::Block> blocks = store.blocks(bucket);
+  FirstFailure failure;
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    thread_local AlignedBuffer buffer;
+    thread_local std::vector<Surfel> surfels;
+    thread_local std::vector<SortWord> words;
+    const Result<Bytes> packed = store.fetch(blocks[i], buffer);
+    failure.note(packed.status());
+    if (!packed.ok()) return;
+    surfels.resize(blocks[i].surfels);
+    words.resize(blocks[i].surfels);
+    failure.note(unpackSurfels(*packed, surfels));
+    for (std::size_t s = 0; s < surfels.size(); ++s) words[s] = wordOf(surfels[s], word);
+    failure.note(finer->add(surfels, words));
+  });
+  SURFEIT_RETURN_IF_ERROR(failure.status());
+  SURFEIT_RETURN_IF_ERROR(finer->finish());
+  levels_.push_back({std::move(finer), word, 0});
+  noteTemporaryBytes();
+  return {};
+}
+
+}  // namespace surfeit

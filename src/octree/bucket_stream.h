@@ -1,0 +1,78 @@
+// Takes the buckets of a SurfelStore in order, sorts each in memory and hands it out. Reads ahead
+// while the last bucket is being used.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <vector>
+
+#include "core/bounds.h"
+#include "octree/sorted_surfels.h"
+#include "octree/surfel_store.h"
+
+namespace surfeit {
+
+class BucketStream : public SortedSurfelStream {
+ public:
+  // Bytes that a surfel of a bucket takes at most while buckets follow each other: packed once;
+  // unpacked and as a ticket in this batch and the last one; and sorting.
+  static constexpr std::size_t kBytesPerSurfel = 64 + 2 * (64 + sizeof(Ticket)) + sizeof(Ticket);
+
+  // `store` is finished. Buckets of more than `capacity` surfels are distributed again, by finer
+  // splitters, through another temporary file: also when all surfels have one key, or are equal.
+  BucketStream(std::unique_ptr<SurfelStore> store, const RootCube& cube, std::size_t capacity,
+               std::string temporary_directory);
+  ~BucketStream() override;
+
+  Result<std::shared_ptr<const SortedBatch>> next() override;
+
+  // Most bytes in temporary files so far.
+  std::uint64_t temporaryBytes() const { return peak_temporary_bytes_; }
+
+ private:
+  // A store whose buckets are being taken. Its words are curve keys, or with level > 0 the
+  // content's word number level - 1, all words before being equal.
+  struct Level {
+    std::unique_ptr<SurfelStore> store;
+    int word = 0;
+    std::size_t next_bucket = 0;
+  };
+  // The blocks of a bucket, being read or read.
+  struct Reading {
+    std::vector<AlignedBuffer> buffers;
+    std::vector<Bytes> views;
+    const SurfelStore* store = nullptr;
+    std::size_t bucket = 0;
+    std::vector<std::future<Status>> parts;
+  };
+
+  void startReading(const SurfelStore& store, std::size_t bucket);
+  Status finishReading();
+  void readAhead();
+  Result<std::shared_ptr<const SortedBatch>> load(const SurfelStore& store, std::size_t bucket);
+  Result<std::shared_ptr<const SortedBatch>> nextOfEqual();
+  Status unpack(std::span<const Bytes> blocks, SortedBatch& batch);
+  void sort(SortedBatch& batch);
+  std::shared_ptr<SortedBatch> freshBatch();
+  Status distribute(const SurfelStore& store, std::size_t bucket, int word);
+  Result<std::vector<SortWord>> chooseSplitters(const SurfelStore& store, std::size_t bucket,
+                                                int& word);
+  SortWord wordOf(const Surfel& surfel, int word) const;
+  void noteTemporaryBytes();
+
+  const RootCube cube_;
+  const std::size_t capacity_;
+  const std::string temporary_directory_;
+  std::vector<Level> levels_;
+  Reading reading_;
+  std::vector<Ticket> scratch_;
+  std::vector<std::shared_ptr<SortedBatch>> batches_;  // handed out before, reused when free
+  std::uint64_t peak_temporary_bytes_ = 0;
+  // A bucket of equal surfels, handed out piece by piece
+  const SurfelStore* equal_store_ = nullptr;
+  std::size_t equal_bucket_ = 0, equal_block_ = 0;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,206 @@
+#include "octree/cloud_reader.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_pipeline.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <mutex>
+
+#include "octree/row_fetcher.h"
+
+namespace surfeit {
+namespace {
+
+// Records read at each place of a sample: few, because neighbours say the same.
+constexpr std::size_t kSampleRun = 32;
+
+// What the decoding threads of one input share.
+class InputPass {
+ public:
+  InputPass(const SurfelSource& source, const CloudReader::Consumer& consume,
+            std::uint64_t sample_step, Progress& progress)
+      : source_(source), consume_(consume), sample_step_(sample_step), progress_(progress) {}
+
+  void decode(const RowFetcher::Rows& rows);
+  void note(std::uint64_t record, const Status& status);
+
+  bool failed() const { return failed_; }
+  const Status& status() const { return status_; }
+  CloudTotals& totals() { return totals_; }
+  const SurfelDefects& defects() const { return defects_; }
+
+ private:
+  Status decodePart(Bytes rows, std::uint64_t first_record, CloudTotals& totals,
+                    SurfelDefects& defects);
+
+  const SurfelSource& source_;
+  const CloudReader::Consumer& consume_;
+  const std::uint64_t sample_step_;
+  Progress& progress_;
+  std::atomic<bool> failed_{false};
+  std::mutex mutex_;  // guards what is below
+  CloudTotals totals_;
+  SurfelDefects defects_;
+  Status status_;
+  std::uint64_t failed_record_ = std::numeric_limits<std::uint64_t>::max();
+};
+
+// Keeps the failure that comes first in the file.
+void InputPass::note(std::uint64_t record, const Status& status) {
+  if (status.ok()) return;
+  const std::lock_guard lock(mutex_);
+  if (record < failed_record_) {
+    failed_record_ = record;
+    status_ = status;
+  }
+  failed_ = true;
+}
+
+Status InputPass::decodePart(Bytes rows, std::uint64_t first_record, CloudTotals& totals,
+                             SurfelDefects& defects) {
+  thread_local std::vector<Surfel> surfels;
+  surfels.resize(kReadBatch);
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                           source_.decodeRows(rows, first_record, surfels, defects));
+  const std::span<Surfel> batch = std::span(surfels).first(count);
+  totals.add(batch);
+  const std::uint64_t phase = first_record % sample_step_;
+  for (std::size_t i = phase == 0 ? 0 : sample_step_ - phase; i < count; i += sample_step_) {
+    totals.sample.push_back(batch[i]);
+  }
+  return consume_(batch);
+}
+
+void InputPass::decode(const RowFetcher::Rows& rows) {
+  const std::size_t row_bytes = source_.rowBytes();
+  const std::size_t row_count = rows.bytes.size() / row_bytes;
+  CloudTotals totals;
+  SurfelDefects defects;
+  for (std::size_t begin = 0; begin < row_count && !failed_; begin += kReadBatch) {
+    const std::size_t count = std::min(kReadBatch, row_count - begin);
+    const Bytes part = rows.bytes.subspan(begin * row_bytes, count * row_bytes);
+    note(rows.first_record + begin, decodePart(part, rows.first_record + begin, totals, defects));
+  }
+  const std::lock_guard lock(mutex_);
+  totals_.add(totals);
+  defects_.add(defects);
+  progress_.advance(row_count);
+  progress_.advanceBytes(rows.bytes.size());
+}
+
+CloudChannels unionOf(const CloudChannels& a, const CloudChannels& b) {
+  return {a.normal || b.normal,       a.radius || b.radius, a.area || b.area,
+          a.radiosity || b.radiosity, a.albedo || b.albedo, a.two_sided || b.two_sided};
+}
+
+}  // namespace
+
+void CloudTotals::add(std::span<const Surfel> added) {
+  for (const Surfel& surfel : added) {
+    missing_both += surfel.radius <= 0 && surfel.area <= 0 ? 1 : 0;
+    missing_area += surfel.radius > 0 && surfel.area <= 0 ? 1 : 0;
+    missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
+    spheres += surfel.isSphere() ? 1 : 0;
+    bounds.add(surfel.position);
+    content += XXH3_64bits(&surfel, sizeof surfel);
+  }
+  surfels += added.size();
+}
+
+void CloudTotals::add(const CloudTotals& other) {
+  if (!other.bounds.isEmpty()) bounds.add(other.bounds);
+  surfels += other.surfels;
+  skipped += other.skipped;
+  content += other.content;
+  channels = unionOf(channels, other.channels);
+  missing_both += other.missing_both;
+  missing_area += other.missing_area;
+  missing_radius += other.missing_radius;
+  spheres += other.spheres;
+  sample.insert(sample.end(), other.sample.begin(), other.sample.end());
+}
+
+Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bool strict,
+                                      std::size_t read_bytes) {
+  CloudReader reader;
+  reader.inputs_ = inputs;
+  reader.strict_ = strict;
+  reader.read_bytes_ = read_bytes;
+  for (const std::string& path : inputs) {
+    SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, strict));
+    reader.records_.push_back(source->recordCount());
+    reader.record_count_ += source->recordCount();
+    reader.is_seekable_ = reader.is_seekable_ && source->isSeekable();
+    SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+    reader.file_bytes_ += file.size();
+  }
+  return reader;
+}
+
+Result<std::vector<Surfel>> CloudReader::sample() const {
+  std::vector<Surfel> all, run(kSampleRun);
+  const std::uint64_t step =
+      std::max<std::uint64_t>(kSampleRun, record_count_ / (kSampleSurfels / kSampleRun));
+  AlignedBuffer buffer;
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    SURFEIT_ASSIGN_OR_RETURN(const auto source,
+                             openSurfelSource(inputs_[i], strict_, Access::kDirect));
+    for (std::uint64_t record = step / 2; record < records_[i]; record += step) {
+      SURFEIT_RETURN_IF_ERROR(source->seekRow(record));
+      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, source->readRows(kSampleRun, buffer));
+      SurfelDefects defects;
+      SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                               source->decodeRows(rows, record, run, defects));
+      all.insert(all.end(), run.begin(), run.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+  }
+  return all;
+}
+
+Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& progress) const {
+  using tbb::filter_mode;
+  CloudTotals totals;
+  const std::uint64_t sample_step = std::max<std::uint64_t>(1, record_count_ / kSampleSurfels);
+  for (const std::string& path : inputs_) {
+    SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, strict_, Access::kDirect));
+    InputPass pass(*source, consume, sample_step, progress);
+    RowFetcher fetcher(*source, read_bytes_);
+    tbb::parallel_pipeline(
+        RowFetcher::kSlots,
+        tbb::make_filter<void, RowFetcher::Rows>(filter_mode::serial_in_order,
+                                                 [&](tbb::flow_control& control) {
+                                                   if (progress.isCancelled())
+                                                     pass.note(0, Status::interrupted());
+                                                   RowFetcher::Rows rows;
+                                                   if (!pass.failed()) rows = fetcher.next();
+                                                   if (rows.bytes.empty()) control.stop();
+                                                   return rows;
+                                                 }) &
+            tbb::make_filter<RowFetcher::Rows, void>(filter_mode::parallel,
+                                                     [&](const RowFetcher::Rows& rows) {
+                                                       pass.decode(rows);
+                                                       fetcher.giveBack(rows);
+                                                     }));
+    if (pass.failed()) return pass.status();
+    SURFEIT_RETURN_IF_ERROR(fetcher.status());
+    pass.totals().channels = source->channels();
+    pass.totals().skipped = pass.defects().total();
+    if (const std::string defects = pass.defects().describe(); !defects.empty()) {
+      progress.note(fmt::format("{}: skipped {}", path, defects));
+    }
+    totals.add(pass.totals());
+  }
+  return totals;
+}
+
+std::uint64_t CloudReader::memoryBytes(std::size_t read_bytes, int threads) {
+  // A batch, grouped by bucket with its words, and a packed block
+  constexpr std::uint64_t kThreadBytes = kReadBatch * (2 * sizeof(Surfel) + 16) + (512 << 10);
+  return RowFetcher::kSlots * std::uint64_t{read_bytes} +
+         static_cast<std::uint64_t>(threads) * kThreadBytes + 3 * kSampleSurfels * sizeof(Surfel);
+}
+
+}  // namespace surfeit

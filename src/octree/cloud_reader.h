@@ -1,0 +1,75 @@
+// Reads all input clouds of the indexer once: one thread fetches records, all decode them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/bounds.h"
+#include "io/surfel_source.h"
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// Surfels that are handed out at once: 512 KiB, which the second-level cache holds.
+inline constexpr std::size_t kReadBatch = 8192;
+// Surfels of a sample, about.
+inline constexpr std::size_t kSampleSurfels = 65536;
+
+// What one pass over the inputs finds out. The order of the surfels does not show.
+struct CloudTotals {
+  Bounds3 bounds;
+  std::uint64_t surfels = 0;
+  std::uint64_t skipped = 0;
+  std::uint64_t content = 0;  // sum of the surfels' hashes
+  CloudChannels channels;
+  std::uint64_t missing_both = 0, missing_area = 0, missing_radius = 0, spheres = 0;
+  std::vector<Surfel> sample;  // surfels from all over the inputs
+
+  void add(std::span<const Surfel> surfels);
+  void add(const CloudTotals& other);
+};
+
+class CloudReader {
+ public:
+  // Opens every input to see that it can be read. `read_bytes`: how much is fetched at once.
+  static Result<CloudReader> open(const std::vector<std::string>& inputs, bool strict,
+                                  std::size_t read_bytes);
+
+  // Records of all inputs, valid or not, and bytes of the files.
+  std::uint64_t recordCount() const { return record_count_; }
+  std::uint64_t fileBytes() const { return file_bytes_; }
+  // Whether sample() works: all inputs can be read at any place.
+  bool isSeekable() const { return is_seekable_; }
+
+  // A sample of the surfels, from places spread evenly over all inputs.
+  Result<std::vector<Surfel>> sample() const;
+
+  // Takes batches of at most kReadBatch surfels, which it may change, from several threads at once.
+  using Consumer = std::function<Status(std::span<Surfel>)>;
+  // Reads everything. Invalid records are skipped, counted and told through progress.note(), or
+  // refused. With the threads of the current arena. Errors: those of the inputs and the consumer;
+  // of several bad records the first; kInterrupted.
+  Result<CloudTotals> readAll(const Consumer& consume, Progress& progress) const;
+
+  // Memory of readAll for this many threads.
+  static std::uint64_t memoryBytes(std::size_t read_bytes, int threads);
+
+ private:
+  CloudReader() = default;
+
+  std::vector<std::string> inputs_;
+  std::vector<std::uint64_t> records_;  // by input
+  bool strict_ = false;
+  std::size_t read_bytes_ = 0;
+  std::uint64_t record_count_ = 0;
+  std::uint64_t file_bytes_ = 0;
+  bool is_seekable_ = true;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,31 @@
+// Sorting along the curve: what moves is a ticket of 16 bytes, not the surfel.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "core/curve_key.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// A surfel's place on the curve and where the surfel lies.
+struct Ticket {
+  CurveKey key = 0;
+  std::uint64_t index = 0;
+};
+
+// Order of surfels with one key: by their bytes, so that the order of the input does not show.
+bool contentLess(const Surfel& a, const Surfel& b);
+
+// Sorts tickets by key with all threads of the current arena; `scratch` has the same size. Within a
+// key the order stays as it was. A pass from the top splits the tickets until they fit the
+// second-level cache, where passes from the bottom sort them: measured on 4 M keys of a scene, 25
+// ns per key against 66 for passes from the bottom alone and 100 for a comparison sort.
+void sortByKey(std::span<Ticket> tickets, std::span<Ticket> scratch);
+
+// The same, and within a key by content. `surfels` is what the indices point into.
+void sortAlongCurve(std::span<Ticket> tickets, std::span<Ticket> scratch,
+                    std::span<const Surfel> surfels);
+
+}  // namespace surfeit

@@ -1,0 +1,49 @@
+// What a thread makes of a slab by itself: encoded surfel pages, and the octree of each brick.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "octree/cell_sweep.h"
+#include "octree/scene_file.h"
+#include "octree/slab.h"
+
+namespace surfeit {
+
+// Encoded pages, one after the other.
+struct EncodedPages {
+  struct Page {
+    std::uint32_t stored_bytes = 0, payload_bytes = 0;
+  };
+  std::vector<std::byte> bytes;
+  std::vector<Page> pages;
+
+  void add(std::span<const std::byte> stored, std::size_t payload_bytes);
+};
+
+// A built slab. Leaves refer to surfel pages by their number in the slab, interior nodes to the
+// children by the number of the sibling group in the slab.
+struct BuiltSlab {
+  struct Siblings {
+    std::uint8_t level = 0, count = 0;
+  };
+  struct Root {
+    FinishedNode node;
+    int boundary_level = 0;
+    std::size_t siblings_end = 0;  // sibling groups of this brick and those before
+  };
+  EncodedPages surfel_pages;
+  std::size_t surfel_count = 0;
+  std::vector<LevelNode> nodes;  // sibling group after sibling group, in the order of closing
+  std::vector<Siblings> siblings;
+  std::vector<Root> roots;  // by brick
+  bool is_giant = false;
+  bool giant_begins = false, giant_ends = false;
+};
+
+// Builds a slab; `header` says how pages are filled and stored. Safe from any thread.
+Result<BuiltSlab> buildSlab(const Slab& slab, const SceneHeader& header);
+
+}  // namespace surfeit

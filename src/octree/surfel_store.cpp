@@ -1,0 +1,163 @@
+#include "octree/surfel_store.h"
+
+#include <algorithm>
+
+#include "core/assert.h"
+#include "octree/surfel_block.h"
+
+namespace surfeit {
+namespace {
+
+constexpr int kTableBits = 14;
+constexpr std::size_t kChunkBytes = 4 << 20;
+
+}  // namespace
+
+struct SurfelStore::Bucket {
+  std::mutex mutex;  // guards all below; held for copying and bookkeeping only
+  std::vector<Surfel> open;
+  std::vector<Block> blocks;
+  std::uint64_t surfels = 0;
+};
+
+SurfelStore::SurfelStore(Plan plan)
+    : plan_(std::move(plan)),
+      bucket_count_(plan_.splitters.size() + 1),
+      first_bucket_((std::size_t{1} << kTableBits) + 1),
+      buckets_(new Bucket[bucket_count_]) {
+  SURFEIT_CHECK(std::is_sorted(plan_.splitters.begin(), plan_.splitters.end()));
+  for (std::size_t i = 0; i + 1 < first_bucket_.size(); ++i) {
+    const SortWord word = SortWord{i} << (64 - kTableBits);
+    first_bucket_[i] = static_cast<std::uint32_t>(
+        std::upper_bound(plan_.splitters.begin(), plan_.splitters.end(), word) -
+        plan_.splitters.begin());
+  }
+  first_bucket_.back() = static_cast<std::uint32_t>(plan_.splitters.size());
+}
+
+SurfelStore::~SurfelStore() = default;
+
+std::size_t SurfelStore::bucketOf(SortWord word) const {
+  const std::size_t top = word >> (64 - kTableBits);
+  const auto begin = plan_.splitters.begin() + first_bucket_[top];
+  const auto end = plan_.splitters.begin() + first_bucket_[top + 1];
+  return static_cast<std::size_t>(std::upper_bound(begin, end, word) - plan_.splitters.begin());
+}
+
+Status SurfelStore::add(std::span<const Surfel> surfels, std::span<const SortWord> words) {
+  SURFEIT_ASSERT(surfels.size() == words.size());
+  if (bucket_count_ == 1) return append(buckets_[0], surfels);
+
+  // Group by bucket, so that a bucket is locked once for all its surfels
+  thread_local std::vector<std::uint32_t> bucket_of, next;
+  thread_local std::vector<Surfel> grouped;
+  bucket_of.resize(surfels.size());
+  grouped.resize(surfels.size());
+  next.assign(bucket_count_ + 1, 0);
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    bucket_of[i] = static_cast<std::uint32_t>(bucketOf(words[i]));
+    ++next[bucket_of[i] + 1];
+  }
+  for (std::size_t b = 0; b < bucket_count_; ++b) next[b + 1] += next[b];
+  for (std::size_t i = 0; i < surfels.size(); ++i) grouped[next[bucket_of[i]]++] = surfels[i];
+  // next[b] is now where bucket b ends
+  std::size_t begin = 0;
+  for (std::size_t b = 0; b < bucket_count_; ++b) {
+    const std::size_t end = next[b];
+    if (end == begin) continue;
+    SURFEIT_RETURN_IF_ERROR(append(buckets_[b], std::span(grouped).subspan(begin, end - begin)));
+    begin = end;
+  }
+  return {};
+}
+
+Status SurfelStore::append(Bucket& bucket, std::span<const Surfel> surfels) {
+  // Full blocks leave the bucket before they are packed, so that others can go on filling it
+  thread_local std::vector<Surfel> full;
+  while (!surfels.empty()) {
+    full.clear();
+    {
+      const std::lock_guard lock(bucket.mutex);
+      bucket.surfels += surfels.size();
+      if (bucket.open.capacity() < plan_.block_surfels) bucket.open.reserve(plan_.block_surfels);
+      const std::size_t room = plan_.block_surfels - bucket.open.size();
+      const std::size_t count = std::min(room, surfels.size());
+      bucket.open.insert(bucket.open.end(), surfels.begin(),
+                         surfels.begin() + static_cast<std::ptrdiff_t>(count));
+      surfels = surfels.subspan(count);
+      bucket.surfels -= surfels.size();
+      if (bucket.open.size() == plan_.block_surfels) bucket.open.swap(full);
+    }
+    if (!full.empty()) SURFEIT_RETURN_IF_ERROR(store(bucket, full));
+  }
+  return {};
+}
+
+Status SurfelStore::store(Bucket& bucket, std::span<const Surfel> surfels) {
+  thread_local std::vector<std::byte> packed;
+  packSurfels(surfels, packed);
+  Block block;
+  block.bytes = static_cast<std::uint32_t>(packed.size());
+  block.surfels = static_cast<std::uint32_t>(surfels.size());
+  if (std::byte* memory = allocate(packed.size()); memory != nullptr) {
+    std::copy(packed.begin(), packed.end(), memory);
+    block.memory = memory;
+  } else {
+    {
+      const std::lock_guard lock(file_mutex_);
+      if (file_ == nullptr) {
+        SURFEIT_ASSIGN_OR_RETURN(TemporaryFile file,
+                                 TemporaryFile::create(plan_.temporary_directory));
+        file_ = std::make_unique<TemporaryFile>(std::move(file));
+      }
+    }
+    SURFEIT_ASSIGN_OR_RETURN(block.offset, file_->append(packed));
+    temporary_bytes_ += packed.size();
+  }
+  const std::lock_guard lock(bucket.mutex);
+  bucket.blocks.push_back(block);
+  return {};
+}
+
+// Room in memory, or nullptr when the allowance is used up: from then on all goes to the file.
+std::byte* SurfelStore::allocate(std::size_t bytes) {
+  const std::lock_guard lock(memory_mutex_);
+  if (memory_full_) return nullptr;
+  if (chunks_.empty() || chunk_used_ + bytes > chunks_.back().capacity()) {
+    const std::size_t chunk_bytes = std::max(kChunkBytes, bytes);
+    if (memory_used_ + chunk_bytes > plan_.memory_bytes) {
+      memory_full_ = true;
+      return nullptr;
+    }
+    chunks_.emplace_back(chunk_bytes);
+    memory_used_ += chunk_bytes;
+    chunk_used_ = 0;
+  }
+  std::byte* memory = chunks_.back().data() + chunk_used_;
+  chunk_used_ += bytes;
+  return memory;
+}
+
+Status SurfelStore::finish() {
+  for (std::size_t b = 0; b < bucket_count_; ++b) {
+    Bucket& bucket = buckets_[b];
+    if (!bucket.open.empty()) SURFEIT_RETURN_IF_ERROR(store(bucket, bucket.open));
+    bucket.open = {};
+  }
+  return file_ != nullptr ? file_->flush() : Status();
+}
+
+std::uint64_t SurfelStore::surfelCount(std::size_t bucket) const {
+  return buckets_[bucket].surfels;
+}
+
+std::span<const SurfelStore::Block> SurfelStore::blocks(std::size_t bucket) const {
+  return buckets_[bucket].blocks;
+}
+
+Result<Bytes> SurfelStore::fetch(const Block& block, AlignedBuffer& buffer) const {
+  if (block.memory != nullptr) return Bytes(block.memory, block.bytes);
+  return file_->readView(block.offset, block.bytes, buffer);
+}
+
+}  // namespace surfeit
