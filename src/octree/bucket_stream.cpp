@@ -13,7 +13,8 @@
 namespace surfeit {
 namespace {
 
-// Threads that read a bucket's blocks: two keep the device busy with blocks of 100 KiB.
+// Threads that read the blocks of a bucket: blocks of 100 to 400 KiB need several to keep the
+// device busy.
 constexpr std::size_t kReaders = 2;
 constexpr int kContentWords = sizeof(Surfel) / sizeof(SortWord);
 // Words that splitters are chosen from, when a bucket is distributed again.
@@ -82,7 +83,7 @@ Result<std::shared_ptr<const SortedBatch>> BucketStream::nextOfEqual() {
   }
   AlignedBuffer buffer;
   SURFEIT_ASSIGN_OR_RETURN(const Bytes block, equal_store_->fetch(blocks[equal_block_++], buffer));
-  const std::shared_ptr<SortedBatch> batch = freshBatch();
+  const std::shared_ptr<SortedBatch> batch = batches_.take();
   SURFEIT_RETURN_IF_ERROR(unpack({&block, 1}, *batch));
   return std::shared_ptr<const SortedBatch>(batch);
 }
@@ -132,21 +133,12 @@ Result<std::shared_ptr<const SortedBatch>> BucketStream::load(const SurfelStore&
   if (reading_.store == nullptr) startReading(store, bucket);
   SURFEIT_CHECK(reading_.store == &store && reading_.bucket == bucket);
   SURFEIT_RETURN_IF_ERROR(finishReading());
-  const std::shared_ptr<SortedBatch> batch = freshBatch();
+  const std::shared_ptr<SortedBatch> batch = batches_.take();
   SURFEIT_RETURN_IF_ERROR(unpack(reading_.views, *batch));
   // The buffers are free: the device works while we sort and build
   readAhead();
   sort(*batch);
   return std::shared_ptr<const SortedBatch>(batch);
-}
-
-// A batch that nobody holds any more, so that its memory is not touched for the first time again.
-std::shared_ptr<SortedBatch> BucketStream::freshBatch() {
-  for (const std::shared_ptr<SortedBatch>& batch : batches_) {
-    if (batch.use_count() == 1) return batch;
-  }
-  batches_.push_back(std::make_shared<SortedBatch>());
-  return batches_.back();
 }
 
 Status BucketStream::unpack(std::span<const Bytes> blocks, SortedBatch& batch) {
@@ -158,9 +150,10 @@ Status BucketStream::unpack(std::span<const Bytes> blocks, SortedBatch& batch) {
     const std::size_t size = begin[i + 1] - begin[i];
     const std::span<Surfel> surfels = batch.surfels.subspan(begin[i], size);
     failure.note(unpackSurfels(blocks[i], surfels));
-    for (std::size_t s = 0; s < size; ++s) {
-      batch.tickets[begin[i] + s] = {curveKey(surfels[s].position, cube_), begin[i] + s};
-    }
+    thread_local std::vector<CurveKey> keys;
+    keys.resize(size);
+    if (size > 0) curveKeys(&surfels.front().position, sizeof(Surfel), cube_, keys);
+    for (std::size_t s = 0; s < size; ++s) batch.tickets[begin[i] + s] = {keys[s], begin[i] + s};
   });
   if (failure.status().ok()) return {};
   return Status::ioError(

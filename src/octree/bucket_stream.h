@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/bounds.h"
+#include "core/recycler.h"
 #include "octree/sorted_surfels.h"
 #include "octree/surfel_store.h"
 
@@ -55,7 +56,6 @@ class BucketStream : public SortedSurfelStream {
   Result<std::shared_ptr<const SortedBatch>> nextOfEqual();
   Status unpack(std::span<const Bytes> blocks, SortedBatch& batch);
   void sort(SortedBatch& batch);
-  std::shared_ptr<SortedBatch> freshBatch();
   Status distribute(const SurfelStore& store, std::size_t bucket, int word);
   Result<std::vector<SortWord>> chooseSplitters(const SurfelStore& store, std::size_t bucket,
                                                 int& word);
@@ -68,7 +68,7 @@ class BucketStream : public SortedSurfelStream {
   std::vector<Level> levels_;
   Reading reading_;
   std::vector<Ticket> scratch_;
-  std::vector<std::shared_ptr<SortedBatch>> batches_;  // handed out before, reused when free
+  Recycler<SortedBatch> batches_;
   std::uint64_t peak_temporary_bytes_ = 0;
   // A bucket of equal surfels, handed out piece by piece
   const SurfelStore* equal_store_ = nullptr;

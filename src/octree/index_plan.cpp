@@ -21,8 +21,10 @@ constexpr std::size_t kMaxBlockSurfels = 2048, kMinBlockSurfels = 64;
 constexpr std::uint64_t kFileBytes = 12 << 20;
 // Bytes of the page directory per surfel: 24 for each surfel page, and each node page.
 constexpr double kDirectoryBytes = 0.1;
-// Smaller buckets than this leave threads waiting.
+// Larger buckets than this gain nothing, and their memory has to be touched for a first time; fewer
+// than so many buckets do no harm.
 constexpr std::size_t kUsefulBucket = 1 << 20;
+constexpr double kFewBuckets = 1024;
 
 }  // namespace
 
@@ -51,7 +53,10 @@ IndexPlan planIndex(std::uint64_t memory_bytes, int threads, std::uint64_t recor
     plan.block_memory = static_cast<std::uint64_t>(packed_total);
     plan.bucket_capacity = static_cast<std::size_t>(small);
   } else {
-    plan.bucket_capacity = std::max<std::size_t>(1024, building / BucketStream::kBytesPerSurfel);
+    const std::uint64_t useful = std::max<std::uint64_t>(
+        kUsefulBucket, static_cast<std::uint64_t>(double(records) * kUnevenness / kFewBuckets));
+    plan.bucket_capacity = static_cast<std::size_t>(
+        std::clamp<std::uint64_t>(building / BucketStream::kBytesPerSurfel, 1024, useful));
   }
   const double buckets = std::ceil(double(records) * kUnevenness / double(plan.bucket_capacity));
   plan.bucket_count = records <= plan.bucket_capacity

@@ -2,12 +2,14 @@
 
 #include <tbb/parallel_pipeline.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <mutex>
 #include <utility>
 
 #include "core/assert.h"
+#include "core/recycler.h"
 
 namespace surfeit {
 namespace {
@@ -17,7 +19,7 @@ struct Work {
   Slab slab;
   BuiltSlab built;
   std::vector<FullNodePage> full_pages;
-  std::vector<EncodedPages> node_pages;  // one each
+  std::vector<EncodedPages> node_pages;  // one each; there may be more from before
 };
 using WorkPtr = std::shared_ptr<Work>;
 
@@ -50,6 +52,7 @@ class OctreePipeline {
   const SceneHeader header_;
   SlabStitcher stitcher_;
   Progress& progress_;
+  Recycler<Work> works_;
   std::mutex mutex_;  // guards status_
   Status status_;
   std::atomic<bool> failed_{false};
@@ -68,16 +71,14 @@ WorkPtr OctreePipeline::cut() {
   Result<std::optional<Slab>> slab = cutter_.next();
   note(slab.status());
   if (!slab.ok() || !slab->has_value()) return nullptr;
-  const WorkPtr work = std::make_shared<Work>();
+  const WorkPtr work = works_.take();
   work->slab = std::move(**slab);
   return work;
 }
 
 void OctreePipeline::build(Work& work) {
   if (failed_) return;
-  Result<BuiltSlab> built = buildSlab(work.slab, header_);
-  note(built.status());
-  if (built.ok()) work.built = std::move(*built);
+  note(buildSlab(work.slab, header_, work.built));
   work.slab = {};
 }
 
@@ -89,8 +90,9 @@ void OctreePipeline::stitch(Work& work) {
 
 void OctreePipeline::encode(Work& work) {
   if (failed_) return;
-  work.node_pages.resize(work.full_pages.size());
+  work.node_pages.resize(std::max(work.node_pages.size(), work.full_pages.size()));
   for (std::size_t i = 0; i < work.full_pages.size(); ++i) {
+    work.node_pages[i].clear();
     note(encodeNodePage(work.full_pages[i], header_.full_precision, work.node_pages[i]));
     work.full_pages[i].nodes = {};
   }
@@ -99,7 +101,7 @@ void OctreePipeline::encode(Work& work) {
 void OctreePipeline::write(Work& work) {
   if (failed_) return;
   note(writer_.addSurfelPages(work.built.surfel_pages, work.built.surfel_count));
-  for (std::size_t i = 0; i < work.node_pages.size() && !failed_; ++i) {
+  for (std::size_t i = 0; i < work.full_pages.size() && !failed_; ++i) {
     note(writer_.addNodePage(work.full_pages[i].level, work.node_pages[i].bytes,
                              work.node_pages[i].pages.front().payload_bytes));
   }

@@ -26,10 +26,15 @@ class SlabSiblings : public SiblingSink {
 
 class SlabBuilder {
  public:
-  SlabBuilder(const Slab& slab, const SceneHeader& header)
-      : slab_(slab), header_(header), sink_(built_), sweep_(sink_, header.flatness_limit) {}
+  SlabBuilder(const Slab& slab, const SceneHeader& header, BuiltSlab& built)
+      : slab_(slab),
+        header_(header),
+        built_(built),
+        sink_(built),
+        sweep_(sink_, header.flatness_limit) {}
 
-  Result<BuiltSlab> build() {
+  Status build() {
+    built_.clear();
     fetchSurfels();
     built_.surfel_count = surfels_.size();
     built_.is_giant = slab_.is_giant;
@@ -41,8 +46,7 @@ class SlabBuilder {
       begin = brick.end;
     }
     page_begins_.push_back(surfels_.size());
-    SURFEIT_RETURN_IF_ERROR(encodePages());
-    return std::move(built_);
+    return encodePages();
   }
 
  private:
@@ -55,7 +59,7 @@ class SlabBuilder {
 
   const Slab& slab_;
   const SceneHeader& header_;
-  BuiltSlab built_;
+  BuiltSlab& built_;
   SlabSiblings sink_;
   CellSweep sweep_;
   std::vector<Surfel>& surfels_ = surfelScratch();
@@ -175,8 +179,20 @@ void EncodedPages::add(std::span<const std::byte> stored, std::size_t payload_by
       {static_cast<std::uint32_t>(stored.size()), static_cast<std::uint32_t>(payload_bytes)});
 }
 
-Result<BuiltSlab> buildSlab(const Slab& slab, const SceneHeader& header) {
-  return SlabBuilder(slab, header).build();
+void EncodedPages::clear() {
+  bytes.clear();
+  pages.clear();
+}
+
+void BuiltSlab::clear() {
+  surfel_pages.clear();
+  nodes.clear();
+  siblings.clear();
+  roots.clear();
+}
+
+Status buildSlab(const Slab& slab, const SceneHeader& header, BuiltSlab& built) {
+  return SlabBuilder(slab, header, built).build();
 }
 
 }  // namespace surfeit

@@ -21,6 +21,7 @@ struct EncodedPages {
   std::vector<Page> pages;
 
   void add(std::span<const std::byte> stored, std::size_t payload_bytes);
+  void clear();
 };
 
 // A built slab. Leaves refer to surfel pages by their number in the slab, interior nodes to the
@@ -41,9 +42,12 @@ struct BuiltSlab {
   std::vector<Root> roots;  // by brick
   bool is_giant = false;
   bool giant_begins = false, giant_ends = false;
+
+  void clear();
 };
 
-// Builds a slab; `header` says how pages are filled and stored. Safe from any thread.
-Result<BuiltSlab> buildSlab(const Slab& slab, const SceneHeader& header);
+// Builds a slab into `built` (replaced, its memory used again); `header` says how pages are filled
+// and stored. Safe from any thread.
+Status buildSlab(const Slab& slab, const SceneHeader& header, BuiltSlab& built);
 
 }  // namespace surfeit

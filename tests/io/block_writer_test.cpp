@@ -46,7 +46,7 @@ TEST_F(BlockWriterTest, SmallFileStartsNoThread) {
   EXPECT_EQ(entryCount("/proc/self/task"), threads);
   EXPECT_FALSE(file_.isDirect());
   ASSERT_TRUE(writer.append(bytesOf("a")).ok());
-  EXPECT_EQ(entryCount("/proc/self/task"), threads + 1);
+  EXPECT_GT(entryCount("/proc/self/task"), threads);
 }
 
 TEST_F(BlockWriterTest, AppendReturnsOffsetsAndFlushWritesAll) {
