@@ -107,6 +107,9 @@ class TemporaryFile {
   // were appended. What has not been flushed, they flush.
   Status readAt(std::uint64_t offset, std::span<std::byte> bytes) const;
   Result<Bytes> readView(std::uint64_t offset, std::size_t size, AlignedBuffer& buffer) const;
+  // Gives the space of a flushed range back to the file system, where that works. What was there
+  // must not be read again.
+  void release(std::uint64_t offset, std::uint64_t size);
 
  private:
   struct State;

@@ -122,6 +122,13 @@ Result<std::size_t> PositionalFile::readAligned(std::uint64_t begin, std::size_t
   return done + rest;
 }
 
+void PositionalFile::release(std::uint64_t offset, std::uint64_t size) const {
+  const std::uint64_t begin = (offset + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
+  const std::uint64_t end = (offset + size) / kDirectAlignment * kDirectAlignment;
+  // What it does not give back goes with the file
+  if (begin < end) system_calls::punchHole(cached_.get(), begin, end - begin);
+}
+
 Status PositionalFile::writeAt(std::uint64_t offset, Bytes bytes) const {
   while (!bytes.empty()) {
     const ssize_t written = system_calls::pwrite(cached_.get(), bytes.data(), bytes.size(), offset);

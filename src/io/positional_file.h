@@ -95,6 +95,9 @@ class PositionalFile {
 
   // Writes all bytes at any offset, cached.
   Status writeAt(std::uint64_t offset, Bytes bytes) const;
+  // Gives space back to the file system: that of the whole pages within the range. Does nothing
+  // where the file system cannot.
+  void release(std::uint64_t offset, std::uint64_t size) const;
   // Writes directly what begins, lies and ends at multiples of kDirectAlignment; cached where
   // direct I/O is not open or refused.
   Status writeAligned(std::uint64_t offset, Bytes bytes) const;

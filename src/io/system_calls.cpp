@@ -71,6 +71,14 @@ int ftruncate(int descriptor, std::uint64_t size) {
               [&](std::size_t) { return ::ftruncate(descriptor, static_cast<off_t>(size)); });
 }
 
+int punchHole(int descriptor, std::uint64_t offset, std::uint64_t size) {
+  return make({.call = Call::kFallocate, .descriptor = descriptor, .offset = offset},
+              [&](std::size_t) {
+                return ::fallocate(descriptor, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE,
+                                   static_cast<off_t>(offset), static_cast<off_t>(size));
+              });
+}
+
 int fstat(int descriptor, struct ::stat* info) {
   return make({.call = Call::kFstat, .descriptor = descriptor},
               [&](std::size_t) { return ::fstat(descriptor, info); });

@@ -18,6 +18,7 @@ enum class Call : std::uint8_t {
   kPwrite,
   kFsync,
   kFtruncate,
+  kFallocate,
   kFstat,
   kFlock,
   kLinkat,
@@ -34,7 +35,7 @@ struct CallInfo {
   const char* new_path = nullptr;  // of kLinkat and kRename
   int flags = 0;                   // of kOpen and kFlock
   std::size_t bytes = 0;           // of kPread and kPwrite
-  std::uint64_t offset = 0;        // of kPread, kPwrite and kFtruncate
+  std::uint64_t offset = 0;        // of kPread, kPwrite, kFtruncate and kFallocate
 };
 
 // Called around every system call, from the thread that makes it.
@@ -57,6 +58,8 @@ ssize_t pread(int descriptor, void* bytes, std::size_t size, std::uint64_t offse
 ssize_t pwrite(int descriptor, const void* bytes, std::size_t size, std::uint64_t offset);
 int fsync(int descriptor);
 int ftruncate(int descriptor, std::uint64_t size);
+// Gives the space of a range back to the file system; the range reads as zeros.
+int punchHole(int descriptor, std::uint64_t offset, std::uint64_t size);
 int fstat(int descriptor, struct ::stat* info);
 int flock(int descriptor, int operation);
 // Gives the file of `descriptor`, which has no name, the name `path`.

@@ -75,4 +75,8 @@ Result<Bytes> TemporaryFile::readView(std::uint64_t offset, std::size_t size,
   return view;
 }
 
+void TemporaryFile::release(std::uint64_t offset, std::uint64_t size) {
+  state_->file.release(offset, size);
+}
+
 }  // namespace surfeit

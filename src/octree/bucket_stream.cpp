@@ -100,6 +100,7 @@ void BucketStream::startReading(const SurfelStore& store, std::size_t bucket) {
     const auto read = [this, &store, blocks, begin, end]() -> Status {
       for (std::size_t i = begin; i < end; ++i) {
         SURFEIT_ASSIGN_OR_RETURN(reading_.views[i], store.fetch(blocks[i], reading_.buffers[i]));
+        store.release(blocks[i]);
       }
       return {};
     };
@@ -228,6 +229,7 @@ Status BucketStream::distribute(const SurfelStore& store, std::size_t bucket, in
   // Open blocks of all buckets take no more than the bucket itself would have
   plan.block_surfels = std::clamp<std::size_t>(capacity_ / (plan.splitters.size() + 1), 64, 2048);
   plan.temporary_directory = temporary_directory_;
+  plan.gives_back = store.givesBack();
   auto finer = std::make_unique<SurfelStore>(std::move(plan));
   const std::span<const SurfelStore::Block> blocks = store.blocks(bucket);
   FirstFailure failure;
@@ -246,6 +248,7 @@ Status BucketStream::distribute(const SurfelStore& store, std::size_t bucket, in
   });
   SURFEIT_RETURN_IF_ERROR(failure.status());
   SURFEIT_RETURN_IF_ERROR(finer->finish());
+  for (const SurfelStore::Block& block : blocks) store.release(block);
   levels_.push_back({std::move(finer), word, 0});
   noteTemporaryBytes();
   return {};

@@ -26,6 +26,20 @@
 namespace surfeit {
 namespace {
 
+// Bytes per surfel of a finished file: the least, and as many as any cloud took; and of packed
+// blocks the least.
+constexpr double kLeastOutputBytes = 6;
+constexpr double kUsualOutputBytes = 26;
+constexpr double kLeastPackedBytes = 10;
+
+// kIoError when a directory's file system has less room.
+Status checkRoom(const std::string& directory, double needed, const char* advice) {
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t available, availableBytes(directory));
+  if (double(available) >= needed) return {};
+  return Status::ioError(fmt::format("{}: {} MiB are free, expected at least {:.0f} MiB: {}",
+                                     directory, available >> 20, needed / (1 << 20), advice));
+}
+
 // Whether the positions lie in the cube.
 bool contains(const RootCube& cube, const Bounds3& bounds) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -69,7 +83,8 @@ class Indexer {
  private:
   Status checkOptions() const;
   Status openInputs();
-  Status checkFreeSpace() const;
+  Status checkFreeSpace();
+  Status checkOutputRoom() const;
   Result<std::unique_ptr<SurfelStore>> readInputs();
   Result<std::unique_ptr<SurfelStore>> readInto(const std::optional<RootCube>& cube);
   void noteRules() const;
@@ -88,6 +103,7 @@ class Indexer {
   std::optional<CloudReader> reader_;
   std::vector<Surfel> sample_;
   IndexPlan plan_;
+  bool gives_space_back_ = false;
   CloudTotals totals_;
   IndexStats stats_;
   PhaseClock clock_;
@@ -99,6 +115,8 @@ Result<IndexStats> Indexer::run() {
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
   noteRules();
   stats_.skipped_records = totals_.skipped;
+  // Others may have filled the disk while we read; blocks that are read will give room back
+  if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
 
   auto buckets = std::make_unique<BucketStream>(std::move(store), rootCube(totals_.bounds),
                                                 plan_.bucket_capacity, temporary_directory_);
@@ -151,23 +169,24 @@ Status Indexer::openInputs() {
   return {};
 }
 
-// Refuses what cannot end well, before hours are spent on it.
-Status Indexer::checkFreeSpace() const {
-  // The least that a finished file takes, and what blocks are expected to take
-  constexpr double kLeastOutputBytes = 6;
+// Refuses what cannot end well, before hours are spent on it. When temporary file and scene will
+// not both fit whole, the temporary file gives back what has been read from it.
+Status Indexer::checkFreeSpace() {
   const double records = double(reader_->recordCount());
-  const auto check = [](const std::string& directory, double needed, const char* advice) -> Status {
-    SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t available, availableBytes(directory));
-    if (double(available) >= needed) return {};
-    return Status::ioError(fmt::format("{}: {:.0f} MiB are free, expected at least {:.0f} MiB: {}",
-                                       directory, double(available >> 20), needed / (1 << 20),
-                                       advice));
-  };
-  const double spilled = plan_.spills ? records * packedBytesPerSurfel(sample_) * 0.9 : 0;
-  SURFEIT_RETURN_IF_ERROR(check(temporary_directory_, spilled,
-                                "make room, or choose another place for temporary files (--temp)"));
-  return check(directoryOf(output_), records * kLeastOutputBytes,
-               "make room, or write the scene elsewhere");
+  const double packed = sample_.empty() ? kLeastPackedBytes : packedBytesPerSurfel(sample_);
+  const double spilled = plan_.spills ? records * packed : 0;
+  SURFEIT_RETURN_IF_ERROR(
+      checkRoom(temporary_directory_, 0.9 * spilled,
+                "make room, or choose another place for temporary files (--temp)"));
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t available, availableBytes(temporary_directory_));
+  gives_space_back_ = double(available) < 1.1 * spilled + records * kUsualOutputBytes;
+  return checkOutputRoom();
+}
+
+Status Indexer::checkOutputRoom() const {
+  const double records = double(reader_->recordCount());
+  return checkRoom(directoryOf(output_), records * kLeastOutputBytes,
+                   "make room, or write the scene elsewhere");
 }
 
 // All surfels, distributed. The curve needs the bounds of the cloud: a sample nearly always gives
@@ -210,6 +229,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
   store_plan.block_surfels = plan_.block_surfels;
   store_plan.memory_bytes = plan_.block_memory;
   store_plan.temporary_directory = temporary_directory_;
+  store_plan.gives_back = gives_space_back_;
   auto store = std::make_unique<SurfelStore>(std::move(store_plan));
   const bool needs_cube = store->bucketCount() > 1;
 

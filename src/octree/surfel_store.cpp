@@ -160,4 +160,8 @@ Result<Bytes> SurfelStore::fetch(const Block& block, AlignedBuffer& buffer) cons
   return file_->readView(block.offset, block.bytes, buffer);
 }
 
+void SurfelStore::release(const Block& block) const {
+  if (plan_.gives_back && block.memory == nullptr) file_->release(block.offset, block.bytes);
+}
+
 }  // namespace surfeit

@@ -30,6 +30,7 @@ class SurfelStore {
     std::size_t block_surfels = 2048;  // that are packed at once; every bucket has room for as many
     std::uint64_t memory_bytes = 0;    // for packed blocks
     std::string temporary_directory;
+    bool gives_back = false;  // the space of blocks that were read: for disks that are nearly full
   };
 
   // A packed block of a bucket, in memory or in the temporary file.
@@ -49,10 +50,14 @@ class SurfelStore {
   Status finish();
 
   std::size_t bucketCount() const { return bucket_count_; }
+  bool givesBack() const { return plan_.gives_back; }
   std::uint64_t surfelCount(std::size_t bucket) const;
   std::span<const Block> blocks(std::size_t bucket) const;
   // The bytes of a block, for unpackSurfels; in `buffer` when they come from the file.
   Result<Bytes> fetch(const Block& block, AlignedBuffer& buffer) const;
+
+  // The block will not be fetched again.
+  void release(const Block& block) const;
 
   // Bytes in the temporary file so far. From any thread.
   std::uint64_t temporaryBytes() const { return temporary_bytes_; }

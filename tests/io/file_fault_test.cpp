@@ -266,7 +266,7 @@ TEST_F(FileFaultTest, ShortReadsAndWritesGiveTheSameBytes) {
   }
 }
 
-TEST_F(FileFaultTest, FirstTransferOfEveryLengthGivesTheSameBytes) {
+TEST_F(FileFaultTest, FirstTransferOfAnyLengthGivesTheSameBytes) {
   constexpr std::size_t kSize = 3 * kDirectAlignment;
   const std::string text = noise(kSize + 100);
   write("a", text);

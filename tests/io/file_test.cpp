@@ -387,5 +387,24 @@ TEST(DirectoryOf, IsThePartBeforeTheLastSlash) {
   EXPECT_EQ(directoryOf("b/c/a"), "b/c");
 }
 
+TEST_F(TemporaryFileTest, TemporaryFileGivesBackWhatItReleasesAndNothingElse) {
+  Result<TemporaryFile> file = TemporaryFile::create(directory_.string());
+  ASSERT_TRUE(file.ok());
+  const std::vector<std::byte> bytes(3 << 20, std::byte{7});
+  ASSERT_TRUE(file->append(bytes).ok());
+  ASSERT_TRUE(file->flush().ok());
+  const std::uint64_t begin = 100'000, size = 2'000'000;
+  file->release(begin, size);
+  std::vector<std::byte> found(bytes.size());
+  ASSERT_TRUE(file->readAt(0, found).ok());
+  const auto is_kept = [](std::byte b) { return b == std::byte{7}; };
+  const auto at = [&](std::uint64_t offset) { return found.begin() + std::ptrdiff_t(offset); };
+  EXPECT_TRUE(std::all_of(found.begin(), at(begin), is_kept));
+  EXPECT_TRUE(std::all_of(at(begin + size), found.end(), is_kept));
+  // All but the pages at the ends, where the file system can
+  const auto kept = std::count_if(at(begin), at(begin + size), is_kept);
+  EXPECT_TRUE(kept < 3 * 4096 || kept == std::ptrdiff_t(size)) << kept;
+}
+
 }  // namespace
 }  // namespace surfeit

@@ -1,0 +1,265 @@
+// Indexing when the system refuses: every call of a whole run that spills fails in turn.
+//
+// Where a run makes hundreds of calls, only some fail, unless SURFEIT_FULL_SWEEP is in the
+// environment.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/time.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "io/fault_injector.h"
+#include "octree/spilling_index_test.h"
+
+namespace surfeit {
+namespace {
+
+using Repeat = FailCall::Repeat;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// What a disk, its quota and the limits of a process say.
+constexpr int kErrors[] = {EIO, ENOSPC, EDQUOT, EAGAIN, EMFILE};
+constexpr int kMostCalls = 3000;  // more than any run here makes
+
+bool isFullSweep() { return std::getenv("SURFEIT_FULL_SWEEP") != nullptr; }
+
+enum class Names { kUnnamed, kNamed };  // whether a file has a name while it is written
+
+struct FaultKind {
+  int error = EIO;
+  Repeat repeat = Repeat::kOnce;
+  Names names = Names::kUnnamed;
+  int stride = 1;  // of the calls that fail
+};
+
+class IndexFaultTest : public SpillingIndexTest {
+ protected:
+  // Fails call 1, 1 + stride, ... until there is no such call.
+  void sweep(const FaultKind& kind) {
+    for (int number = 1; number < kMostCalls; number += isFullSweep() ? 1 : kind.stride) {
+      SCOPED_TRACE(testing::Message() << "call " << number << ", " << std::strerror(kind.error)
+                                      << (kind.repeat == Repeat::kOnce ? ", once" : ", for ever"));
+      FailCall fail(number, kind.error, kind.repeat);
+      const Status status = indexWithFault(fail, kind.names);
+      if (!fail.hasFailed()) {
+        EXPECT_TRUE(status.ok()) << status.message();
+        EXPECT_GT(number, 1);
+        return;
+      }
+      checkOutcome(status, kind, fail);
+      if (HasFailure()) return;
+    }
+    FAIL() << "the calls come to no end";
+  }
+
+  Status indexWithFault(FailCall& fail, Names names) {
+    write("out/scene.sft", "old");
+    const std::ptrdiff_t descriptors = entryCount("/proc/self/fd");
+    RefuseUnnamed refuse_unnamed;
+    Status status;
+    {
+      const Faults faults(names == Names::kNamed
+                              ? std::initializer_list<FaultInjector*>{&refuse_unnamed, &fail}
+                              : std::initializer_list<FaultInjector*>{&fail});
+      status = tryIndex().status();
+    }
+    EXPECT_EQ(entryCount("/proc/self/fd"), descriptors);
+    return status;
+  }
+
+  void checkOutcome(const Status& status, const FaultKind& kind, const FailCall& fail) {
+    EXPECT_TRUE(kind.error != EINTR || status.ok()) << status.message();
+    if (status.ok()) {
+      EXPECT_TRUE(contents("out/scene.sft") == expected_);
+    } else {
+      EXPECT_EQ(status.code(), StatusCode::kIoError) << status.message();
+      EXPECT_THAT(status.message(), HasSubstr(directory_.string()));
+      // Once the scene has its name, only the sync of its directory is left to fail
+      if (status.message().find("sync the directory") == std::string::npos) {
+        EXPECT_EQ(contents("out/scene.sft"), "old") << status.message();
+      } else {
+        EXPECT_TRUE(fail.failedCall() == Call::kFsync && contents("out/scene.sft") == expected_);
+      }
+    }
+    // A system that refuses to remove a temporary file does so when the next run comes
+    const bool may_refuse = kind.repeat == Repeat::kForEver || fail.failedCall() == Call::kUnlink;
+    if (may_refuse && filesIn("out").size() + filesIn("temp").size() > 1) {
+      EXPECT_FALSE(status.ok());
+      EXPECT_TRUE(tryIndex().ok());
+    }
+    EXPECT_EQ(filesIn("out").size(), 1u);
+    EXPECT_THAT(filesIn("temp"), IsEmpty());
+  }
+
+  // A run with the injectors succeeds, and the scene is the same.
+  void expectSameScene(std::initializer_list<FaultInjector*> injectors) {
+    std::filesystem::remove(path("out/scene.sft"));
+    {
+      const Faults faults(injectors);
+      const Result<IndexStats> stats = tryIndex();
+      EXPECT_TRUE(stats.ok()) << stats.status().message();
+    }
+    EXPECT_TRUE(contents("out/scene.sft") == expected_);
+    EXPECT_THAT(filesIn("temp"), IsEmpty());
+  }
+};
+
+TEST_F(IndexFaultTest, EveryCallMayFail) {
+  makeScene(randomCloud(5000));
+  for (const Repeat repeat : {Repeat::kOnce, Repeat::kForEver}) {
+    for (const int error : kErrors) sweep({.error = error, .repeat = repeat});
+  }
+  sweep({.error = EINTR});
+}
+
+TEST_F(IndexFaultTest, EveryCallMayFailWhereFilesHaveNames) {
+  makeScene(randomCloud(5000));
+  for (const Repeat repeat : {Repeat::kOnce, Repeat::kForEver}) {
+    for (const int error : kErrors) {
+      sweep({.error = error, .repeat = repeat, .names = Names::kNamed});
+    }
+  }
+}
+
+// Hundreds of reads that are all alike
+TEST_F(IndexFaultTest, EveryCallMayFailWhileASampleIsTaken) {
+  makeScene(randomCloud(9000));
+  sweep({.error = EIO});
+  for (const int error : kErrors) {
+    sweep({.error = error, .repeat = Repeat::kForEver, .stride = 11});
+  }
+}
+
+TEST_F(IndexFaultTest, EveryCallMayFailWhileSizesAreFound) {
+  makeScene(randomCloud(5000), kPositionsOnly);
+  for (const Repeat repeat : {Repeat::kOnce, Repeat::kForEver}) {
+    for (const int error : kErrors) sweep({.error = error, .repeat = repeat, .stride = 2});
+  }
+  sweep({.error = EIO, .names = Names::kNamed});
+}
+
+TEST_F(IndexFaultTest, LostTemporaryFileIsAnErrorThatNamesItsDirectory) {
+  makeScene(randomCloud(20000));
+  for (const Repeat repeat : {Repeat::kOnce, Repeat::kForEver}) {
+    for (int number = 1;; ++number) {
+      FailCall fail(number, EIO, repeat, readsBelow(path("temp")));
+      const Status status = indexWithFault(fail, Names::kUnnamed);
+      if (!fail.hasFailed()) {
+        EXPECT_GT(number, 5);
+        break;
+      }
+      ASSERT_EQ(status.code(), StatusCode::kIoError);
+      EXPECT_THAT(status.message(), HasSubstr(path("temp") + " (temporary file)"));
+      EXPECT_EQ(contents("out/scene.sft"), "old");
+    }
+  }
+}
+
+TEST_F(IndexFaultTest, FullDiskIsAnErrorWhateverItsSize) {
+  makeScene(randomCloud(5000));
+  const std::uint64_t all = expected_.size() + 5000 * 64;
+  for (const std::uint64_t bytes :
+       {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{4096}, all / 8, all / 4, all / 3}) {
+    for (const int error : {ENOSPC, EDQUOT}) {
+      SCOPED_TRACE(bytes);
+      write("out/scene.sft", "old");
+      {
+        FullDisk full(bytes, error);
+        const Faults faults({&full});
+        const Status status = tryIndex().status();
+        ASSERT_EQ(status.code(), StatusCode::kIoError);
+        EXPECT_THAT(status.message(), HasSubstr(std::strerror(error)));
+      }
+      EXPECT_EQ(contents("out/scene.sft"), "old");
+      EXPECT_EQ(filesIn("out").size() + filesIn("temp").size(), 1u);
+    }
+  }
+  expectSameScene({});
+}
+
+TEST_F(IndexFaultTest, FailedSyncIsFinal) {
+  makeScene(randomCloud(5000));
+  CountCalls syncs(only(Call::kFsync));
+  FailCall fail(1, EIO, Repeat::kOnce, only(Call::kFsync));
+  write("out/scene.sft", "old");
+  {
+    const Faults faults({&syncs, &fail});
+    const Status status = tryIndex().status();
+    EXPECT_EQ(status.code(), StatusCode::kIoError);
+    EXPECT_THAT(status.message(), HasSubstr(path("out/scene.sft") + ": cannot sync"));
+  }
+  EXPECT_EQ(syncs.count(), 1);
+  EXPECT_EQ(contents("out/scene.sft"), "old");
+}
+
+TEST_F(IndexFaultTest, ShortTransfersDoNotChangeTheScene) {
+  for (const CloudChannels& channels : {kAllChannels, kPositionsOnly}) {
+    makeScene(randomCloud(9000), channels);
+    for (const std::size_t limit : {std::size_t{0}, std::size_t{4095}, std::size_t{100'000}}) {
+      ShortTransfers shorten(limit);
+      expectSameScene({&shorten});
+    }
+  }
+  makeScene(randomCloud(500));
+  ShortTransfers one_byte(1);
+  expectSameScene({&one_byte});
+}
+
+TEST_F(IndexFaultTest, FileSystemsThatLackFeaturesDoNotChangeTheScene) {
+  makeScene(randomCloud(9000));
+  RefuseUnnamed refuse_unnamed;
+  RefuseDirect refuse_opened(RefuseDirect::When::kOpened), refuse_used(RefuseDirect::When::kUsed);
+  expectSameScene({&refuse_unnamed});
+  expectSameScene({&refuse_opened});
+  expectSameScene({&refuse_used, &refuse_unnamed});
+}
+
+TEST_F(IndexFaultTest, InterruptedCallsDoNotChangeTheScene) {
+  for (const CloudChannels& channels : {kAllChannels, kPositionsOnly}) {
+    makeScene(randomCloud(9000), channels);
+    InterruptStorm storm;
+    expectSameScene({&storm});
+  }
+}
+
+// Signals every 100 us, whose handler interrupts system calls for real, until it goes.
+class SignalStorm {
+ public:
+  SignalStorm() {
+    struct sigaction action = {};
+    action.sa_handler = [](int) { ++count_; };  // without SA_RESTART
+    EXPECT_EQ(::sigaction(SIGALRM, &action, &before_), 0);
+    const itimerval every_100_us = {{0, 100}, {0, 100}};
+    EXPECT_EQ(::setitimer(ITIMER_REAL, &every_100_us, nullptr), 0);
+  }
+  SignalStorm(const SignalStorm&) = delete;
+  SignalStorm& operator=(const SignalStorm&) = delete;
+  ~SignalStorm() {
+    const itimerval never = {};
+    ::setitimer(ITIMER_REAL, &never, nullptr);
+    ::sigaction(SIGALRM, &before_, nullptr);
+  }
+  int count() const { return count_; }
+
+ private:
+  static inline std::atomic<int> count_{0};
+  struct sigaction before_ = {};
+};
+
+TEST_F(IndexFaultTest, SignalsDoNotChangeTheScene) {
+  makeScene(randomCloud(60000));
+  const SignalStorm storm;
+  for (int run = 0; run < 3; ++run) expectSameScene({});
+  EXPECT_GT(storm.count(), 20);
+}
+
+}  // namespace
+}  // namespace surfeit
