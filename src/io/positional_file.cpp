@@ -26,10 +26,12 @@ AlignedBuffer::~AlignedBuffer() { std::free(data_); }
 
 void AlignedBuffer::reserve(std::size_t bytes) {
   if (bytes <= capacity_) return;
-  std::free(data_);
-  capacity_ = (bytes + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
-  data_ = static_cast<std::byte*>(std::aligned_alloc(kDirectAlignment, capacity_));
-  SURFEIT_CHECK(data_ != nullptr);
+  std::free(std::exchange(data_, nullptr));
+  capacity_ = 0;
+  const std::size_t rounded = (bytes + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
+  data_ = static_cast<std::byte*>(std::aligned_alloc(kDirectAlignment, rounded));
+  if (data_ == nullptr) throw std::bad_alloc();
+  capacity_ = rounded;
 }
 
 FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {

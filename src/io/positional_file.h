@@ -31,7 +31,7 @@ class AlignedBuffer {
     return *this;
   }
   ~AlignedBuffer();
-  // Room for `bytes` at least; what was there is lost when it must grow.
+  // Room for `bytes` at least; what was there is lost when it must grow. Throws std::bad_alloc.
   void reserve(std::size_t bytes);
   std::byte* data() const { return data_; }
   std::size_t capacity() const { return capacity_; }

@@ -1,6 +1,7 @@
 #include "octree/row_fetcher.h"
 
 #include <algorithm>
+#include <new>
 
 namespace surfeit {
 
@@ -19,6 +20,15 @@ RowFetcher::~RowFetcher() {
   thread_.join();
 }
 
+// No exception may leave the thread.
+Result<Bytes> RowFetcher::readRows(AlignedBuffer& buffer) {
+  try {
+    return source_.readRows(max_rows_, buffer);
+  } catch (const std::bad_alloc&) {
+    return Status::failed(source_.path() + ": no more memory for reading");
+  }
+}
+
 void RowFetcher::run() {
   std::uint64_t record = 0;
   for (;;) {
@@ -30,7 +40,7 @@ void RowFetcher::run() {
       slot = free_.back();
       free_.pop_back();
     }
-    const Result<Bytes> bytes = source_.readRows(max_rows_, buffers_[slot]);
+    const Result<Bytes> bytes = readRows(buffers_[slot]);
     const std::lock_guard lock(mutex_);
     if (!bytes.ok() || bytes->empty()) {
       status_ = bytes.status();

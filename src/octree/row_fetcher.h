@@ -39,6 +39,7 @@ class RowFetcher {
 
  private:
   void run();
+  Result<Bytes> readRows(AlignedBuffer& buffer);
 
   SurfelSource& source_;
   const std::size_t max_rows_;

@@ -11,6 +11,10 @@ namespace {
 constexpr int kTableBits = 14;
 constexpr std::size_t kChunkBytes = 4 << 20;
 
+constexpr std::size_t wholePages(std::size_t bytes) {
+  return (bytes + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
+}
+
 }  // namespace
 
 struct SurfelStore::Bucket {
@@ -111,6 +115,9 @@ Status SurfelStore::store(Bucket& bucket, std::span<const Surfel> surfels) {
         file_ = std::make_unique<TemporaryFile>(std::move(file));
       }
     }
+    // Whole pages, so that nothing is left of a block that is given back: the remains of a million
+    // blocks took the file system minutes to remove
+    if (plan_.gives_back) packed.resize(wholePages(packed.size()));
     SURFEIT_ASSIGN_OR_RETURN(block.offset, file_->append(packed));
     temporary_bytes_ += packed.size();
   }
@@ -161,7 +168,8 @@ Result<Bytes> SurfelStore::fetch(const Block& block, AlignedBuffer& buffer) cons
 }
 
 void SurfelStore::release(const Block& block) const {
-  if (plan_.gives_back && block.memory == nullptr) file_->release(block.offset, block.bytes);
+  if (plan_.gives_back && block.memory == nullptr)
+    file_->release(block.offset, wholePages(block.bytes));
 }
 
 }  // namespace surfeit

@@ -10,47 +10,7 @@ cornell_scene=$3
 readme=$4
 work_dir=$5
 
-fail() {
-  echo "FAILED: $*" >&2
-  exit 1
-}
-
-# run STATUS ARGUMENT...: runs surfeit, which must exit with STATUS; what it said is in `said`.
-run() {
-  local expected=$1 status=0
-  shift
-  said=$("$surfeit" "$@" 2>&1) || status=$?
-  printf '$ surfeit %s\n%s\n' "$*" "$said"
-  [[ $status == "$expected" ]] || fail "exit status $status, expected $expected: surfeit $*"
-}
-
-# says TEXT...: every text must stand in what the last run said.
-says() {
-  local text
-  for text in "$@"; do
-    [[ $said == *"$text"* ]] || fail "expected \"$text\" in: $said"
-  done
-}
-
-exists() { [[ -s $1 ]] || fail "$1 is missing or empty"; }
-
-# Neither a file of that name nor a temporary one beside it.
-leavesNothing() {
-  local left
-  left=$(find . -name "$1*" -o -name '*.tmp')
-  [[ -z $left ]] || fail "left behind: $left"
-}
-
-sameBytes() { cmp "$1" "$2" || fail "$1 and $2 differ"; }
-
-# jsonHas FILE KEY...
-jsonHas() {
-  local file=$1 key
-  shift
-  for key in "$@"; do
-    grep -q "\"$key\":" "$file" || fail "$file has no \"$key\": $(cat "$file")"
-  done
-}
+source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 
 # A scene of about that many surfels: cornell.obj, cornell.ply and cornell.sft.
 makeScene() {
