@@ -2,6 +2,7 @@
 // time each time: fresh memory is dearer than the disk.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -9,8 +10,8 @@
 
 namespace surfeit {
 
-// Hands out objects that come back when their last owner lets go, whichever thread that is; they may
-// outlive the recycler. What they held stays in them. Safe from any thread.
+// Hands out objects that come back when their last owner lets go, whichever thread that is; they
+// may outlive the recycler. What they held stays in them. Safe from any thread.
 template <typename T>
 class Recycler {
  public:
@@ -25,13 +26,18 @@ class Recycler {
     }
     if (object == nullptr) object = std::make_unique<T>();
     return std::shared_ptr<T>(object.release(), [free = free_](T* returned) {
+      std::unique_ptr<T> owned(returned);
       const std::lock_guard lock(free->mutex);
-      free->objects.emplace_back(returned);
+      // Kept where there is room for it: a deleter may not throw
+      if (free->objects.size() < free->objects.capacity())
+        free->objects.push_back(std::move(owned));
     });
   }
 
  private:
+  static constexpr std::size_t kMostKept = 1024;
   struct Free {
+    Free() { objects.reserve(kMostKept); }
     std::mutex mutex;
     std::vector<std::unique_ptr<T>> objects;
   };

@@ -38,7 +38,9 @@ Result<TemporaryFile> TemporaryFile::create(const std::string& directory, std::s
   FileDescriptor descriptor(
       system_calls::open(directory.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
   if (!descriptor.isOpen()) {
-    // Not every file system has files without names: create one with a name and remove that
+    // Not every file system has files without names: create one with a name and remove that. What
+    // a run left that was killed in between goes with it
+    removeStaleTemporaries(directory + "/scratch");
     SURFEIT_ASSIGN_OR_RETURN(NamedFile named, createTemporary(directory + "/scratch", directory));
     if (system_calls::unlink(named.path.c_str()) != 0) {
       return systemError(directory, "remove the name of a temporary file");

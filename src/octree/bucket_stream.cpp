@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <mutex>
 
@@ -19,7 +20,7 @@ constexpr std::size_t kReaders = 2;
 constexpr int kContentWords = sizeof(Surfel) / sizeof(SortWord);
 // Words that splitters are chosen from, when a bucket is distributed again.
 constexpr std::size_t kSampleWords = 65536;
-constexpr std::size_t kMaxBuckets = 1024;
+constexpr std::size_t kMaxFinerBuckets = 1024;
 
 // The first failure of several threads.
 class FirstFailure {
@@ -28,19 +29,23 @@ class FirstFailure {
     if (status.ok()) return;
     const std::lock_guard lock(mutex_);
     if (status_.ok()) status_ = status;
+    happened_ = true;
   }
+  bool happened() const { return happened_; }
+  // When all threads are done.
   const Status& status() const { return status_; }
 
  private:
+  std::atomic<bool> happened_{false};
   std::mutex mutex_;
   Status status_;
 };
 
 }  // namespace
 
-BucketStream::BucketStream(std::unique_ptr<SurfelStore> store, const RootCube& cube,
-                           std::size_t capacity, std::string temporary_directory)
-    : cube_(cube), capacity_(capacity), temporary_directory_(std::move(temporary_directory)) {
+BucketStream::BucketStream(std::unique_ptr<SurfelStore> store, Options options,
+                           const Progress& progress)
+    : options_(std::move(options)), progress_(progress) {
   levels_.push_back({std::move(store), 0, 0});
   noteTemporaryBytes();
 }
@@ -68,7 +73,7 @@ Result<std::shared_ptr<const SortedBatch>> BucketStream::next() {
     const SurfelStore& store = *level.store;
     const std::size_t bucket = level.next_bucket++;
     if (store.surfelCount(bucket) == 0) continue;
-    if (store.surfelCount(bucket) <= capacity_) return load(store, bucket);
+    if (store.surfelCount(bucket) <= options_.capacity) return load(store, bucket);
     SURFEIT_RETURN_IF_ERROR(distribute(store, bucket, level.word));
   }
   return std::shared_ptr<const SortedBatch>();
@@ -81,10 +86,11 @@ Result<std::shared_ptr<const SortedBatch>> BucketStream::nextOfEqual() {
     equal_store_ = nullptr;
     return std::shared_ptr<const SortedBatch>();
   }
+  const std::span<const SurfelStore::Block> block = blocks.subspan(equal_block_++, 1);
   AlignedBuffer buffer;
-  SURFEIT_ASSIGN_OR_RETURN(const Bytes block, equal_store_->fetch(blocks[equal_block_++], buffer));
+  SURFEIT_ASSIGN_OR_RETURN(const Bytes packed, equal_store_->fetch(block.front(), buffer));
   const std::shared_ptr<SortedBatch> batch = batches_.take();
-  SURFEIT_RETURN_IF_ERROR(unpack({&block, 1}, *batch));
+  SURFEIT_RETURN_IF_ERROR(unpack(block, {&packed, 1}, *batch));
   return std::shared_ptr<const SortedBatch>(batch);
 }
 
@@ -124,7 +130,7 @@ void BucketStream::readAhead() {
   const Level& level = levels_.back();
   for (std::size_t b = level.next_bucket; b < level.store->bucketCount(); ++b) {
     if (level.store->surfelCount(b) == 0) continue;
-    if (level.store->surfelCount(b) <= capacity_) startReading(*level.store, b);
+    if (level.store->surfelCount(b) <= options_.capacity) startReading(*level.store, b);
     return;
   }
 }
@@ -135,30 +141,44 @@ Result<std::shared_ptr<const SortedBatch>> BucketStream::load(const SurfelStore&
   SURFEIT_CHECK(reading_.store == &store && reading_.bucket == bucket);
   SURFEIT_RETURN_IF_ERROR(finishReading());
   const std::shared_ptr<SortedBatch> batch = batches_.take();
-  SURFEIT_RETURN_IF_ERROR(unpack(reading_.views, *batch));
+  SURFEIT_RETURN_IF_ERROR(unpack(store.blocks(bucket), reading_.views, *batch));
   // The buffers are free: the device works while we sort and build
   readAhead();
   sort(*batch);
   return std::shared_ptr<const SortedBatch>(batch);
 }
 
-Status BucketStream::unpack(std::span<const Bytes> blocks, SortedBatch& batch) {
+Status BucketStream::unpack(std::span<const SurfelStore::Block> blocks,
+                            std::span<const Bytes> packed, SortedBatch& batch) {
   std::vector<std::size_t> begin(blocks.size() + 1, 0);
-  for (std::size_t i = 0; i < blocks.size(); ++i) begin[i + 1] = begin[i] + packedCount(blocks[i]);
+  for (std::size_t i = 0; i < blocks.size(); ++i) begin[i + 1] = begin[i] + blocks[i].surfels;
   batch.resize(begin.back());
   FirstFailure failure;
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     const std::size_t size = begin[i + 1] - begin[i];
     const std::span<Surfel> surfels = batch.surfels.subspan(begin[i], size);
-    failure.note(unpackSurfels(blocks[i], surfels));
+    failure.note(unpackSurfels(packed[i], surfels));
     thread_local std::vector<CurveKey> keys;
     keys.resize(size);
-    if (size > 0) curveKeys(&surfels.front().position, sizeof(Surfel), cube_, keys);
+    if (size > 0) curveKeys(&surfels.front().position, sizeof(Surfel), options_.cube, keys);
     for (std::size_t s = 0; s < size; ++s) batch.tickets[begin[i] + s] = {keys[s], begin[i] + s};
   });
-  if (failure.status().ok()) return {};
+  return namedError(failure.status());
+}
+
+// Damage to a block is damage of the temporary file.
+Status BucketStream::namedError(const Status& status) const {
+  if (status.code() != StatusCode::kCorruption) return status;
   return Status::ioError(
-      fmt::format("{} (temporary file): {}", temporary_directory_, failure.status().message()));
+      fmt::format("{} (temporary file): {}", options_.temporary_directory, status.message()));
+}
+
+Status BucketStream::fetchSurfels(const SurfelStore& store, const SurfelStore::Block& block,
+                                  AlignedBuffer& buffer, std::vector<Surfel>& surfels) const {
+  if (progress_.isCancelled()) return Status::interrupted();
+  SURFEIT_ASSIGN_OR_RETURN(const Bytes packed, store.fetch(block, buffer));
+  surfels.resize(block.surfels);
+  return namedError(unpackSurfels(packed, surfels));
 }
 
 void BucketStream::sort(SortedBatch& batch) {
@@ -167,7 +187,7 @@ void BucketStream::sort(SortedBatch& batch) {
 }
 
 SortWord BucketStream::wordOf(const Surfel& surfel, int word) const {
-  if (word == 0) return curveKey(surfel.position, cube_);
+  if (word == 0) return curveKey(surfel.position, options_.cube);
   // Bytes compare from the front, as contentLess does
   SortWord content;
   std::memcpy(&content,
@@ -189,9 +209,7 @@ Result<std::vector<SortWord>> BucketStream::chooseSplitters(const SurfelStore& s
     std::vector<SortWord> sample;
     std::uint64_t record = 0;
     for (const SurfelStore::Block& block : store.blocks(bucket)) {
-      SURFEIT_ASSIGN_OR_RETURN(const Bytes packed, store.fetch(block, buffer));
-      surfels.resize(block.surfels);
-      SURFEIT_RETURN_IF_ERROR(unpackSurfels(packed, surfels));
+      SURFEIT_RETURN_IF_ERROR(fetchSurfels(store, block, buffer, surfels));
       for (const Surfel& surfel : surfels) {
         const SortWord at = wordOf(surfel, word);
         least = std::min(least, at);
@@ -202,8 +220,8 @@ Result<std::vector<SortWord>> BucketStream::chooseSplitters(const SurfelStore& s
     if (least == most) continue;
     // Every value that fills a bucket by itself gets one of its own, so that what is left shrinks
     std::sort(sample.begin(), sample.end());
-    const std::size_t buckets =
-        std::min<std::size_t>(kMaxBuckets, static_cast<std::size_t>(2 * count / capacity_ + 2));
+    const std::size_t buckets = std::min<std::size_t>(
+        kMaxFinerBuckets, static_cast<std::size_t>(2 * count / options_.capacity + 2));
     std::vector<SortWord> splitters = {least + 1};
     for (std::size_t b = 1; b < buckets; ++b) {
       const SortWord value = sample[sample.size() * b / buckets];
@@ -227,8 +245,11 @@ Status BucketStream::distribute(const SurfelStore& store, std::size_t bucket, in
     return {};
   }
   // Open blocks of all buckets take no more than the bucket itself would have
-  plan.block_surfels = std::clamp<std::size_t>(capacity_ / (plan.splitters.size() + 1), 64, 2048);
-  plan.temporary_directory = temporary_directory_;
+  plan.block_surfels =
+      std::clamp<std::size_t>(options_.capacity / (plan.splitters.size() + 1), 64, 2048);
+  plan.temporary_directory = options_.temporary_directory;
+  // What lies in memory stays there until its level ends
+  if (levels_.size() == 1) plan.memory_bytes = options_.spare_memory;
   plan.gives_back = store.givesBack();
   auto finer = std::make_unique<SurfelStore>(std::move(plan));
   const std::span<const SurfelStore::Block> blocks = store.blocks(bucket);
@@ -237,12 +258,11 @@ Status BucketStream::distribute(const SurfelStore& store, std::size_t bucket, in
     thread_local AlignedBuffer buffer;
     thread_local std::vector<Surfel> surfels;
     thread_local std::vector<SortWord> words;
-    const Result<Bytes> packed = store.fetch(blocks[i], buffer);
-    failure.note(packed.status());
-    if (!packed.ok()) return;
-    surfels.resize(blocks[i].surfels);
-    words.resize(blocks[i].surfels);
-    failure.note(unpackSurfels(*packed, surfels));
+    if (failure.happened()) return;
+    const Status status = fetchSurfels(store, blocks[i], buffer, surfels);
+    failure.note(status);
+    if (!status.ok()) return;
+    words.resize(surfels.size());
     for (std::size_t s = 0; s < surfels.size(); ++s) words[s] = wordOf(surfels[s], word);
     failure.note(finer->add(surfels, words));
   });

@@ -12,6 +12,7 @@
 #include "core/recycler.h"
 #include "octree/sorted_surfels.h"
 #include "octree/surfel_store.h"
+#include "surfeit/progress.h"
 
 namespace surfeit {
 
@@ -21,10 +22,17 @@ class BucketStream : public SortedSurfelStream {
   // unpacked and as a ticket in this batch and the last one; and sorting.
   static constexpr std::size_t kBytesPerSurfel = 64 + 2 * (64 + sizeof(Ticket)) + sizeof(Ticket);
 
-  // `store` is finished. Buckets of more than `capacity` surfels are distributed again, by finer
-  // splitters, through another temporary file: also when all surfels have one key, or are equal.
-  BucketStream(std::unique_ptr<SurfelStore> store, const RootCube& cube, std::size_t capacity,
-               std::string temporary_directory);
+  struct Options {
+    RootCube cube;
+    std::size_t capacity = 0;        // most surfels of a bucket that is sorted in memory
+    std::uint64_t spare_memory = 0;  // for blocks that are distributed again, before another file
+    std::string temporary_directory;
+  };
+
+  // `store` is finished. Buckets of more surfels than fit are distributed again, by finer
+  // splitters: also when all surfels have one key, or are equal. `progress` is asked whether to go
+  // on.
+  BucketStream(std::unique_ptr<SurfelStore> store, Options options, const Progress& progress);
   ~BucketStream() override;
 
   Result<std::shared_ptr<const SortedBatch>> next() override;
@@ -54,7 +62,11 @@ class BucketStream : public SortedSurfelStream {
   void readAhead();
   Result<std::shared_ptr<const SortedBatch>> load(const SurfelStore& store, std::size_t bucket);
   Result<std::shared_ptr<const SortedBatch>> nextOfEqual();
-  Status unpack(std::span<const Bytes> blocks, SortedBatch& batch);
+  Status unpack(std::span<const SurfelStore::Block> blocks, std::span<const Bytes> packed,
+                SortedBatch& batch);
+  Status fetchSurfels(const SurfelStore& store, const SurfelStore::Block& block,
+                      AlignedBuffer& buffer, std::vector<Surfel>& surfels) const;
+  Status namedError(const Status& status) const;
   void sort(SortedBatch& batch);
   Status distribute(const SurfelStore& store, std::size_t bucket, int word);
   Result<std::vector<SortWord>> chooseSplitters(const SurfelStore& store, std::size_t bucket,
@@ -62,9 +74,8 @@ class BucketStream : public SortedSurfelStream {
   SortWord wordOf(const Surfel& surfel, int word) const;
   void noteTemporaryBytes();
 
-  const RootCube cube_;
-  const std::size_t capacity_;
-  const std::string temporary_directory_;
+  const Options options_;
+  const Progress& progress_;
   std::vector<Level> levels_;
   Reading reading_;
   std::vector<Ticket> scratch_;

@@ -14,8 +14,8 @@
 namespace surfeit {
 namespace {
 
-// Records read at each place of a sample: few, because neighbours say the same.
-constexpr std::size_t kSampleRun = 32;
+// Places that a sample is taken from; few records at each, because neighbours say the same.
+constexpr std::uint64_t kLeastPlaces = 2048, kMostPlaces = 16384;
 
 // What the decoding threads of one input share.
 class InputPass {
@@ -27,7 +27,7 @@ class InputPass {
   void decode(const RowFetcher::Rows& rows);
   void note(std::uint64_t record, const Status& status);
 
-  bool failed() const { return failed_; }
+  bool failed() const { return failed_record_ != kNone; }
   const Status& status() const { return status_; }
   CloudTotals& totals() { return totals_; }
   const SurfelDefects& defects() const { return defects_; }
@@ -40,12 +40,12 @@ class InputPass {
   const CloudReader::Consumer& consume_;
   const std::uint64_t sample_step_;
   Progress& progress_;
-  std::atomic<bool> failed_{false};
-  std::mutex mutex_;  // guards what is below
+  static constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();
+  std::atomic<std::uint64_t> failed_record_{kNone};  // the first of the file, so far
+  std::mutex mutex_;                                 // guards what is below
   CloudTotals totals_;
   SurfelDefects defects_;
   Status status_;
-  std::uint64_t failed_record_ = std::numeric_limits<std::uint64_t>::max();
 };
 
 // Keeps the failure that comes first in the file.
@@ -56,7 +56,6 @@ void InputPass::note(std::uint64_t record, const Status& status) {
     failed_record_ = record;
     status_ = status;
   }
-  failed_ = true;
 }
 
 Status InputPass::decodePart(Bytes rows, std::uint64_t first_record, CloudTotals& totals,
@@ -79,7 +78,9 @@ void InputPass::decode(const RowFetcher::Rows& rows) {
   const std::size_t row_count = rows.bytes.size() / row_bytes;
   CloudTotals totals;
   SurfelDefects defects;
-  for (std::size_t begin = 0; begin < row_count && !failed_; begin += kReadBatch) {
+  // What comes before a failure goes on: it may hold the first one
+  for (std::size_t begin = 0; begin < row_count && rows.first_record + begin < failed_record_;
+       begin += kReadBatch) {
     const std::size_t count = std::min(kReadBatch, row_count - begin);
     const Bytes part = rows.bytes.subspan(begin * row_bytes, count * row_bytes);
     note(rows.first_record + begin, decodePart(part, rows.first_record + begin, totals, defects));
@@ -134,28 +135,38 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     reader.records_.push_back(source->recordCount());
     reader.record_count_ += source->recordCount();
     reader.is_seekable_ = reader.is_seekable_ && source->isSeekable();
+    const CloudChannels channels = source->channels();
+    reader.lacks_sizes_ = reader.lacks_sizes_ || (!channels.radius && !channels.area);
     SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
     reader.file_bytes_ += file.size();
   }
   return reader;
 }
 
-Result<std::vector<Surfel>> CloudReader::sample() const {
-  std::vector<Surfel> all, run(kSampleRun);
-  const std::uint64_t step =
-      std::max<std::uint64_t>(kSampleRun, record_count_ / (kSampleSurfels / kSampleRun));
+Result<std::vector<Surfel>> CloudReader::sample(std::uint64_t buckets) const {
+  const std::uint64_t places = std::clamp(8 * buckets, kLeastPlaces, kMostPlaces);
+  const std::size_t run_size = static_cast<std::size_t>(kSampleSurfels / places);
+  const std::uint64_t step = std::max<std::uint64_t>(run_size, record_count_ / places);
+  std::vector<Surfel> all, run(run_size);
   AlignedBuffer buffer;
+  std::uint64_t record = step / 2;  // counted on from input to input
   for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    if (record >= records_[i]) {
+      record -= records_[i];
+      continue;
+    }
+    // Bad records are refused, if they are to be, when all are read: then the first one is named
     SURFEIT_ASSIGN_OR_RETURN(const auto source,
-                             openSurfelSource(inputs_[i], strict_, Access::kDirect));
-    for (std::uint64_t record = step / 2; record < records_[i]; record += step) {
+                             openSurfelSource(inputs_[i], /* strict= */ false, Access::kDirect));
+    for (; record < records_[i]; record += step) {
       SURFEIT_RETURN_IF_ERROR(source->seekRow(record));
-      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, source->readRows(kSampleRun, buffer));
+      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, source->readRows(run_size, buffer));
       SurfelDefects defects;
       SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
                                source->decodeRows(rows, record, run, defects));
       all.insert(all.end(), run.begin(), run.begin() + static_cast<std::ptrdiff_t>(count));
     }
+    record -= records_[i];
   }
   return all;
 }
@@ -167,7 +178,10 @@ Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& prog
   for (const std::string& path : inputs_) {
     SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, strict_, Access::kDirect));
     InputPass pass(*source, consume, sample_step, progress);
-    RowFetcher fetcher(*source, read_bytes_);
+    // Small inputs are read in parts too, so that all threads have some
+    const std::uint64_t part_rows = source->recordCount() / (4 * RowFetcher::kSlots) + kReadBatch;
+    RowFetcher fetcher(*source, static_cast<std::size_t>(std::min<std::uint64_t>(
+                                    read_bytes_, part_rows * source->rowBytes())));
     tbb::parallel_pipeline(
         RowFetcher::kSlots,
         tbb::make_filter<void, RowFetcher::Rows>(filter_mode::serial_in_order,

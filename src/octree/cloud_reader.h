@@ -47,8 +47,12 @@ class CloudReader {
   // Whether sample() works: all inputs can be read at any place.
   bool isSeekable() const { return is_seekable_; }
 
-  // A sample of the surfels, from places spread evenly over all inputs.
-  Result<std::vector<Surfel>> sample() const;
+  // Whether an input has neither radii nor areas.
+  bool lacksSizes() const { return lacks_sizes_; }
+
+  // A sample of the surfels, from places spread evenly over all inputs, enough to tell `buckets`
+  // equal parts of the curve.
+  Result<std::vector<Surfel>> sample(std::uint64_t buckets) const;
 
   // Takes batches of at most kReadBatch surfels, which it may change, from several threads at once.
   using Consumer = std::function<Status(std::span<Surfel>)>;
@@ -70,6 +74,7 @@ class CloudReader {
   std::uint64_t record_count_ = 0;
   std::uint64_t file_bytes_ = 0;
   bool is_seekable_ = true;
+  bool lacks_sizes_ = false;
 };
 
 }  // namespace surfeit

@@ -1,11 +1,13 @@
 #include "octree/curve_sort.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 namespace surfeit {
@@ -113,16 +115,17 @@ void sortByKey(std::span<Ticket> tickets, std::span<Ticket> scratch) { sortPart(
 void sortAlongCurve(std::span<Ticket> tickets, std::span<Ticket> scratch,
                     std::span<const Surfel> surfels) {
   sortByKey(tickets, scratch);
-  // Equal keys are rare: two surfels within 2^-21 of the scene
+  // Equal keys are rare: two surfels within 2^-20 of the scene
+  const auto less = [surfels](const Ticket& a, const Ticket& b) {
+    return contentLess(surfels[a.index], surfels[b.index]);
+  };
   for (std::size_t i = 1; i < tickets.size(); ++i) {
     if (tickets[i].key != tickets[i - 1].key) continue;
     const std::size_t first = i - 1;
     while (i < tickets.size() && tickets[i].key == tickets[first].key) ++i;
-    std::sort(tickets.begin() + static_cast<std::ptrdiff_t>(first),
-              tickets.begin() + static_cast<std::ptrdiff_t>(i),
-              [surfels](const Ticket& a, const Ticket& b) {
-                return contentLess(surfels[a.index], surfels[b.index]);
-              });
+    // Small ranges are sorted here by this thread
+    tbb::parallel_sort(tickets.begin() + static_cast<std::ptrdiff_t>(first),
+                       tickets.begin() + static_cast<std::ptrdiff_t>(i), less);
   }
 }
 

@@ -32,6 +32,8 @@ namespace {
 constexpr double kLeastOutputBytes = 6;
 constexpr double kUsualOutputBytes = 26;
 constexpr double kLeastPackedBytes = 10;
+// The octree of bare positions, at full precision.
+constexpr double kBareOutputBytes = 40;
 
 // kIoError when a directory's file system has less room.
 Status checkRoom(const std::string& directory, double needed, const char* advice) {
@@ -119,8 +121,11 @@ Result<IndexStats> Indexer::run() {
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
 
-  auto buckets = std::make_unique<BucketStream>(std::move(store), rootCube(totals_.bounds),
-                                                plan_.bucket_capacity, temporary_directory_);
+  auto buckets = std::make_unique<BucketStream>(
+      std::move(store),
+      BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
+                            temporary_directory_},
+      progress_);
   if (totals_.missing_both > 0) {
     SURFEIT_RETURN_IF_ERROR(buildWithDensity(std::move(buckets)));
     return stats_;
@@ -145,25 +150,23 @@ Status Indexer::checkOptions() const {
     return Status::invalidArgument(
         fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
   }
-  if (options_.memory_bytes < kLeastIndexMemory) {
-    return Status::budgetTooSmall(
-        fmt::format("--memory of {} MiB is too small to index: {} MiB is "
-                    "the least that works",
-                    options_.memory_bytes >> 20, kLeastIndexMemory >> 20));
-  }
+
   return {};
 }
 
 // Opens the inputs, takes a sample where that is possible, and plans.
 Status Indexer::openInputs() {
-  const std::size_t read_bytes = planIndex(options_.memory_bytes, threads_, 0, 0).read_bytes;
-  SURFEIT_ASSIGN_OR_RETURN(reader_, CloudReader::open(inputs_, options_.strict, read_bytes));
+  SURFEIT_ASSIGN_OR_RETURN(
+      reader_, CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes)));
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) {
-    SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample());
+    SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(usualBucketCount(records)));
     for (Surfel& surfel : sample_) applySizeRules(surfel, options_.overlap);
   }
-  plan_ = planIndex(options_.memory_bytes, threads_, records, packedBytesPerSurfel(sample_));
+  // The octree of bare positions is built at full precision
+  const SlabForm form = {options_.leaf_capacity, options_.full_precision || reader_->lacksSizes()};
+  SURFEIT_ASSIGN_OR_RETURN(plan_, planIndex({options_.memory_bytes, threads_, records,
+                                             packedBytesPerSurfel(sample_), form}));
   stats_.input_bytes = reader_->fileBytes();
   SURFEIT_RETURN_IF_ERROR(checkFreeSpace());
   clock_.finish("sample");
@@ -175,7 +178,8 @@ Status Indexer::openInputs() {
 Status Indexer::checkFreeSpace() {
   const double records = double(reader_->recordCount());
   const double packed = sample_.empty() ? kLeastPackedBytes : packedBytesPerSurfel(sample_);
-  const double spilled = plan_.spills ? records * packed : 0;
+  double spilled = plan_.spills ? records * packed : 0;
+  if (reader_->lacksSizes()) spilled += records * kBareOutputBytes;
   SURFEIT_RETURN_IF_ERROR(
       checkRoom(temporary_directory_, 0.9 * spilled,
                 "make room, or choose another place for temporary files (--temp)"));
@@ -324,9 +328,10 @@ Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
   bare_writer.reset();
   stats_.temporary_bytes = bucket_bytes + bare.fileBytes();
 
-  const std::uint64_t building = buildOctreeBytes(threads_);
+  // Its directory is another one of the same size
+  const std::uint64_t directory = bare.pages().pageCount() * sizeof(PageEntry);
   const std::uint64_t cache_bytes =
-      std::min<std::uint64_t>(std::max(options_.memory_bytes - building, kLeastIndexMemory / 4),
+      std::min<std::uint64_t>(plan_.octree_memory - std::min(plan_.octree_memory, directory),
                               PagedOctree::unlimitedCacheBytes(bare));
   SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
                            PagedOctree::planMemory(bare, cache_bytes, threads_));
@@ -344,10 +349,17 @@ Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
 
 // Two files of one identity hold the same surfels built the same way.
 std::uint64_t Indexer::identity(bool full_precision) const {
+  const CloudChannels& channels = totals_.channels;
+  const std::string text = provenance();
   const std::uint64_t parts[] = {
-      totals_.content,          totals_.surfels,
-      kFormatVersion,           options_.leaf_capacity,
-      full_precision ? 1u : 0u, static_cast<std::uint64_t>(double(options_.overlap) * 65536)};
+      totals_.content,
+      totals_.surfels,
+      kFormatVersion,
+      full_precision ? 1u : 0u,
+      std::uint64_t{channels.normal} | std::uint64_t{channels.radius} << 1 |
+          std::uint64_t{channels.area} << 2 | std::uint64_t{channels.radiosity} << 3 |
+          std::uint64_t{channels.albedo} << 4 | std::uint64_t{channels.two_sided} << 5,
+      XXH3_64bits(text.data(), text.size())};
   return XXH3_64bits(parts, sizeof parts);
 }
 

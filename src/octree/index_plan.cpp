@@ -1,70 +1,114 @@
 #include "octree/index_plan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "core/curve_key.h"
 #include "octree/bucket_stream.h"
 #include "octree/cloud_reader.h"
-#include "octree/octree_builder.h"
 #include "octree/surfel_block.h"
 
 namespace surfeit {
 namespace {
 
+constexpr std::uint64_t kMega = 1 << 20;
 // Buckets are this much smaller on average than the largest that fits: a sample of 64 surfels for
 // each is off by a fifth, and neighbours in a file make it worse.
 constexpr double kUnevenness = 1.6;
 constexpr std::size_t kMaxBuckets = 4096;
-constexpr std::size_t kMaxBlockSurfels = 2048, kMinBlockSurfels = 64;
+// Smaller blocks than these make lists long and reads short.
+constexpr std::size_t kMaxBlockSurfels = 2048, kMinBlockSurfels = 512;
 // Buffers of the file being written and of the temporary file, and zstd.
-constexpr std::uint64_t kFileBytes = 12 << 20;
-// Bytes of the page directory per surfel: 24 for each surfel page, and each node page.
-constexpr double kDirectoryBytes = 0.1;
-// Larger buckets than this gain nothing, and their memory has to be touched for a first time; fewer
-// than so many buckets do no harm.
-constexpr std::size_t kUsefulBucket = 1 << 20;
-constexpr double kFewBuckets = 1024;
+constexpr std::uint64_t kFileBytes = 12 * kMega;
+// Larger buckets than this gain nothing, and their memory has to be touched for a first time, which
+// costs as much as the disk; fewer than so many buckets do no harm.
+constexpr std::uint64_t kUsefulBucket = 1 << 20;
+constexpr std::uint64_t kFewBuckets = 1024;
+// Smaller buckets than this are not worth their seams.
+constexpr std::uint64_t kLeastBucket = 32768;
+
+// Page directory of the scene, 24 bytes a page: the only thing, with the list of blocks, that grows
+// with the cloud.
+std::uint64_t directoryBytes(const IndexTask& task) {
+  constexpr double kEntry = 24, kSurfelsPerPage = 480, kNodesPerPage = 120;
+  return static_cast<std::uint64_t>(
+      double(task.records) * kEntry *
+      (1 / kSurfelsPerPage + task.slabs.nodesPerSurfel() / kNodesPerPage));
+}
+
+// List of blocks; vectors grow by doubling.
+std::uint64_t blockListBytes(std::uint64_t records, std::size_t block_surfels) {
+  return 3 * sizeof(SurfelStore::Block) / 2 * (records / block_surfels);
+}
+
+// Buckets for a capacity, and blocks for the room that open ones may take.
+void planBuckets(std::uint64_t records, std::uint64_t open_bytes, IndexPlan& plan) {
+  const double buckets = std::ceil(double(records) * kUnevenness / double(plan.bucket_capacity));
+  const double most = std::clamp(double(open_bytes / (kMinBlockSurfels * sizeof(Surfel))), 1.0,
+                                 double(kMaxBuckets));
+  plan.bucket_count = records <= plan.bucket_capacity
+                          ? 1
+                          : static_cast<std::size_t>(std::clamp(buckets, 1.0, most));
+  plan.block_surfels = static_cast<std::size_t>(std::clamp<std::uint64_t>(
+      open_bytes / (plan.bucket_count * sizeof(Surfel)), kMinBlockSurfels, kMaxBlockSurfels));
+}
 
 }  // namespace
 
-IndexPlan planIndex(std::uint64_t memory_bytes, int threads, std::uint64_t records,
-                    double packed_bytes) {
-  constexpr std::uint64_t kMega = 1 << 20;
+std::size_t readBytesWithin(std::uint64_t memory_bytes) {
+  return static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(memory_bytes / 256, kMega / 4, 4 * kMega));
+}
+
+std::uint64_t usualBucketCount(std::uint64_t records) {
+  return std::min<std::uint64_t>(
+      kFewBuckets, static_cast<std::uint64_t>(double(records) * kUnevenness) / kUsefulBucket + 1);
+}
+
+Result<IndexPlan> planIndex(const IndexTask& task) {
   IndexPlan plan;
-  plan.read_bytes =
-      static_cast<std::size_t>(std::clamp<std::uint64_t>(memory_bytes / 256, kMega / 4, 4 * kMega));
+  plan.read_bytes = readBytesWithin(task.memory_bytes);
 
   // What is taken in any case, while reading and while building
-  const auto left = [memory_bytes](std::uint64_t taken) {
-    return memory_bytes > taken + kMega ? memory_bytes - taken : kMega;
-  };
-  const std::uint64_t directory = static_cast<std::uint64_t>(double(records) * kDirectoryBytes);
-  const std::uint64_t reading =
-      left(CloudReader::memoryBytes(plan.read_bytes, threads) + kFileBytes);
-  const std::uint64_t building = left(buildOctreeBytes(threads) + directory + kFileBytes);
+  const std::uint64_t lists = blockListBytes(task.records, kMinBlockSurfels);
+  const std::uint64_t read_fixed =
+      CloudReader::memoryBytes(plan.read_bytes, task.threads) + kFileBytes + lists;
+  const std::uint64_t build_fixed =
+      buildOctreeBytes(task.slabs, task.threads) + directoryBytes(task) + kFileBytes + lists;
+  const std::uint64_t least_bucket =
+      std::min(kLeastBucket, task.records) * BucketStream::kBytesPerSurfel;
+  const std::uint64_t least = std::max({kLeastIndexMemory, build_fixed + least_bucket,
+                                        read_fixed + 64 * kMinBlockSurfels * sizeof(Surfel)});
+  if (task.memory_bytes < least) {
+    return Status::budgetTooSmall(fmt::format(
+        "--memory of {} MiB is too small to index {} records with {} threads: {} MiB is "
+        "the least that works",
+        task.memory_bytes >> 20, task.records, task.threads, (least + kMega - 1) >> 20));
+  }
+  const std::uint64_t reading = task.memory_bytes - read_fixed;
+  const std::uint64_t building = task.memory_bytes - build_fixed;
+  plan.octree_memory = building;
 
   // All in memory: blocks stay while buckets are sorted
-  const double packed_total = double(records) * packed_bytes * 1.05 + double(8 * kMega);
-  const std::uint64_t small = std::clamp<std::uint64_t>(records, 1024, kUsefulBucket);
-  const std::uint64_t small_bytes = small * BucketStream::kBytesPerSurfel;
-  plan.spills = packed_total + double(small_bytes) > double(std::min(reading, building));
+  const std::uint64_t packed =
+      static_cast<std::uint64_t>(double(task.records) * task.packed_bytes * 1.05) + 8 * kMega;
+  const std::uint64_t bucket = std::clamp<std::uint64_t>(task.records, 1024, kUsefulBucket);
+  const std::uint64_t bucket_bytes = bucket * BucketStream::kBytesPerSurfel;
+  plan.spills = packed + bucket_bytes > std::min(reading, building);
   if (!plan.spills) {
-    plan.block_memory = static_cast<std::uint64_t>(packed_total);
-    plan.bucket_capacity = static_cast<std::size_t>(small);
-  } else {
-    const std::uint64_t useful = std::max<std::uint64_t>(
-        kUsefulBucket, static_cast<std::uint64_t>(double(records) * kUnevenness / kFewBuckets));
-    plan.bucket_capacity = static_cast<std::size_t>(
-        std::clamp<std::uint64_t>(building / BucketStream::kBytesPerSurfel, 1024, useful));
+    plan.block_memory = packed;
+    plan.spare_memory = std::min(reading, building) - packed - bucket_bytes;
+    plan.bucket_capacity = static_cast<std::size_t>(bucket);
+    planBuckets(task.records, bucket_bytes, plan);
+    return plan;
   }
-  const double buckets = std::ceil(double(records) * kUnevenness / double(plan.bucket_capacity));
-  plan.bucket_count = records <= plan.bucket_capacity
-                          ? 1
-                          : static_cast<std::size_t>(std::clamp(buckets, 2.0, double(kMaxBuckets)));
-  const std::uint64_t open_bytes = plan.spills ? reading / 2 : small_bytes;
-  plan.block_surfels = static_cast<std::size_t>(std::clamp<std::uint64_t>(
-      open_bytes / (plan.bucket_count * sizeof(Surfel)), kMinBlockSurfels, kMaxBlockSurfels));
+  const std::uint64_t useful = std::max(
+      kUsefulBucket, static_cast<std::uint64_t>(double(task.records) * kUnevenness) / kFewBuckets);
+  plan.bucket_capacity = static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(building / BucketStream::kBytesPerSurfel, 1024, useful));
+  planBuckets(task.records, reading / 2, plan);
   return plan;
 }
 

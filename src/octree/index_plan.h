@@ -1,35 +1,54 @@
-// How the indexer divides its memory. docs/architecture.md, "Memory of the indexer", has the sum.
+// How the indexer divides its memory. docs/architecture.md, "Memory", has the sums.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/bounds.h"
+#include "octree/octree_builder.h"
 #include "octree/surfel_store.h"
+#include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 
-// The least that indexClouds accepts.
+// The least that indexClouds accepts; many threads and many surfels need more.
 inline constexpr std::uint64_t kLeastIndexMemory = 64 << 20;
+
+// What has to be planned for.
+struct IndexTask {
+  std::uint64_t memory_bytes = 0;
+  int threads = 1;
+  std::uint64_t records = 0;  // at most so many surfels
+  double packed_bytes = 64;   // of a surfel in a packed block, about
+  SlabForm slabs;
+};
 
 struct IndexPlan {
   std::size_t read_bytes = 0;       // of the input at once
   std::size_t bucket_capacity = 0;  // surfels that are sorted at once
-  std::size_t bucket_count = 1;     // for an even distribution with room for an uneven one
+  std::size_t bucket_count = 1;     // so many that an uneven distribution fits too
   std::size_t block_surfels = 0;    // surfels packed at once; every bucket has room for them
   std::uint64_t block_memory = 0;   // for packed blocks, before they go to a temporary file
-  bool spills = false;              // the input is expected not to fit block_memory
+  std::uint64_t spare_memory = 0;   // for blocks of buckets that are distributed again
+  std::uint64_t octree_memory = 0;  // what reading the octree of bare positions may take
+  bool spills = false;              // the blocks are not expected to fit in memory
 };
 
-// For at most `records` surfels of about `packed_bytes` each.
-IndexPlan planIndex(std::uint64_t memory_bytes, int threads, std::uint64_t records,
-                    double packed_bytes);
+// kBudgetTooSmall, with the least that works, when it cannot be done.
+Result<IndexPlan> planIndex(const IndexTask& task);
+
+// Bytes that are read at once within a budget.
+std::size_t readBytesWithin(std::uint64_t memory_bytes);
 
 // Bytes per surfel when packed, measured on a sample: about what they will take, since a sample is
 // less alike than neighbours.
 double packedBytesPerSurfel(std::span<const Surfel> sample);
+
+// Buckets that a cloud gets when the budget does not ask for more.
+std::uint64_t usualBucketCount(std::uint64_t records);
 
 // Words that divide the curve into `bucket_count` buckets of equal numbers of sample surfels.
 std::vector<SortWord> splittersOf(std::span<const Surfel> sample, const RootCube& cube,

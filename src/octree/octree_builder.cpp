@@ -24,7 +24,7 @@ struct Work {
 using WorkPtr = std::shared_ptr<Work>;
 
 // Slabs on their way: enough that stages do not wait for each other.
-std::size_t slabsInFlight(int threads) { return 2 * static_cast<std::size_t>(threads) + 2; }
+std::size_t slabsInFlight(int threads) { return static_cast<std::size_t>(threads) * 3 / 2 + 2; }
 
 // The stages. What fails first ends the work: later stages pass what they get.
 class OctreePipeline {
@@ -206,12 +206,19 @@ Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, int threads,
   return OctreePipeline(stream, writer, progress).run(threads);
 }
 
-std::uint64_t buildOctreeBytes(int threads) {
-  // A slab has at most 2 * kBrickSurfels surfels, a node for every fourth, and pages of 24 bytes
-  // per surfel; a thread fetches one slab at a time
-  constexpr std::uint64_t kSlabBytes = 2 * kBrickSurfels * (sizeof(LevelNode) / 4 + 24);
+double SlabForm::nodesPerSurfel() const { return std::min(2.0, 4.0 / leaf_capacity); }
+
+std::uint64_t buildOctreeBytes(const SlabForm& form, int threads) {
+  // A slab has at most 2 * kBrickSurfels surfels, with their nodes and pages, in vectors that grow
+  // by doubling; a thread fetches the surfels of one slab at a time
+  constexpr double kSlack = 1.5;
+  constexpr double kQuantizedBytes = 20, kFullBytes = 60;
   constexpr std::uint64_t kFetchBytes = 2 * kBrickSurfels * (sizeof(Surfel) + sizeof(CurveKey));
-  return slabsInFlight(threads) * kSlabBytes + static_cast<std::uint64_t>(threads) * kFetchBytes;
+  const double surfel_bytes = form.nodesPerSurfel() * sizeof(LevelNode) +
+                              (form.full_precision ? kFullBytes : kQuantizedBytes);
+  const std::uint64_t slab_bytes =
+      static_cast<std::uint64_t>(kSlack * 2 * kBrickSurfels * surfel_bytes);
+  return slabsInFlight(threads) * slab_bytes + static_cast<std::uint64_t>(threads) * kFetchBytes;
 }
 
 }  // namespace surfeit

@@ -1,6 +1,7 @@
 // Builds the octree bottom-up in one sweep over sorted surfels, slab by slab: threads build slabs,
 // one stitches their octrees together and numbers pages, threads encode node pages, one writes.
-// Nothing grows with the cloud: slabs on their way, open cells and an open node page per level.
+// Nothing but the page directory grows with the cloud: slabs on their way, open cells, and an open
+// node page per level.
 // docs/architecture.md, "Building", explains the stages.
 #pragma once
 
@@ -39,12 +40,21 @@ class SlabStitcher {
   bool complete_ = false;
 };
 
+// What decides how much memory a slab takes once it is built.
+struct SlabForm {
+  std::uint32_t leaf_capacity = 16;
+  bool full_precision = false;
+
+  // At most, about: scenes have half of it or less.
+  double nodesPerSurfel() const;
+};
+
 // Takes every surfel of the stream and hands all pages to the writer, with the threads of the
 // current arena; `threads` of them bound what is on its way. kInterrupted when cancelled.
 Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, int threads,
                    Progress& progress);
 
 // Memory that buildOctree takes at most, beside stream and writer.
-std::uint64_t buildOctreeBytes(int threads);
+std::uint64_t buildOctreeBytes(const SlabForm& form, int threads);
 
 }  // namespace surfeit

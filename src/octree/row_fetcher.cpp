@@ -1,12 +1,13 @@
 #include "octree/row_fetcher.h"
 
 #include <algorithm>
-#include <new>
+#include <exception>
 
 namespace surfeit {
 
 RowFetcher::RowFetcher(SurfelSource& source, std::size_t read_bytes)
     : source_(source), max_rows_(std::max<std::size_t>(1, read_bytes / source.rowBytes())) {
+  ready_.reserve(kSlots);
   for (std::size_t slot = 0; slot < kSlots; ++slot) free_.push_back(slot);
   thread_ = std::thread([this] { run(); });
 }
@@ -24,8 +25,8 @@ RowFetcher::~RowFetcher() {
 Result<Bytes> RowFetcher::readRows(AlignedBuffer& buffer) {
   try {
     return source_.readRows(max_rows_, buffer);
-  } catch (const std::bad_alloc&) {
-    return Status::failed(source_.path() + ": no more memory for reading");
+  } catch (const std::exception& error) {
+    return Status::failed(source_.path() + ": " + error.what());
   }
 }
 

@@ -18,8 +18,9 @@ constexpr std::size_t wholePages(std::size_t bytes) {
 }  // namespace
 
 struct SurfelStore::Bucket {
-  std::mutex mutex;  // guards all below; held for copying and bookkeeping only
-  std::vector<Surfel> open;
+  std::mutex mutex;        // guards all below; held for copying and bookkeeping only
+  std::span<Surfel> open;  // room for a block
+  std::size_t open_count = 0;
   std::vector<Block> blocks;
   std::uint64_t surfels = 0;
 };
@@ -30,6 +31,12 @@ SurfelStore::SurfelStore(Plan plan)
       first_bucket_((std::size_t{1} << kTableBits) + 1),
       buckets_(new Bucket[bucket_count_]) {
   SURFEIT_CHECK(std::is_sorted(plan_.splitters.begin(), plan_.splitters.end()));
+  // In one piece, which goes back to the system when all is packed
+  open_.reserve(bucket_count_ * plan_.block_surfels * sizeof(Surfel));
+  for (std::size_t b = 0; b < bucket_count_; ++b) {
+    buckets_[b].open = {reinterpret_cast<Surfel*>(open_.data()) + b * plan_.block_surfels,
+                        plan_.block_surfels};
+  }
   for (std::size_t i = 0; i + 1 < first_bucket_.size(); ++i) {
     const SortWord word = SortWord{i} << (64 - kTableBits);
     first_bucket_[i] = static_cast<std::uint32_t>(
@@ -82,15 +89,16 @@ Status SurfelStore::append(Bucket& bucket, std::span<const Surfel> surfels) {
     full.clear();
     {
       const std::lock_guard lock(bucket.mutex);
-      bucket.surfels += surfels.size();
-      if (bucket.open.capacity() < plan_.block_surfels) bucket.open.reserve(plan_.block_surfels);
-      const std::size_t room = plan_.block_surfels - bucket.open.size();
-      const std::size_t count = std::min(room, surfels.size());
-      bucket.open.insert(bucket.open.end(), surfels.begin(),
-                         surfels.begin() + static_cast<std::ptrdiff_t>(count));
+      const std::size_t count = std::min(bucket.open.size() - bucket.open_count, surfels.size());
+      std::copy_n(surfels.begin(), count,
+                  bucket.open.begin() + static_cast<std::ptrdiff_t>(bucket.open_count));
       surfels = surfels.subspan(count);
-      bucket.surfels -= surfels.size();
-      if (bucket.open.size() == plan_.block_surfels) bucket.open.swap(full);
+      bucket.open_count += count;
+      bucket.surfels += count;
+      if (bucket.open_count == bucket.open.size()) {
+        full.assign(bucket.open.begin(), bucket.open.end());
+        bucket.open_count = 0;
+      }
     }
     if (!full.empty()) SURFEIT_RETURN_IF_ERROR(store(bucket, full));
   }
@@ -105,7 +113,8 @@ Status SurfelStore::store(Bucket& bucket, std::span<const Surfel> surfels) {
   block.surfels = static_cast<std::uint32_t>(surfels.size());
   if (std::byte* memory = allocate(packed.size()); memory != nullptr) {
     std::copy(packed.begin(), packed.end(), memory);
-    block.memory = memory;
+    block.place = reinterpret_cast<std::uintptr_t>(memory);
+    block.in_memory = 1;
   } else {
     {
       const std::lock_guard lock(file_mutex_);
@@ -118,7 +127,7 @@ Status SurfelStore::store(Bucket& bucket, std::span<const Surfel> surfels) {
     // Whole pages, so that nothing is left of a block that is given back: the remains of a million
     // blocks took the file system minutes to remove
     if (plan_.gives_back) packed.resize(wholePages(packed.size()));
-    SURFEIT_ASSIGN_OR_RETURN(block.offset, file_->append(packed));
+    SURFEIT_ASSIGN_OR_RETURN(block.place, file_->append(packed));
     temporary_bytes_ += packed.size();
   }
   const std::lock_guard lock(bucket.mutex);
@@ -148,9 +157,12 @@ std::byte* SurfelStore::allocate(std::size_t bytes) {
 Status SurfelStore::finish() {
   for (std::size_t b = 0; b < bucket_count_; ++b) {
     Bucket& bucket = buckets_[b];
-    if (!bucket.open.empty()) SURFEIT_RETURN_IF_ERROR(store(bucket, bucket.open));
+    if (bucket.open_count > 0) {
+      SURFEIT_RETURN_IF_ERROR(store(bucket, bucket.open.first(bucket.open_count)));
+    }
     bucket.open = {};
   }
+  open_ = {};
   return file_ != nullptr ? file_->flush() : Status();
 }
 
@@ -163,13 +175,12 @@ std::span<const SurfelStore::Block> SurfelStore::blocks(std::size_t bucket) cons
 }
 
 Result<Bytes> SurfelStore::fetch(const Block& block, AlignedBuffer& buffer) const {
-  if (block.memory != nullptr) return Bytes(block.memory, block.bytes);
-  return file_->readView(block.offset, block.bytes, buffer);
+  if (block.in_memory) return Bytes(reinterpret_cast<const std::byte*>(block.place), block.bytes);
+  return file_->readView(block.place, block.bytes, buffer);
 }
 
 void SurfelStore::release(const Block& block) const {
-  if (plan_.gives_back && block.memory == nullptr)
-    file_->release(block.offset, wholePages(block.bytes));
+  if (plan_.gives_back && !block.in_memory) file_->release(block.place, wholePages(block.bytes));
 }
 
 }  // namespace surfeit

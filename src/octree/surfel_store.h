@@ -33,13 +33,14 @@ class SurfelStore {
     bool gives_back = false;  // the space of blocks that were read: for disks that are nearly full
   };
 
-  // A packed block of a bucket, in memory or in the temporary file.
+  // A packed block of a bucket, at an address in memory or an offset in the temporary file.
   struct Block {
-    const std::byte* memory = nullptr;
-    std::uint64_t offset = 0;
+    std::uint64_t place = 0;
     std::uint32_t bytes = 0;
-    std::uint32_t surfels = 0;
+    std::uint32_t surfels : 31 = 0;
+    std::uint32_t in_memory : 1 = 0;
   };
+  static_assert(sizeof(Block) == 16);
 
   explicit SurfelStore(Plan plan);
   ~SurfelStore();
@@ -74,6 +75,7 @@ class SurfelStore {
   std::size_t bucket_count_;
   std::vector<std::uint32_t> first_bucket_;  // by the top bits of a word
   std::unique_ptr<Bucket[]> buckets_;
+  AlignedBuffer open_;  // the open blocks of all buckets
 
   std::mutex memory_mutex_;
   std::vector<AlignedBuffer> chunks_;  // filled one after the other

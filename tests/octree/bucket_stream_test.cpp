@@ -19,6 +19,7 @@ class BucketStreamTest : public DirectoryTest {
     std::size_t capacity = 1 << 20;
     std::uint64_t memory_bytes = 0;
     std::size_t block_surfels = 100;
+    std::uint64_t spare_memory = 0;
   };
 
   // The cloud through a store and a stream.
@@ -39,11 +40,15 @@ class BucketStreamTest : public DirectoryTest {
     }
     EXPECT_TRUE(store->finish().ok());
     if (temporary_bytes != nullptr) *temporary_bytes = store->temporaryBytes();
-    BucketStream stream(std::move(store), kUnitCube, options.capacity, directory_.string());
+    const Progress progress;
+    BucketStream stream(std::move(store),
+                        {kUnitCube, options.capacity, options.spare_memory, directory_.string()},
+                        progress);
     std::vector<Surfel> all;
     for (;;) {
       const Result<std::shared_ptr<const SortedBatch>> batch = stream.next();
       EXPECT_TRUE(batch.ok()) << batch.status().message();
+      stream_temporary_bytes_ = stream.temporaryBytes();
       if (!batch.ok() || *batch == nullptr) return all;
       EXPECT_FALSE((*batch)->tickets.empty());
       for (const Ticket& ticket : (*batch)->tickets) {
@@ -53,6 +58,8 @@ class BucketStreamTest : public DirectoryTest {
       }
     }
   }
+
+  std::uint64_t stream_temporary_bytes_ = 0;
 
   static void expectSame(const std::vector<Surfel>& found, const std::vector<Surfel>& expected) {
     ASSERT_EQ(found.size(), expected.size());
@@ -94,6 +101,14 @@ TEST_F(BucketStreamTest, NothingIsSpilledWhileMemoryLasts) {
 TEST_F(BucketStreamTest, BucketsThatAreTooLargeAreDistributedAgain) {
   const std::vector<Surfel> cloud = randomCloud(20000);
   expectSame(sorted(cloud, {.buckets = 2, .capacity = 300}), reference(cloud));
+}
+
+TEST_F(BucketStreamTest, WhatFitsInMemoryIsDistributedThere) {
+  const std::vector<Surfel> cloud = randomCloud(20000);
+  const Options options = {
+      .buckets = 2, .capacity = 300, .memory_bytes = 64 << 20, .spare_memory = 64 << 20};
+  expectSame(sorted(cloud, options), reference(cloud));
+  EXPECT_EQ(stream_temporary_bytes_, 0u);
 }
 
 TEST_F(BucketStreamTest, OneKeyWithMoreSurfelsThanFit) {

@@ -38,20 +38,22 @@ struct FaultKind {
   Repeat repeat = Repeat::kOnce;
   Names names = Names::kUnnamed;
   int stride = 1;  // of the calls that fail
+  int first = 1;   // of them
 };
 
 class IndexFaultTest : public SpillingIndexTest {
  protected:
-  // Fails call 1, 1 + stride, ... until there is no such call.
+  // Fails call first, first + stride, ... until there is no such call.
   void sweep(const FaultKind& kind) {
-    for (int number = 1; number < kMostCalls; number += isFullSweep() ? 1 : kind.stride) {
+    const int stride = isFullSweep() ? 1 : kind.stride;
+    for (int number = kind.first; number < kMostCalls; number += stride) {
       SCOPED_TRACE(testing::Message() << "call " << number << ", " << std::strerror(kind.error)
                                       << (kind.repeat == Repeat::kOnce ? ", once" : ", for ever"));
       FailCall fail(number, kind.error, kind.repeat);
       const Status status = indexWithFault(fail, kind.names);
       if (!fail.hasFailed()) {
         EXPECT_TRUE(status.ok()) << status.message();
-        EXPECT_GT(number, 1);
+        EXPECT_GT(number, kind.first);
         return;
       }
       checkOutcome(status, kind, fail);
@@ -142,6 +144,19 @@ TEST_F(IndexFaultTest, EveryCallMayFailWhileASampleIsTaken) {
   }
 }
 
+TEST_F(IndexFaultTest, EveryCallMayFailWithSeveralBuckets) {
+  makeScene(randomCloud(2 * kOneBucket));
+  sweep({.error = EIO, .stride = 293});
+  sweep({.error = ENOSPC, .repeat = Repeat::kForEver, .stride = 293});
+  // The last calls one by one: buckets, pages, and what ends a file
+  CountCalls reads(readsBelow(path("in")));
+  {
+    const Faults faults({&reads});
+    ASSERT_TRUE(tryIndex().ok());
+  }
+  sweep({.error = EIO, .first = reads.count()});
+}
+
 TEST_F(IndexFaultTest, EveryCallMayFailWhileSizesAreFound) {
   makeScene(randomCloud(5000), kPositionsOnly);
   for (const Repeat repeat : {Repeat::kOnce, Repeat::kForEver}) {
@@ -152,9 +167,9 @@ TEST_F(IndexFaultTest, EveryCallMayFailWhileSizesAreFound) {
 }
 
 TEST_F(IndexFaultTest, LostTemporaryFileIsAnErrorThatNamesItsDirectory) {
-  makeScene(randomCloud(20000));
+  makeScene(randomCloud(2 * kOneBucket));
   for (const Repeat repeat : {Repeat::kOnce, Repeat::kForEver}) {
-    for (int number = 1;; ++number) {
+    for (int number = 1;; number += 3) {
       FailCall fail(number, EIO, repeat, readsBelow(path("temp")));
       const Status status = indexWithFault(fail, Names::kUnnamed);
       if (!fail.hasFailed()) {

@@ -206,7 +206,7 @@ TEST_F(IndexTest, OrderThreadsAndMemoryDoNotChangeTheFile) {
     small.memory_bytes = 64 << 20;
     small.threads = 1;
     const IndexStats spilled = indexFiles({path("b.ply")}, path("b.sft"), small);
-    EXPECT_GT(spilled.temporary_bytes, in_memory.temporary_bytes + cloud.size() * 12);
+    EXPECT_GT(spilled.temporary_bytes, in_memory.temporary_bytes + cloud.size() * 8);
     indexFiles({path("b.ply")}, path("c.sft"), optionsWith(&IndexOptions::threads, 2));
     const std::string expected = contents("a.sft");
     EXPECT_TRUE(contents("b.sft") == expected);
