@@ -80,6 +80,8 @@ Result<NamedFile> createTemporary(const std::string& path, const std::string& na
     file.descriptor = FileDescriptor(system_calls::open(file.path.c_str(), kFlags, 0666));
     if (file.descriptor.isOpen()) {
       if (!isLost(file.descriptor.get())) return file;
+      // Whoever took it for a leftover removes it; so do we, in case that was not it
+      system_calls::unlink(file.path.c_str());
     } else if (errno != EEXIST) {
       break;
     }
