@@ -21,7 +21,7 @@ struct IndexArguments {
 
 Status runIndex(IndexArguments& arguments, CommandContext& context) {
   IndexOptions& options = arguments.options;
-  options.threads = context.threads();
+  options.threads = context.common.threads;
   options.full_precision = arguments.precision == "full";
   if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
@@ -65,7 +65,10 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       app.add_subcommand("index", "Build a paged octree file (.sft) from surfel clouds");
   const auto arguments = std::make_shared<IndexArguments>();
   IndexOptions& options = arguments->options;
-  command->add_option("CLOUD", arguments->inputs, "Surfel clouds (PLY), in any order")->required();
+  command
+      ->add_option("CLOUD", arguments->inputs,
+                   "Surfel clouds (PLY, or recipes of generate), in any order")
+      ->required();
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
   command->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
       ->check(CLI::Range(1, 4096))
@@ -85,7 +88,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->footer(
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
       "overlap;\n"
-      "no radius, the distance to the neighbours; no normal, a sphere. --memory defaults to 1G.\n"
+      "no radius, that of the area; neither, the distance to the neighbours; no normal, a sphere.\n"
+      "--memory defaults to 1G; 64M is the least for two threads.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch");

@@ -13,7 +13,7 @@ namespace surfeit {
 
 struct IndexOptions {
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // budget of the process
-  int threads = 0;                                      // 0: all that the job may use
+  int threads = 0;                    // 0: all that the job may use and the budget feeds
   std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
   float overlap = 2;                  // disk area over surfel area where one must be made up
   bool full_precision = false;        // keep floats instead of quantized values

@@ -16,7 +16,7 @@ namespace {
 
 // Threads that read the blocks of a bucket: blocks of 100 to 400 KiB need several to keep the
 // device busy.
-constexpr std::size_t kReaders = 2;
+constexpr std::size_t kReaders = 4;
 constexpr int kContentWords = sizeof(Surfel) / sizeof(SortWord);
 // Words that splitters are chosen from, when a bucket is distributed again.
 constexpr std::size_t kSampleWords = 65536;

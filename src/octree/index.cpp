@@ -1,6 +1,7 @@
 #include "surfeit/index.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 #include <xxhash.h>
 
@@ -383,7 +384,19 @@ std::string Indexer::provenance() const {
 
 Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
                                const IndexOptions& options, Progress& progress) {
-  const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
+  int threads = options.threads;
+  if (threads <= 0) {
+    const int available = defaultThreadCount();
+    threads = threadsWithin(options.memory_bytes, {options.leaf_capacity, options.full_precision},
+                            available);
+    if (threads < available) {
+      progress.note(fmt::format("{} of {} threads: a budget of {} MiB feeds no more", threads,
+                                available, options.memory_bytes >> 20));
+    }
+  }
+  // More than there are processors, if that is what is asked for
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(threads));
   tbb::task_arena arena(threads);
   Result<IndexStats> result = Status::failed("index: not run");
   try {

@@ -67,6 +67,16 @@ std::uint64_t usualBucketCount(std::uint64_t records) {
       kFewBuckets, static_cast<std::uint64_t>(double(records) * kUnevenness) / kUsefulBucket + 1);
 }
 
+int threadsWithin(std::uint64_t memory_bytes, const SlabForm& slabs, int wanted) {
+  const std::size_t read_bytes = readBytesWithin(memory_bytes);
+  int threads = wanted;
+  while (threads > 1 && std::max(CloudReader::memoryBytes(read_bytes, threads),
+                                 buildOctreeBytes(slabs, threads)) > memory_bytes / 2) {
+    --threads;
+  }
+  return threads;
+}
+
 Result<IndexPlan> planIndex(const IndexTask& task) {
   IndexPlan plan;
   plan.read_bytes = readBytesWithin(task.memory_bytes);

@@ -37,6 +37,9 @@ struct IndexPlan {
   bool spills = false;              // the blocks are not expected to fit in memory
 };
 
+// Threads that a budget can feed: no more than take half of it, of those wanted.
+int threadsWithin(std::uint64_t memory_bytes, const SlabForm& slabs, int wanted);
+
 // kBudgetTooSmall, with the least that works, when it cannot be done.
 Result<IndexPlan> planIndex(const IndexTask& task);
 

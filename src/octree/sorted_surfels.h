@@ -29,8 +29,8 @@ struct SortedBatch {
   AlignedBuffer memory_;
 };
 
-// Where sorted surfels come from, batch after batch. Surfels of one key are ordered by content. One
-// thread at a time; a stream may use all threads of the current arena.
+// Where sorted surfels come from, batch after batch. Surfels of one key come in an order that follows
+// from their content. One thread at a time; a stream may use all threads of the current arena.
 class SortedSurfelStream {
  public:
   virtual ~SortedSurfelStream() = default;
