@@ -1,11 +1,14 @@
 // Compares two PLY clouds record by record: for every scalar property that both have, the mean, the
-// root mean square difference, and that over the mean.
+// root mean square difference over the mean, and that of the 99 % of records that differ least:
+// where receivers lie within a surface, the side that covers them may change with the last bit.
 //
 //   compare_baked A.ply B.ply
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,8 +23,15 @@ struct Property {
   std::string name;
   const PlyProperty* a = nullptr;
   const PlyProperty* b = nullptr;
-  double sum = 0, difference_sq = 0;
+  double sum = 0;
+  std::vector<float> differences{};
 };
+
+double rmsOf(std::span<const float> differences) {
+  double sum = 0;
+  for (const float difference : differences) sum += double(difference) * double(difference);
+  return differences.empty() ? 0 : std::sqrt(sum / double(differences.size()));
+}
 
 struct Cloud {
   PlyReader reader;
@@ -67,20 +77,20 @@ Status compare(const std::string& path_a, const std::string& path_b) {
             plyValue(&rows_b[i * b.element->row_bytes + property.b->offset], property.b->type);
         if (!std::isfinite(value_a) && !std::isfinite(value_b)) continue;
         property.sum += value_a;
-        property.difference_sq += (value_a - value_b) * (value_a - value_b);
+        property.differences.push_back(float(std::abs(value_a - value_b)));
       }
     }
   }
   const double records = double(a.element->count);
-  for (const Property& property : properties) {
+  for (Property& property : properties) {
     const double mean = property.sum / records;
-    const double rms = std::sqrt(property.difference_sq / records);
-    if (rms == 0) {
-      fmt::print("{:<16} mean {:10.4g}  equal\n", property.name, mean);
-    } else {
-      fmt::print("{:<16} mean {:10.4g}  RMS difference {:9.3g}  {:.4f} % of the mean\n",
-                 property.name, mean, rms, 100 * rms / std::abs(mean));
-    }
+    std::vector<float>& differences = property.differences;
+    std::sort(differences.begin(), differences.end());
+    const double rms = rmsOf(differences);
+    const double most = rmsOf(std::span(differences).first(differences.size() * 99 / 100));
+    fmt::print(
+        "{:<16} mean {:10.4g}  RMS difference {:9.4f} % of it, of 99 % of records {:.4f} %\n",
+        property.name, mean, 100 * rms / std::abs(mean), 100 * most / std::abs(mean));
   }
   return {};
 }
