@@ -1,12 +1,11 @@
 #include "octree/local_density.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <glm/geometric.hpp>
+#include <thread>
 
 namespace surfeit {
 namespace {
@@ -172,11 +171,21 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
 
   // One slice per searcher, in order: neighbours find the same pages
   std::vector<Status> statuses(searchers_.size());
-  tbb::parallel_for(std::size_t{0}, searchers_.size(), [&](std::size_t r) {
+  const auto search_slice = [&](std::size_t r) {
     const std::size_t begin = surfels_.size() * r / searchers_.size();
     const std::size_t end = surfels_.size() * (r + 1) / searchers_.size();
-    statuses[r] = fillSizes(searchers_[r], std::span(surfels_).subspan(begin, end - begin));
-  });
+    try {
+      statuses[r] = fillSizes(searchers_[r], std::span(surfels_).subspan(begin, end - begin));
+    } catch (const std::exception& error) {
+      statuses[r] = Status::failed(error.what());  // none may leave a thread
+    }
+  };
+  {
+    // Threads for a batch, which takes them tens of milliseconds: they join here
+    std::vector<std::jthread> others;
+    for (std::size_t r = 1; r < searchers_.size(); ++r) others.emplace_back(search_slice, r);
+    search_slice(0);
+  }
   for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
 
   const auto batch = std::make_shared<SortedBatch>();
