@@ -1,10 +1,12 @@
-// What it costs to turn sorted surfels into finished pages and back: one thread, processor time.
+// What it costs to turn sorted surfels into finished pages and back, and to pack the indexer's
+// blocks: one thread, processor time.
 //
 //   codec_bench [CLOUD.ply ...]
 //
 // Without clouds two synthetic ones of 262,144 surfels: a bumpy terrain with spheres above it, lit
 // and colored smoothly, and the same with noise in every channel. Prints nanoseconds per surfel or
-// node, and bytes before and after zstd; each time is the least of several runs.
+// node, and bytes before and after zstd; each time is the least of several runs. For blocks zstd is
+// what the indexer does not do.
 #include <fmt/format.h>
 #include <time.h>
 
@@ -23,6 +25,7 @@
 #include "io/surfel_source.h"
 #include "octree/node_group.h"
 #include "octree/node_sums.h"
+#include "octree/surfel_block.h"
 #include "octree/surfel_group.h"
 
 namespace surfeit {
@@ -32,6 +35,8 @@ constexpr std::size_t kSyntheticSurfels = 1 << 18;
 constexpr std::size_t kLargestCloud = 1 << 20;  // surfels taken of a file
 constexpr std::size_t kSurfelGroup = 512;
 constexpr std::size_t kNodeGroup = 128;
+constexpr std::size_t kBlock = 2048;
+constexpr std::size_t kBucket = 16 * kBlock;
 constexpr std::size_t kLeafCapacity = 16;
 constexpr float kFlatnessLimit = 0.97f;
 constexpr int kRuns = 7;
@@ -332,6 +337,45 @@ void measureSums(const SortedCloud& cloud, const Tree& tree) {
              surfel_ns, child_ns, node_ns, checksum);
 }
 
+// Blocks of buckets of the curve, within which surfels have no order.
+void measureBlocks(std::vector<Surfel> surfels) {
+  std::mt19937 random(3);
+  std::vector<std::span<const Surfel>> blocks;
+  for (std::size_t i = 0; i < surfels.size(); i += kBucket) {
+    const std::size_t size = std::min(kBucket, surfels.size() - i);
+    const std::span<Surfel> bucket = std::span(surfels).subspan(i, size);
+    std::shuffle(bucket.begin(), bucket.end(), random);
+    addGroups(std::span<const Surfel>(bucket), kBlock, blocks);
+  }
+  std::vector<std::vector<std::byte>> packed(blocks.size()), stored(blocks.size());
+  const double pack_ns = timeOf(surfels.size(), [&] {
+    for (std::size_t i = 0; i < blocks.size(); ++i) packSurfels(blocks[i], packed[i]);
+  });
+  std::vector<Surfel> unpacked(kBlock);
+  const double unpack_ns = timeOf(surfels.size(), [&] {
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (!unpackSurfels(packed[i], std::span(unpacked).first(blocks[i].size())).ok()) {
+        fmt::print("  unpackSurfels failed\n");
+      }
+    }
+  });
+  const double compress_ns = timeOf(surfels.size(), [&] {
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (!compressPage(packed[i], stored[i]).ok()) fmt::print("  compressPage failed\n");
+    }
+  });
+  std::size_t packed_bytes = 0, stored_bytes = 0;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    packed_bytes += packed[i].size();
+    stored_bytes += stored[i].size();
+  }
+  const auto perSurfel = [&](std::size_t bytes) { return double(bytes) / double(surfels.size()); };
+  fmt::print("  {:8} pack {:.1f}  unpack {:.1f}  zstd {:.1f} ns, ", "blocks", pack_ns, unpack_ns,
+             compress_ns);
+  fmt::print("packed {:.2f}  with zstd {:.2f} bytes\n", perSurfel(packed_bytes),
+             perSurfel(stored_bytes));
+}
+
 void measureCloud(const std::string& name, const std::vector<Surfel>& unsorted) {
   const SortedCloud cloud = sortAlongCurve(unsorted);
   const Tree tree(cloud);
@@ -344,6 +388,7 @@ void measureCloud(const std::string& name, const std::vector<Surfel>& unsorted) 
   measureSurfels(cloud.surfels);
   measureNodes(tree);
   measureSums(cloud, tree);
+  measureBlocks(cloud.surfels);
 }
 
 }  // namespace

@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "io/file.h"
+#include "io/page_file.h"
 #include "io/square_strata.h"
 #include "surfeit/index.h"
 #include "tools/command.h"
@@ -37,7 +38,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t kBlockBytes = 1 << 20;
-constexpr std::uint64_t kIdentityOffset = 16;  // docs/format.md, "Container"
 
 struct BenchOptions {
   SceneRecipe recipe;
@@ -160,12 +160,9 @@ Result<Json> indexInput(const std::string& input, const std::string& output,
   for (const auto& [phase, seconds] : stats.phase_seconds) {
     report["phases"].push_back(Json{phase, seconds});
   }
-  // The identity tells whether two runs wrote the same
-  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(output));
-  std::uint64_t identity = 0;
-  SURFEIT_RETURN_IF_ERROR(
-      file.readAt(kIdentityOffset, std::as_writable_bytes(std::span(&identity, 1))));
-  report["identity"] = fmt::format("{:016x}", identity);
+  // Tells whether two runs wrote the same pages
+  SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(output));
+  report["directory_checksum"] = fmt::format("{:016x}", pages.directoryChecksum());
   std::filesystem::remove(output);
   return report;
 }
@@ -301,7 +298,7 @@ Json summaryOf(const Setting& setting) {
           {"copy_cpu_seconds", medianOf(setting.copy_runs, cpuOf)},
           {"index_over_copy", wall / copy},
           {"phases", phases},
-          {"identity", report["identity"]},
+          {"directory_checksum", report["directory_checksum"]},
           {"wall_seconds_of_runs", wall_runs},
           {"copy_seconds_of_runs", copy_runs},
           {"copy_steps", setting.copy_runs.front().report}};
@@ -331,15 +328,15 @@ void printTable(const Json& rows) {
 }
 
 // kFailed when two settings wrote different octrees.
-Status checkIdentities(const std::vector<Setting>& settings) {
-  const std::string expected = settings.front().index_runs.front().report["identity"];
+Status checkFiles(const std::vector<Setting>& settings) {
+  const std::string expected = settings.front().index_runs.front().report["directory_checksum"];
   for (const Setting& setting : settings) {
     for (const ProcessResult& run : setting.index_runs) {
-      const std::string found = run.report["identity"];
+      const std::string found = run.report["directory_checksum"];
       if (found == expected) continue;
-      return Status::failed(fmt::format("{} threads, {}: identity {}, expected {} as before",
-                                        setting.threads, formatBytes(setting.memory_bytes), found,
-                                        expected));
+      return Status::failed(
+          fmt::format("{} threads, {}: directory checksum {}, expected {} as before",
+                      setting.threads, formatBytes(setting.memory_bytes), found, expected));
     }
   }
   return {};
@@ -366,7 +363,7 @@ Status runBench(const BenchOptions& options) {
     SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
     SURFEIT_RETURN_IF_ERROR(file.commit());
   }
-  return checkIdentities(settings);
+  return checkFiles(settings);
 }
 
 // Reads a text by a parser of Results; a failure is told by CLI11.

@@ -119,8 +119,7 @@ Status BlockWriter::flush() {
     const std::uint64_t offset = size() - filled_;
     Bytes tail(block_.data(), filled_);
     if (file_.isDirect()) {
-      const std::size_t padding =
-          (kDirectAlignment - filled_ % kDirectAlignment) % kDirectAlignment;
+      const std::size_t padding = alignedUp(filled_) - filled_;
       std::memset(block_.data() + filled_, 0, padding);
       tail = Bytes(block_.data(), filled_ + padding);
       is_padded_ = is_padded_ || padding > 0;

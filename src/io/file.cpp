@@ -8,6 +8,13 @@
 #include "io/system_calls.h"
 
 namespace surfeit {
+namespace {
+
+std::int64_t writtenNs(const struct ::stat& info) {
+  return std::int64_t{info.st_mtim.tv_sec} * 1'000'000'000 + info.st_mtim.tv_nsec;
+}
+
+}  // namespace
 
 Result<InputFile> InputFile::open(const std::string& path, Access access) {
   FileDescriptor descriptor(system_calls::open(path.c_str(), O_RDONLY | O_CLOEXEC));
@@ -26,8 +33,20 @@ Result<InputFile> InputFile::fromOpen(PositionalFile file, Access access) {
     return Status::ioError(fmt::format("{}: not a regular file", input.path()));
   }
   input.size_ = static_cast<std::uint64_t>(info.st_size);
+  input.written_ns_ = writtenNs(info);
   if (access == Access::kDirect) input.file_.openDirect(O_RDONLY);
   return input;
+}
+
+Status InputFile::checkUnchanged() const {
+  struct ::stat info {};
+  if (system_calls::fstat(file_.descriptor(), &info) != 0) return file_.systemError("stat");
+  const std::uint64_t size = static_cast<std::uint64_t>(info.st_size);
+  if (size == size_ && writtenNs(info) == written_ns_) return {};
+  return Status::corruption(fmt::format(
+      "{}: changed while it was read: found {} bytes written at {} ns, expected {} bytes written "
+      "at {} ns",
+      path(), size, writtenNs(info), size_, written_ns_));
 }
 
 std::string directoryOf(const std::string& path) {

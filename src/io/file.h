@@ -37,12 +37,17 @@ class InputFile {
     return file_.readView(offset, size, buffer);
   }
 
+  // kCorruption when the file has been written to since open, as its size or the time of the last
+  // write tell. That its path names another file by now, or none, is no failure.
+  Status checkUnchanged() const;
+
  private:
   friend class AtomicFile;
   static Result<InputFile> fromOpen(PositionalFile file, Access access);
 
   PositionalFile file_;
   std::uint64_t size_ = 0;
+  std::int64_t written_ns_ = 0;  // time of the last write, since 1970
 };
 
 // A file that appears under its final name only when complete. Until then it has no name, where the

@@ -48,8 +48,14 @@ Status PageFile::pageError(std::uint32_t page, const std::string& message) const
       fmt::format("{}: page {} at {}: {}", path(), page, entry(page).offset, message));
 }
 
-Result<PageFile> PageFile::open(const std::string& path) {
-  SURFEIT_ASSIGN_OR_RETURN(InputFile file, InputFile::open(path));
+// A message of the file, which names another place when the read was direct, with the page's own.
+Status PageFile::readError(std::uint32_t page, const Status& status) const {
+  return Status(status.code(),
+                fmt::format("{} (page {} at {})", status.message(), page, entry(page).offset));
+}
+
+Result<PageFile> PageFile::open(const std::string& path, Access access) {
+  SURFEIT_ASSIGN_OR_RETURN(InputFile file, InputFile::open(path, access));
   return open(std::move(file));
 }
 
@@ -58,9 +64,9 @@ Result<PageFile> PageFile::open(InputFile file) {
   pages.file_ = std::move(file);
   SURFEIT_RETURN_IF_ERROR(pages.readHeader());
 
-  std::uint64_t directory_offset, provenance_offset, directory_checksum, provenance_checksum;
-  SURFEIT_RETURN_IF_ERROR(pages.readFooter(directory_offset, provenance_offset, directory_checksum,
-                                           provenance_checksum));
+  std::uint64_t directory_offset, provenance_offset, provenance_checksum;
+  SURFEIT_RETURN_IF_ERROR(
+      pages.readFooter(directory_offset, provenance_offset, provenance_checksum));
 
   // Provenance and directory: sizes follow from offsets that readFooter has checked
   pages.provenance_.resize(directory_offset - provenance_offset);
@@ -74,8 +80,8 @@ Result<PageFile> PageFile::open(InputFile file) {
   SURFEIT_RETURN_IF_ERROR(
       pages.file_.readAt(directory_offset, std::as_writable_bytes(std::span(pages.directory_))));
   if (const std::uint64_t found = hash(bytesOf(pages.directory_), pages.identity_);
-      found != directory_checksum) {
-    return pages.partError("directory", checksumMismatch(found, directory_checksum));
+      found != pages.directory_checksum_) {
+    return pages.partError("directory", checksumMismatch(found, pages.directory_checksum_));
   }
   SURFEIT_RETURN_IF_ERROR(pages.checkDirectory(provenance_offset));
   return pages;
@@ -116,7 +122,7 @@ Status PageFile::readHeader() {
 }
 
 Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& provenance_offset,
-                            std::uint64_t& directory_checksum, std::uint64_t& provenance_checksum) {
+                            std::uint64_t& provenance_checksum) {
   constexpr std::uint64_t kFrameBytes = kFileHeaderBytes + kFileFooterBytes;
   if (fileBytes() < kFrameBytes) {
     return partError("footer", fmt::format("file of {} bytes, expected at least {}: it was not "
@@ -129,7 +135,7 @@ Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& prov
   provenance_offset = reader.get<std::uint64_t>();
   directory_offset = reader.get<std::uint64_t>();
   provenance_checksum = reader.get<std::uint64_t>();
-  directory_checksum = reader.get<std::uint64_t>();
+  directory_checksum_ = reader.get<std::uint64_t>();
   const std::uint64_t file_bytes = reader.get<std::uint64_t>();
   const std::uint64_t node_pages = reader.get<std::uint64_t>();
   const std::uint64_t checksum = reader.get<std::uint64_t>();
@@ -206,18 +212,23 @@ Status PageFile::checkTiling() const {
   return {};
 }
 
-Status PageFile::readPage(std::uint32_t page, std::vector<std::byte>& stored,
+Status PageFile::readPage(std::uint32_t page, AlignedBuffer& stored,
                           std::vector<std::byte>& payload) const {
   SURFEIT_ASSERT(page < pageCount());
   const PageEntry& at = entry(page);
-  stored.resize(at.stored_bytes);
-  SURFEIT_RETURN_IF_ERROR(file_.readAt(at.offset, stored));
-  if (const std::uint64_t found = hash(stored, pageSeed(identity_, at.offset));
+  const Result<Bytes> read = file_.readView(at.offset, at.stored_bytes, stored);
+  if (!read.ok()) return readError(page, read.status());
+  const Bytes bytes = *read;
+  if (bytes.size() != at.stored_bytes) {
+    return pageError(
+        page, fmt::format("file ends early: {} bytes, expected {}", bytes.size(), at.stored_bytes));
+  }
+  if (const std::uint64_t found = hash(bytes, pageSeed(identity_, at.offset));
       found != at.checksum) {
     return pageError(page, checksumMismatch(found, at.checksum));
   }
   payload.resize(at.payload_bytes);
-  const Status status = decompressPage(stored, payload);
+  const Status status = decompressPage(bytes, payload);
   return status.ok() ? Status() : pageError(page, status.message());
 }
 
@@ -278,9 +289,11 @@ Status PageFileWriter::finish(Bytes scene_fields, const std::string& provenance)
 
 Result<PageFile> PageFileWriter::finishUnnamed(Bytes scene_fields, const std::string& provenance) {
   SURFEIT_RETURN_IF_ERROR(complete(scene_fields, provenance));
+  // Cached: its pages are read in order, and their neighbours again and again
   SURFEIT_ASSIGN_OR_RETURN(
       InputFile file,
-      file_.finishUnnamed(fmt::format("temporary scene in {}", directoryOf(file_.path()))));
+      file_.finishUnnamed(fmt::format("temporary scene in {}", directoryOf(file_.path())),
+                          Access::kCached));
   return PageFile::open(std::move(file));
 }
 

@@ -45,8 +45,9 @@ std::uint64_t pageSeed(std::uint64_t file_identity, std::uint64_t offset);
 class PageFile {
  public:
   // Checks everything but the pages. kCorruption names file, part, found and expected; a newer
-  // version is refused with its number. Allocates no more than the file's own directory.
-  static Result<PageFile> open(const std::string& path);
+  // version is refused with its number. Allocates no more than the file's own directory. `access`
+  // is how readPage reads; all else is cached.
+  static Result<PageFile> open(const std::string& path, Access access = Access::kCached);
   static Result<PageFile> open(InputFile file);
 
   const std::string& path() const { return file_.path(); }
@@ -59,15 +60,16 @@ class PageFile {
   std::uint32_t pageCount() const { return static_cast<std::uint32_t>(directory_.size()); }
   std::uint32_t nodePageCount() const { return node_page_count_; }
   const PageEntry& entry(std::uint32_t page) const { return directory_[page]; }
+  // Differs between two files unless identity and the bytes and places of all pages are the same.
+  std::uint64_t directoryChecksum() const { return directory_checksum_; }
   // Most stored and decoded bytes of any page.
   std::uint32_t maxStoredBytes() const { return max_stored_bytes_; }
   std::uint32_t maxPayloadBytes() const { return max_payload_bytes_; }
 
-  // Reads, checks and decompresses a page into `payload`, with `stored` as scratch. page must be
-  // below pageCount(). Messages read "scene.sft: page 1832 at 30015488: checksum ..., expected
-  // ...".
-  Status readPage(std::uint32_t page, std::vector<std::byte>& stored,
-                  std::vector<std::byte>& payload) const;
+  // Reads, checks and decompresses a page into `payload`, with `stored` as scratch: it grows to at
+  // most two alignments more than maxStoredBytes(). page must be below pageCount(). Messages read
+  // "scene.sft: page 1832 at 30015488: checksum ..., expected ...".
+  Status readPage(std::uint32_t page, AlignedBuffer& stored, std::vector<std::byte>& payload) const;
   // Whether the pages fill the space between header and provenance without gap or overlap: that
   // they do in sum, open has checked. Takes memory of 16 bytes per page.
   Status checkTiling() const;
@@ -77,8 +79,9 @@ class PageFile {
  private:
   Status readHeader();
   Status readFooter(std::uint64_t& directory_offset, std::uint64_t& provenance_offset,
-                    std::uint64_t& directory_checksum, std::uint64_t& provenance_checksum);
+                    std::uint64_t& provenance_checksum);
   Status checkDirectory(std::uint64_t pages_end);
+  Status readError(std::uint32_t page, const Status& status) const;
   Status partError(const char* part, const std::string& message) const;
 
   InputFile file_;
@@ -87,6 +90,7 @@ class PageFile {
   std::vector<std::byte> scene_fields_;
   std::string provenance_;
   std::vector<PageEntry> directory_;
+  std::uint64_t directory_checksum_ = 0;
   std::uint32_t max_stored_bytes_ = 0;
   std::uint32_t max_payload_bytes_ = 0;
 };

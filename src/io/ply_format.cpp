@@ -13,6 +13,7 @@ namespace surfeit {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r\v\f";
+constexpr std::size_t kUsualHeaderBytes = 16 << 10;
 constexpr std::size_t kMaxQuotedChars = 40;
 constexpr std::size_t kMaxNameChars = 64;
 
@@ -204,13 +205,6 @@ class HeaderParser {
   std::set<std::string> element_names_, property_names_;
 };
 
-template <typename T>
-double valueAs(const std::byte* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return static_cast<double>(value);
-}
-
 }  // namespace
 
 std::size_t plyTypeBytes(PlyType type) { return typeRow(type).bytes; }
@@ -253,6 +247,18 @@ Result<PlyHeader> parsePlyHeader(std::string_view text, const std::string& path)
   return HeaderParser(text.substr(0, kMaxPlyHeaderBytes), path).parse();
 }
 
+Result<PlyHeader> readPlyHeader(const InputFile& file) {
+  // Headers are short; only one that does not parse gets the room that it may have at most
+  for (std::size_t most = kUsualHeaderBytes;; most = kMaxPlyHeaderBytes) {
+    std::string text(most, '\0');
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t got,
+                             file.readSome(0, std::as_writable_bytes(std::span(text))));
+    text.resize(got);
+    Result<PlyHeader> header = parsePlyHeader(text, file.path());
+    if (header.ok() || got < most || most == kMaxPlyHeaderBytes) return header;
+  }
+}
+
 std::string formatPlyHeader(const PlyHeader& header) {
   std::string text = fmt::format("ply\nformat {} 1.0\n", encodingName(header.encoding));
   for (std::string comment : header.comments) {
@@ -272,25 +278,11 @@ std::string formatPlyHeader(const PlyHeader& header) {
 }
 
 double plyValue(const std::byte* bytes, PlyType type) {
-  switch (type) {
-    case PlyType::kInt8:
-      return valueAs<std::int8_t>(bytes);
-    case PlyType::kUint8:
-      return valueAs<std::uint8_t>(bytes);
-    case PlyType::kInt16:
-      return valueAs<std::int16_t>(bytes);
-    case PlyType::kUint16:
-      return valueAs<std::uint16_t>(bytes);
-    case PlyType::kInt32:
-      return valueAs<std::int32_t>(bytes);
-    case PlyType::kUint32:
-      return valueAs<std::uint32_t>(bytes);
-    case PlyType::kFloat32:
-      return valueAs<float>(bytes);
-    case PlyType::kFloat64:
-      break;
-  }
-  return valueAs<double>(bytes);
+  return visitPlyType(type, [bytes]<typename T>(std::type_identity<T>) {
+    T value;
+    std::memcpy(&value, bytes, sizeof value);
+    return static_cast<double>(value);
+  });
 }
 
 void packPlyRow(PlyElement& element) {

@@ -7,8 +7,10 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
+#include "io/file.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -32,6 +34,31 @@ std::size_t plyTypeBytes(PlyType type);
 // The classic spelling: char uchar short ushort int uint float double.
 std::string_view plyTypeName(PlyType type);
 std::optional<PlyType> plyTypeFromName(std::string_view name);
+
+// Calls `visit` with std::type_identity<T>, T being the C++ type of values of a PLY type, and
+// returns what it returns.
+template <typename Visit>
+decltype(auto) visitPlyType(PlyType type, Visit visit) {
+  switch (type) {
+    case PlyType::kInt8:
+      return visit(std::type_identity<std::int8_t>());
+    case PlyType::kUint8:
+      return visit(std::type_identity<std::uint8_t>());
+    case PlyType::kInt16:
+      return visit(std::type_identity<std::int16_t>());
+    case PlyType::kUint16:
+      return visit(std::type_identity<std::uint16_t>());
+    case PlyType::kInt32:
+      return visit(std::type_identity<std::int32_t>());
+    case PlyType::kUint32:
+      return visit(std::type_identity<std::uint32_t>());
+    case PlyType::kFloat32:
+      return visit(std::type_identity<float>());
+    case PlyType::kFloat64:
+      break;
+  }
+  return visit(std::type_identity<double>());
+}
 
 // Whether an element or a property may be called so: a word of at most 64 bytes without control
 // characters, fit to stand in a message.
@@ -76,6 +103,8 @@ inline constexpr std::size_t kMaxPlyHeaderBytes = 1 << 20;
 // Element names are unique, and so are the property names of an element; an element that has rows
 // has properties. "obj_info" lines are dropped, and so are comments without text.
 Result<PlyHeader> parsePlyHeader(std::string_view text, const std::string& path);
+// The same from the file itself.
+Result<PlyHeader> readPlyHeader(const InputFile& file);
 
 // The header as it stands in a file, up to and including "end_header\n". Line ends in comments
 // become spaces.

@@ -1,9 +1,9 @@
 #include "io/ply_number.h"
 
 #include <charconv>
-#include <cstdint>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 namespace surfeit {
 namespace {
@@ -40,60 +40,27 @@ bool storeReal(std::string_view text, std::byte* out) {
   return true;
 }
 
-template <typename T>
-char* formatAs(const std::byte* bytes, char* out) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return std::to_chars(out, out + kLongestPlyNumber, value).ptr;
-}
-
 }  // namespace
 
 bool parsePlyNumber(std::string_view text, PlyType type, std::byte* out) {
   if (text.size() > kMaxPlyNumberChars) return false;
   // from_chars reads no plus sign
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  switch (type) {
-    case PlyType::kInt8:
-      return storeInteger<std::int8_t>(text, out);
-    case PlyType::kUint8:
-      return storeInteger<std::uint8_t>(text, out);
-    case PlyType::kInt16:
-      return storeInteger<std::int16_t>(text, out);
-    case PlyType::kUint16:
-      return storeInteger<std::uint16_t>(text, out);
-    case PlyType::kInt32:
-      return storeInteger<std::int32_t>(text, out);
-    case PlyType::kUint32:
-      return storeInteger<std::uint32_t>(text, out);
-    case PlyType::kFloat32:
-      return storeReal<float>(text, out);
-    case PlyType::kFloat64:
-      break;
-  }
-  return storeReal<double>(text, out);
+  return visitPlyType(type, [text, out]<typename T>(std::type_identity<T>) {
+    if constexpr (std::is_integral_v<T>) {
+      return storeInteger<T>(text, out);
+    } else {
+      return storeReal<T>(text, out);
+    }
+  });
 }
 
 char* formatPlyNumber(const std::byte* bytes, PlyType type, char* out) {
-  switch (type) {
-    case PlyType::kInt8:
-      return formatAs<std::int8_t>(bytes, out);
-    case PlyType::kUint8:
-      return formatAs<std::uint8_t>(bytes, out);
-    case PlyType::kInt16:
-      return formatAs<std::int16_t>(bytes, out);
-    case PlyType::kUint16:
-      return formatAs<std::uint16_t>(bytes, out);
-    case PlyType::kInt32:
-      return formatAs<std::int32_t>(bytes, out);
-    case PlyType::kUint32:
-      return formatAs<std::uint32_t>(bytes, out);
-    case PlyType::kFloat32:
-      return formatAs<float>(bytes, out);
-    case PlyType::kFloat64:
-      break;
-  }
-  return formatAs<double>(bytes, out);
+  return visitPlyType(type, [bytes, out]<typename T>(std::type_identity<T>) {
+    T value;
+    std::memcpy(&value, bytes, sizeof value);
+    return std::to_chars(out, out + kLongestPlyNumber, value).ptr;
+  });
 }
 
 }  // namespace surfeit

@@ -3,161 +3,94 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 #include <string_view>
 #include <utility>
 
-#include "io/file_stamp.h"
+#include "io/ply_cursor.h"
 #include "io/ply_number.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kBufferBytes = 256 << 10;
-constexpr std::size_t kUsualHeaderBytes = 16 << 10;
 constexpr std::size_t kMaxListItems = 1 << 20;
 constexpr std::size_t kNoList = std::numeric_limits<std::size_t>::max();
 
-bool isBlank(std::byte byte) {
-  const char c = static_cast<char>(byte);
-  return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
-}
-
-bool isLineEnd(std::byte byte) { return static_cast<char>(byte) == '\n'; }
-
 }  // namespace
 
-// The file behind a buffer, and where in the file we are.
+// Where in the file we are.
 struct PlyReader::State {
-  InputFile file;
-  FileStamp stamp;  // when it was opened
+  explicit State(InputFile opened) : cursor(std::move(opened)) {}
+
+  PlyCursor cursor;
   PlyHeader header;
   Status failure;  // of the last read, until the next seek
-
-  // buffer[begin, end) are the next bytes; the file goes on at end_offset
-  std::vector<std::byte> buffer = std::vector<std::byte>(kBufferBytes);
-  std::size_t begin = 0, end = 0;
-  std::uint64_t end_offset = 0;
-  bool at_end = false;  // the file has nothing at end_offset
-  std::string_view token;
 
   std::size_t element_index = 0;
   std::uint64_t row = 0;
   std::vector<std::uint64_t> element_begin;  // offsets of the first elements, as far as known
   std::vector<std::byte> skipped_row;
+  std::string_view token;
 
+  const InputFile& file() const { return cursor.file(); }
   const PlyElement& element() const { return header.elements[element_index]; }
   bool isAscii() const { return header.encoding == PlyEncoding::kAscii; }
-  std::uint64_t offset() const { return end_offset - (end - begin); }
+  bool hasFixedRows() const { return !isAscii() && !element().hasLists(); }
 
   Status damaged(std::string_view what) const {
     return Status::corruption(
-        fmt::format("{}: element {} row {}: {}", file.path(), element().name, row, what));
+        fmt::format("{}: element {} row {}: {}", file().path(), element().name, row, what));
   }
   Status endsEarly(std::string_view expected) const {
-    return damaged(fmt::format("file ends early: {} bytes, expected {}", file.size(), expected));
+    return damaged(fmt::format("file ends early: {} bytes, expected {}", file().size(), expected));
+  }
+  Status invalidCall(std::string_view what) const {
+    return Status::invalidArgument(fmt::format("{}: {}", file().path(), what));
   }
 
-  // --- Bytes ---
-
-  void jumpTo(std::uint64_t new_offset) {
-    begin = end = 0;
-    end_offset = new_offset;
-    at_end = false;
-  }
-
-  // Appends what fits behind the bytes that are left. A system error ends the file here; it is
-  // kept in `failure`, which goes before any complaint about the early end.
-  void refill() {
-    std::memmove(buffer.data(), buffer.data() + begin, end - begin);
-    end -= begin;
-    begin = 0;
-    Result<std::size_t> got = file.readSome(end_offset, std::span(buffer).subspan(end));
-    if (!got.ok()) failure = got.status();
-    const std::size_t got_bytes = got.ok() ? *got : 0;
-    at_end = got_bytes < buffer.size() - end;
-    end += got_bytes;
-    end_offset += got_bytes;
+  // What `read` returns, unless a read has failed before. A failure is kept for the next ones.
+  template <typename Read>
+  auto unlessFailed(Read read) -> decltype(read()) {
+    SURFEIT_RETURN_IF_ERROR(failure);
+    auto result = read();
+    if (!result.ok()) failure = result.status();
+    return result;
   }
 
   Status readBytes(std::span<std::byte> bytes) {
-    while (!bytes.empty()) {
-      if (begin == end) {
-        // Large reads go past the buffer, straight to where they are wanted
-        if (bytes.size() >= kBufferBytes) {
-          SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, file.readSome(end_offset, bytes));
-          if (got < bytes.size()) return endsEarly(fmt::format("{} more", bytes.size() - got));
-          end_offset += got;
-          return {};
-        }
-        refill();
-        SURFEIT_RETURN_IF_ERROR(failure);
-        if (begin == end) return endsEarly(fmt::format("{} more", bytes.size()));
-      }
-      const std::size_t size = std::min(bytes.size(), end - begin);
-      std::memcpy(bytes.data(), &buffer[begin], size);
-      begin += size;
-      bytes = bytes.subspan(size);
-    }
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, cursor.read(bytes));
+    if (got < bytes.size()) return endsEarly(fmt::format("{} more", bytes.size() - got));
     return {};
   }
 
   Status skipBytes(std::uint64_t size) {
-    if (size > file.size() - std::min(file.size(), offset())) {
-      return endsEarly(fmt::format("{} bytes at {}", size, offset()));
+    const std::uint64_t offset = cursor.offset();
+    if (size > file().size() - std::min(file().size(), offset)) {
+      return endsEarly(fmt::format("{} bytes at {}", size, offset));
     }
-    if (size <= end - begin) {
-      begin += static_cast<std::size_t>(size);
-    } else {
-      jumpTo(offset() + size);
-    }
+    cursor.skip(size);
     return {};
   }
 
-  // --- Ascii ---
-
-  // Afterwards the cursor stands on a number, a line end or the end of the file, and a number is
-  // in the buffer as a whole unless it is too long to be one.
-  void skipBlanks() {
-    for (;;) {
-      while (begin < end && isBlank(buffer[begin])) ++begin;
-      if (end - begin > kMaxPlyNumberChars || at_end) return;
-      refill();
-    }
-  }
-
-  // Moves `token` to the next number of the line; empty at the end of the line.
-  void nextToken() {
-    skipBlanks();
-    const std::size_t limit = std::min(end, begin + kMaxPlyNumberChars + 1);
-    std::size_t last = begin;
-    while (last < limit && !isBlank(buffer[last]) && !isLineEnd(buffer[last])) ++last;
-    token = {reinterpret_cast<const char*>(buffer.data()) + begin, last - begin};
-    begin = last;
-  }
-
-  void skipEmptyLines() {
-    for (skipBlanks(); begin < end && isLineEnd(buffer[begin]); skipBlanks()) ++begin;
-  }
+  // --- Ascii rows ---
 
   Status badToken(const PlyProperty& property, PlyType type) const {
-    SURFEIT_RETURN_IF_ERROR(failure);
+    SURFEIT_RETURN_IF_ERROR(cursor.failure());
     const std::string expected = fmt::format("{} of type {}", property.name, plyTypeName(type));
     if (!token.empty()) {
       return damaged(fmt::format("found {}, expected {}", quotePlyText(token), expected));
     }
-    if (begin == end) return endsEarly(expected);
+    if (cursor.isAtEnd()) return endsEarly(expected);
     return damaged(fmt::format("line ends early, expected {}", expected));
   }
 
   Status readAsciiRow(std::byte* scalars, std::size_t wanted_list, std::vector<double>* list) {
-    skipEmptyLines();
+    cursor.skipEmptyLines();
     const std::vector<PlyProperty>& properties = element().properties;
     for (std::size_t i = 0; i < properties.size(); ++i) {
       // A scalar
       const PlyProperty& property = properties[i];
-      nextToken();
+      token = cursor.nextWord();
       if (!property.is_list) {
         if (!parsePlyNumber(token, property.type, scalars + property.offset)) {
           return badToken(property, property.type);
@@ -174,19 +107,19 @@ struct PlyReader::State {
       SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t item_count,
                                listLength(property, value, is_wanted));
       for (std::uint64_t item = 0; item < item_count; ++item) {
-        nextToken();
+        token = cursor.nextWord();
         if (!parsePlyNumber(token, property.type, value)) return badToken(property, property.type);
         if (is_wanted) list->push_back(plyValue(value, property.type));
       }
     }
 
     // A row with too many values is as wrong as one with too few
-    nextToken();
+    token = cursor.nextWord();
     if (!token.empty()) {
       return damaged(fmt::format("found {}, expected the end of the line", quotePlyText(token)));
     }
-    if (begin < end) ++begin;
-    return failure;
+    cursor.passLineEnd();
+    return cursor.failure();
   }
 
   // --- Binary rows with lists ---
@@ -248,9 +181,9 @@ struct PlyReader::State {
   // At the end of an element, notes where the next begins; the last must end with the file.
   Status endElement() {
     if (row < element().count) return {};
-    SURFEIT_RETURN_IF_ERROR(checkUnchanged(file.path(), stamp));
+    SURFEIT_RETURN_IF_ERROR(file().checkUnchanged());
     if (element_begin.size() > element_index + 1) return {};
-    const std::uint64_t next_begin = offset();
+    const std::uint64_t next_begin = cursor.offset();
     const bool is_last = std::all_of(
         header.elements.begin() + static_cast<std::ptrdiff_t>(element_index) + 1,
         header.elements.end(), [](const PlyElement& later) { return later.count == 0; });
@@ -260,19 +193,20 @@ struct PlyReader::State {
   }
 
   Status checkEnd() {
-    if (offset() >= file.size()) return {};
+    const std::uint64_t size = file().size();
+    if (cursor.offset() >= size) return {};
     // Only so few bytes can be a line end rather than data
-    if (isAscii() || file.size() - offset() <= 2) skipEmptyLines();
-    SURFEIT_RETURN_IF_ERROR(failure);
-    if (offset() >= file.size()) return {};
+    if (isAscii() || size - cursor.offset() <= 2) cursor.skipEmptyLines();
+    SURFEIT_RETURN_IF_ERROR(cursor.failure());
+    if (cursor.offset() >= size) return {};
     return Status::corruption(
         fmt::format("{}: {} bytes at {} after the last element, expected the end of the file",
-                    file.path(), file.size() - offset(), offset()));
+                    file().path(), size - cursor.offset(), cursor.offset()));
   }
 
   // What the file can hold bounds every count before anyone uses it; sums cannot overflow later.
   Status checkCounts() {
-    std::uint64_t left = file.size() - std::min(file.size(), header.data_offset);
+    std::uint64_t left = file().size() - std::min(file().size(), header.data_offset);
     bool is_fixed_size = !isAscii();
     for (element_index = 0; element_index < header.elements.size(); ++element_index) {
       // An ascii value takes a digit and a blank; a list takes its length at least
@@ -298,7 +232,7 @@ struct PlyReader::State {
 
     // With rows of fixed size the end is known at once
     if (is_fixed_size) {
-      jumpTo(file.size() - left);
+      cursor.jumpTo(file().size() - left);
       SURFEIT_RETURN_IF_ERROR(checkEnd());
     }
     return {};
@@ -308,7 +242,7 @@ struct PlyReader::State {
     // Start at the last element whose place is known, or go on from here when inside it
     const std::size_t known = std::min(index, element_begin.size() - 1);
     if (known != element_index || known == index || !failure.ok()) {
-      jumpTo(element_begin[known]);
+      cursor.jumpTo(element_begin[known]);
       element_index = known;
       row = 0;
       failure = {};
@@ -350,8 +284,6 @@ struct PlyReader::State {
     return row_count;
   }
 
-  bool hasFixedRows() const { return !isAscii() && !element().hasLists(); }
-
   Result<Bytes> readRowView(std::size_t max_rows, AlignedBuffer& view_buffer) {
     const std::size_t row_bytes = element().row_bytes;
     const std::size_t row_count =
@@ -365,8 +297,8 @@ struct PlyReader::State {
     }
 
     // The rows of the file are the packed rows
-    const std::uint64_t at = offset();
-    SURFEIT_ASSIGN_OR_RETURN(const Bytes view, file.readView(at, size, view_buffer));
+    const std::uint64_t at = cursor.offset();
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes view, file().readView(at, size, view_buffer));
     if (view.size() < size) {
       row += view.size() / row_bytes;
       return damaged(
@@ -375,7 +307,7 @@ struct PlyReader::State {
     if (needsByteSwap(header.encoding)) {
       swapPlyRows(element(), {view_buffer.data() + (view.data() - view_buffer.data()), size});
     }
-    jumpTo(at + size);
+    cursor.jumpTo(at + size);
     row += row_count;
     SURFEIT_RETURN_IF_ERROR(endElement());
     return view;
@@ -383,7 +315,7 @@ struct PlyReader::State {
 
   void seekRow(std::uint64_t new_row) {
     row = new_row;
-    jumpTo(element_begin[element_index] + row * element().row_bytes);
+    cursor.jumpTo(element_begin[element_index] + row * element().row_bytes);
     failure = {};
   }
 
@@ -395,35 +327,15 @@ struct PlyReader::State {
     SURFEIT_RETURN_IF_ERROR(endElement());
     return has_row;
   }
-
-  Status invalidCall(std::string_view what) const {
-    return Status::invalidArgument(fmt::format("{}: {}", file.path(), what));
-  }
 };
 
 Result<PlyReader> PlyReader::open(const std::string& path, Access access) {
-  auto state = std::make_unique<State>();
-  SURFEIT_ASSIGN_OR_RETURN(state->file, InputFile::open(path, access));
-  SURFEIT_ASSIGN_OR_RETURN(state->stamp, FileStamp::of(path));
-
-  // Headers are short; only one that does not parse gets the room that it may have at most
-  for (const std::size_t header_bytes : {kUsualHeaderBytes, kMaxPlyHeaderBytes}) {
-    std::string text(header_bytes, '\0');
-    SURFEIT_ASSIGN_OR_RETURN(
-        const std::size_t got,
-        state->file.readSome(0, std::as_writable_bytes(std::span(text.data(), text.size()))));
-    text.resize(got);
-    Result<PlyHeader> header = parsePlyHeader(text, path);
-    if (header.ok()) {
-      state->header = std::move(*header);
-      break;
-    }
-    if (got < header_bytes || header_bytes == kMaxPlyHeaderBytes) return header.status();
-  }
-
+  SURFEIT_ASSIGN_OR_RETURN(InputFile file, InputFile::open(path, access));
+  auto state = std::make_unique<State>(std::move(file));
+  SURFEIT_ASSIGN_OR_RETURN(state->header, readPlyHeader(state->file()));
   SURFEIT_RETURN_IF_ERROR(state->checkCounts());
   state->element_begin = {state->header.data_offset};
-  state->jumpTo(state->header.data_offset);
+  state->cursor.jumpTo(state->header.data_offset);
   state->row = 0;
   return PlyReader(std::move(state));
 }
@@ -433,7 +345,7 @@ PlyReader::PlyReader(PlyReader&&) noexcept = default;
 PlyReader& PlyReader::operator=(PlyReader&&) noexcept = default;
 PlyReader::~PlyReader() = default;
 
-const std::string& PlyReader::path() const { return state_->file.path(); }
+const std::string& PlyReader::path() const { return state_->file().path(); }
 
 const PlyHeader& PlyReader::header() const { return state_->header; }
 
@@ -454,10 +366,7 @@ Result<std::size_t> PlyReader::readRows(std::span<std::byte> rows) {
     return state_->invalidCall(
         fmt::format("room for {} bytes given to read rows of {} bytes", rows.size(), row_bytes));
   }
-  SURFEIT_RETURN_IF_ERROR(state_->failure);
-  Result<std::size_t> count = state_->readRows(rows);
-  if (!count.ok()) state_->failure = count.status();
-  return count;
+  return state_->unlessFailed([&] { return state_->readRows(rows); });
 }
 
 Result<Bytes> PlyReader::readRowView(std::size_t max_rows, AlignedBuffer& buffer) {
@@ -466,10 +375,7 @@ Result<Bytes> PlyReader::readRowView(std::size_t max_rows, AlignedBuffer& buffer
     return state_->invalidCall(
         fmt::format("{} rows of {} bytes asked for", max_rows, state_->element().row_bytes));
   }
-  SURFEIT_RETURN_IF_ERROR(state_->failure);
-  Result<Bytes> rows = state_->readRowView(max_rows, buffer);
-  if (!rows.ok()) state_->failure = rows.status();
-  return rows;
+  return state_->unlessFailed([&] { return state_->readRowView(max_rows, buffer); });
 }
 
 bool PlyReader::hasFixedRows() const {
@@ -496,10 +402,8 @@ Result<bool> PlyReader::readRowWithList(std::span<std::byte> scalars, std::size_
                     "bytes for {} bytes of scalars",
                     list_property, element.name, scalars.size(), element.row_bytes));
   }
-  SURFEIT_RETURN_IF_ERROR(state_->failure);
-  Result<bool> has_row = state_->readRowWithList(scalars, list_property, list);
-  if (!has_row.ok()) state_->failure = has_row.status();
-  return has_row;
+  return state_->unlessFailed(
+      [&] { return state_->readRowWithList(scalars, list_property, list); });
 }
 
 }  // namespace surfeit

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <new>
 #include <system_error>
+#include <utility>
 
 #include "core/assert.h"
 #include "io/system_calls.h"
@@ -28,7 +30,7 @@ void AlignedBuffer::reserve(std::size_t bytes) {
   if (bytes <= capacity_) return;
   std::free(std::exchange(data_, nullptr));
   capacity_ = 0;
-  const std::size_t rounded = (bytes + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
+  const std::size_t rounded = alignedUp(bytes);
   data_ = static_cast<std::byte*>(std::aligned_alloc(kDirectAlignment, rounded));
   if (data_ == nullptr) throw std::bad_alloc();
   capacity_ = rounded;
@@ -89,9 +91,9 @@ Result<Bytes> PositionalFile::readView(std::uint64_t offset, std::size_t size,
     const std::size_t before = offset % kDirectAlignment;
     const std::size_t wanted = before + size;
     buffer.reserve(wanted);
-    const std::size_t whole = (wanted + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t got,
-                             readAligned(offset - before, wanted, {buffer.data(), whole}));
+    SURFEIT_ASSIGN_OR_RETURN(
+        const std::size_t got,
+        readAligned(offset - before, wanted, {buffer.data(), alignedUp(wanted)}));
     if (got <= before) return Bytes();
     return Bytes(buffer.data() + before, std::min(got, wanted) - before);
   }
@@ -125,7 +127,7 @@ Result<std::size_t> PositionalFile::readAligned(std::uint64_t begin, std::size_t
 }
 
 void PositionalFile::release(std::uint64_t offset, std::uint64_t size) const {
-  const std::uint64_t begin = (offset + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
+  const std::uint64_t begin = alignedUp(offset);
   const std::uint64_t end = (offset + size) / kDirectAlignment * kDirectAlignment;
   // What it does not give back goes with the file
   if (begin < end) system_calls::punchHole(cached_.get(), begin, end - begin);

@@ -16,9 +16,15 @@ namespace surfeit {
 
 using Bytes = std::span<const std::byte>;
 
+// Direct I/O begins and ends at multiples of this, in the file and in memory.
+inline constexpr std::size_t kDirectAlignment = 4096;
+// The least multiple of it that is not below `value`.
+constexpr std::uint64_t alignedUp(std::uint64_t value) {
+  return (value + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
+}
+
 // Memory that direct I/O can reach: begins at a multiple of kDirectAlignment. Grows only, and is
 // reused: first touch of fresh memory costs more than the disk. Move-only.
-inline constexpr std::size_t kDirectAlignment = 4096;
 class AlignedBuffer {
  public:
   AlignedBuffer() = default;

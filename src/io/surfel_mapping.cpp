@@ -24,23 +24,12 @@ double linearFromSrgb(double value) {
   return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
 }
 
-const std::array<double, 256>& linearFromSrgb8() {
-  static const std::array<double, 256> table = [] {
-    std::array<double, 256> values{};
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = linearFromSrgb(static_cast<double>(i) / 255);
-    }
-    return values;
-  }();
-  return table;
-}
-
-// The same as floats, for the fast way.
-const std::array<float, 256>& linearFloatFromSrgb8() {
+// Of codes of 8 bits.
+const std::array<float, 256>& linearFromSrgb8() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = static_cast<float>(linearFromSrgb8()[i]);
+      values[i] = static_cast<float>(linearFromSrgb(static_cast<double>(i) / 255));
     }
     return values;
   }();
@@ -211,7 +200,7 @@ std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
     if (field.type == PlyType::kFloat32) {
       decoder.addFloat(offset, place, least, most);
     } else if (field.type == PlyType::kUint8 && field.is_srgb) {
-      decoder.addByte(offset, place, linearFloatFromSrgb8());
+      decoder.addByte(offset, place, linearFromSrgb8());
     } else {
       is_fast = false;
     }

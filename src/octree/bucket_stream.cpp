@@ -1,14 +1,13 @@
 #include "octree/bucket_stream.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstring>
-#include <mutex>
 
 #include "core/assert.h"
+#include "core/first_failure.h"
+#include "octree/parallel.h"
 #include "octree/surfel_block.h"
 
 namespace surfeit {
@@ -21,25 +20,6 @@ constexpr int kContentWords = sizeof(Surfel) / sizeof(SortWord);
 // Words that splitters are chosen from, when a bucket is distributed again.
 constexpr std::size_t kSampleWords = 65536;
 constexpr std::size_t kMaxFinerBuckets = 1024;
-
-// The first failure of several threads.
-class FirstFailure {
- public:
-  void note(const Status& status) {
-    if (status.ok()) return;
-    const std::lock_guard lock(mutex_);
-    if (status_.ok()) status_ = status;
-    happened_ = true;
-  }
-  bool happened() const { return happened_; }
-  // When all threads are done.
-  const Status& status() const { return status_; }
-
- private:
-  std::atomic<bool> happened_{false};
-  std::mutex mutex_;
-  Status status_;
-};
 
 }  // namespace
 
@@ -100,11 +80,23 @@ void BucketStream::startReading(const SurfelStore& store, std::size_t bucket) {
   reading_.bucket = bucket;
   reading_.views.assign(blocks.size(), {});
   if (reading_.buffers.size() < blocks.size()) reading_.buffers.resize(blocks.size());
-  for (std::size_t part = 0; part < kReaders; ++part) {
-    const std::size_t begin = blocks.size() * part / kReaders;
-    const std::size_t end = blocks.size() * (part + 1) / kReaders;
-    const auto read = [this, &store, blocks, begin, end]() -> Status {
-      for (std::size_t i = begin; i < end; ++i) {
+
+  // What lies in memory is there; the rest is dealt to the readers
+  reading_.in_file.clear();
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    if (blocks[i].in_memory) {
+      reading_.views[i] = store.inMemory(blocks[i]);
+    } else {
+      reading_.in_file.push_back(i);
+    }
+  }
+  const std::size_t count = reading_.in_file.size();
+  const std::size_t parts = std::min(kReaders, count);
+  for (std::size_t part = 0; part < parts; ++part) {
+    const std::span<const std::size_t> dealt =
+        std::span(reading_.in_file).first(count * (part + 1) / parts).subspan(count * part / parts);
+    const auto read = [this, &store, blocks, dealt]() -> Status {
+      for (const std::size_t i : dealt) {
         SURFEIT_ASSIGN_OR_RETURN(reading_.views[i], store.fetch(blocks[i], reading_.buffers[i]));
         store.release(blocks[i]);
       }
@@ -154,7 +146,7 @@ Status BucketStream::unpack(std::span<const SurfelStore::Block> blocks,
   for (std::size_t i = 0; i < blocks.size(); ++i) begin[i + 1] = begin[i] + blocks[i].surfels;
   batch.resize(begin.back());
   FirstFailure failure;
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+  parallelFor(blocks.size(), [&](std::size_t i) {
     const std::size_t size = begin[i + 1] - begin[i];
     const std::span<Surfel> surfels = batch.surfels.subspan(begin[i], size);
     failure.note(unpackSurfels(packed[i], surfels));
@@ -254,7 +246,7 @@ Status BucketStream::distribute(const SurfelStore& store, std::size_t bucket, in
   auto finer = std::make_unique<SurfelStore>(std::move(plan));
   const std::span<const SurfelStore::Block> blocks = store.blocks(bucket);
   FirstFailure failure;
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+  parallelFor(blocks.size(), [&](std::size_t i) {
     thread_local AlignedBuffer buffer;
     thread_local std::vector<Surfel> surfels;
     thread_local std::vector<SortWord> words;

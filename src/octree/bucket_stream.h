@@ -52,6 +52,7 @@ class BucketStream : public SortedSurfelStream {
   struct Reading {
     std::vector<AlignedBuffer> buffers;
     std::vector<Bytes> views;
+    std::vector<std::size_t> in_file;  // blocks that are read, the others lie in memory
     const SurfelStore* store = nullptr;
     std::size_t bucket = 0;
     std::vector<std::future<Status>> parts;

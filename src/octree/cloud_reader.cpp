@@ -1,14 +1,15 @@
 #include "octree/cloud_reader.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_pipeline.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <atomic>
-#include <limits>
+#include <array>
 #include <mutex>
+#include <optional>
 
+#include "core/first_failure.h"
+#include "octree/parallel.h"
 #include "octree/row_fetcher.h"
 
 namespace surfeit {
@@ -25,10 +26,9 @@ class InputPass {
       : source_(source), consume_(consume), sample_step_(sample_step), progress_(progress) {}
 
   void decode(const RowFetcher::Rows& rows);
-  void note(std::uint64_t record, const Status& status);
 
-  bool failed() const { return failed_record_ != kNone; }
-  const Status& status() const { return status_; }
+  // The first of the file, by record.
+  FirstFailure& failure() { return failure_; }
   CloudTotals& totals() { return totals_; }
   const SurfelDefects& defects() const { return defects_; }
 
@@ -40,23 +40,11 @@ class InputPass {
   const CloudReader::Consumer& consume_;
   const std::uint64_t sample_step_;
   Progress& progress_;
-  static constexpr std::uint64_t kNone = std::numeric_limits<std::uint64_t>::max();
-  std::atomic<std::uint64_t> failed_record_{kNone};  // the first of the file, so far
-  std::mutex mutex_;                                 // guards what is below
+  FirstFailure failure_;
+  std::mutex mutex_;  // guards what is below
   CloudTotals totals_;
   SurfelDefects defects_;
-  Status status_;
 };
-
-// Keeps the failure that comes first in the file.
-void InputPass::note(std::uint64_t record, const Status& status) {
-  if (status.ok()) return;
-  const std::lock_guard lock(mutex_);
-  if (record < failed_record_) {
-    failed_record_ = record;
-    status_ = status;
-  }
-}
 
 Status InputPass::decodePart(Bytes rows, std::uint64_t first_record, CloudTotals& totals,
                              SurfelDefects& defects) {
@@ -70,7 +58,7 @@ Status InputPass::decodePart(Bytes rows, std::uint64_t first_record, CloudTotals
   for (std::size_t i = phase == 0 ? 0 : sample_step_ - phase; i < count; i += sample_step_) {
     totals.sample.push_back(batch[i]);
   }
-  return consume_(batch);
+  return consume_(batch, totals.bounds);
 }
 
 void InputPass::decode(const RowFetcher::Rows& rows) {
@@ -79,11 +67,12 @@ void InputPass::decode(const RowFetcher::Rows& rows) {
   CloudTotals totals;
   SurfelDefects defects;
   // What comes before a failure goes on: it may hold the first one
-  for (std::size_t begin = 0; begin < row_count && rows.first_record + begin < failed_record_;
+  for (std::size_t begin = 0; begin < row_count && rows.first_record + begin < failure_.place();
        begin += kReadBatch) {
     const std::size_t count = std::min(kReadBatch, row_count - begin);
     const Bytes part = rows.bytes.subspan(begin * row_bytes, count * row_bytes);
-    note(rows.first_record + begin, decodePart(part, rows.first_record + begin, totals, defects));
+    const std::uint64_t first_record = rows.first_record + begin;
+    failure_.note(decodePart(part, first_record, totals, defects), first_record);
   }
   const std::lock_guard lock(mutex_);
   totals_.add(totals);
@@ -172,7 +161,6 @@ Result<std::vector<Surfel>> CloudReader::sample(std::uint64_t buckets) const {
 }
 
 Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& progress) const {
-  using tbb::filter_mode;
   CloudTotals totals;
   const std::uint64_t sample_step = std::max<std::uint64_t>(1, record_count_ / kSampleSurfels);
   for (const std::string& path : inputs_) {
@@ -182,23 +170,22 @@ Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& prog
     const std::uint64_t part_rows = source->recordCount() / (4 * RowFetcher::kSlots) + kReadBatch;
     RowFetcher fetcher(*source, static_cast<std::size_t>(std::min<std::uint64_t>(
                                     read_bytes_, part_rows * source->rowBytes())));
-    tbb::parallel_pipeline(
-        RowFetcher::kSlots,
-        tbb::make_filter<void, RowFetcher::Rows>(filter_mode::serial_in_order,
-                                                 [&](tbb::flow_control& control) {
-                                                   if (progress.isCancelled())
-                                                     pass.note(0, Status::interrupted());
-                                                   RowFetcher::Rows rows;
-                                                   if (!pass.failed()) rows = fetcher.next();
-                                                   if (rows.bytes.empty()) control.stop();
-                                                   return rows;
-                                                 }) &
-            tbb::make_filter<RowFetcher::Rows, void>(filter_mode::parallel,
-                                                     [&](const RowFetcher::Rows& rows) {
-                                                       pass.decode(rows);
-                                                       fetcher.giveBack(rows);
-                                                     }));
-    if (pass.failed()) return pass.status();
+    std::array<RowFetcher::Rows, RowFetcher::kSlots> fetched;  // by slot
+    const auto fetch = [&]() -> std::optional<std::size_t> {
+      if (progress.isCancelled()) pass.failure().note(Status::interrupted());
+      if (pass.failure().happened()) return std::nullopt;
+      const RowFetcher::Rows rows = fetcher.next();
+      if (rows.bytes.empty()) return std::nullopt;
+      fetched[rows.slot] = rows;
+      return rows.slot;
+    };
+    const PipelineStage decode = {PipelineStage::Mode::kParallel, [&](std::size_t slot) {
+                                    const RowFetcher::Rows rows = fetched[slot];
+                                    pass.decode(rows);
+                                    fetcher.giveBack(rows);
+                                  }};
+    runPipeline(RowFetcher::kSlots, fetch, {&decode, 1});
+    SURFEIT_RETURN_IF_ERROR(pass.failure().status());
     SURFEIT_RETURN_IF_ERROR(fetcher.status());
     pass.totals().channels = source->channels();
     pass.totals().skipped = pass.defects().total();

@@ -55,7 +55,8 @@ class CloudReader {
   Result<std::vector<Surfel>> sample(std::uint64_t buckets) const;
 
   // Takes batches of at most kReadBatch surfels, which it may change, from several threads at once.
-  using Consumer = std::function<Status(std::span<Surfel>)>;
+  // `bounds` hold their positions, and perhaps those of surfels that it was given before.
+  using Consumer = std::function<Status(std::span<Surfel>, const Bounds3& bounds)>;
   // Reads everything. Invalid records are skipped, counted and told through progress.note(), or
   // refused. With the threads of the current arena. Errors: those of the inputs and the consumer;
   // of several bad records the first; kInterrupted.

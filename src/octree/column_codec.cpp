@@ -45,8 +45,6 @@ bool getAxesAsFloats(PayloadReader& reader, const MutableAxes& values) {
                      [&](std::span<float> axis) { return getFloats(reader, axis); });
 }
 
-Axes constAxes(const MutableAxes& values) { return {values[0], values[1], values[2]}; }
-
 // Least and greatest of the values; 0 and 0 of none. Sixteen at a time, because a chain of single
 // comparisons waits for each.
 struct Range {

@@ -19,6 +19,7 @@ namespace surfeit {
 // The x, y and z, or r, g and b, of all records.
 using Axes = std::array<std::span<const float>, 3>;
 using MutableAxes = std::array<std::span<float>, 3>;
+inline Axes constAxes(const MutableAxes& axes) { return {axes[0], axes[1], axes[2]}; }
 
 // Column encoders append; decoders take from the front and return false when the column is damaged:
 // it ends early, a range is not finite, or a value that must be finite is not. Every decoder fills

@@ -1,14 +1,13 @@
 #include "octree/curve_sort.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
 #include <utility>
 #include <vector>
+
+#include "octree/parallel.h"
 
 namespace surfeit {
 namespace {
@@ -69,7 +68,7 @@ void splitAndSort(std::span<Ticket> tickets, std::span<Ticket> scratch) {
     return tickets.subspan(begin, std::min(kPieceTickets, tickets.size() - begin));
   };
   std::vector<Histogram> next(pieces);
-  tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t p) {
+  parallelFor(pieces, [&](std::size_t p) {
     next[p].fill(0);
     for (const Ticket& ticket : piece(p)) ++next[p][digitOf(ticket.key, shift)];
   });
@@ -80,10 +79,10 @@ void splitAndSort(std::span<Ticket> tickets, std::span<Ticket> scratch) {
     for (Histogram& histogram : next) sum += std::exchange(histogram[digit], sum);
   }
   begin[kDigits] = sum;
-  tbb::parallel_for(std::size_t{0}, pieces, [&](std::size_t p) {
+  parallelFor(pieces, [&](std::size_t p) {
     for (const Ticket& ticket : piece(p)) scratch[next[p][digitOf(ticket.key, shift)]++] = ticket;
   });
-  tbb::parallel_for(std::size_t{0}, kDigits, [&](std::size_t digit) {
+  parallelFor(kDigits, [&](std::size_t digit) {
     const std::size_t size = begin[digit + 1] - begin[digit];
     if (size == 0) return;
     // What was moved to scratch is sorted there and comes back
@@ -124,8 +123,8 @@ void sortAlongCurve(std::span<Ticket> tickets, std::span<Ticket> scratch,
     const std::size_t first = i - 1;
     while (i < tickets.size() && tickets[i].key == tickets[first].key) ++i;
     // Small ranges are sorted here by this thread
-    tbb::parallel_sort(tickets.begin() + static_cast<std::ptrdiff_t>(first),
-                       tickets.begin() + static_cast<std::ptrdiff_t>(i), less);
+    parallelSort(tickets.begin() + static_cast<std::ptrdiff_t>(first),
+                 tickets.begin() + static_cast<std::ptrdiff_t>(i), less);
   }
 }
 

@@ -1,8 +1,6 @@
 #include "surfeit/index.h"
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 #include <xxhash.h>
 
 #include <algorithm>
@@ -21,6 +19,7 @@
 #include "octree/local_density.h"
 #include "octree/octree_builder.h"
 #include "octree/paged_octree.h"
+#include "octree/parallel.h"
 #include "octree/phase_clock.h"
 #include "octree/scene_writer.h"
 #include "surfeit/version.h"
@@ -87,7 +86,7 @@ class Indexer {
  private:
   Status checkOptions() const;
   Status openInputs();
-  Status checkFreeSpace();
+  Status checkFreeSpace(double packed_bytes);
   Status checkOutputRoom() const;
   Result<std::unique_ptr<SurfelStore>> readInputs();
   Result<std::unique_ptr<SurfelStore>> readInto(const std::optional<RootCube>& cube);
@@ -151,7 +150,6 @@ Status Indexer::checkOptions() const {
     return Status::invalidArgument(
         fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
   }
-
   return {};
 }
 
@@ -166,20 +164,21 @@ Status Indexer::openInputs() {
   }
   // The octree of bare positions is built at full precision
   const SlabForm form = {options_.leaf_capacity, options_.full_precision || reader_->lacksSizes()};
-  SURFEIT_ASSIGN_OR_RETURN(plan_, planIndex({options_.memory_bytes, threads_, records,
-                                             packedBytesPerSurfel(sample_), form}));
+  const double packed_bytes = packedBytesPerSurfel(sample_);
+  SURFEIT_ASSIGN_OR_RETURN(
+      plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form}));
   stats_.input_bytes = reader_->fileBytes();
-  SURFEIT_RETURN_IF_ERROR(checkFreeSpace());
+  SURFEIT_RETURN_IF_ERROR(checkFreeSpace(sample_.empty() ? kLeastPackedBytes : packed_bytes));
   clock_.finish("sample");
   return {};
 }
 
 // Refuses what cannot end well, before hours are spent on it. When temporary file and scene will
-// not both fit whole, the temporary file gives back what has been read from it.
-Status Indexer::checkFreeSpace() {
+// not both fit whole, the temporary file gives back what has been read from it. packed_bytes: of a
+// surfel.
+Status Indexer::checkFreeSpace(double packed_bytes) {
   const double records = double(reader_->recordCount());
-  const double packed = sample_.empty() ? kLeastPackedBytes : packedBytesPerSurfel(sample_);
-  double spilled = plan_.spills ? records * packed : 0;
+  double spilled = plan_.spills ? records * packed_bytes : 0;
   if (reader_->lacksSizes()) spilled += records * kBareOutputBytes;
   SURFEIT_RETURN_IF_ERROR(
       checkRoom(temporary_directory_, 0.9 * spilled,
@@ -239,13 +238,11 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
   auto store = std::make_unique<SurfelStore>(std::move(store_plan));
   const bool needs_cube = store->bucketCount() > 1;
 
-  const auto consume = [&](std::span<Surfel> surfels) -> Status {
+  const auto consume = [&](std::span<Surfel> surfels, const Bounds3& bounds) -> Status {
     if (surfels.empty() || !distributing) return {};
     thread_local std::vector<CurveKey> keys;
     keys.resize(surfels.size());
     if (needs_cube) {
-      Bounds3 bounds;
-      for (const Surfel& surfel : surfels) bounds.add(surfel.position);
       if (!contains(*cube, bounds)) {
         distributing = false;
         return {};
@@ -394,16 +391,16 @@ Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std
                                 available, options.memory_bytes >> 20));
     }
   }
-  // More than there are processors, if that is what is asked for
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                  static_cast<std::size_t>(threads));
-  tbb::task_arena arena(threads);
   Result<IndexStats> result = Status::failed("index: not run");
   try {
-    arena.execute([&] { result = Indexer(inputs, output, options, threads, progress).run(); });
+    withThreads(threads,
+                [&] { result = Indexer(inputs, output, options, threads, progress).run(); });
   } catch (const std::bad_alloc&) {
     return Status::failed(
         fmt::format("{}: the system gave no more memory; try a smaller --memory", output));
+  } catch (const std::exception& error) {
+    // A thread that could not be started, above all
+    return Status::failed(fmt::format("{}: {}", output, error.what()));
   }
   return result;
 }

@@ -27,8 +27,6 @@ Status damaged(const char* field) {
   return Status::corruption(fmt::format("node group: damaged field {}", field));
 }
 
-Axes constAxes(const MutableAxes& axes) { return {axes[0], axes[1], axes[2]}; }
-
 // The nodes of a page as columns. Every page of a thread uses the same.
 class Columns {
  public:

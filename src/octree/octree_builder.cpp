@@ -1,27 +1,24 @@
 #include "octree/octree_builder.h"
 
-#include <tbb/parallel_pipeline.h>
-
 #include <algorithm>
-#include <atomic>
-#include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "core/assert.h"
-#include "core/recycler.h"
+#include "core/first_failure.h"
+#include "octree/parallel.h"
 
 namespace surfeit {
 namespace {
 
-// A slab on its way through the stages.
+// A slab on its way through the stages. Its memory is used again by a later one.
 struct Work {
   Slab slab;
   BuiltSlab built;
   std::vector<FullNodePage> full_pages;
   std::vector<EncodedPages> node_pages;  // one each; there may be more from before
 };
-using WorkPtr = std::shared_ptr<Work>;
 
 // Slabs on their way: enough that stages do not wait for each other.
 std::size_t slabsInFlight(int threads) { return static_cast<std::size_t>(threads) * 3 / 2 + 2; }
@@ -29,111 +26,103 @@ std::size_t slabsInFlight(int threads) { return static_cast<std::size_t>(threads
 // The stages. What fails first ends the work: later stages pass what they get.
 class OctreePipeline {
  public:
-  OctreePipeline(SortedSurfelStream& stream, SceneWriter& writer, Progress& progress)
+  OctreePipeline(SortedSurfelStream& stream, SceneWriter& writer, int threads, Progress& progress)
       : cutter_(stream),
         writer_(writer),
         // The writer's header changes while slabs are built
         header_(writer.header()),
         stitcher_(writer),
-        progress_(progress) {}
+        progress_(progress),
+        works_(slabsInFlight(threads)) {
+    for (std::size_t i = 0; i < works_.size(); ++i) free_works_.push_back(i);
+  }
 
-  Status run(int threads);
+  Status run();
 
  private:
-  WorkPtr cut();
+  std::optional<std::size_t> cut();
   void build(Work& work);
   void stitch(Work& work);
   void encode(Work& work);
   void write(Work& work);
-  void note(const Status& status);
+  void giveBack(Work& work);
 
   SlabCutter cutter_;
   SceneWriter& writer_;
   const SceneHeader header_;
   SlabStitcher stitcher_;
   Progress& progress_;
-  Recycler<Work> works_;
-  std::mutex mutex_;  // guards status_
-  Status status_;
-  std::atomic<bool> failed_{false};
+  FirstFailure failure_;
+  std::vector<Work> works_;
+  std::mutex free_mutex_;                // guards free_works_
+  std::vector<std::size_t> free_works_;  // the last one given back is taken first: caches have it
 };
 
-void OctreePipeline::note(const Status& status) {
-  if (status.ok()) return;
-  const std::lock_guard lock(mutex_);
-  if (status_.ok()) status_ = status;
-  failed_ = true;
-}
-
-WorkPtr OctreePipeline::cut() {
-  if (progress_.isCancelled()) note(Status::interrupted());
-  if (failed_) return nullptr;
+std::optional<std::size_t> OctreePipeline::cut() {
+  if (progress_.isCancelled()) failure_.note(Status::interrupted());
+  if (failure_.happened()) return std::nullopt;
   Result<std::optional<Slab>> slab = cutter_.next();
-  note(slab.status());
-  if (!slab.ok() || !slab->has_value()) return nullptr;
-  const WorkPtr work = works_.take();
-  work->slab = std::move(**slab);
-  return work;
+  failure_.note(slab.status());
+  if (!slab.ok() || !slab->has_value()) return std::nullopt;
+  const std::lock_guard lock(free_mutex_);
+  SURFEIT_CHECK(!free_works_.empty());
+  const std::size_t number = free_works_.back();
+  free_works_.pop_back();
+  works_[number].slab = std::move(**slab);
+  return number;
 }
 
 void OctreePipeline::build(Work& work) {
-  if (failed_) return;
-  note(buildSlab(work.slab, header_, work.built));
+  if (failure_.happened()) return;
+  failure_.note(buildSlab(work.slab, header_, work.built));
   work.slab = {};
 }
 
 void OctreePipeline::stitch(Work& work) {
-  if (failed_) return;
+  if (failure_.happened()) return;
   stitcher_.add(work.built);
   work.full_pages = writer_.takeFullNodePages();
 }
 
 void OctreePipeline::encode(Work& work) {
-  if (failed_) return;
+  if (failure_.happened()) return;
   work.node_pages.resize(std::max(work.node_pages.size(), work.full_pages.size()));
   for (std::size_t i = 0; i < work.full_pages.size(); ++i) {
     work.node_pages[i].clear();
-    note(encodeNodePage(work.full_pages[i], header_.full_precision, work.node_pages[i]));
+    failure_.note(encodeNodePage(work.full_pages[i], header_.full_precision, work.node_pages[i]));
     work.full_pages[i].nodes = {};
   }
 }
 
 void OctreePipeline::write(Work& work) {
-  if (failed_) return;
-  note(writer_.addSurfelPages(work.built.surfel_pages, work.built.surfel_count));
-  for (std::size_t i = 0; i < work.full_pages.size() && !failed_; ++i) {
-    note(writer_.addNodePage(work.full_pages[i].level, work.node_pages[i].bytes,
-                             work.node_pages[i].pages.front().payload_bytes));
+  if (failure_.happened()) return;
+  failure_.note(writer_.addSurfelPages(work.built.surfel_pages, work.built.surfel_count));
+  for (std::size_t i = 0; i < work.full_pages.size() && !failure_.happened(); ++i) {
+    failure_.note(writer_.addNodePage(work.full_pages[i].level, work.node_pages[i].bytes,
+                                      work.node_pages[i].pages.front().payload_bytes));
   }
   progress_.advance(work.built.surfel_count);
   progress_.advanceBytes(work.built.surfel_pages.bytes.size());
 }
 
-Status OctreePipeline::run(int threads) {
-  using tbb::filter_mode;
-  const auto stage = [](auto&& function) {
-    return [function](WorkPtr work) {
-      function(*work);
-      return work;
-    };
+void OctreePipeline::giveBack(Work& work) {
+  const std::lock_guard lock(free_mutex_);
+  free_works_.push_back(static_cast<std::size_t>(&work - works_.data()));
+}
+
+Status OctreePipeline::run() {
+  using Mode = PipelineStage::Mode;
+  const auto stage = [this](Mode mode, void (OctreePipeline::*work)(Work&)) {
+    return PipelineStage{mode, [this, work](std::size_t i) { (this->*work)(works_[i]); }};
   };
-  const auto source = [this](tbb::flow_control& control) {
-    WorkPtr work = cut();
-    if (work == nullptr) control.stop();
-    return work;
-  };
-  tbb::parallel_pipeline(
-      slabsInFlight(threads),
-      tbb::make_filter<void, WorkPtr>(filter_mode::serial_in_order, source) &
-          tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel,
-                                             stage([this](Work& work) { build(work); })) &
-          tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::serial_in_order,
-                                             stage([this](Work& work) { stitch(work); })) &
-          tbb::make_filter<WorkPtr, WorkPtr>(filter_mode::parallel,
-                                             stage([this](Work& work) { encode(work); })) &
-          tbb::make_filter<WorkPtr, void>(filter_mode::serial_in_order,
-                                          [this](const WorkPtr& work) { write(*work); }));
-  if (failed_) return status_;
+  const PipelineStage stages[] = {stage(Mode::kParallel, &OctreePipeline::build),
+                                  stage(Mode::kInOrder, &OctreePipeline::stitch),
+                                  stage(Mode::kParallel, &OctreePipeline::encode),
+                                  stage(Mode::kInOrder, &OctreePipeline::write),
+                                  stage(Mode::kParallel, &OctreePipeline::giveBack)};
+  runPipeline(
+      works_.size(), [this] { return cut(); }, stages);
+  if (failure_.happened()) return failure_.status();
   SURFEIT_CHECK(stitcher_.isComplete());
 
   // Pages that never became full
@@ -141,7 +130,7 @@ Status OctreePipeline::run(int threads) {
   rest.full_pages = writer_.takeOpenNodePages();
   encode(rest);
   write(rest);
-  return status_;
+  return failure_.status();
 }
 
 }  // namespace
@@ -158,7 +147,7 @@ void SlabStitcher::add(BuiltSlab& slab) {
       node += siblings.count;
     }
     resolve(root.node.node);
-    if (slab.is_giant) {
+    if (slab.giant) {
       addGiantPiece(slab, root);
     } else {
       join(root.node, root.boundary_level);
@@ -180,12 +169,12 @@ void SlabStitcher::resolve(LevelNode& node) const {
 
 // The sums of a giant leaf add up piece by piece; its sphere is that around their box.
 void SlabStitcher::addGiantPiece(BuiltSlab& slab, BuiltSlab::Root& root) {
-  if (slab.giant_begins) {
+  if (slab.giant->begins) {
     giant_ = root.node;
   } else {
     giant_.sums.add(root.node.sums);
   }
-  if (!slab.giant_ends) return;
+  if (!slab.giant->ends) return;
   const Node first = giant_.node.node;
   Node& node = giant_.node.node;
   node = giant_.sums.toNode(writer_.header().flatness_limit);
@@ -203,7 +192,7 @@ void SlabStitcher::join(FinishedNode& node, int boundary_level) {
 
 Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, int threads,
                    Progress& progress) {
-  return OctreePipeline(stream, writer, progress).run(threads);
+  return OctreePipeline(stream, writer, threads, progress).run();
 }
 
 double SlabForm::nodesPerSurfel() const { return std::min(2.0, 4.0 / leaf_capacity); }

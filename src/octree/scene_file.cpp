@@ -8,8 +8,8 @@
 
 namespace surfeit {
 
-Result<SceneFile> SceneFile::open(const std::string& path) {
-  SURFEIT_ASSIGN_OR_RETURN(PageFile pages, PageFile::open(path));
+Result<SceneFile> SceneFile::open(const std::string& path, Access access) {
+  SURFEIT_ASSIGN_OR_RETURN(PageFile pages, PageFile::open(path, access));
   return open(std::move(pages));
 }
 

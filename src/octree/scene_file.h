@@ -37,8 +37,9 @@ struct SceneHeader {
 // Immutable once open; decode calls are safe from any thread.
 class SceneFile {
  public:
-  // Checks header, footer, directory and provenance, but reads no page.
-  static Result<SceneFile> open(const std::string& path);
+  // Checks header, footer, directory and provenance, but reads no page. `access` is how pages are
+  // read.
+  static Result<SceneFile> open(const std::string& path, Access access = Access::kCached);
   static Result<SceneFile> open(PageFile pages);
 
   const std::string& path() const;
@@ -51,7 +52,8 @@ class SceneFile {
 
   // Scratch for one decoding thread.
   struct Scratch {
-    std::vector<std::byte> stored, payload;
+    AlignedBuffer stored;
+    std::vector<std::byte> payload;
   };
   // Reads, checks and decodes a page into `nodes` or `surfels` (capacity of the header) and returns
   // how many it holds. kCorruption names file, page, and what was wrong.

@@ -62,11 +62,10 @@ Result<std::optional<Slab>> SlabCutter::next() {
 }
 
 void SlabCutter::takeGiantPiece(Slab& slab) {
-  slab.is_giant = true;
-  slab.giant_begins = !in_giant_;
+  const bool begins = !in_giant_;
   take(runInCell(kCurveLevels, kBrickSurfels), kCurveLevels, slab);
-  slab.giant_ends = boundary_level_ <= kCurveLevels;
-  in_giant_ = !slab.giant_ends;
+  in_giant_ = boundary_level_ > kCurveLevels;
+  slab.giant = GiantPiece{begins, !in_giant_};
 }
 
 // Moves `count` surfels from the front to the slab, as a brick.

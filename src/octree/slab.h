@@ -25,6 +25,11 @@ struct Brick {
                            // 0 at the end of the cloud
 };
 
+// A cell of the finest level with more surfels than a brick is one leaf that is made in pieces.
+struct GiantPiece {
+  bool begins = false, ends = false;  // whether it is the first, and the last
+};
+
 struct Slab {
   // Its surfels: tickets [begin, end) of batches, in order.
   struct Run {
@@ -34,10 +39,7 @@ struct Slab {
   std::vector<Run> runs;
   std::size_t surfel_count = 0;
   std::vector<Brick> bricks;
-  // A cell of the finest level with more surfels than a brick is one leaf, made in pieces: each a
-  // slab of one brick.
-  bool is_giant = false;
-  bool giant_begins = false, giant_ends = false;
+  std::optional<GiantPiece> giant;  // then the slab has one brick, which is the piece
 };
 
 // Cuts a stream into slabs of kBrickSurfels to 2 * kBrickSurfels surfels (the last: any). One

@@ -37,9 +37,7 @@ class SlabBuilder {
     built_.clear();
     fetchSurfels();
     built_.surfel_count = surfels_.size();
-    built_.is_giant = slab_.is_giant;
-    built_.giant_begins = slab_.giant_begins;
-    built_.giant_ends = slab_.giant_ends;
+    built_.giant = slab_.giant;
     std::size_t begin = 0;
     for (const Brick& brick : slab_.bricks) {
       buildBrick(begin, brick);
@@ -100,7 +98,7 @@ void SlabBuilder::buildBrick(std::size_t begin, const Brick& brick) {
   int boundary_level = brick.level;
   while (begin < brick.end) {
     std::size_t end = brick.end;
-    if (!slab_.is_giant) end = begin + leafSize(begin, brick.end, boundary_level);
+    if (!slab_.giant) end = begin + leafSize(begin, brick.end, boundary_level);
     makeLeaf(begin, end, node);
     boundary_level =
         end < brick.end ? firstDifferentLevel(keys_[end - 1], keys_[end]) : brick.level;

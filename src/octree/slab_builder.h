@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,8 +41,7 @@ struct BuiltSlab {
   std::vector<LevelNode> nodes;  // sibling group after sibling group, in the order of closing
   std::vector<Siblings> siblings;
   std::vector<Root> roots;  // by brick
-  bool is_giant = false;
-  bool giant_begins = false, giant_ends = false;
+  std::optional<GiantPiece> giant;
 
   void clear();
 };

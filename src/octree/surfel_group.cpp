@@ -98,8 +98,6 @@ class Columns {
   }
 };
 
-Axes constAxes(const MutableAxes& axes) { return {axes[0], axes[1], axes[2]}; }
-
 }  // namespace
 
 std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,

@@ -11,10 +11,6 @@ namespace {
 constexpr int kTableBits = 14;
 constexpr std::size_t kChunkBytes = 4 << 20;
 
-constexpr std::size_t wholePages(std::size_t bytes) {
-  return (bytes + kDirectAlignment - 1) / kDirectAlignment * kDirectAlignment;
-}
-
 }  // namespace
 
 struct SurfelStore::Bucket {
@@ -126,7 +122,7 @@ Status SurfelStore::store(Bucket& bucket, std::span<const Surfel> surfels) {
     }
     // Whole pages, so that nothing is left of a block that is given back: the remains of a million
     // blocks took the file system minutes to remove
-    if (plan_.gives_back) packed.resize(wholePages(packed.size()));
+    if (plan_.gives_back) packed.resize(alignedUp(packed.size()));
     SURFEIT_ASSIGN_OR_RETURN(block.place, file_->append(packed));
     temporary_bytes_ += packed.size();
   }
@@ -175,12 +171,17 @@ std::span<const SurfelStore::Block> SurfelStore::blocks(std::size_t bucket) cons
 }
 
 Result<Bytes> SurfelStore::fetch(const Block& block, AlignedBuffer& buffer) const {
-  if (block.in_memory) return Bytes(reinterpret_cast<const std::byte*>(block.place), block.bytes);
+  if (block.in_memory) return inMemory(block);
   return file_->readView(block.place, block.bytes, buffer);
 }
 
+Bytes SurfelStore::inMemory(const Block& block) const {
+  SURFEIT_ASSERT(block.in_memory);
+  return {reinterpret_cast<const std::byte*>(block.place), block.bytes};
+}
+
 void SurfelStore::release(const Block& block) const {
-  if (plan_.gives_back && !block.in_memory) file_->release(block.place, wholePages(block.bytes));
+  if (plan_.gives_back && !block.in_memory) file_->release(block.place, alignedUp(block.bytes));
 }
 
 }  // namespace surfeit

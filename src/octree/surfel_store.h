@@ -56,6 +56,8 @@ class SurfelStore {
   std::span<const Block> blocks(std::size_t bucket) const;
   // The bytes of a block, for unpackSurfels; in `buffer` when they come from the file.
   Result<Bytes> fetch(const Block& block, AlignedBuffer& buffer) const;
+  // The same of a block that lies in memory.
+  Bytes inMemory(const Block& block) const;
 
   // The block will not be fetched again.
   void release(const Block& block) const;

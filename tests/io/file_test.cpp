@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -93,6 +94,32 @@ TEST_F(InputFileTest, ViewsHoldTheBytesAndEndWithTheFile) {
     }
     EXPECT_LE(buffer.capacity(), 100'000 + 2 * kDirectAlignment);
   }
+}
+
+TEST_F(InputFileTest, WritingToAnOpenFileIsNoticed) {
+  write("a", "0123");
+  const Result<InputFile> file = InputFile::open(path("a"));
+  ASSERT_TRUE(file.ok());
+  EXPECT_TRUE(file->checkUnchanged().ok());
+  fs::last_write_time(path("a"), fs::file_time_type::clock::now() + std::chrono::seconds(5));
+  const Status status = file->checkUnchanged();
+  EXPECT_EQ(status.code(), StatusCode::kCorruption);
+  EXPECT_NE(status.message().find("/a: changed while it was read: found 4 bytes"),
+            std::string::npos);
+  FailCall fail(1, EIO, FailCall::Repeat::kOnce, only(Call::kFstat));
+  const Faults faults{&fail};
+  EXPECT_EQ(file->checkUnchanged().code(), StatusCode::kIoError);
+}
+
+TEST_F(InputFileTest, NewFileUnderTheNameOfAnOpenOneIsNoChange) {
+  write("a", "0123");
+  const Result<InputFile> file = InputFile::open(path("a"));
+  ASSERT_TRUE(file.ok());
+  write("b", "longer than before");
+  fs::rename(path("b"), path("a"));
+  EXPECT_TRUE(file->checkUnchanged().ok());
+  fs::remove(path("a"));
+  EXPECT_TRUE(file->checkUnchanged().ok());
 }
 
 TEST_F(InputFileTest, FileKeepsItsBytesWhenItsPathGoes) {

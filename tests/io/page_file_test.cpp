@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/job_limits.h"
+#include "io/fault_injector.h"
 #include "io/page_codec.h"
 #include "io/page_file_damage.h"
 #include "io/test_directory.h"
@@ -16,7 +17,10 @@
 namespace surfeit {
 namespace {
 
+using testing::AllOf;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 constexpr std::uint64_t kIdentity = 0x0123456789abcdefull;
 const std::string kProvenance = "{\"program\":\"test\"}";
@@ -60,9 +64,10 @@ class PageFileTest : public DirectoryTest {
   }
 
   // Opens the file and reads every page.
-  Status readAll(const std::string& name) {
-    SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(path(name)));
-    std::vector<std::byte> stored, payload;
+  Status readAll(const std::string& name, Access access = Access::kCached) {
+    SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(path(name), access));
+    AlignedBuffer stored;
+    std::vector<std::byte> payload;
     for (std::uint32_t page = 0; page < pages.pageCount(); ++page) {
       SURFEIT_RETURN_IF_ERROR(pages.readPage(page, stored, payload));
     }
@@ -73,6 +78,10 @@ class PageFileTest : public DirectoryTest {
   testing::AssertionResult noticed(const std::string& bytes) {
     replaceContents(path("damaged.sft"), bytes);
     const Status status = readAll("damaged.sft");
+    if (const Status direct = readAll("damaged.sft", Access::kDirect);
+        direct.message() != status.message()) {
+      return testing::AssertionFailure() << "read directly: " << direct.message();
+    }
     if (status.ok()) return testing::AssertionFailure() << "not noticed";
     if (status.code() != StatusCode::kCorruption ||
         status.message().find("damaged.sft: ") == std::string::npos) {
@@ -88,6 +97,78 @@ class PageFileTest : public DirectoryTest {
   }
 };
 
+// Fails the test when a read of pages is not as its access says: direct, or exactly the page.
+class ReadWatch : public FaultInjector {
+ public:
+  explicit ReadWatch(Access access) : access_(access) {}
+  void expect(const PageEntry& page) {
+    page_ = page;
+    reads_ = 0;
+  }
+  int before(CallInfo& info) override {
+    if (info.call != Call::kPread) return 0;
+    ++reads_;
+    const bool is_direct = (::fcntl(info.descriptor, F_GETFL) & O_DIRECT) != 0;
+    EXPECT_EQ(is_direct, access_ == Access::kDirect);
+    if (access_ == Access::kCached) {
+      EXPECT_EQ(info.offset, page_.offset);
+      EXPECT_EQ(info.bytes, page_.stored_bytes);
+    }
+    return 0;
+  }
+  int reads() const { return reads_; }
+
+ private:
+  const Access access_;
+  PageEntry page_;
+  int reads_ = 0;
+};
+
+TEST_F(PageFileTest, PageIsOneReadOfItsBytesOrADirectOne) {
+  writePages("a.sft", 40, 300);
+  for (const Access access : {Access::kCached, Access::kDirect}) {
+    const Result<PageFile> pages = PageFile::open(path("a.sft"), access);
+    ASSERT_TRUE(pages.ok()) << pages.status().message();
+    ReadWatch watch(access);
+    const Faults faults{&watch};
+    AlignedBuffer stored;
+    std::vector<std::byte> payload;
+    for (std::uint32_t i = 0; i < pages->pageCount(); ++i) {
+      watch.expect(pages->entry(i));
+      ASSERT_TRUE(pages->readPage(i, stored, payload).ok());
+      EXPECT_EQ(watch.reads(), 1);
+      ASSERT_EQ(payload, payloadOf(i < 40 ? i : 100 + i - 40));
+    }
+    EXPECT_LE(stored.capacity(), pages->maxStoredBytes() + 2 * kDirectAlignment);
+  }
+}
+
+TEST_F(PageFileTest, FailedReadAndCutFileNameFilePageAndPlace) {
+  writePages("a.sft", 2, 3);
+  for (const Access access : {Access::kCached, Access::kDirect}) {
+    const Result<PageFile> pages = PageFile::open(path("a.sft"), access);
+    ASSERT_TRUE(pages.ok());
+    AlignedBuffer stored;
+    std::vector<std::byte> payload;
+    const std::string place = " at " + std::to_string(pages->entry(3).offset);
+    {
+      FailCall fail(1, EIO, FailCall::Repeat::kForEver, only(Call::kPread));
+      const Faults faults{&fail};
+      const Status status = pages->readPage(3, stored, payload);
+      EXPECT_EQ(status.code(), StatusCode::kIoError);
+      EXPECT_THAT(status.message(), AllOf(StartsWith(path("a.sft") + ": cannot read "),
+                                          EndsWith(": Input/output error (page 3" + place + ")")));
+    }
+    const std::string file = contents("a.sft");
+    std::filesystem::resize_file(path("a.sft"), pages->entry(3).offset + 1);
+    const Status status = pages->readPage(3, stored, payload);
+    EXPECT_EQ(status.code(), StatusCode::kCorruption);
+    EXPECT_THAT(status.message(),
+                StartsWith(path("a.sft") + ": page 3" + place + ": file ends early: 1 bytes"));
+    write("a.sft", file);
+  }
+}
+
 TEST_F(PageFileTest, WhatIsWrittenIsRead) {
   for (const auto& [node_pages, surfel_pages] :
        {std::pair{0u, 0u}, {1u, 0u}, {0u, 1u}, {3u, 4u}, {40u, 300u}}) {
@@ -101,11 +182,12 @@ TEST_F(PageFileTest, WhatIsWrittenIsRead) {
               sceneFields());
     ASSERT_EQ(pages->nodePageCount(), node_pages);
     ASSERT_EQ(pages->pageCount(), node_pages + surfel_pages);
-    std::vector<std::byte> stored, payload;
+    AlignedBuffer stored;
+    std::vector<std::byte> payload;
     for (std::uint32_t i = 0; i < pages->pageCount(); ++i) {
       ASSERT_TRUE(pages->readPage(i, stored, payload).ok());
       ASSERT_EQ(payload, payloadOf(i < node_pages ? i : 100 + i - node_pages));
-      EXPECT_LE(stored.size(), pages->maxStoredBytes());
+      EXPECT_LE(stored.capacity(), pages->maxStoredBytes() + 2 * kDirectAlignment);
       EXPECT_LE(payload.size(), pages->maxPayloadBytes());
     }
     std::filesystem::remove(path("a.sft"));
@@ -214,7 +296,8 @@ TEST_F(PageFileTest, DamageInOnePageLeavesTheOthersReadable) {
   write("damaged.sft", file);
   const Result<PageFile> pages = PageFile::open(path("damaged.sft"));
   ASSERT_TRUE(pages.ok());
-  std::vector<std::byte> stored, payload;
+  AlignedBuffer stored;
+  std::vector<std::byte> payload;
   for (std::uint32_t page = 0; page < pages->pageCount(); ++page) {
     const PageEntry& at = pages->entry(page);
     const bool damaged = at.offset <= 600 && 600 < at.offset + at.stored_bytes;

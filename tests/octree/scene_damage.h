@@ -22,9 +22,10 @@ inline Status rewriteScene(const std::string& from, const std::string& to, const
                            const HeaderEdit& edit_header = {}) {
   SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(from));
   SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer, PageFileWriter::create(to, pages.identity()));
+  AlignedBuffer buffer;
   std::vector<std::byte> stored, payload;
   const auto copy = [&](std::uint32_t page) -> Status {
-    SURFEIT_RETURN_IF_ERROR(pages.readPage(page, stored, payload));
+    SURFEIT_RETURN_IF_ERROR(pages.readPage(page, buffer, payload));
     if (edit) edit(page, payload);
     SURFEIT_RETURN_IF_ERROR(compressPage(payload, stored));
     const auto bytes = static_cast<std::uint32_t>(payload.size());

@@ -109,9 +109,9 @@ TEST(SlabCutter, OneKeyWithMoreThanABrickIsAGiant) {
   std::size_t pieces = 0, surfels = 0;
   for (const Slab& slab : slabsOf(keys, 3000)) {
     surfels += slab.surfel_count;
-    if (!slab.is_giant) continue;
-    EXPECT_EQ(slab.giant_begins, pieces == 0);
-    EXPECT_EQ(slab.giant_ends, pieces == 2);
+    if (!slab.giant) continue;
+    EXPECT_EQ(slab.giant->begins, pieces == 0);
+    EXPECT_EQ(slab.giant->ends, pieces == 2);
     EXPECT_EQ(slab.surfel_count, pieces < 2 ? kBrickSurfels : 6);
     ++pieces;
   }
