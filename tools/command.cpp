@@ -93,14 +93,17 @@ Status CommandContext::writeStats(nlohmann::json fields) {
   fields["cpu_seconds"] = processCpuSeconds();
   fields["peak_resident_bytes"] = peakResidentBytes();
   fields["threads"] = threads();
-  const std::string text = fields.dump(2) + "\n";
-  SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(common.stats_path));
-  SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
-  return file.commit();
+  return writeTextFile(common.stats_path, fields.dump(2) + "\n");
 }
 
 double CommandContext::wallSeconds() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+Status writeTextFile(const std::string& path, const std::string& text) {
+  SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
+  SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
+  return file.commit();
 }
 
 int CommandContext::threads() const {

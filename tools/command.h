@@ -78,6 +78,9 @@ std::string formatCount(std::uint64_t count);
 CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,
                                const std::string& help);
 
+// Writes a whole file, which appears when complete.
+Status writeTextFile(const std::string& path, const std::string& text);
+
 // Exit status of a failure (docs/architecture.md): 2 usage, 3 bad data, 33 budget, 74 I/O, 130
 // interrupted.
 int exitStatus(StatusCode code);
@@ -89,6 +92,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context);
 void addInfoCommand(CLI::App& app, CommandContext& context);
 void addVerifyCommand(CLI::App& app, CommandContext& context);
 void addGatherCommand(CLI::App& app, CommandContext& context);
+void addTuneCommand(CLI::App& app, CommandContext& context);
 void addViewCommand(CLI::App& app, CommandContext& context);
 
 }  // namespace surfeit

@@ -20,6 +20,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addInfoCommand(app, context);
   addVerifyCommand(app, context);
   addGatherCommand(app, context);
+  addTuneCommand(app, context);
   addViewCommand(app, context);
 }
 

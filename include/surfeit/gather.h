@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -31,19 +32,60 @@ struct GatherQuality {
   GatherSides sides = GatherSides::kFront;
 };
 
+// The order in which receivers are gathered. Decides how often pages are read, never the result.
+enum class ReceiverOrder : std::uint8_t {
+  kHilbert,  // along the Hilbert curve of the scene
+  kMorton,   // along its Morton (Z) curve, for comparison
+  kInput,    // as they come: for clouds that are in a good order already
+};
+
 struct GatherOptions {
   GatherMode mode = GatherMode::kOcclusion;
   GatherQuality quality;
-  std::uint64_t memory_bytes =
-      0;                // budget of the process; 0: three quarters of what the job may use
+  // Budget of the process: its peak resident memory stays below this plus 64 MiB. 0: three quarters
+  // of what the job may use.
+  std::uint64_t memory_bytes = 0;
   int threads = 0;      // 0: all that the job may use
   bool strict = false;  // refuse invalid receivers instead of writing NaN for them
+
+  ReceiverOrder order = ReceiverOrder::kHilbert;
+  // Share of the cache memory that goes to node groups, 0..1; negative: found by measurement.
+  double cache_split = -1;
+  bool direct_io = false;  // read the scene past the page cache of the system
+  bool prefetch = true;    // read ahead along the order of the receivers when reading is slow
+  // Where receivers and results go that do not fit the memory; empty: beside the result.
+  std::string temporary_directory;
 };
 
+// What one of the two caches did. Counts, bytes, and seconds summed over threads.
 struct GatherCacheStats {
-  std::uint64_t requests = 0, hits = 0, misses = 0, evictions = 0, bytes_read = 0, peak_bytes = 0;
-  std::uint64_t budget_bytes = 0;   // frames this cache may fill
-  std::uint64_t decoded_bytes = 0;  // frames that would hold every page
+  std::uint64_t requests = 0;        // hits + misses
+  std::uint64_t hits = 0;            // front_hits + shared_hits
+  std::uint64_t front_hits = 0;      // answered by a thread's own front, or always resident
+  std::uint64_t shared_hits = 0;     // found loaded, or being loaded by another thread
+  std::uint64_t waits = 0;           // of the shared hits: those that waited for that other thread
+  std::uint64_t misses = 0;          // loads that a thread waited for
+  std::uint64_t prefetches = 0;      // loads ahead of any request
+  std::uint64_t repeated_loads = 0;  // of both: of pages that had been evicted
+  std::uint64_t evictions = 0;       // pages given up for others
+  std::uint64_t bytes_read = 0, repeated_bytes = 0;  // stored bytes, of all and of repeated loads
+  double load_seconds = 0;                           // reading, checking and decoding
+  double stall_seconds = 0;                          // gathering threads waited for pages
+  std::uint64_t peak_bytes = 0;                      // most bytes of frames in use
+  std::uint64_t budget_bytes = 0;                    // frames this cache may fill
+  std::uint64_t decoded_bytes = 0;                   // frames that would hold every page
+  // Frames with which a tenth of the reads would repeat earlier ones, from sampled reuse distances.
+  std::uint64_t working_set_bytes = 0;
+};
+
+// The monitor's record of a stretch of time. Counts are those of the window alone; peak_bytes and
+// budget_bytes hold at its end, and working_set_bytes is what pages touched in it would fill.
+struct GatherWindow {
+  double begin_seconds = 0, end_seconds = 0;  // since the gather began
+  std::uint64_t receivers = 0;
+  std::uint64_t run_receivers = 0;       // neighbours that a thread takes at a time, at its end
+  std::uint64_t prefetch_receivers = 0;  // how far ahead pages are read, at its end
+  GatherCacheStats node_cache, surfel_cache;
 };
 
 struct GatherStats {
@@ -52,7 +94,9 @@ struct GatherStats {
   double gather_seconds = 0;  // wall time inside the gather proper, without reading and writing
   int threads = 0;
   std::uint64_t memory_bytes = 0;
+  std::uint64_t temporary_bytes = 0;  // written to temporary files
   GatherCacheStats node_cache, surfel_cache;
+  std::vector<GatherWindow> windows;  // in order; at most some hundreds, however long it took
 };
 
 // Gathers at every record of the cloud `receivers_path` (PLY) and writes `result_path` (PLY,

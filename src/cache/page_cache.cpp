@@ -1,278 +1,533 @@
 #include "cache/page_cache.h"
 
 #include <fmt/format.h>
-#include <sys/mman.h>
 
 #include <algorithm>
-#include <bit>
-#include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <exception>
-#include <limits>
+#include <new>
 #include <utility>
 
-#include "core/assert.h"
+#include "cache/cache_front.h"
+#include "cache/process_barrier.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kFrameAlignment = 64;  // a cache line, and the widest vector
+// Adds the time it lives to a sum of nanoseconds.
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::uint64_t& sum) : sum_(sum) {}
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+  ~Stopwatch() {
+    sum_ += static_cast<std::uint64_t>(std::chrono::nanoseconds(Clock::now() - begin_).count());
+  }
 
-// The options as the cache works by them: whole cache lines, and no frame that could stay unused.
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::uint64_t& sum_;
+  const Clock::time_point begin_ = Clock::now();
+};
+
+// The options as the cache works by them: no frame that could stay unused.
 PageCache::Options normalised(PageCache::Options options) {
-  const std::size_t lines = (options.frame_bytes + kFrameAlignment - 1) / kFrameAlignment;
-  options.frame_bytes = std::max<std::size_t>(lines, 1) * kFrameAlignment;
-  options.frame_count = std::min<std::size_t>(options.frame_count, options.page_count);
+  const std::size_t pages = options.page_count;
+  options.frame_count = std::min(options.frame_count, pages);
+  if (options.most_frames == 0) options.most_frames = pages;
+  options.most_frames = std::clamp(options.most_frames, options.frame_count, pages);
   return options;
 }
 
 // A loader is code from elsewhere: were it to throw past the cache, the threads that wait for the
 // page would wait for ever.
-Result<std::uint64_t> callLoader(const PageCache::Loader& loader, PageNumber page,
-                                 std::span<std::byte> frame) {
+Result<PageCache::Loaded> callLoader(const PageCache::Loader& loader, PageNumber page,
+                                     std::span<std::byte> frame) noexcept {
   try {
-    return loader(page, frame);
-  } catch (const std::exception& exception) {
-    return Status::failed(fmt::format("cannot load page {}: {}", page, exception.what()));
+    try {
+      return loader(page, frame);
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::exception& exception) {
+      return Status::failed(fmt::format("cannot load page {}: {}", page, exception.what()));
+    } catch (...) {
+      return Status::failed(fmt::format("cannot load page {}", page));
+    }
+  } catch (...) {
+    return Status::failed("out of memory");  // so short a text takes none
+  }
+}
+
+// A copy for another thread.
+Status copyOf(const Status& status) noexcept {
+  try {
+    return status;
+  } catch (const std::bad_alloc&) {
+    return Status::failed("out of memory");
   }
 }
 
 }  // namespace
 
-PageCache::Pin::Pin(Pin&& other) noexcept
-    : cache_(std::exchange(other.cache_, nullptr)),
-      data_(std::exchange(other.data_, nullptr)),
-      frame_(other.frame_) {}
-
-PageCache::Pin& PageCache::Pin::operator=(Pin&& other) noexcept {
-  if (this != &other) {
-    release();
-    cache_ = std::exchange(other.cache_, nullptr);
-    data_ = std::exchange(other.data_, nullptr);
-    frame_ = other.frame_;
-  }
-  return *this;
-}
-
-PageCache::Pin::~Pin() { release(); }
-
-void PageCache::Pin::release() {
-  if (cache_ != nullptr) cache_->unpin(frame_);
-  cache_ = nullptr;
-  data_ = nullptr;
-}
-
 std::size_t PageCache::memoryBytes(const Options& options) {
   const Options used = normalised(options);
-  return used.frame_count * used.frame_bytes + (used.frame_count + 1) * sizeof(Frame) +
-         std::size_t{used.page_count} * sizeof(std::uint32_t);
+  return used.frame_count * (frameBytes(used.frame_bytes) + sizeof(Frame) + sizeof(std::uint32_t)) +
+         used.page_count * sizeof(Entry) + (kEpochLists + 1) * sizeof(List);
 }
 
 Result<std::unique_ptr<PageCache>> PageCache::create(const Options& options, Loader loader) {
   const Options used = normalised(options);
-  if (used.frame_count > std::numeric_limits<std::size_t>::max() / used.frame_bytes) {
-    return Status::failed(
-        fmt::format("cannot reserve {} frames of {} bytes: more than can be addressed",
-                    used.frame_count, used.frame_bytes));
+  if (used.frame_count == 0 && used.page_count > 0) {
+    return Status::budgetTooSmall(
+        fmt::format("a cache without a frame: expected at least one of {} bytes",
+                    frameBytes(used.frame_bytes)));
   }
-
-  // Address space alone: the kernel gives memory to a frame when it is first written
-  std::byte* pool = nullptr;
-  const std::size_t pool_bytes = used.frame_count * used.frame_bytes;
-  if (pool_bytes > 0) {
-    void* mapped = mmap(nullptr, pool_bytes, PROT_READ | PROT_WRITE,
-                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    if (mapped == MAP_FAILED) {
-      return Status::failed(fmt::format("cannot reserve {} frames of {} bytes: {}",
-                                        used.frame_count, used.frame_bytes, std::strerror(errno)));
-    }
-    pool = static_cast<std::byte*>(mapped);
-  }
-  return std::unique_ptr<PageCache>(new PageCache(used, pool, std::move(loader)));
+  SURFEIT_ASSIGN_OR_RETURN(FramePool pool,
+                           FramePool::create(frameBytes(used.frame_bytes), used.most_frames));
+  return std::unique_ptr<PageCache>(new PageCache(used, std::move(pool), std::move(loader)));
 }
 
-PageCache::PageCache(const Options& options, std::byte* pool, Loader loader)
+PageCache::PageCache(const Options& options, FramePool pool, Loader loader)
     : options_(options),
       loader_(std::move(loader)),
-      pool_(pool),
-      frame_of_page_(options.page_count, kNoFrame),
-      frames_(options.frame_count + 1) {
-  // The LRU list is a ring through the last entry, empty when that entry links to itself
-  const std::uint32_t ring = static_cast<std::uint32_t>(options.frame_count);
-  frames_[ring].previous = frames_[ring].next = ring;
+      pool_(std::move(pool)),
+      has_barrier_(registerProcessBarrier()),
+      entries_(std::make_unique<Entry[]>(options.page_count)),
+      lists_(kEpochLists + 1) {
+  setFrameLimit(options.frame_count);
 }
 
 PageCache::~PageCache() {
-  for (const Frame& frame : frames_) SURFEIT_ASSERT(frame.pins == 0);
-  if (pool_ != nullptr) munmap(pool_, options_.frame_count * options_.frame_bytes);
+  resident_pins_.clear();
+  SURFEIT_ASSERT(fronts_.empty());
+  for (PageNumber page = 0; page < options_.page_count; ++page) {
+    SURFEIT_ASSERT(!isPinned(entries_[page].word.load()));
+  }
 }
 
-Result<PageCache::Pin> PageCache::pin(PageNumber page) {
-  if (page >= options_.page_count) {
-    return Status::corruption(
-        fmt::format("page {} does not exist: expected less than {}", page, options_.page_count));
-  }
-  if (options_.frame_count == 0) {
+Status PageCache::keepResident(PageNumber count) {
+  SURFEIT_CHECK(count <= options_.page_count && resident_.empty());
+  const std::size_t limit = frameLimit();
+  if (count >= limit && count > 0 && limit < options_.page_count) {
     return Status::budgetTooSmall(
-        fmt::format("the cache has no frame for page {}: expected at least one of {} bytes", page,
-                    options_.frame_bytes));
+        fmt::format("{} frames for {} pages kept resident and one for all others", limit, count));
   }
-
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    if (const std::uint32_t frame = frame_of_page_[page]; frame != kNoFrame) {
-      return pinPresent(lock, frame);
-    }
-    if (const std::uint32_t frame = takeFrame(); frame != kNoFrame) {
-      return load(lock, page, frame);
-    }
-    // Every frame is pinned. By the time one is released another thread may have begun to load
-    // this very page, so we look again from the start.
-    ++waiting_for_frame_;
-    frame_released_.wait(lock);
-    --waiting_for_frame_;
+  std::vector<Pin> pins;
+  std::vector<std::span<const std::byte>> resident;
+  pins.reserve(count);
+  resident.reserve(count);
+  for (PageNumber page = 0; page < count; ++page) {
+    Request request{.is_prefetch = true};
+    SURFEIT_ASSIGN_OR_RETURN(Pin pin, pinOrLoad(page, request));
+    resident.push_back(pin.data());
+    pins.push_back(std::move(pin));
   }
+  resident_pins_ = std::move(pins);
+  resident_ = std::move(resident);
+  return {};
 }
 
-// Pins a page that is loaded, or waits for the thread that loads it.
-Result<PageCache::Pin> PageCache::pinPresent(std::unique_lock<std::mutex>& lock,
-                                             std::uint32_t index) {
-  Frame& frame = frames_[index];
-  ++hits_;
-  if (frame.pins++ == 0) unlink(index);
-
-  // Our pin keeps the frame from being used for anything else while we wait, also when it fails
-  while (frame.state == FrameState::kLoading) load_ended_.wait(lock);
-  if (frame.state == FrameState::kLoaded) return Pin(this, frameData(index), index);
-
-  // The last thread to collect the Status gives up the frame
-  SURFEIT_ASSERT(frame.state == FrameState::kFailed);
-  const auto failure = failures_.find(index);
-  Status status = failure->second;
-  if (--frame.pins == 0) {
-    failures_.erase(failure);
-    freeFrame(index);
-  }
-  return status;
-}
-
-// Fills a frame that takeFrame returned. Meanwhile the table shows the page as present, so that
-// every other thread that wants it ends up in pinPresent.
-Result<PageCache::Pin> PageCache::load(std::unique_lock<std::mutex>& lock, PageNumber page,
-                                       std::uint32_t index) {
-  Frame& frame = frames_[index];
-  ++misses_;
-  frame.page = page;
-  frame.pins = 1;
-  frame.state = FrameState::kLoading;
-  frame_of_page_[page] = index;
-
-  lock.unlock();
-  const Result<std::uint64_t> bytes_read =
-      callLoader(loader_, page, {frameData(index), options_.frame_bytes});
-  lock.lock();
-
-  if (bytes_read.ok()) {
-    bytes_read_ += *bytes_read;
-    frame.state = FrameState::kLoaded;
-    load_ended_.notify_all();
-    return Pin(this, frameData(index), index);
-  }
-
-  // Forget the page at once, so that whoever asks next tries again
-  frame_of_page_[page] = kNoFrame;
-  if (--frame.pins == 0) {
-    freeFrame(index);
-  } else {
-    frame.state = FrameState::kFailed;
-    failures_.emplace(index, bytes_read.status());
-    load_ended_.notify_all();
-  }
-  return bytes_read.status();
-}
-
-// A frame for a new page, or kNoFrame when all are pinned. Frames that were written before come
-// first and untouched ones in order, so that resident memory is never more than the peak in use.
-std::uint32_t PageCache::takeFrame() {
-  if (free_frame_ != kNoFrame) {
-    return std::exchange(free_frame_, frames_[free_frame_].next);
-  }
-  if (untouched_frame_ < options_.frame_count) return untouched_frame_++;
-
-  const std::uint32_t ring = static_cast<std::uint32_t>(options_.frame_count);
-  const std::uint32_t victim = frames_[ring].next;
-  if (victim == ring) return kNoFrame;
-  unlink(victim);
-  frame_of_page_[frames_[victim].page] = kNoFrame;
-  ++evictions_;
-  return victim;
-}
-
-void PageCache::freeFrame(std::uint32_t frame) {
-  frames_[frame].state = FrameState::kFree;
-  frames_[frame].next = std::exchange(free_frame_, frame);
-  if (waiting_for_frame_ > 0) frame_released_.notify_all();
-}
-
-void PageCache::unpin(std::uint32_t frame) {
+void PageCache::setFrameLimit(std::size_t frames) {
   const std::lock_guard lock(mutex_);
-  SURFEIT_ASSERT(frames_[frame].pins > 0);
-  if (--frames_[frame].pins > 0) return;
-  linkMostRecent(frame);
-  // All of them: one that finds its page loaded by now would leave the frame to nobody
-  if (waiting_for_frame_ > 0) frame_released_.notify_all();
-}
+  const std::size_t least = resident_.size() + 1;
+  const std::size_t limit = std::min(std::max(frames, least), options_.most_frames);
+  if (limit > frames_.size()) {
+    frames_.reserve(limit);  // exactly, where resize would round up
+    strays_.reserve(limit);
+    frames_.resize(limit);
+  }
+  frame_limit_ = limit;
+  limit_end_.store(pool_.data(static_cast<std::uint32_t>(limit)), std::memory_order_relaxed);
+  pool_.setLimit(limit);
 
-void PageCache::linkMostRecent(std::uint32_t frame) {
-  const std::uint32_t ring = static_cast<std::uint32_t>(options_.frame_count);
-  frames_[frame].next = ring;
-  frames_[frame].previous = frames_[ring].previous;
-  frames_[frames_[ring].previous].next = frame;
-  frames_[ring].previous = frame;
-}
-
-void PageCache::unlink(std::uint32_t frame) {
-  frames_[frames_[frame].previous].next = frames_[frame].next;
-  frames_[frames_[frame].next].previous = frames_[frame].previous;
-}
-
-void PageCache::addFrontHits(std::uint64_t count) {
-  front_hits_.fetch_add(count, std::memory_order_relaxed);
+  // Below the limit, what is not in use is free; above, what is in use is astray
+  free_frame_ = kNone;
+  for (std::size_t frame = limit; frame-- > 0;) {
+    if (frames_[frame].page == kNone) {
+      frames_[frame].next = std::exchange(free_frame_, static_cast<std::uint32_t>(frame));
+    }
+  }
+  strays_.clear();
+  stray_end_ = std::max(stray_end_, static_cast<std::uint32_t>(limit));
+  for (std::size_t frame = limit; frame < stray_end_; ++frame) {
+    strays_.push_back(static_cast<std::uint32_t>(frame));
+  }
+  shrink();
+  frame_released_.notify_all();
 }
 
 CacheCounters PageCache::counters() const {
   const std::lock_guard lock(mutex_);
-  CacheCounters counters;
-  counters.hits = hits_ + front_hits_.load(std::memory_order_relaxed);
-  counters.misses = misses_;
+  CacheCounters counters = counts_;
+  for (const CacheFront* front : fronts_) front->addTo(counters);
+  counters.hits = counters.front_hits + counters.shared_hits;
   counters.requests = counters.hits + counters.misses;
-  counters.evictions = evictions_;
-  counters.bytes_read = bytes_read_;
-  // Used frames are reused before untouched ones, so as many were in use at once
-  counters.peak_bytes = std::uint64_t{untouched_frame_} * options_.frame_bytes;
-  counters.budget_bytes = std::uint64_t{options_.frame_count} * options_.frame_bytes;
-  counters.decoded_bytes = std::uint64_t{options_.page_count} * options_.frame_bytes;
+  counters.peak_bytes = std::uint64_t{peak_frames_} * pool_.stride();
+  counters.budget_bytes = std::uint64_t{frame_limit_} * pool_.stride();
+  counters.decoded_bytes = std::uint64_t{options_.page_count} * pool_.stride();
   return counters;
 }
 
-CacheFront::CacheFront(PageCache& cache, std::size_t slots)
-    : cache_(cache), slots_(std::bit_floor(std::max<std::size_t>(slots, 1))) {
-  mask_ = static_cast<PageNumber>(slots_.size() - 1);
+std::size_t PageCache::frameLimit() const {
+  const std::lock_guard lock(mutex_);
+  return frame_limit_;
 }
 
-CacheFront::~CacheFront() { countHits(); }
-
-Result<const std::byte*> CacheFront::lookupInCache(PageNumber page) {
-  Slot& slot = slots_[page & mask_];
-  slot.pin.release();
-  SURFEIT_ASSIGN_OR_RETURN(slot.pin, cache_.pin(page));
-  slot.page = page;
-  return slot.pin.data();
+bool PageCache::isLoaded(PageNumber page) const {
+  SURFEIT_ASSERT(page < options_.page_count);
+  const State state = stateOf(entries_[page].word.load(std::memory_order_relaxed));
+  return state == kLoaded || state == kLeaving;
 }
 
-void CacheFront::countHits() {
-  cache_.addFrontHits(uncounted_hits_);
-  uncounted_hits_ = 0;
+void PageCache::useReleased() {
+  const std::lock_guard lock(mutex_);
+  shrink();
+  frame_released_.notify_all();
+}
+
+Result<PageCache::Pin> PageCache::pinOrLoad(PageNumber page, Request& request) {
+  using Outcome = Request::Outcome;
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    Pin pin;
+    request.outcome = Outcome::kHit;
+    if (tryPin(page, pin)) return pin;
+    switch (stateOf(entries_[page].word.load(std::memory_order_relaxed))) {
+      case kLeaving:
+        return takeBack(page);
+      case kLoading: {
+        request.outcome = Outcome::kWaited;
+        const Stopwatch watch(request.stall_ns);
+        return waitForLoad(lock, page);
+      }
+      case kFailed: {  // and not all have been told: whoever comes later tries again
+        const Stopwatch watch(request.stall_ns);
+        load_ended_.wait(lock);
+        continue;
+      }
+      default:
+        break;
+    }
+
+    std::uint32_t frame = takeFrame();
+    if (frame == kNone && request.may_wait) {
+      frame = waitForFrame(lock, request.stall_ns);
+      // Meanwhile another thread may have begun to load this very page
+      if (frame == kNone) continue;
+    }
+    if (frame == kNone) {
+      request.outcome = Outcome::kNoFrame;
+      return Pin();
+    }
+    request.outcome = Outcome::kMissed;
+    return load(lock, page, frame, request);
+  }
+}
+
+// Pins a page that was about to be evicted.
+PageCache::Pin PageCache::takeBack(PageNumber page) {
+  std::atomic<Word>& at = entries_[page].word;
+  const Word word = at.load();
+  unlink(frameOf(word));
+  link(frameOf(word), epoch_ % kEpochLists);
+  --leaving_;
+  at.store((word ^ kLeaving ^ kLoaded) + kOnePin);
+  return Pin(this, page, dataOf(page, word));
+}
+
+// Every frame was held. A frame that was released since is taken without waiting, and without
+// letting go of the lock; kNone after waiting, for another attempt.
+std::uint32_t PageCache::waitForFrame(std::unique_lock<std::mutex>& lock, std::uint64_t& stall_ns) {
+  ++releases_awaited_;
+  awaitFronts();
+  const std::uint32_t frame = takeFrame();
+  if (frame == kNone) {
+    const Stopwatch watch(stall_ns);
+    frame_released_.wait(lock);
+  }
+  --releases_awaited_;
+  return frame;
+}
+
+// Waits for the thread that loads the page. The pin added here is handed out, or keeps the frame's
+// failure from being forgotten before it is told.
+Result<PageCache::Pin> PageCache::waitForLoad(std::unique_lock<std::mutex>& lock, PageNumber page) {
+  std::atomic<Word>& at = entries_[page].word;
+  at.fetch_add(kOnePin);
+  while (stateOf(at) == kLoading) load_ended_.wait(lock);
+  const Word word = at.load();
+  if (stateOf(word) == kLoaded) return Pin(this, page, dataOf(page, word));
+
+  SURFEIT_ASSERT(stateOf(word) == kFailed);
+  Status status = copyOf(*frames_[frameOf(word)].failure);
+  at.fetch_sub(kOnePin);
+  load_ended_.notify_all();
+  return status;
+}
+
+// Fills a frame that takeFrame returned. Meanwhile the word shows the page as being loaded, so that
+// every other thread that wants it ends up in waitForLoad.
+Result<PageCache::Pin> PageCache::load(std::unique_lock<std::mutex>& lock, PageNumber page,
+                                       std::uint32_t index, Request& request) {
+  std::atomic<Word>& at = entries_[page].word;
+  const Word seen = at.load(std::memory_order_relaxed) & kSeen;
+  countMiss();
+  ++(request.is_prefetch ? counts_.prefetches : counts_.misses);
+  stamp(page);
+  frames_[index].page = page;
+  link(index, epoch_ % kEpochLists);
+  at.store(Word{index} << kFrameShift | kOnePin | seen | kLoading, std::memory_order_relaxed);
+
+  lock.unlock();
+  std::uint64_t nanoseconds = 0;
+  const Result<Loaded> loaded = [&] {
+    const Stopwatch watch(nanoseconds);
+    return callLoader(loader_, page, {pool_.data(index), options_.frame_bytes});
+  }();
+  lock.lock();
+  counts_.load_ns += nanoseconds;
+  request.stall_ns += nanoseconds;
+  if (!loaded.ok()) return fail(lock, page, index, loaded.status());
+
+  SURFEIT_ASSERT(loaded->decoded_bytes <= options_.frame_bytes);
+  entries_[page].decoded_bytes = loaded->decoded_bytes;
+  counts_.bytes_read += loaded->stored_bytes;
+  if (seen != 0) {
+    ++counts_.repeated_loads;
+    counts_.repeated_bytes += loaded->stored_bytes;
+  }
+  // The pins of threads that wait stay; only state and seen change. Whoever finds it loaded finds
+  // its data, too
+  const Word before = at.fetch_xor((kLoading ^ kLoaded) | (seen ^ kSeen));
+  if ((before & kPinMask) != kOnePin) load_ended_.notify_all();
+  return Pin(this, page, dataOf(page, before));
+}
+
+// Forgets a page whose load failed, once all that wait for it have been told.
+Result<PageCache::Pin> PageCache::fail(std::unique_lock<std::mutex>& lock, PageNumber page,
+                                       std::uint32_t index, const Status& status) {
+  std::atomic<Word>& at = entries_[page].word;
+  ++counts_.failed_loads;
+  frames_[index].failure = &status;
+  at.fetch_xor(kLoading ^ kFailed);
+  load_ended_.notify_all();
+  while ((at.load() & kPinMask) != kOnePin) load_ended_.wait(lock);
+
+  at.store(at.load() & kSeen);
+  unlink(index);
+  setFree(index);
+  shrink();
+  load_ended_.notify_all();
+  frame_released_.notify_all();
+  return copyOf(status);
+}
+
+// An epoch ends after so many misses that the oldest page is about kEpochsInCache epochs old. That
+// is a 2048th of the frames when misses turn the cache over, and less when it nearly holds all that
+// is used, as then a page that goes was in use a few misses ago.
+//
+// A page goes before its epoch's list is used again: since it was stamped, every miss has loaded
+// another one that stays longer, so that there were no more misses than frames. Only failed loads
+// and a limit that changes again and again could break that; then an epoch lasts longer.
+void PageCache::countMiss() {
+  if (++misses_in_epoch_ < misses_per_epoch_) return;
+  while (oldest_epoch_ != epoch_ && epochList(oldest_epoch_).first == kNone) ++oldest_epoch_;
+  const std::uint32_t age = epoch_ - oldest_epoch_;
+  if (age + 1 == kEpochLists) return;
+  ++epoch_;
+  misses_in_epoch_ = 0;
+  const std::size_t most = std::max<std::size_t>(frame_limit_ / kEpochsInCache, 1);
+  if (age < kEpochsInCache / 2 && frames_in_use_ == frame_limit_) misses_per_epoch_ /= 2;
+  if (age > 2 * kEpochsInCache) misses_per_epoch_ *= 2;
+  misses_per_epoch_ = std::clamp<std::size_t>(misses_per_epoch_, 1, most);
+}
+
+// A frame for a new page, or kNone when all are held.
+std::uint32_t PageCache::takeFrame() {
+  shrink();
+  if (frames_in_use_ > frame_limit_) return kNone;
+  if (frames_in_use_ == frame_limit_ && !evictOne()) return kNone;
+  const std::uint32_t frame = popFree();
+  peak_frames_ = std::max(peak_frames_, ++frames_in_use_);
+  return frame;
+}
+
+// Frees the frame of the page that was let go of longest ago. False when all are held.
+bool PageCache::evictOne() {
+  while (leaving_ == 0) {
+    const std::size_t most = std::clamp<std::size_t>(frame_limit_ / 128, 1, kMostLeaving);
+    if (makeLeave(most) == 0) return false;
+  }
+  const std::uint32_t index = lists_[kLeavingList].first;
+  std::atomic<Word>& at = entries_[frames_[index].page].word;
+  at.store(at.load() & kSeen);
+  unlink(index);
+  --leaving_;
+  setFree(index);
+  ++counts_.evictions;
+  return true;
+}
+
+// Puts the oldest pages that nobody holds into the list of those that are leaving. 0 when all are
+// held: none but held ones were met since the last of the others, as many as there are. Otherwise
+// some may have been, though a front takes them back before this returns.
+//
+// Frames that are met before their time move to where they belong now, held ones to the end. So no
+// more are looked at than twice those in use, but for pages that others use meanwhile, and few in
+// the mean.
+std::size_t PageCache::makeLeave(std::size_t most) {
+  markHeldByFronts();
+  const std::uint32_t now = epoch_;
+  std::size_t made = 0;
+  for (std::size_t held = 0; made < most && held < frames_in_use_ - leaving_;) {
+    while (epochList(oldest_epoch_).first == kNone) ++oldest_epoch_;
+    const std::uint32_t index = epochList(oldest_epoch_).first;
+    const Entry& entry = entries_[frames_[index].page];
+    const bool is_held = isPinned(entry.word.load()) || frames_[index].held_in_scan == scan_;
+    // A thread that was stopped while it let go may have brought an epoch that is past already
+    const std::uint32_t age = now - entry.epoch.load(std::memory_order_relaxed);
+    if (!is_held && age >= now - oldest_epoch_) {
+      if (!tryMakeLeave(index)) continue;  // it was pinned meanwhile
+      unlink(index);
+      link(index, kLeavingList);
+      ++leaving_;
+      ++made;
+      continue;
+    }
+    held = is_held ? held + 1 : 0;
+    unlink(index);
+    link(index, (is_held ? now : now - age) % kEpochLists);
+  }
+  if (made > 0) keepHeldByFronts();
+  return made;
+}
+
+// Keeps threads without the lock from taking hold of a loaded page that has no pins. Fronts may
+// have hold of it still: keepHeldByFronts must follow.
+bool PageCache::tryMakeLeave(std::uint32_t index) {
+  std::atomic<Word>& at = entries_[frames_[index].page].word;
+  Word word = at.load();
+  return stateOf(word) == kLoaded && !isPinned(word) &&
+         at.compare_exchange_strong(word, word ^ kLoaded ^ kLeaving);
+}
+
+// What a front announced before, or has let go of, is seen after this.
+void PageCache::awaitFronts() const {
+  if (has_barrier_) processBarrier();
+}
+
+void PageCache::markHeldByFronts() {
+  ++scan_;
+  for (const CacheFront* front : fronts_) {
+    front->forEachAnnounced([&](PageNumber page) {
+      const Word word = entries_[page].word.load();
+      if (stateOf(word) == kLoaded) frames_[frameOf(word)].held_in_scan = scan_;
+    });
+  }
+}
+
+// A front announces a page before it looks at the page's word: it has found the page leaving, and
+// asks for the lock, or its announcement is seen here.
+void PageCache::keepHeldByFronts() {
+  awaitFronts();
+  for (const CacheFront* front : fronts_) {
+    front->forEachAnnounced([&](PageNumber page) {
+      std::atomic<Word>& at = entries_[page].word;
+      const Word word = at.load();
+      if (stateOf(word) != kLeaving) return;
+      if (frames_[frameOf(word)].list == kLeavingList) --leaving_;
+      unlink(frameOf(word));
+      link(frameOf(word), epoch_ % kEpochLists);
+      at.store(word ^ kLeaving ^ kLoaded);
+    });
+  }
+}
+
+void PageCache::setFree(std::uint32_t index) {
+  frames_[index].page = kNone;
+  --frames_in_use_;
+  if (index < frame_limit_) frames_[index].next = std::exchange(free_frame_, index);
+}
+
+std::uint32_t PageCache::popFree() { return std::exchange(free_frame_, frames_[free_frame_].next); }
+
+// Evicts what is more than the limit, moves what lies beyond it, and gives the memory there back.
+void PageCache::shrink() {
+  if (frames_in_use_ <= frame_limit_ && strays_.empty()) return;
+  releases_awaited_ |= kOverLimit;  // before pins and fronts are looked at; see noteRelease
+  awaitFronts();
+  while (frames_in_use_ > frame_limit_ && evictOne()) {
+  }
+  moveStrays();
+  const auto is_empty = [this](std::uint32_t frame) { return frames_[frame].page == kNone; };
+  if (std::erase_if(strays_, is_empty) > 0) giveBackAroundStrays();
+  if (strays_.empty()) releases_awaited_ &= ~kOverLimit;
+}
+
+// Moves pages from beyond the limit to free frames below, but for those that are held.
+void PageCache::moveStrays() {
+  markHeldByFronts();
+  bool any = false;
+  for (const std::uint32_t from : strays_) {
+    const Frame& frame = frames_[from];
+    if (frame.page == kNone || frame.list == kLeavingList || frame.held_in_scan == scan_) continue;
+    any = tryMakeLeave(from) || any;
+  }
+  if (any) keepHeldByFronts();
+
+  for (const std::uint32_t from : strays_) {
+    const Frame& frame = frames_[from];
+    if (frame.page == kNone) continue;
+    std::atomic<Word>& at = entries_[frame.page].word;
+    Word word = at.load();
+    if (stateOf(word) != kLeaving) continue;
+    const std::span<const std::byte> data = dataOf(frame.page, word);
+    if (frame.list != kLeavingList) word ^= kLeaving ^ kLoaded;
+    if (free_frame_ != kNone) {  // else there are more pages than the limit allows
+      const std::uint32_t to = popFree();
+      std::memcpy(pool_.data(to), data.data(), data.size());
+      replaceInList(from, to);
+      word += (Word{to} - Word{from}) << kFrameShift;
+    }
+    at.store(word);
+  }
+}
+
+// Strays are in order, and so are the gaps between them.
+void PageCache::giveBackAroundStrays() {
+  std::uint32_t begin = static_cast<std::uint32_t>(frame_limit_);
+  for (const std::uint32_t stray : strays_) {
+    pool_.giveBackBetween(begin, stray);
+    begin = stray + 1;
+  }
+  pool_.giveBackFrom(begin);
+  stray_end_ = begin;
+}
+
+void PageCache::link(std::uint32_t index, std::uint32_t list_number) {
+  List& list = lists_[list_number];
+  frames_[index].list = list_number;
+  frames_[index].next = kNone;
+  frames_[index].previous = list.last;
+  (list.last == kNone ? list.first : frames_[list.last].next) = index;
+  list.last = index;
+}
+
+void PageCache::unlink(std::uint32_t index) {
+  const Frame& frame = frames_[index];
+  List& list = lists_[frame.list];
+  (frame.previous == kNone ? list.first : frames_[frame.previous].next) = frame.next;
+  (frame.next == kNone ? list.last : frames_[frame.next].previous) = frame.previous;
+}
+
+// The page of one frame is in another from now on.
+void PageCache::replaceInList(std::uint32_t from, std::uint32_t to) {
+  const Frame& frame = frames_[to] = frames_[from];
+  List& list = lists_[frame.list];
+  (frame.previous == kNone ? list.first : frames_[frame.previous].next) = to;
+  (frame.next == kNone ? list.last : frames_[frame.next].previous) = to;
+  frames_[from].page = kNone;
 }
 
 }  // namespace surfeit

@@ -1,13 +1,22 @@
 // An LRU cache of decoded pages in frames of one size. It knows page numbers and a loader, not
 // files. docs/architecture.md, "Life of a page", tells how gather, caches and file fit together.
 //
-//   page -> frame   dense table, one entry per page of the file (page numbers are dense)
-//   frames          one block of address space, touched frame by frame as the cache fills, so that
-//                   resident bytes equal the budget; never given back to the allocator
-//   LRU list        holds exactly the loaded frames that nobody pins; least recently unpinned first
+//   page -> entry   dense table, as page numbers are dense: an atomic word
+//                   [ frame : 32 | pins : 28 | seen : 1 | state : 3 ], and the page's epoch
+//   frames          FramePool; those in use are the first ones, so that resident bytes equal the
+//                   budget, and what a lower limit frees goes back to the system
+//   epochs          a few misses each, at most a 2048th of the frames. Whoever lets go of a page
+//                   stamps it with the epoch; the page stamped longest ago goes first. That is LRU
+//                   but for the order within an epoch, and a hit moves no list.
+//   fronts          a thread's own window (cache/cache_front.h). The pages in it are announced, and
+//                   whoever evicts looks at the announcements of all: hazard pointers (Michael,
+//                   IEEE TPDS 2004), with the barrier on the side of the rare eviction.
 //
-// A miss puts a placeholder into the table and loads outside the lock; other threads that want the
-// same page wait for that page only. A failed load wakes them with its Status and is not cached.
+// A look-up of a loaded page takes no lock, and through a front it writes nothing that threads
+// share, but for the stamp once per epoch. A miss puts a placeholder into the word and loads
+// outside the lock; other threads that want the same page wait for that page only. A failed load
+// wakes them with its Status and is not cached.
+//
 #pragma once
 
 #include <atomic>
@@ -18,172 +27,297 @@
 #include <memory>
 #include <mutex>
 #include <span>
-#include <unordered_map>
+#include <utility>
 #include <vector>
 
+#include "cache/cache_counters.h"
+#include "cache/frame_pool.h"
+#include "cache/page_number.h"
+#include "core/assert.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
 
-using PageNumber = std::uint32_t;
-
-// What a cache has done so far. hits + misses == requests.
-struct CacheCounters {
-  std::uint64_t requests = 0;
-  std::uint64_t hits = 0;           // found loaded, being loaded by another thread, or in a front
-  std::uint64_t misses = 0;         // loads started
-  std::uint64_t evictions = 0;      // loaded pages given up for others
-  std::uint64_t bytes_read = 0;     // stored bytes of the pages loaded, as the loader reports them
-  std::uint64_t peak_bytes = 0;     // most frame bytes in use at any time
-  std::uint64_t budget_bytes = 0;   // of all frames in the pool
-  std::uint64_t decoded_bytes = 0;  // of the frames that would hold every page
-};
+class CacheFront;
+class ReuseDistances;
 
 class PageCache {
  public:
   struct Options {
     PageNumber page_count = 0;    // pages that exist: numbers 0 .. page_count - 1
-    std::size_t frame_bytes = 0;  // size of a frame; rounded up to 64 bytes
-    std::size_t frame_count = 0;  // frames in the pool; more than page_count are never used
+    std::size_t frame_bytes = 0;  // most bytes of a decoded page
+    std::size_t frame_count = 0;  // frames at first; see setFrameLimit
+    // Told of the look-ups that fronts do not answer; may be null. Must outlive the cache.
+    ReuseDistances* reuse_distances = nullptr;
+    // Most frames that setFrameLimit may ever allow, for which address space is reserved; 0 stands
+    // for one per page, as does anything above that.
+    std::size_t most_frames = 0;
   };
 
-  // Decodes `page` into `frame` (frame_bytes long, 64-byte aligned, contents undefined) and returns
-  // the stored bytes it read. Called without any lock held, from the thread that missed, never
-  // for one page twice at a time.
-  using Loader = std::function<Result<std::uint64_t>(PageNumber page, std::span<std::byte> frame)>;
+  // What a loader made of a page.
+  struct Loaded {
+    std::uint32_t stored_bytes = 0;   // read from the file
+    std::uint32_t decoded_bytes = 0;  // written to the frame
+  };
+  // Decodes `page` into `frame` (frame_bytes long, aligned to 64 bytes, contents undefined). Called
+  // without any lock held, from the thread that missed, never for one page twice at a time. What it
+  // throws becomes a kFailed; it must not use the cache.
+  using Loader = std::function<Result<Loaded>(PageNumber page, std::span<std::byte> frame)>;
 
-  // A page held in memory. Move-only; given back when destroyed. Data is immutable meanwhile.
+  // A page held in memory. Move-only; given back when destroyed. Data is immutable meanwhile. One
+  // thread at a time, any thread.
   class Pin {
    public:
     Pin() = default;
-    Pin(Pin&& other) noexcept;
-    Pin& operator=(Pin&& other) noexcept;
-    ~Pin();
+    Pin(Pin&& other) noexcept
+        : cache_(std::exchange(other.cache_, nullptr)), page_(other.page_), data_(other.data_) {}
+    Pin& operator=(Pin&& other) noexcept {
+      Pin old(std::move(*this));
+      cache_ = std::exchange(other.cache_, nullptr);
+      page_ = other.page_;
+      data_ = other.data_;
+      return *this;
+    }
+    ~Pin() { release(); }
     explicit operator bool() const { return cache_ != nullptr; }
-    const std::byte* data() const { return data_; }
-    void release();
+    // As many bytes as the loader said.
+    std::span<const std::byte> data() const { return data_; }
+    void release() {
+      if (cache_ != nullptr) std::exchange(cache_, nullptr)->unpin(page_, data_.data());
+    }
 
    private:
     friend class PageCache;
-    Pin(PageCache* cache, const std::byte* data, std::uint32_t frame)
-        : cache_(cache), data_(data), frame_(frame) {}
+    Pin(PageCache* cache, PageNumber page, std::span<const std::byte> data)
+        : cache_(cache), page_(page), data_(data) {}
 
     PageCache* cache_ = nullptr;
-    const std::byte* data_ = nullptr;
-    std::uint32_t frame_ = 0;
+    PageNumber page_ = 0;
+    std::span<const std::byte> data_;
   };
 
+  // Bytes that a frame takes: FramePool::strideFor.
+  static std::size_t frameBytes(std::size_t decoded_bytes) {
+    return FramePool::strideFor(decoded_bytes);
+  }
   // Memory that a cache of these options takes when full: frames and tables.
   static std::size_t memoryBytes(const Options& options);
 
-  // kFailed when the address space cannot be had.
+  // kBudgetTooSmall without a frame, kFailed when the address space cannot be had. May throw
+  // std::bad_alloc, as may keepResident and setFrameLimit, which then have changed nothing.
   static Result<std::unique_ptr<PageCache>> create(const Options& options, Loader loader);
   PageCache(const PageCache&) = delete;
   PageCache& operator=(const PageCache&) = delete;
+  // All pins and fronts must be gone.
   ~PageCache();
 
-  // Loads the page if need be and holds it. Safe from any thread. The caller must see to it that
-  // the pins of all threads together never take the last frame: a miss with every frame pinned
-  // waits until one is released. kCorruption when page >= page_count, kBudgetTooSmall when the
-  // pool has no frame at all; both are not counted as requests.
-  Result<Pin> pin(PageNumber page);
+  // Loads pages 0 .. count - 1 and holds them as long as the cache lives. Fronts made later find
+  // them without a look-up. Once, before other threads use the cache; the loads are counted as
+  // prefetches. kBudgetTooSmall when that leaves no frame for the other pages, else the Status of
+  // the loader; then none is held, and it may be tried again.
+  Status keepResident(PageNumber count);
 
-  // Adds requests that a front answered without asking the cache. Safe from any thread.
-  void addFrontHits(std::uint64_t count);
+  // Changes the number of frames in use: at least one more than pages are kept resident, at most
+  // Options::most_frames. Where it falls, pages are evicted, the others move to the first frames,
+  // and the memory beyond goes back to the system: at once, or where pages are pinned or in a
+  // front, when they are let go of. Takes the time of a copy per page that moves. Safe from any
+  // thread.
+  void setFrameLimit(std::size_t frames);
 
+  // Safe from any thread. Counts of a moment: those of fronts may be a few look-ups old.
   CacheCounters counters() const;
-  // As asked for, with the rounding and the limit on frames that Options tells of.
-  const Options& options() const { return options_; }
+  std::size_t frameLimit() const;
+  PageNumber pageCount() const { return options_.page_count; }
+  bool isLoaded(PageNumber page) const;  // at this moment
 
  private:
-  // What a frame holds. Only a loaded frame is ever without pins, and then in the LRU list.
-  enum class FrameState : std::uint8_t {
-    kFree,     // nothing: in the free list, or never used
-    kLoading,  // being filled by the thread that missed; threads that wait hold pins too
-    kLoaded,   // its page
-    kFailed,   // nothing, but threads that waited still have to collect the Status
+  friend class CacheFront;
+
+  // Low bits of a page's word.
+  enum State : std::uint64_t {
+    kAbsent = 0,   // no frame
+    kLoading = 1,  // a frame is being filled; pins: the thread that fills it and all that wait
+    kLoaded = 2,   // a frame holds the page
+    kFailed = 3,   // loading failed; pins: the thread that loaded and those yet to be told why
+    kLeaving = 4,  // a frame holds the page, but only a thread with the lock may have it back
   };
+  static constexpr std::uint64_t kStateMask = 7;
+  static constexpr std::uint64_t kSeen = 8;  // was loaded before: another load is a repeated one
+  static constexpr int kPinShift = 4, kFrameShift = 32;
+  static constexpr std::uint64_t kOnePin = std::uint64_t{1} << kPinShift;
+  static constexpr std::uint64_t kPinMask = (std::uint64_t{1} << kFrameShift) - kOnePin;
+
+  using Word = std::uint64_t;
+  static State stateOf(Word word) { return static_cast<State>(word & kStateMask); }
+  static std::uint32_t frameOf(Word word) {
+    return static_cast<std::uint32_t>(word >> kFrameShift);
+  }
+  static bool isPinned(Word word) { return (word & kPinMask) != 0; }
+
+  // One cache line is all that a look-up reads of the table.
+  struct alignas(16) Entry {
+    std::atomic<Word> word{0};
+    std::atomic<std::uint32_t> epoch{0};  // when it was let go of last
+    std::uint32_t decoded_bytes = 0;      // of a loaded page
+  };
+
+  // Epochs that a full cache lives through before its oldest page goes, about; and lists for more
+  // than can ever hold a frame at once. Fewer epochs cost misses where a stream that nearly fits
+  // repeats itself: 15 % with 128 epochs, 4 % with 512, 0.5 % with 2048.
+  static constexpr std::uint32_t kEpochsInCache = 2048, kEpochLists = 8192;
+  // The list of pages that are leaving, oldest first. Evicting takes a barrier in every thread, so
+  // some pages are made ready for it at a time: a 128th of the frames, and no more than this.
+  static constexpr std::uint32_t kLeavingList = kEpochLists;
+  static constexpr std::size_t kMostLeaving = 32;
+
+  // A frame in use is in the list of an epoch no later than that of its page, where it looks for
+  // its place when its turn comes, or in that of the leaving.
+  static constexpr std::uint32_t kNone = 0xffffffffu;
   struct Frame {
-    PageNumber page = 0;
-    std::uint32_t pins = 0;
-    std::uint32_t previous = 0, next = 0;  // in the LRU list; `next` also in the free list
-    FrameState state = FrameState::kFree;
+    PageNumber page = kNone;  // kNone: not in use
+    std::uint32_t list = 0;
+    std::uint32_t previous = 0, next = 0;  // in its list; next also in the list of free frames
+    std::uint32_t held_in_scan = 0;        // the last scan of fronts that met it
+    const Status* failure = nullptr;       // of a page that is kFailed
   };
-  static constexpr std::uint32_t kNoFrame = 0xffffffffu;
+  struct List {
+    std::uint32_t first = kNone, last = kNone;
+  };
 
-  PageCache(const Options& options, std::byte* pool, Loader loader);
+  PageCache(const Options& options, FramePool pool, Loader loader);
 
-  std::byte* frameData(std::uint32_t frame) const {
-    return pool_ + std::size_t{frame} * options_.frame_bytes;
+  std::span<const std::byte> dataOf(PageNumber page, Word word) const {
+    return {pool_.data(frameOf(word)), entries_[page].decoded_bytes};
   }
 
-  // All below: mutex_ held
-  Result<Pin> pinPresent(std::unique_lock<std::mutex>& lock, std::uint32_t frame);
-  Result<Pin> load(std::unique_lock<std::mutex>& lock, PageNumber page, std::uint32_t frame);
+  // Adds a pin when the page is loaded. No lock.
+  bool tryPin(PageNumber page, Pin& pin) {
+    std::atomic<Word>& at = entries_[page].word;
+    Word word = at.load(std::memory_order_relaxed);
+    while (stateOf(word) == kLoaded) {
+      if (at.compare_exchange_weak(word, word + kOnePin, std::memory_order_acquire,
+                                   std::memory_order_relaxed)) {
+        pin = Pin(this, page, dataOf(page, word));
+        return true;
+      }
+    }
+    return false;
+  }
+
+  // The page's data when it is loaded, else none. The caller has announced the page, so that nobody
+  // evicts it afterwards; see CacheFront::announce.
+  std::span<const std::byte> findLoaded(PageNumber page) const {
+    const Word word = entries_[page].word.load();
+    if (stateOf(word) != kLoaded) return {};
+    return dataOf(page, word);
+  }
+
+  // Notes that a page is in use now. Threads that use it together write the epoch once, no matter
+  // how often they do. (Without a branch: which pages have it is beyond any prediction.)
+  void stamp(PageNumber page) {
+    const std::uint32_t epoch = epoch_.load(std::memory_order_relaxed);
+    std::atomic<std::uint32_t> elsewhere;
+    std::atomic<std::uint32_t>* const targets[] = {&entries_[page].epoch, &elsewhere};
+    const bool has_it = targets[0]->load(std::memory_order_relaxed) == epoch;
+    targets[has_it]->store(epoch, std::memory_order_relaxed);
+  }
+
+  // Gives a pin back. No lock, unless someone waits.
+  void unpin(PageNumber page, const std::byte* data) {
+    stamp(page);
+    const Word before = entries_[page].word.fetch_sub(kOnePin);
+    SURFEIT_ASSERT(isPinned(before));
+    if ((before & kPinMask) == kOnePin) noteRelease(data);
+  }
+
+  // Must follow when a page was let go of, whose data was there: others may wait for that. They
+  // announce it before they look at pins and fronts for the last time, and this thread has let go
+  // before it looks for announcements: one of the two sees the other.
+  void noteRelease(const std::byte* data) {
+    const std::uint32_t awaited = releases_awaited_.load();
+    if (awaited == 0) return;
+    // What is over the limit waits for the frames beyond it alone
+    if (awaited == kOverLimit && data < limit_end_.load(std::memory_order_relaxed)) return;
+    useReleased();
+  }
+  void useReleased();
+
+  // What pinOrLoad shall do, and what it did.
+  struct Request {
+    bool is_prefetch = false;
+    bool may_wait = true;  // until a frame is released, when all are held
+    enum class Outcome : std::uint8_t { kHit, kWaited, kMissed, kNoFrame } outcome = Outcome::kHit;
+    std::uint64_t stall_ns = 0;  // spent on loading and waiting is added here
+  };
+  // Pins a page that was not loaded a moment ago. With every frame held it waits until one is
+  // released, or, when it may not, says kNoFrame and returns no pin. Counts loads, nothing else.
+  // Throws nothing.
+  Result<Pin> pinOrLoad(PageNumber page, Request& request);
+
+  // All below: mutex_ held. Loading:
+  Pin takeBack(PageNumber page);
+  std::uint32_t waitForFrame(std::unique_lock<std::mutex>& lock, std::uint64_t& stall_ns);
+  Result<Pin> waitForLoad(std::unique_lock<std::mutex>& lock, PageNumber page);
+  Result<Pin> load(std::unique_lock<std::mutex>& lock, PageNumber page, std::uint32_t frame,
+                   Request& request);
+  Result<Pin> fail(std::unique_lock<std::mutex>& lock, PageNumber page, std::uint32_t frame,
+                   const Status& status);
+  void countMiss();
+
+  // Frames:
   std::uint32_t takeFrame();
-  void freeFrame(std::uint32_t frame);
-  void linkMostRecent(std::uint32_t frame);
+  bool evictOne();
+  std::size_t makeLeave(std::size_t most);
+  bool tryMakeLeave(std::uint32_t frame);
+  void awaitFronts() const;
+  void markHeldByFronts();
+  void keepHeldByFronts();
+  void setFree(std::uint32_t frame);
+  std::uint32_t popFree();
+  void shrink();
+  void moveStrays();
+  void giveBackAroundStrays();
+  void link(std::uint32_t frame, std::uint32_t list);
   void unlink(std::uint32_t frame);
+  void replaceInList(std::uint32_t from, std::uint32_t to);
+  List& epochList(std::uint32_t epoch) { return lists_[epoch % kEpochLists]; }
 
-  void unpin(std::uint32_t frame);  // takes mutex_
-
-  const Options options_;
+  // Written by create and keepResident alone, and read by every look-up
+  const Options options_;  // normalised
   const Loader loader_;
-  std::byte* const pool_;  // frame_count * frame_bytes, mapped
+  FramePool pool_;
+  const bool has_barrier_;  // processBarrier
+  std::unique_ptr<Entry[]> entries_;
+  std::vector<Pin> resident_pins_;
+  std::vector<std::span<const std::byte>> resident_;  // pages that are always there
 
-  mutable std::mutex mutex_;
-  std::condition_variable load_ended_;      // with mutex_: some frame left kLoading
+  // Written seldom, and read whenever a page is let go of
+  std::atomic<std::uint32_t> epoch_{0};  // now; written with mutex_ held
+  // Threads that wait for frame_released_, and kOverLimit while there are frames to give back
+  static constexpr std::uint32_t kOverLimit = 1u << 31;
+  std::atomic<std::uint32_t> releases_awaited_{0};
+  std::atomic<const std::byte*> limit_end_;  // end of the frames below frame_limit_
+
+  // Written on every miss: a cache line away from the above
+  alignas(64) mutable std::mutex mutex_;
+  std::condition_variable load_ended_;      // with mutex_: some page left kLoading or kFailed
   std::condition_variable frame_released_;  // with mutex_: takeFrame may succeed again
 
   // All below: guarded by mutex_
-  std::vector<std::uint32_t> frame_of_page_;  // kNoFrame: neither loaded nor loading
-  std::vector<Frame> frames_;                 // the last one is head and tail of the LRU list
-  std::uint32_t untouched_frame_ = 0;         // this frame and those above were never used
-  std::uint32_t free_frame_ = kNoFrame;       // first of the used frames that hold nothing
-  std::uint32_t waiting_for_frame_ = 0;       // threads that wait for frame_released_
-  std::unordered_map<std::uint32_t, Status> failures_;  // of frames that are kFailed
-  std::uint64_t hits_ = 0, misses_ = 0, evictions_ = 0, bytes_read_ = 0;
-
-  std::atomic<std::uint64_t> front_hits_{0};
-};
-
-// A thread's own small, direct-mapped window of pinned pages in front of a PageCache: a hit takes
-// no lock and writes nothing shared. One thread at a time; must go before its cache.
-//
-// The page that a lookup displaces is released before the new one is pinned. So a front never holds
-// more than `slots` pins, and where the pool has a frame for every slot of all its fronts, no
-// lookup ever waits for a frame.
-class CacheFront {
- public:
-  // Holds up to `slots` pins (rounded down to a power of two, at least 1).
-  CacheFront(PageCache& cache, std::size_t slots);
-  CacheFront(const CacheFront&) = delete;
-  CacheFront& operator=(const CacheFront&) = delete;
-  ~CacheFront();
-
-  // The page's data, valid until the next lookup through this front.
-  Result<const std::byte*> lookup(PageNumber page) {
-    const Slot& slot = slots_[page & mask_];
-    if (slot.page != page || !slot.pin) return lookupInCache(page);
-    if (++uncounted_hits_ == kHitsPerCount) countHits();
-    return slot.pin.data();
-  }
-
- private:
-  struct Slot {
-    PageNumber page = 0;
-    PageCache::Pin pin;
-  };
-  // Often enough for a monitor to watch, seldom enough that the shared counter costs nothing.
-  static constexpr std::uint32_t kHitsPerCount = 4096;
-
-  Result<const std::byte*> lookupInCache(PageNumber page);
-  void countHits();
-
-  PageCache& cache_;
-  std::vector<Slot> slots_;
-  PageNumber mask_ = 0;
-  std::uint32_t uncounted_hits_ = 0;
+  std::vector<Frame> frames_;       // as many as were ever allowed
+  std::vector<List> lists_;         // of epochs, and kLeavingList
+  std::uint32_t oldest_epoch_ = 0;  // no list before it holds a frame
+  std::size_t misses_in_epoch_ = 0, misses_per_epoch_ = 1;
+  std::size_t frame_limit_ = 0;
+  std::size_t frames_in_use_ = 0;      // hold a page or are being filled
+  std::size_t leaving_ = 0;            // of these: in kLeavingList
+  std::uint32_t free_frame_ = kNone;   // the first, through next, of those below frame_limit_
+  std::vector<std::uint32_t> strays_;  // frames in use that are not below it, in order
+  std::uint32_t stray_end_ = 0;        // no frame from here on is in use
+  std::size_t peak_frames_ = 0;
+  std::uint32_t scan_ = 0;  // scans of fronts so far
+  CacheCounters counts_;    // those that are not counted in fronts, and those of fronts that went
+  std::vector<const CacheFront*> fronts_;  // that exist
 };
 
 }  // namespace surfeit

@@ -2,12 +2,10 @@
 // the raster (memo, section 3). This scalar code is the definition that faster gathers are held to.
 #pragma once
 
-#include <array>
 #include <cstddef>
 
-#include "core/curve_key.h"
+#include "gather/cut.h"
 #include "gather/receiver_raster.h"
-#include "octree/node.h"
 #include "octree/paged_octree.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
@@ -41,16 +39,10 @@ class PointGatherer {
   }
 
  private:
-  // Every level leaves at most 7 sibling ranges behind on the way down, the last one 8.
-  static constexpr std::size_t kStackSize = 7 * (kCurveLevels + 1) + 8;
-
-  bool isFarEnough(const Node& node, float distance_sq) const;
-  Status selectCut(PagedOctree::Reader& octree);
-
   GatherQuality quality_;
   ReceiverRaster raster_;
+  CutWalk cut_;
   Work work_;
-  std::array<NodeRange, kStackSize> stack_;
 };
 
 }  // namespace surfeit

@@ -42,14 +42,9 @@ void ReceiverRaster::begin(const Receiver& receiver) {
   near_surfels_.clear();
 }
 
-float ReceiverRaster::heightAboveHorizon(const glm::vec3& offset) const {
-  return is_spherical_ ? std::numeric_limits<float>::infinity()
-                       : glm::dot(offset, receiver_.normal);
-}
-
 void ReceiverRaster::addNode(const Node& node) {
   const glm::vec3 to_node = node.position - receiver_.position;
-  if (!(heightAboveHorizon(to_node) > 0)) return;
+  if (!(heightAboveHorizon(receiver_, to_node) > 0)) return;
   Entry entry;
   if (!makeContribution(node, to_node, rules_, entry.contribution)) return;
   if (!(entry.contribution.distance_sq <= max_distance_sq_)) return;
@@ -67,7 +62,7 @@ void ReceiverRaster::addSurfel(const Surfel& surfel) {
   }
 
   // Mid field: a patch, when its middle is above the horizon
-  const float height = heightAboveHorizon(to_surfel);
+  const float height = heightAboveHorizon(receiver_, to_surfel);
   const float near_distance = quality_.near_field_radii * surfel.radius;
   if (distance_sq >= near_distance * near_distance) {
     Entry entry;

@@ -5,7 +5,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -25,6 +27,13 @@ struct Receiver {
 
   bool isSpherical() const { return normal == glm::vec3(0); }
 };
+
+// Height of a point above the receiver's horizon; infinite for a spherical receiver, which has
+// none. `offset` leads from the receiver to the point.
+inline float heightAboveHorizon(const Receiver& receiver, const glm::vec3& offset) {
+  return receiver.isSpherical() ? std::numeric_limits<float>::infinity()
+                                : glm::dot(offset, receiver.normal);
+}
 
 struct GatherResult {
   // Covered part of the hemisphere by cosine, or of the sphere; 0..1.
@@ -50,10 +59,6 @@ class ReceiverRaster {
 
   // Starts over for a receiver.
   void begin(const Receiver& receiver);
-
-  // Height of a point above the receiver's horizon; infinite for a spherical receiver, which has
-  // none. `offset` leads from the receiver to the point.
-  float heightAboveHorizon(const glm::vec3& offset) const;
 
   // Adds a node as a whole: the far field. The receiver must lie outside the node's radius.
   void addNode(const Node& node);

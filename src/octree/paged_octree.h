@@ -8,7 +8,9 @@
 #include <span>
 #include <string>
 
-#include "cache/page_cache.h"
+#include "cache/cache_counters.h"
+#include "cache/cache_front.h"
+#include "cache/reuse_distances.h"
 #include "core/bounds.h"
 #include "octree/node.h"
 #include "octree/scene_file.h"
@@ -20,45 +22,71 @@ namespace surfeit {
 // Open file, directory and caches. Readers on several threads share one of these.
 class PagedOctree {
  public:
-  // How a memory budget is spent. All in bytes or counts; see planMemory.
+  // How a memory budget is spent; see planMemory.
   struct Memory {
     std::size_t node_frames = 0;
     std::size_t surfel_frames = 0;
-    std::size_t front_slots = 0;  // per thread and cache
+    std::size_t least_node_frames = 0;  // that the threads need; resident pages included
+    std::size_t least_surfel_frames = 0;
+    std::size_t front_slots = 0;         // per thread and cache
+    PageNumber resident_node_pages = 0;  // upper levels, which every traversal visits
+    std::size_t tracked_pages = 0;       // sampled for reuse distances, per cache; 0: none
   };
+  // Node frames for half of the bytes.
+  static constexpr double kEvenSplit = 0.5;
 
   // Bytes that opening the file takes beside the caches: directory and decode buffers of `threads`.
   static std::size_t fixedBytes(const SceneFile& file, int threads);
   // Splits `cache_bytes` between the two caches of a file that `threads` readers use: everything
-  // when it fits, else half each with what one cannot use given to the other. kBudgetTooSmall,
-  // naming the bytes that would do, when a reader could not hold the pages of one traversal step.
-  static Result<Memory> planMemory(const SceneFile& file, std::size_t cache_bytes, int threads);
+  // when it fits, else `node_share` of it (0..1) to nodes, with what one cannot use given to the
+  // other and never less than the threads need. kBudgetTooSmall, naming the bytes that would do,
+  // when a reader could not hold the pages of one traversal step.
+  static Result<Memory> planMemory(const SceneFile& file, std::size_t cache_bytes, int threads,
+                                   double node_share = kEvenSplit);
+  // The fewest cache bytes that planMemory accepts.
+  static std::size_t leastCacheBytes(const SceneFile& file, int threads);
   // Cache bytes that hold the whole file decoded.
   static std::size_t unlimitedCacheBytes(const SceneFile& file);
+  // Bytes that a page of either kind takes in its cache.
+  static std::size_t nodeFrameBytes(const SceneFile& file);
+  static std::size_t surfelFrameBytes(const SceneFile& file);
 
   static Result<std::unique_ptr<PagedOctree>> create(SceneFile file, const Memory& memory);
   ~PagedOctree();
 
   const SceneFile& file() const;
+  const Memory& memory() const;  // as at first
+  PageCache& nodeCache();
+  PageCache& surfelCache();
   CacheCounters nodeCounters() const;
   CacheCounters surfelCounters() const;
+  // How pages are reused; null unless memory().tracked_pages > 0. Look-ups of resident pages and
+  // those that fronts answer are not seen.
+  ReuseDistances* nodeDistances();
+  ReuseDistances* surfelDistances();
 
-  // A thread's way into the octree. One thread at a time; must go before the octree does.
+  // A thread's way into the octree. One thread at a time; must go before the octree does. Threads
+  // wait for no frame while they hold one that another waits for, however few frames there are; a
+  // thread that pauses must release().
   class Reader {
    public:
-    explicit Reader(PagedOctree& octree);
+    explicit Reader(PagedOctree& octree, CacheFront::Role role = CacheFront::Role::kRequests);
     ~Reader();
+
+    // Lets go of all pages.
+    void release();
 
     // kCorruption when a traversal has met more nodes or surfels than the file holds: references
     // that share or repeat what lies below, which would make it endless for all practical purposes.
     Status checkVisits(std::uint64_t nodes, std::uint64_t surfels) const;
 
     // The siblings of a range. Valid until the next call of nodes() on this reader; surfels() does
-    // not invalidate it. kCorruption when a page does not decode.
+    // not invalidate it, but nodes() may invalidate surfels. kCorruption when a page does not
+    // decode.
     Result<std::span<const Node>> nodes(const NodeRange& range);
 
     // Up to `count` surfels from index `first` of a surfel page: fewer when the page ends before.
-    // Never empty when ok. Valid until the next call of surfels() on this reader.
+    // Never empty when ok. Valid until the next call of surfels() or nodes() on this reader.
     Result<std::span<const Surfel>> surfels(std::uint32_t page, std::uint32_t first,
                                             std::uint64_t count);
 

@@ -1,0 +1,120 @@
+#include "gather/gather_crew.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <exception>
+#include <memory>
+#include <new>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "gather/gather_point.h"
+
+namespace surfeit {
+
+GatherCrew::GatherCrew(const Setup& setup, Sink sink)
+    : setup_(setup),
+      sink_(std::move(sink)),
+      prefetcher_(setup.octree, setup.queue, setup.options.quality, setup.prefetch_threads) {}
+
+Status GatherCrew::run() {
+  {
+    // This thread works too
+    std::vector<std::jthread> threads;
+    try {
+      threads.reserve(static_cast<std::size_t>(setup_.threads));
+      for (int i = 1; i < setup_.threads; ++i) threads.emplace_back([this] { work(); });
+    } catch (const std::system_error& error) {
+      failure_.note(Status::failed(fmt::format("cannot start a thread: {}", error.what())));
+    }
+    work();
+  }  // all threads have ended
+  return failure_.status();
+}
+
+// What is thrown ends here: past the border of a thread it would end the process.
+void GatherCrew::work() {
+  try {
+    failure_.note(gatherRuns());
+  } catch (const std::bad_alloc&) {
+    failure_.note(Status::failed("out of memory"));
+  } catch (const std::exception& exception) {
+    failure_.note(Status::failed(fmt::format("cannot gather: {}", exception.what())));
+  }
+}
+
+// Takes runs until none is left or some thread has failed.
+Status GatherCrew::gatherRuns() {
+  const auto gatherer =
+      std::make_unique<PointGatherer>(setup_.options.mode, setup_.options.quality);
+  PagedOctree::Reader reader(setup_.octree);
+  std::vector<SortedReceiver> run;
+  std::vector<ResultStore::Entry> results;
+  run.reserve(PagingController::kMostRun);
+  results.reserve(PagingController::kMostRun);
+  while (!failure_.happened()) {
+    SURFEIT_RETURN_IF_ERROR(setup_.queue.take(run, setup_.controller.runReceivers()));
+    if (run.empty()) return {};
+    prefetcher_.notify();
+    results.clear();
+    for (const SortedReceiver& receiver : run) {
+      if (results.size() % kPacketReceivers == 0 && setup_.progress.isCancelled()) {
+        return Status::interrupted();
+      }
+      ResultStore::Entry& entry = results.emplace_back();
+      entry.index = receiver.index;
+      SURFEIT_RETURN_IF_ERROR(gatherer->gather(receiver.receiver, reader, entry.result));
+    }
+    SURFEIT_RETURN_IF_ERROR(sink_(results));
+    setup_.progress.advance(run.size());
+    if (setup_.controller.advance(run.size())) {
+      prefetcher_.setDepth(setup_.controller.prefetchReceivers());
+    }
+  }
+  return {};
+}
+
+Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
+                    const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
+                    Progress& progress, ReceiverQueue::Sampling sampling) {
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
+                           PagedOctree::create(std::move(scene), memory.caches));
+  const std::uint64_t kept = stats.receivers / sampling.period * sampling.keep;
+  progress.beginPhase("gather", sampling.keep < sampling.period ? kept : stats.receivers,
+                      "receivers");
+  progress.advance(sampling.keep < sampling.period ? 0 : stats.invalid_receivers);
+  const auto begin = std::chrono::steady_clock::now();
+  PagingController controller(
+      *octree,
+      {.threads = stats.threads,
+       .adapts_split = options.cache_split<0, .prefetches = memory.prefetch_threads> 0,
+       .memory_bytes = stats.memory_bytes,
+       .receivers = stats.receivers - stats.invalid_receivers,
+       .least_node_frames = memory.caches.least_node_frames,
+       .least_surfel_frames = memory.caches.least_surfel_frames},
+      progress);
+  ReceiverQueue queue(sorter, kQueueReceivers, sampling);
+  {
+    GatherCrew crew({.octree = *octree,
+                     .queue = queue,
+                     .controller = controller,
+                     .options = options,
+                     .threads = stats.threads,
+                     .prefetch_threads = memory.prefetch_threads,
+                     .progress = progress},
+                    std::move(sink));
+    SURFEIT_RETURN_IF_ERROR(crew.run());
+  }  // the readers go, and with them their last counts reach the caches
+  controller.finish();
+  stats.gather_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  stats.node_cache = controller.nodeStats();
+  stats.surfel_cache = controller.surfelStats();
+  stats.windows = controller.takeWindows();
+  return {};
+}
+
+}  // namespace surfeit

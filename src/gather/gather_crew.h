@@ -1,0 +1,60 @@
+// Gathers at sorted receivers on a fixed number of threads. Each takes the next run of
+// neighbours along the curve, so that all of them work in one neighbourhood and what one reads the
+// others find in the caches.
+#pragma once
+
+#include <functional>
+#include <span>
+
+#include "core/first_failure.h"
+#include "gather/gather_memory.h"
+#include "gather/paging_controller.h"
+#include "gather/prefetcher.h"
+#include "gather/receiver_queue.h"
+#include "gather/result_store.h"
+#include "octree/paged_octree.h"
+#include "surfeit/gather.h"
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+class GatherCrew {
+ public:
+  // What takes the results of a run, from any thread.
+  using Sink = std::function<Status(std::span<const ResultStore::Entry>)>;
+
+  // All that is referred to must outlive the crew.
+  struct Setup {
+    PagedOctree& octree;
+    ReceiverQueue& queue;
+    PagingController& controller;
+    const GatherOptions& options;
+    int threads = 1;
+    int prefetch_threads = 0;
+    Progress& progress;
+  };
+  GatherCrew(const Setup& setup, Sink sink);
+
+  // Gathers until the queue is empty, and advances progress and controller. Returns the first
+  // failure, kInterrupted when the progress is cancelled. Once.
+  Status run();
+
+ private:
+  void work();
+  Status gatherRuns();
+
+  const Setup setup_;
+  const Sink sink_;
+  Prefetcher prefetcher_;
+  FirstFailure failure_;
+};
+
+// The gather proper: opens the caches of `scene`, gathers at what is in `sorter` (finished), or at
+// a sample of it, and fills in the statistics of that; threads of `stats` work, as many prefetch as
+// `memory` says.
+Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
+                    const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
+                    Progress& progress, ReceiverQueue::Sampling sampling = {});
+
+}  // namespace surfeit

@@ -1,0 +1,126 @@
+#include "gather/gather_input.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <utility>
+
+#include "core/curve_key.h"
+#include "gather/gather_memory.h"
+
+namespace surfeit {
+namespace {
+
+// The key along the Z curve through the same cells.
+CurveKey mortonKey(CurveKey hilbert_key) {
+  std::array<std::uint32_t, 3> cell;
+  curveCell(hilbert_key, cell[0], cell[1], cell[2]);
+  CurveKey key = 0;
+  for (int bit = kCurveLevels - 1; bit >= 0; --bit) {
+    for (const std::uint32_t axis : cell) key = key << 1 | (axis >> bit & 1);
+  }
+  return key;
+}
+
+CurveKey keyOf(const glm::vec3& position, std::uint64_t index, ReceiverOrder order,
+               const RootCube& cube) {
+  switch (order) {
+    case ReceiverOrder::kInput:
+      return index;
+    case ReceiverOrder::kMorton:
+      return mortonKey(curveKey(position, cube));
+    case ReceiverOrder::kHilbert:
+      break;
+  }
+  return curveKey(position, cube);
+}
+
+}  // namespace
+
+Result<GatherInput> GatherInput::open(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t element, findSurfelElement(reader.header(), path));
+  SURFEIT_ASSIGN_OR_RETURN(ReceiverMapping mapping,
+                           ReceiverMapping::create(reader.header().elements[element], path));
+  return GatherInput(std::move(reader), element, std::move(mapping));
+}
+
+GatherInput::GatherInput(PlyReader reader, std::size_t element, ReceiverMapping mapping)
+    : reader_(std::move(reader)), element_(element), mapping_(std::move(mapping)) {}
+
+void GatherInput::note(Progress& progress) const {
+  const PlyHeader& header = reader_.header();
+  if (!mapping_.hasNormals()) {
+    progress.note(fmt::format("{}: no normals: gathering over the whole sphere", reader_.path()));
+  }
+  for (const PlyProperty& property : receivers().properties) {
+    if (!property.is_list) continue;
+    progress.note(fmt::format("{}: list property {} is not kept", reader_.path(), property.name));
+  }
+  for (std::size_t i = 0; i < header.elements.size(); ++i) {
+    if (i == element_) continue;
+    progress.note(
+        fmt::format("{}: element {} is not kept", reader_.path(), header.elements[i].name));
+  }
+}
+
+Result<std::size_t> GatherInput::readSlice(Progress& progress) {
+  if (progress.isCancelled()) return Status::interrupted();
+  slice_.resize(kSliceRows * receivers().row_bytes);
+  return reader_.readRows(slice_);
+}
+
+Status GatherInput::sort(ReceiverOrder order, const RootCube& cube, bool strict,
+                         ReceiverSorter& sorter, Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(reader_.seekElement(element_));
+  defects_ = {};
+  for (std::uint64_t record = 0;;) {
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, readSlice(progress));
+    if (count == 0) return sorter.finish();
+    for (std::size_t i = 0; i < count; ++i, ++record) {
+      const std::byte* row = slice_.data() + i * receivers().row_bytes;
+      SortedReceiver receiver;
+      if (mapping_.decode(row, record, receiver.receiver, defects_)) {
+        receiver.index = record;
+        receiver.key = keyOf(receiver.receiver.position, record, order, cube);
+        SURFEIT_RETURN_IF_ERROR(sorter.add(receiver));
+      } else if (strict) {
+        return Status::corruption(
+            fmt::format("{}: record {}: {}", reader_.path(), record, mapping_.describeDefect(row)));
+      }
+    }
+    progress.advance(count);
+  }
+}
+
+Status GatherInput::write(const ResultRows& rows, ResultStore& results, PlyWriter& writer,
+                          Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(reader_.seekElement(element_));
+  std::vector<GatherResult> slice_results;
+  std::vector<std::byte> output(kSliceRows * rows.rowBytes());
+  for (;;) {
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, readSlice(progress));
+    if (count == 0) return writer.finish();
+    slice_results.resize(count);
+    SURFEIT_RETURN_IF_ERROR(results.take(slice_results));
+    for (std::size_t i = 0; i < count; ++i) {
+      rows.make(slice_.data() + i * receivers().row_bytes, slice_results[i],
+                output.data() + i * rows.rowBytes());
+    }
+    SURFEIT_RETURN_IF_ERROR(writer.writeRows({output.data(), count * rows.rowBytes()}));
+    progress.advance(count);
+  }
+}
+
+std::vector<std::string> GatherInput::comments() const {
+  std::vector<std::string> comments = reader_.header().comments;
+  // PlyWriter leaves blank ones for a count to grow
+  std::erase_if(comments, [](const std::string& comment) {
+    return comment.find_first_not_of(' ') == std::string::npos;
+  });
+  return comments;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,137 @@
+#include "gather/gather_memory.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cache/reuse_distances.h"
+#include "gather/gather_point.h"
+#include "gather/paging_controller.h"
+#include "gather/receiver_sorter.h"
+#include "gather/result_store.h"
+
+namespace surfeit {
+namespace {
+
+// Buffers of the PLY reader (0.3 MiB) and writer (1.1 MiB).
+constexpr std::uint64_t kStreamBytes = std::uint64_t{3} << 19;
+// Stack and allocator of a thread.
+constexpr std::uint64_t kThreadBytes = std::uint64_t{128} << 10;
+// Pages that are sampled for the reuse distances of each cache.
+constexpr std::size_t kTrackedPages = 8192;
+// Receivers and results take no more than this part of the budget, unless they must.
+constexpr std::uint64_t kReceiverPart = 4;
+// And threads that prefetch no more than this.
+constexpr std::uint64_t kPrefetchPart = 16;
+// Runs longer than this make merging no faster.
+constexpr std::uint64_t kMostSorterBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kMostReadingBytes = std::uint64_t{32} << 20;
+
+constexpr std::uint64_t kBytesPerReceiver = sizeof(SortedReceiver) + sizeof(GatherResult);
+
+// Bytes of a thread beside its part of the caches. A cut larger than a gatherer has room for from
+// the start is foreseen by estimate: some layers of surfaces, seen in pieces of about the max solid
+// angle. With a max solid angle of 0 it is the whole scene.
+std::uint64_t threadBytes(const SceneFile& file, const GatherQuality& quality) {
+  constexpr double kLayers = 8;
+  constexpr double kBytes = 128;  // of a contribution, in vectors that grow by doubling
+  const double cut = 4 * double(kPi) / double(quality.max_solid_angle) * kLayers;
+  const double most = std::min(double(file.header().surfel_count), cut);
+  const double more = std::max(0.0, most - double(ReceiverRaster::kReservedContributions));
+  return PointGatherer::memoryBytes(quality) + kThreadBytes +
+         PagingController::kMostRun * (sizeof(SortedReceiver) + sizeof(ResultStore::Entry)) +
+         static_cast<std::uint64_t>(more * kBytes);
+}
+
+// All but receivers, results and caches.
+std::uint64_t fixedBytes(const SceneFile& file, const GatherWork& work, int prefetch_threads) {
+  const auto threads = static_cast<std::uint64_t>(work.threads);
+  const std::uint64_t rows = kSliceRows * (work.input_row_bytes + work.result_row_bytes);
+  return PagedOctree::fixedBytes(file, work.threads + prefetch_threads) +
+         threads * threadBytes(file, work.quality) +
+         static_cast<std::uint64_t>(prefetch_threads) * (kThreadBytes + sizeof(CutWalk)) + rows +
+         kStreamBytes + kQueueReceivers * sizeof(SortedReceiver) + PagingController::memoryBytes() +
+         ReuseDistances::memoryBytes(file.nodePageCount(), kTrackedPages) +
+         ReuseDistances::memoryBytes(file.surfelPageCount(), kTrackedPages);
+}
+
+std::uint64_t leastReceiverBytes(std::uint64_t receivers) {
+  return std::min(receivers * kBytesPerReceiver, ReceiverSorter::leastMemoryBytes(receivers) +
+                                                     ResultStore::leastMemoryBytes(receivers));
+}
+
+std::uint64_t leastBytes(const SceneFile& file, const GatherWork& work, int prefetch_threads) {
+  return fixedBytes(file, work, prefetch_threads) + leastReceiverBytes(work.receivers) +
+         PagedOctree::leastCacheBytes(file, work.threads + prefetch_threads);
+}
+
+std::string formatMebibytes(std::uint64_t bytes) {
+  return fmt::format("{:.1f} MiB", std::ceil(double(bytes) / (1 << 20) * 10) / 10);
+}
+
+// Divides `bytes` among receivers and results; `spare_bytes` are free until the gather begins.
+void planReceivers(std::uint64_t receivers, std::uint64_t bytes, std::uint64_t spare_bytes,
+                   GatherMemory& memory) {
+  const std::uint64_t all_receivers = receivers * sizeof(SortedReceiver);
+  const std::uint64_t all_results = receivers * sizeof(GatherResult);
+  if (all_receivers + all_results <= bytes) {
+    memory.sorter_bytes = memory.sorter_reading_bytes = all_receivers;
+    memory.result_bytes = all_results;
+    return;
+  }
+  const std::uint64_t least_sorter = ReceiverSorter::leastMemoryBytes(receivers);
+  const std::uint64_t least_results = ResultStore::leastMemoryBytes(receivers);
+  memory.sorter_reading_bytes =
+      std::clamp(bytes / 4, least_sorter, std::max(least_sorter, kMostReadingBytes));
+  memory.result_bytes = std::min(
+      all_results, std::max(least_results, bytes - std::min(bytes, memory.sorter_reading_bytes)));
+  memory.sorter_bytes = std::clamp(spare_bytes, memory.sorter_reading_bytes,
+                                   std::max(memory.sorter_reading_bytes, kMostSorterBytes));
+}
+
+}  // namespace
+
+std::uint64_t leastGatherMemory(const SceneFile& file, const GatherWork& work) {
+  return leastBytes(file, work, 0);
+}
+
+std::uint64_t gatherMemoryBesideCaches(const SceneFile& file, const GatherWork& work) {
+  return fixedBytes(file, work, work.prefetch_threads) + work.receivers * kBytesPerReceiver;
+}
+
+Result<GatherMemory> planGatherMemory(const SceneFile& file, std::uint64_t memory_bytes,
+                                      const GatherWork& work) {
+  const std::uint64_t least = leastGatherMemory(file, work);
+  if (memory_bytes < least) {
+    return Status::budgetTooSmall(fmt::format(
+        "a memory budget of {:.1f} MiB is too small for {} with {} {}: {} is the least that works",
+        double(memory_bytes) / (1 << 20), file.path(), work.threads,
+        work.threads == 1 ? "thread" : "threads", formatMebibytes(least)));
+  }
+
+  GatherMemory memory;
+  const std::uint64_t for_prefetching = least + memory_bytes / kPrefetchPart;
+  for (int threads = work.prefetch_threads; threads > 0 && memory.prefetch_threads == 0;
+       --threads) {
+    const std::uint64_t needed = leastBytes(file, work, threads);
+    if (needed <= memory_bytes && needed <= for_prefetching) memory.prefetch_threads = threads;
+  }
+  const int readers = work.threads + memory.prefetch_threads;
+  const std::uint64_t fixed = fixedBytes(file, work, memory.prefetch_threads);
+  const std::uint64_t least_receivers = leastReceiverBytes(work.receivers);
+  const std::uint64_t for_receivers =
+      std::min(memory_bytes / kReceiverPart,
+               memory_bytes - fixed - PagedOctree::leastCacheBytes(file, readers));
+  planReceivers(work.receivers, std::max(for_receivers, least_receivers),
+                memory_bytes - fixed - least_receivers, memory);
+  memory.cache_bytes = memory_bytes - fixed - memory.sorter_reading_bytes - memory.result_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(
+      memory.caches,
+      PagedOctree::planMemory(file, memory.cache_bytes, readers,
+                              work.cache_split < 0 ? PagedOctree::kEvenSplit : work.cache_split));
+  memory.caches.tracked_pages = kTrackedPages;
+  return memory;
+}
+
+}  // namespace surfeit

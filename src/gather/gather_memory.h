@@ -1,0 +1,51 @@
+// How the memory budget of a gather is spent.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "io/ply_format.h"
+#include "octree/paged_octree.h"
+#include "octree/scene_file.h"
+#include "surfeit/gather.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Rows read or written between two looks at Progress::isCancelled, and of the buffers for rows.
+inline constexpr std::size_t kSliceRows = 4096;
+// Sorted receivers that the threads and those that prefetch can see.
+inline constexpr std::size_t kQueueReceivers = 16384;
+
+// What is gathered, as far as memory is concerned.
+struct GatherWork {
+  std::uint64_t receivers = 0;
+  std::size_t input_row_bytes = 0, result_row_bytes = 0;
+  GatherQuality quality;
+  int threads = 1;
+  int prefetch_threads = 0;  // wanted
+  double cache_split = -1;   // as in GatherOptions
+};
+
+struct GatherMemory {
+  std::uint64_t sorter_bytes = 0, sorter_reading_bytes = 0;  // of ReceiverSorter
+  std::uint64_t result_bytes = 0;                            // of ResultStore
+  std::uint64_t cache_bytes = 0;                             // of both caches
+  PagedOctree::Memory caches;
+  int prefetch_threads = 0;  // for which there is memory
+};
+
+// The least budget in which a gather works.
+std::uint64_t leastGatherMemory(const SceneFile& file, const GatherWork& work);
+
+// All but the caches, with receivers and results in memory. For advice: this and the bytes of the
+// caches are a budget that spends so much on them.
+std::uint64_t gatherMemoryBesideCaches(const SceneFile& file, const GatherWork& work);
+
+// Up to a quarter of the budget goes to receivers and results, what is fixed to what is fixed, and
+// all the rest to the caches. While receivers are sorted, caches are empty, and their memory serves
+// the sorting. kBudgetTooSmall, naming the least that works.
+Result<GatherMemory> planGatherMemory(const SceneFile& file, std::uint64_t memory_bytes,
+                                      const GatherWork& work);
+
+}  // namespace surfeit

@@ -1,0 +1,48 @@
+#include "gather/gather_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "gather/raster_cube.h"
+
+namespace surfeit {
+namespace {
+
+constexpr int kMostThreads = 4096;
+
+}  // namespace
+
+Status checkGatherOptions(const GatherOptions& options) {
+  const auto refuse = [](const char* what, auto found, const std::string& expected) {
+    return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
+  };
+  // No NaN passes any of these
+  const auto isFromZero = [](float value) { return value >= 0 && std::isfinite(value); };
+  const GatherQuality& quality = options.quality;
+  if (!isFromZero(quality.max_solid_angle)) {
+    return refuse("max solid angle", quality.max_solid_angle, "0 or more steradians");
+  }
+  if (!RasterGeometry::isValidResolution(quality.raster_resolution)) {
+    return refuse("raster resolution", quality.raster_resolution,
+                  fmt::format("an even number from {} to {}", RasterGeometry::kMinResolution,
+                              RasterGeometry::kMaxResolution));
+  }
+  if (!isFromZero(quality.bias)) return refuse("bias", quality.bias, "0 or more surfel radii");
+  if (!isFromZero(quality.near_field_radii)) {
+    return refuse("near field", quality.near_field_radii, "0 or more surfel radii");
+  }
+  if (!(quality.max_distance > 0)) {
+    return refuse("max distance", quality.max_distance, "more than 0 scene units");
+  }
+  if (options.threads < 0 || options.threads > kMostThreads) {
+    return refuse("thread count", options.threads, fmt::format("0 to {}", kMostThreads));
+  }
+  if (!(options.cache_split <= 1)) {
+    return refuse("cache split", options.cache_split, "0 to 1, or a negative number to measure");
+  }
+  return {};
+}
+
+}  // namespace surfeit

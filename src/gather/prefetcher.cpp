@@ -1,0 +1,75 @@
+#include "gather/prefetcher.h"
+
+#include <exception>
+#include <memory>
+#include <optional>
+#include <span>
+#include <system_error>
+
+#include "gather/cut.h"
+
+namespace surfeit {
+namespace {
+
+// To have seen a page is to have it loaded.
+struct IgnoreCut {
+  void node(const Node&) {}
+  void surfels(std::span<const Surfel>) {}
+};
+
+}  // namespace
+
+Prefetcher::Prefetcher(PagedOctree& octree, ReceiverQueue& queue, const GatherQuality& quality,
+                       int threads)
+    : octree_(octree), queue_(queue), quality_(quality) {
+  try {
+    for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+  } catch (const std::system_error&) {
+    // The gather needs none
+  }
+}
+
+Prefetcher::~Prefetcher() {
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  changed_.notify_all();
+}  // the threads join
+
+void Prefetcher::setDepth(std::uint64_t receivers) {
+  if (depth_.exchange(receivers) != receivers && receivers > 0) notify();
+}
+
+void Prefetcher::notify() {
+  if (depth_.load(std::memory_order_relaxed) == 0) return;
+  {
+    const std::lock_guard lock(mutex_);
+    ++moves_;
+  }
+  changed_.notify_all();
+}
+
+// Nothing that goes wrong here is an error of the gather: where it needs the page, it will meet the
+// same.
+void Prefetcher::work() {
+  try {
+    PagedOctree::Reader reader(octree_, CacheFront::Role::kPrefetch);
+    const auto cut = std::make_unique<CutWalk>();
+    std::unique_lock lock(mutex_);
+    while (!ends_) {
+      const std::uint64_t moves = moves_;
+      lock.unlock();
+      const std::optional<Receiver> receiver = queue_.lookAhead(depth_, kStride);
+      bool failed = false;
+      if (receiver) failed = !cut->walk(*receiver, quality_, reader, IgnoreCut{}).ok();
+      if (!receiver) reader.release();
+      lock.lock();
+      if (failed) return;
+      if (!receiver) changed_.wait(lock, [&] { return ends_ || moves_ != moves; });
+    }
+  } catch (const std::exception&) {
+  }
+}
+
+}  // namespace surfeit

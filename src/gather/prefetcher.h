@@ -1,0 +1,53 @@
+// Reads pages before the gather asks for them: threads of their own walk the cuts of receivers some
+// way ahead along the order, one of every few, and what these miss is loaded into the caches.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "gather/receiver_queue.h"
+#include "octree/paged_octree.h"
+#include "surfeit/gather.h"
+
+namespace surfeit {
+
+// Its threads begin at once, and sleep while the depth is 0. Pages that cannot be read are left for
+// the gather to find. Must go before octree and queue do.
+class Prefetcher {
+ public:
+  // Enough for the latency of a disk; they hardly compute.
+  static constexpr int kThreads = 4;
+  // Of so many neighbours one is walked: they see nearly the same.
+  static constexpr std::uint64_t kStride = 2 * kPacketReceivers;
+
+  // `threads` of them; where none can be started there are fewer.
+  Prefetcher(PagedOctree& octree, ReceiverQueue& queue, const GatherQuality& quality, int threads);
+  Prefetcher(const Prefetcher&) = delete;
+  Prefetcher& operator=(const Prefetcher&) = delete;
+  ~Prefetcher();
+
+  // How many receivers ahead of the last one taken it reads. From any thread.
+  void setDepth(std::uint64_t receivers);
+  // The gather has moved on. From any thread; costs nothing while the depth is 0.
+  void notify();
+
+ private:
+  void work();
+
+  PagedOctree& octree_;
+  ReceiverQueue& queue_;
+  const GatherQuality quality_;
+  std::atomic<std::uint64_t> depth_{0};
+  std::mutex mutex_;
+  std::condition_variable changed_;  // with mutex_
+  bool ends_ = false;                // guarded by mutex_
+  std::uint64_t moves_ = 0;          // guarded by mutex_: counts notify and setDepth
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace surfeit

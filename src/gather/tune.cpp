@@ -1,0 +1,333 @@
+// A tuning reads the receivers once, to sort them, and follows a sample of them. All the rest is
+// arithmetic on two miss-ratio curves, unless the user wants it checked.
+
+#include "surfeit/tune.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <new>
+#include <span>
+#include <utility>
+
+#include "core/job_limits.h"
+#include "gather/cache_split.h"
+#include "gather/gather_crew.h"
+#include "gather/gather_input.h"
+#include "gather/gather_memory.h"
+#include "gather/gather_options.h"
+#include "gather/quiet_progress.h"
+#include "gather/receiver_sorter.h"
+#include "gather/tune_sample.h"
+#include "octree/paged_octree.h"
+#include "octree/scene_file.h"
+
+namespace surfeit {
+namespace {
+
+// Caches of the table, as parts of what would hold the whole file.
+constexpr double kTableParts[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
+// Sizes of the curve, in equal ratios.
+constexpr int kCurveSizes = 64;
+// Budgets are advised in whole units.
+constexpr std::uint64_t kMemoryUnit = std::uint64_t{1} << 20;
+
+std::uint64_t roundedUp(std::uint64_t bytes) {
+  return (bytes + kMemoryUnit - 1) / kMemoryUnit * kMemoryUnit;
+}
+
+std::uint64_t loads(const GatherCacheStats& stats) { return stats.misses + stats.prefetches; }
+
+TuneCache measuredCache(const GatherCacheStats& stats) {
+  return {.frame_bytes = stats.budget_bytes,
+          .requests = double(stats.requests),
+          .loads = double(loads(stats)),
+          .bytes_read = double(stats.bytes_read)};
+}
+
+class Tuning {
+ public:
+  Tuning(const std::string& scene_path, const std::string& receivers_path,
+         const TuneOptions& options, Progress& progress)
+      : scene_path_(scene_path),
+        receivers_path_(receivers_path),
+        options_(options),
+        gather_(options.gather),
+        progress_(progress) {}
+
+  Result<TuneReport> run();
+
+ private:
+  Result<SceneFile> openScene() const {
+    return SceneFile::open(scene_path_, gather_.direct_io ? Access::kDirect : Access::kCached);
+  }
+  Result<GatherMemory> planOwnMemory() const;
+  Status sample(const GatherMemory& memory);
+  void predictAll();
+  std::uint64_t memoryFor(std::uint64_t cache_bytes) const;
+  TuneRow predict(std::uint64_t memory_bytes) const;
+  TuneRow predictCaches(std::uint64_t cache_bytes) const { return predict(memoryFor(cache_bytes)); }
+  TuneRow recommend(double most_seconds) const;
+  Result<TuneOutcome> measure(std::uint64_t memory_bytes) const;
+  Status check();
+
+  const std::string& scene_path_;
+  const std::string& receivers_path_;
+  const TuneOptions& options_;
+  GatherOptions gather_;  // with what the caller left open filled in
+  Progress& progress_;
+
+  std::unique_ptr<SceneFile> scene_;
+  std::unique_ptr<GatherInput> input_;
+  GatherWork work_;
+  std::uint64_t sample_receivers_ = 0;
+  std::uint64_t least_memory_ = 0;
+  TuneSample sample_;
+  TuneReport report_;
+};
+
+Result<TuneReport> Tuning::run() {
+  SURFEIT_RETURN_IF_ERROR(checkGatherOptions(gather_));
+  if (gather_.threads == 0) gather_.threads = defaultThreadCount();
+  if (gather_.memory_bytes == 0) gather_.memory_bytes = memoryLimitBytes() / 4 * 3;
+  if (gather_.temporary_directory.empty()) {
+    std::error_code error;  // where there is none, who spills says so
+    gather_.temporary_directory = std::filesystem::temp_directory_path(error).string();
+  }
+
+  // Open scene and receivers
+  {
+    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openScene());
+    scene_ = std::make_unique<SceneFile>(std::move(scene));
+    SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path_));
+    input_ = std::make_unique<GatherInput>(std::move(input));
+  }
+  const ResultRows result_rows(input_->receivers(), gather_.mode);
+  work_ = {.receivers = input_->receiverCount(),
+           .input_row_bytes = input_->receivers().row_bytes,
+           .result_row_bytes = result_rows.rowBytes(),
+           .quality = gather_.quality,
+           .threads = gather_.threads,
+           .prefetch_threads = gather_.prefetch ? 1 : 0,
+           .cache_split = gather_.cache_split};
+  sample_receivers_ = options_.sample_receivers == 0
+                          ? work_.receivers
+                          : std::min(options_.sample_receivers, work_.receivers);
+  least_memory_ = leastGatherMemory(*scene_, work_);
+  report_.receivers = work_.receivers;
+  report_.threads = gather_.threads;
+  report_.memory_bytes = gather_.memory_bytes;
+  report_.decoded_cache_bytes = PagedOctree::unlimitedCacheBytes(*scene_);
+
+  SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory, planOwnMemory());
+  SURFEIT_RETURN_IF_ERROR(sample(memory));
+  predictAll();
+  if (options_.check) SURFEIT_RETURN_IF_ERROR(check());
+  return report_;
+}
+
+// Beside a gather's own, a tuning needs memory for what it samples.
+Result<GatherMemory> Tuning::planOwnMemory() const {
+  const std::uint64_t beside = tuneSampleBytes(*scene_, sample_receivers_, gather_.threads);
+  const std::uint64_t least = least_memory_ + beside;
+  if (gather_.memory_bytes < least) {
+    return Status::budgetTooSmall(fmt::format(
+        "a memory budget of {:.1f} MiB is too small for tuning {} with {} {} and a sample of {} "
+        "receivers: {:.1f} MiB is the least that works",
+        double(gather_.memory_bytes) / (1 << 20), scene_path_, gather_.threads,
+        gather_.threads == 1 ? "thread" : "threads", sample_receivers_,
+        std::ceil(double(least) / (1 << 20) * 10) / 10));
+  }
+  return planGatherMemory(*scene_, gather_.memory_bytes - beside, work_);
+}
+
+Status Tuning::sample(const GatherMemory& memory) {
+  input_->note(progress_);
+  progress_.beginPhase("sort", work_.receivers, "receivers");
+  ReceiverSorter sorter({.count = work_.receivers,
+                         .memory_bytes = memory.sorter_bytes,
+                         .reading_bytes = memory.sorter_reading_bytes,
+                         .temporary_directory = gather_.temporary_directory});
+  SURFEIT_RETURN_IF_ERROR(
+      input_->sort(gather_.order, scene_->header().cube, gather_.strict, sorter, progress_));
+  report_.invalid_receivers = input_->defects().total();
+  if (report_.invalid_receivers == report_.receivers) {
+    return Status::corruption(
+        fmt::format("{}: {} receivers, {} of them invalid, expected at least one that is valid",
+                    receivers_path_, report_.receivers, report_.invalid_receivers));
+  }
+  if (report_.invalid_receivers > 0) {
+    progress_.note(fmt::format("{}: invalid receivers left out: {}", receivers_path_,
+                               input_->defects().describe()));
+  }
+  const std::uint64_t valid = report_.receivers - report_.invalid_receivers;
+  SURFEIT_ASSIGN_OR_RETURN(
+      sample_, sampleGather(scene_path_, sorter, valid, sample_receivers_, memory.caches, gather_,
+                            gather_.threads, progress_));
+  report_.sampled_receivers = sample_.receivers;
+  report_.sample_seconds = sample_.seconds;
+  report_.receiver_seconds = sample_.receiver_seconds;
+  report_.node_load_seconds = sample_.nodes.load_seconds;
+  report_.surfel_load_seconds = sample_.surfels.load_seconds;
+  return {};
+}
+
+void Tuning::predictAll() {
+  // The table
+  const std::uint64_t all = report_.decoded_cache_bytes;
+  report_.rows = {predict(least_memory_)};
+  for (const double part : kTableParts) {
+    const TuneRow row = predictCaches(static_cast<std::uint64_t>(part * double(all)));
+    if (row.memory_bytes > report_.rows.back().memory_bytes) report_.rows.push_back(row);
+  }
+
+  // The curve, from the least to all
+  const double least = double(report_.rows.front().cache_bytes);
+  for (int i = 0; i < kCurveSizes; ++i) {
+    const double size = least * std::pow(double(all) / least, double(i) / (kCurveSizes - 1));
+    const TuneRow row = predictCaches(static_cast<std::uint64_t>(size));
+    if (report_.curve.empty() || row.cache_bytes > report_.curve.back().cache_bytes) {
+      report_.curve.push_back(row);
+    }
+  }
+
+  const std::uint64_t knee = sample_.nodes.curve.knee() * PagedOctree::nodeFrameBytes(*scene_) +
+                             sample_.surfels.curve.knee() * PagedOctree::surfelFrameBytes(*scene_);
+  report_.knee = predict(roundedUp(memoryFor(std::min(knee, all))));
+  report_.recommended = recommend((1 + kTuneTimeMargin) * report_.rows.back().predicted.seconds);
+}
+
+// The least budget that spends so much on the caches.
+std::uint64_t Tuning::memoryFor(std::uint64_t cache_bytes) const {
+  std::uint64_t low = least_memory_;
+  std::uint64_t high = std::max(low, gatherMemoryBesideCaches(*scene_, work_) + cache_bytes);
+  while (low < high) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    const Result<GatherMemory> plan = planGatherMemory(*scene_, middle, work_);
+    if (plan.ok() && plan->cache_bytes >= cache_bytes) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return high;
+}
+
+TuneRow Tuning::predict(std::uint64_t memory_bytes) const {
+  TuneRow row;
+  row.memory_bytes = memory_bytes;
+  const Result<GatherMemory> plan = planGatherMemory(*scene_, memory_bytes, work_);
+  if (!plan.ok()) return row;  // never: no budget here is below the least
+  row.cache_bytes = std::min(plan->cache_bytes, report_.decoded_cache_bytes);
+
+  // The split that the gather finds, or was given
+  const PagedOctree::Memory& caches = plan->caches;
+  const CacheDemand nodes{sample_.nodes.curve, sample_.nodes.load_seconds,
+                          PagedOctree::nodeFrameBytes(*scene_), caches.least_node_frames,
+                          scene_->nodePageCount()};
+  const CacheDemand surfels{sample_.surfels.curve, sample_.surfels.load_seconds,
+                            PagedOctree::surfelFrameBytes(*scene_), caches.least_surfel_frames,
+                            scene_->surfelPageCount()};
+  std::size_t node_frames = caches.node_frames, surfel_frames = caches.surfel_frames;
+  if (gather_.cache_split < 0) {
+    const std::size_t total = node_frames * nodes.frame_bytes + surfel_frames * surfels.frame_bytes;
+    node_frames = bestFrames(nodes, surfels, total, node_frames);
+    surfel_frames = std::min<std::size_t>(
+        (total - node_frames * nodes.frame_bytes) / surfels.frame_bytes, surfels.most_frames);
+  }
+
+  const auto outcome = [](const CacheSample& cache, std::size_t frames, std::size_t frame_bytes) {
+    const double pages = cache.curve.misses(frames);
+    return TuneCache{.frame_bytes = frames * frame_bytes,
+                     .requests = cache.curve.lookups(),
+                     .loads = pages,
+                     .bytes_read = pages * cache.page_bytes};
+  };
+  row.predicted.node_cache = outcome(sample_.nodes, node_frames, nodes.frame_bytes);
+  row.predicted.surfel_cache = outcome(sample_.surfels, surfel_frames, surfels.frame_bytes);
+  row.predicted.seconds =
+      double(report_.receivers - report_.invalid_receivers) * sample_.receiver_seconds +
+      (loadSeconds(nodes, node_frames) + loadSeconds(surfels, surfel_frames)) / gather_.threads;
+  return row;
+}
+
+// The smallest caches that are no slower; predicted times do not rise with their size.
+TuneRow Tuning::recommend(double most_seconds) const {
+  std::uint64_t low = report_.rows.front().cache_bytes, high = report_.decoded_cache_bytes;
+  while (high - std::min(low, high) > kMemoryUnit / 4) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    if (predictCaches(middle).predicted.seconds <= most_seconds) {
+      high = middle;
+    } else {
+      low = middle;
+    }
+  }
+  return predict(roundedUp(memoryFor(high)));
+}
+
+// The gather as it is, but for its results.
+Result<TuneOutcome> Tuning::measure(std::uint64_t memory_bytes) const {
+  QuietProgress progress(progress_);
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openScene());
+  SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory, planGatherMemory(scene, memory_bytes, work_));
+  ReceiverSorter sorter({.count = work_.receivers,
+                         .memory_bytes = memory.sorter_bytes,
+                         .reading_bytes = memory.sorter_reading_bytes,
+                         .temporary_directory = gather_.temporary_directory});
+  progress.beginPhase("sort", work_.receivers, "receivers");
+  SURFEIT_RETURN_IF_ERROR(
+      input_->sort(gather_.order, scene.header().cube, gather_.strict, sorter, progress));
+  GatherStats stats;
+  stats.receivers = work_.receivers;
+  stats.invalid_receivers = report_.invalid_receivers;
+  stats.threads = gather_.threads;
+  stats.memory_bytes = memory_bytes;
+  SURFEIT_RETURN_IF_ERROR(gatherSorted(
+      std::move(scene), sorter, memory, gather_, stats,
+      [](std::span<const ResultStore::Entry>) { return Status(); }, progress));
+  return TuneOutcome{measuredCache(stats.node_cache), measuredCache(stats.surfel_cache),
+                     stats.gather_seconds};
+}
+
+Status Tuning::check() {
+  const auto measure_row = [&](TuneRow& row) -> Status {
+    if (row.memory_bytes > gather_.memory_bytes) return {};
+    SURFEIT_ASSIGN_OR_RETURN(row.measured, measure(row.memory_bytes));
+    return {};
+  };
+  for (TuneRow& row : report_.rows) SURFEIT_RETURN_IF_ERROR(measure_row(row));
+  return measure_row(report_.recommended);
+}
+
+}  // namespace
+
+std::optional<double> TuneReport::hitRateError() const {
+  double sum = 0;
+  int count = 0;
+  for (const TuneRow& row : rows) {
+    if (!row.measured) continue;
+    for (const auto cache : {&TuneOutcome::node_cache, &TuneOutcome::surfel_cache}) {
+      sum += std::abs((row.predicted.*cache).hitRate() - ((*row.measured).*cache).hitRate());
+      ++count;
+    }
+  }
+  if (count == 0) return std::nullopt;
+  return 100 * sum / count;
+}
+
+Result<TuneReport> tuneGather(const std::string& scene_path, const std::string& receivers_path,
+                              const TuneOptions& options, Progress& progress) {
+  try {
+    return Tuning(scene_path, receivers_path, options, progress).run();
+  } catch (const std::bad_alloc&) {
+    return Status::failed(fmt::format("{}: out of memory", receivers_path));
+  } catch (const std::exception& exception) {
+    return Status::failed(fmt::format("{}: {}", receivers_path, exception.what()));
+  }
+}
+
+}  // namespace surfeit

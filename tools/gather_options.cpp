@@ -1,0 +1,93 @@
+#include "tools/gather_options.h"
+
+#include <map>
+#include <string>
+
+namespace surfeit {
+namespace {
+
+void addQualityOptions(CLI::App& command, GatherQuality& quality) {
+  constexpr const char* kGroup = "Quality";
+  command
+      .add_option("--max-solid-angle,--maxsolidangle", quality.max_solid_angle,
+                  "Largest cluster drawn as one, in steradians; 0 opens all")
+      ->check(CLI::Range(0.0, 6.3))
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option("--raster-resolution,--rasterresolution", quality.raster_resolution,
+                  "Pixels along a cube face, even, 2 to 64")
+      ->check(CLI::Range(2, 64))
+      ->capture_default_str()
+      ->group(kGroup);
+  command.add_option("--bias", quality.bias, "Start of rays above the receiver, in surfel radii")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option("--near-field", quality.near_field_radii,
+                  "Surfels closer than this many radii are ray traced")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option("--max-dist,--maxdist", quality.max_distance,
+                  "Surfels farther away do not count, in scene units")
+      ->check(CLI::PositiveNumber)
+      ->group(kGroup);
+  command.add_option("--sides", quality.sides, "Sides of surfels that cover: front or both")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, GatherSides>{
+          {"front", GatherSides::kFront}, {"both", GatherSides::kBoth}}))
+      ->default_str("front")
+      ->group(kGroup);
+}
+
+void addPagingOptions(CLI::App& command, GatherOptions& options) {
+  constexpr const char* kGroup = "Paging";
+  command
+      .add_option("--order", options.order,
+                  "Order in which receivers are gathered: hilbert, morton or input")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, ReceiverOrder>{{"hilbert", ReceiverOrder::kHilbert},
+                                               {"morton", ReceiverOrder::kMorton},
+                                               {"input", ReceiverOrder::kInput}}))
+      ->default_str("hilbert")
+      ->group(kGroup);
+  command
+      .add_option("--cache-split", options.cache_split,
+                  "Share of the cache memory for nodes, 0 to 1; else found by measurement")
+      ->check(CLI::Range(0.0, 1.0))
+      ->default_str("")
+      ->group(kGroup);
+  command
+      .add_flag("--direct-io", options.direct_io,
+                "Read the scene past the page cache of the system")
+      ->group(kGroup);
+  command
+      .add_flag("--prefetch,!--no-prefetch", options.prefetch,
+                "Read ahead along the order when reading is slow (default: on)")
+      ->group(kGroup);
+  command
+      .add_option("--temp", options.temporary_directory,
+                  "Directory of temporary files, for what does not fit the memory")
+      ->group(kGroup);
+}
+
+}  // namespace
+
+void addGatherOptions(CLI::App& command, GatherOptions& options) {
+  command.add_option("--mode", options.mode, "occlusion or bleeding")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, GatherMode>{
+          {"occlusion", GatherMode::kOcclusion}, {"bleeding", GatherMode::kBleeding}}))
+      ->default_str("occlusion");
+  command.add_flag("--strict", options.strict,
+                   "Refuse invalid receivers instead of writing NaN for them");
+  addQualityOptions(command, options.quality);
+  addPagingOptions(command, options);
+}
+
+const char* modeName(GatherMode mode) {
+  return mode == GatherMode::kBleeding ? "bleeding" : "occlusion";
+}
+
+}  // namespace surfeit
