@@ -82,9 +82,8 @@ std::string outcomeCells(const TuneOutcome& outcome) {
 
 std::string rowLines(const TuneReport& report, const TuneRow& row, const char* name) {
   const double part = 100 * double(row.cache_bytes) / double(report.decoded_cache_bytes);
-  std::string lines =
-      fmt::format("\n  {:12}{:>9}{:>9.2f}%{}", name, memoryOption(row.memory_bytes), part,
-                  outcomeCells(row.predicted));
+  std::string lines = fmt::format("\n  {:12}{:>9}{:>9.2f}%{}", name, memoryOption(row.memory_bytes),
+                                  part, outcomeCells(row.predicted));
   if (row.measured) {
     lines += fmt::format("\n  {:>31}{}", "measured", outcomeCells(*row.measured));
   }
@@ -128,9 +127,8 @@ void addSeries(LinePlot& plot, const TuneReport& report, const std::string& labe
 }
 
 Status writePlot(const TuneArguments& arguments, const TuneReport& report) {
-  std::vector<PlotMarker> markers = {
-      {"knee", double(report.knee.cache_bytes)},
-      {"recommended", double(report.recommended.cache_bytes)}};
+  std::vector<PlotMarker> markers = {{"knee", double(report.knee.cache_bytes)},
+                                     {"recommended", double(report.recommended.cache_bytes)}};
   if (markers[0].bytes > markers[1].bytes) std::swap(markers[0], markers[1]);
   const auto plot = [&](const char* title, const char* label, const char* unit, bool is_log) {
     return LinePlot{.title = title,
@@ -151,8 +149,8 @@ Status writePlot(const TuneArguments& arguments, const TuneReport& report) {
   addSeries(plots[1], report, "read",
             [](const TuneOutcome& outcome) { return outcome.bytesRead() / (1 << 30); });
   addSeries(plots[2], report, "time", [](const TuneOutcome& outcome) { return outcome.seconds; });
-  const std::string svg = encodeSvg(
-      fmt::format("{} with {}", arguments.scene, arguments.receivers), plots);
+  const std::string svg =
+      encodeSvg(fmt::format("{} with {}", arguments.scene, arguments.receivers), plots);
   return writeTextFile(arguments.plot, svg);
 }
 
@@ -160,9 +158,9 @@ Status runTune(TuneArguments& arguments, CommandContext& context) {
   GatherOptions& gather = arguments.options.gather;
   gather.threads = context.threads();
   gather.memory_bytes = context.common.memory_bytes;
-  SURFEIT_ASSIGN_OR_RETURN(const TuneReport report,
-                           tuneGather(arguments.scene, arguments.receivers, arguments.options,
-                                      context.progress()));
+  SURFEIT_ASSIGN_OR_RETURN(
+      const TuneReport report,
+      tuneGather(arguments.scene, arguments.receivers, arguments.options, context.progress()));
   std::string error_line;
   if (report.hitRateError()) {
     error_line = fmt::format("\nhit rates are off by {:.4f} percentage points in the mean",

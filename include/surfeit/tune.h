@@ -19,8 +19,8 @@ struct TuneOptions {
   GatherOptions gather;
   // Receivers whose look-ups are followed; 0: all.
   std::uint64_t sample_receivers = 200'000;
-  // Runs the whole gather, throwing its results away, in every budget of the table that fits, and in
-  // the one recommended.
+  // Runs the whole gather, throwing its results away, in every budget of the table that fits, and
+  // in the one recommended.
   bool check = false;
 };
 
@@ -78,12 +78,12 @@ struct TuneReport {
 
 inline constexpr double kTuneTimeMargin = 0.05;
 
-// Follows the look-ups of a sample of the receivers through the octree, gathers at some of them, and
-// predicts from that what a gather at all of `receivers_path` (PLY) would do in budgets of any size.
-// Writes nothing but temporary files. With all receivers sampled, the predicted loads are those of
-// LRU caches on the very look-ups of a gather; with fewer they are estimates: docs/algorithm.md,
-// "Predicting misses from a sample". Times hold for the state of the system's page cache as it is.
-// Errors: as gatherCloud; kCorruption without valid receivers.
+// Follows the look-ups of a sample of the receivers through the octree, gathers at some of them,
+// and predicts from that what a gather at all of `receivers_path` (PLY) would do in budgets of any
+// size. Writes nothing but temporary files. With all receivers sampled, the predicted loads are
+// those of LRU caches on the very look-ups of a gather; with fewer they are estimates:
+// docs/algorithm.md, "Predicting misses from a sample". Times hold for the state of the system's
+// page cache as it is. Errors: as gatherCloud; kCorruption without valid receivers.
 Result<TuneReport> tuneGather(const std::string& scene_path, const std::string& receivers_path,
                               const TuneOptions& options, Progress& progress);
 

@@ -79,13 +79,11 @@ Status GatherCrew::gatherRuns() {
 
 Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
                     const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
-                    Progress& progress, ReceiverQueue::Sampling sampling) {
+                    Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(scene), memory.caches));
-  const std::uint64_t kept = stats.receivers / sampling.period * sampling.keep;
-  progress.beginPhase("gather", sampling.keep < sampling.period ? kept : stats.receivers,
-                      "receivers");
-  progress.advance(sampling.keep < sampling.period ? 0 : stats.invalid_receivers);
+  progress.beginPhase("gather", stats.receivers, "receivers");
+  progress.advance(stats.invalid_receivers);
   const auto begin = std::chrono::steady_clock::now();
   PagingController controller(
       *octree,
@@ -96,7 +94,7 @@ Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory&
        .least_node_frames = memory.caches.least_node_frames,
        .least_surfel_frames = memory.caches.least_surfel_frames},
       progress);
-  ReceiverQueue queue(sorter, kQueueReceivers, sampling);
+  ReceiverQueue queue(sorter, kQueueReceivers);
   {
     GatherCrew crew({.octree = *octree,
                      .queue = queue,

@@ -50,11 +50,10 @@ class GatherCrew {
   FirstFailure failure_;
 };
 
-// The gather proper: opens the caches of `scene`, gathers at what is in `sorter` (finished), or at
-// a sample of it, and fills in the statistics of that; threads of `stats` work, as many prefetch as
-// `memory` says.
+// The gather proper: opens the caches of `scene`, gathers at what is in `sorter` (finished), and
+// fills in the statistics of that; threads of `stats` work, as many prefetch as `memory` says.
 Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
                     const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
-                    Progress& progress, ReceiverQueue::Sampling sampling = {});
+                    Progress& progress);
 
 }  // namespace surfeit

@@ -14,10 +14,10 @@ namespace {
 constexpr double kTickSeconds = 0.25;
 constexpr std::uint64_t kTicksPerHalving = 8;
 
-// Narrower runs when misses rise above what is usual by this factor, wider ones below it.
+// Narrower runs when repeated reads rise above what is usual by this factor.
 constexpr double kRise = 1.5;
 constexpr double kUsual = 0.2;  // weight of the newest tick in what is usual
-// Fewer misses of a tick than this say nothing.
+// Fewer repeated reads of a tick than this say nothing.
 constexpr std::uint64_t kLeastMisses = 32;
 
 // Shares of the threads' time in waiting for pages: above the first, pages are read ahead; below
@@ -140,12 +140,8 @@ void PagingController::finish() {
 
 void PagingController::tick() {
   const Counters now = count();
-  const std::uint64_t misses =
-      loads(now.nodes) - loads(last_tick_.nodes) + loads(now.surfels) - loads(last_tick_.surfels);
-  const std::uint64_t requests = now.nodes.requests - last_tick_.nodes.requests +
-                                 now.surfels.requests - last_tick_.surfels.requests;
   ++ticks_;
-  if (misses >= kLeastMisses) adaptRun(double(misses) / double(std::max(requests, misses)));
+  adaptRun(now);
   if (options_.prefetches) adaptPrefetch(now);
   if (options_.adapts_split) adaptSplit(now);
   if (ticks_ % kTicksPerHalving == 0) {
@@ -157,18 +153,27 @@ void PagingController::tick() {
   last_tick_ = now;
 }
 
-// All threads together work on a stretch of the curve of a run each. When more look-ups miss than
-// is usual, a shorter stretch touches fewer pages at a time; when no more do, a longer one lets
-// threads find more in their own fronts.
-void PagingController::adaptRun(double miss_rate) {
+// All threads together work on a stretch of the curve of a run each. When more look-ups than is usual
+// miss pages that were there before, or many of all reads repeat, a shorter stretch touches fewer
+// pages at a time; when few do, a longer one lets threads find more in their own fronts. First reads
+// of pages are no sign of anything.
+void PagingController::adaptRun(const Counters& now) {
+  const auto grown = [&](std::uint64_t CacheCounters::*count) {
+    return double(now.nodes.*count - last_tick_.nodes.*count + now.surfels.*count -
+                  last_tick_.surfels.*count);
+  };
+  const double repeated = grown(&CacheCounters::repeated_loads);
+  const double loaded = grown(&CacheCounters::misses) + grown(&CacheCounters::prefetches);
+  const double rate = repeated / std::max(grown(&CacheCounters::requests), 1.0);
   const std::uint64_t run = run_receivers_;
-  if (usual_miss_rate_ < 0) usual_miss_rate_ = miss_rate;
-  if (miss_rate > kRise * usual_miss_rate_) {
+  const bool rises = usual_repeat_rate_ >= 0 && rate > kRise * usual_repeat_rate_;
+  if (repeated >= kLeastMisses && (rises || repeated > kMuchRepeated * loaded)) {
     run_receivers_ = std::max(run / 2, kLeastRun);
-  } else if (miss_rate <= usual_miss_rate_ && ticks_ % kTicksPerHalving == 0) {
+  } else if (repeated < kMuchRepeated / 2 * loaded && ticks_ % kTicksPerHalving == 0) {
     run_receivers_ = std::min(run * 2, kMostRun);
   }
-  usual_miss_rate_ += kUsual * (miss_rate - usual_miss_rate_);
+  usual_repeat_rate_ =
+      usual_repeat_rate_ < 0 ? rate : usual_repeat_rate_ + kUsual * (rate - usual_repeat_rate_);
 }
 
 // As far ahead as loads take: the receivers that are gathered in the time of some loads, further

@@ -67,7 +67,7 @@ class PagingController {
   // All below: mutex_ held
   Counters count() const;
   void tick();
-  void adaptRun(double miss_rate);
+  void adaptRun(const Counters& now);
   void adaptPrefetch(const Counters& now);
   void adaptSplit(const Counters& now);
   void advise(const Counters& now);
@@ -88,7 +88,7 @@ class PagingController {
   mutable std::mutex mutex_;
   Counters last_tick_, last_window_;
   std::uint64_t ticks_ = 0;
-  double usual_miss_rate_ = -1;  // of past ticks, newer ones counting more; negative: none yet
+  double usual_repeat_rate_ = -1;  // of past ticks, newer ones counting more; negative: none yet
   bool has_advised_ = false;
   double window_seconds_;
   std::vector<GatherWindow> windows_;

@@ -3,25 +3,16 @@
 #include <algorithm>
 #include <span>
 
-#include "core/assert.h"
-
 namespace surfeit {
 
-ReceiverQueue::ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers,
-                             Sampling sampling)
-    : sorter_(sorter), sampling_(sampling), buffer_(buffer_receivers) {
-  SURFEIT_CHECK(sampling.keep >= 1 && sampling.keep <= sampling.period);
-  SURFEIT_CHECK(sampling.keep == sampling.period || sampling.keep % kPacketReceivers == 0);
-}
+ReceiverQueue::ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers)
+    : sorter_(sorter), buffer_(buffer_receivers) {}
 
 Status ReceiverQueue::take(std::vector<SortedReceiver>& run, std::size_t count) {
   const std::lock_guard lock(mutex_);
   run.clear();
   if (end_ - begin_ < std::max(count, buffer_.size() / 2)) SURFEIT_RETURN_IF_ERROR(refill());
   count = std::min(count, end_ - begin_);
-  if (sampling_.keep < sampling_.period) {
-    count = std::min<std::size_t>(count, sampling_.keep - taken_ % sampling_.keep);
-  }
   const auto first = buffer_.begin() + static_cast<std::ptrdiff_t>(begin_);
   run.assign(first, first + static_cast<std::ptrdiff_t>(count));
   begin_ += count;
@@ -36,20 +27,11 @@ Status ReceiverQueue::refill() {
             buffer_.begin() + static_cast<std::ptrdiff_t>(end_), buffer_.begin());
   end_ -= begin_;
   begin_ = 0;
-  while (end_ < buffer_.size() && !is_at_end_) {
-    // Up to the next border between what is kept and what is not
-    const std::uint64_t place = read_ % sampling_.period;
-    const bool keeps = place < sampling_.keep;
-    std::uint64_t room = buffer_.size() - end_;
-    if (sampling_.keep < sampling_.period) {
-      room = std::min(room, (keeps ? sampling_.keep : sampling_.period) - place);
-    }
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
-                             sorter_.next(std::span(buffer_).subspan(end_, room)));
-    is_at_end_ = count < room;
-    read_ += count;
-    if (keeps) end_ += count;
-  }
+  const std::size_t room = buffer_.size() - end_;
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                           sorter_.next(std::span(buffer_).subspan(end_, room)));
+  is_at_end_ = count < room;
+  end_ += count;
   return {};
 }
 

@@ -19,18 +19,11 @@ inline constexpr std::size_t kPacketReceivers = 16;
 // Safe from any thread.
 class ReceiverQueue {
  public:
-  // Which receivers are handed out: the first `keep` of every `period`. For samples of a gather.
-  struct Sampling {
-    std::uint64_t keep = 1, period = 1;
-  };
+  // `sorter` is finished, and not used by anyone else meanwhile. Takes buffer_receivers * 40 bytes;
+  // runs are no longer than that.
+  ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers);
 
-  // `sorter` is finished, and not used by anyone else meanwhile. Takes buffer_receivers * 40 bytes.
-  ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers, Sampling sampling);
-  ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers)
-      : ReceiverQueue(sorter, buffer_receivers, Sampling{}) {}
-
-  // Replaces `run` by the next receivers, up to `count` of them; none at the end. With sampling, a
-  // run does not cross a gap.
+  // Replaces `run` by the next receivers, up to `count` of them; none at the end.
   Status take(std::vector<SortedReceiver>& run, std::size_t count);
 
   // A receiver for one that prefetches: the next of a stride of `stride` receivers that nobody has
@@ -45,14 +38,12 @@ class ReceiverQueue {
   Status refill();
 
   ReceiverSorter& sorter_;
-  const Sampling sampling_;
 
   mutable std::mutex mutex_;
   std::vector<SortedReceiver> buffer_;
   std::size_t begin_ = 0, end_ = 0;  // of what is in the buffer
-  std::uint64_t read_ = 0;           // receivers of the sorter so far
-  std::uint64_t taken_ = 0;          // of those kept
-  std::uint64_t next_look_ = 0;      // place among those kept
+  std::uint64_t taken_ = 0;
+  std::uint64_t next_look_ = 0;  // place in the order
   bool is_at_end_ = false;
 };
 

@@ -71,7 +71,8 @@ class Tuning {
   std::uint64_t memoryFor(std::uint64_t cache_bytes) const;
   TuneRow predict(std::uint64_t memory_bytes) const;
   TuneRow predictCaches(std::uint64_t cache_bytes) const { return predict(memoryFor(cache_bytes)); }
-  TuneRow recommend(double most_seconds) const;
+  template <typename IsEnough>
+  TuneRow leastThat(IsEnough&& is_enough) const;
   Result<TuneOutcome> measure(std::uint64_t memory_bytes) const;
   Status check();
 
@@ -195,10 +196,15 @@ void Tuning::predictAll() {
     }
   }
 
-  const std::uint64_t knee = sample_.nodes.curve.knee() * PagedOctree::nodeFrameBytes(*scene_) +
-                             sample_.surfels.curve.knee() * PagedOctree::surfelFrameBytes(*scene_);
-  report_.knee = predict(roundedUp(memoryFor(std::min(knee, all))));
-  report_.recommended = recommend((1 + kTuneTimeMargin) * report_.rows.back().predicted.seconds);
+  // Beyond the knees of both, whatever the split
+  const auto knee_loads = [](const MissRatioCurve& curve) { return curve.misses(curve.knee()); };
+  const double most_loads = knee_loads(sample_.nodes.curve) + knee_loads(sample_.surfels.curve);
+  report_.knee = leastThat([&](const TuneOutcome& outcome) {
+    return outcome.node_cache.loads + outcome.surfel_cache.loads <= most_loads;
+  });
+  const double most_seconds = (1 + kTuneTimeMargin) * report_.rows.back().predicted.seconds;
+  report_.recommended =
+      leastThat([&](const TuneOutcome& outcome) { return outcome.seconds <= most_seconds; });
 }
 
 // The least budget that spends so much on the caches.
@@ -255,12 +261,14 @@ TuneRow Tuning::predict(std::uint64_t memory_bytes) const {
   return row;
 }
 
-// The smallest caches that are no slower; predicted times do not rise with their size.
-TuneRow Tuning::recommend(double most_seconds) const {
+// The smallest budget, in whole units, that is good enough; larger ones are, and so is the largest.
+template <typename IsEnough>
+TuneRow Tuning::leastThat(IsEnough&& is_enough) const {
   std::uint64_t low = report_.rows.front().cache_bytes, high = report_.decoded_cache_bytes;
-  while (high - std::min(low, high) > kMemoryUnit / 4) {
+  if (is_enough(report_.rows.front().predicted)) high = low;
+  while (high > low + kMemoryUnit / 4) {
     const std::uint64_t middle = low + (high - low) / 2;
-    if (predictCaches(middle).predicted.seconds <= most_seconds) {
+    if (is_enough(predictCaches(middle).predicted)) {
       high = middle;
     } else {
       low = middle;

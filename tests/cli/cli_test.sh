@@ -91,6 +91,13 @@ statisticsHaveTheDocumentedFields() {
     receivers invalid_receivers receivers_per_second gather_seconds node_cache surfel_cache \
     requests hits misses evictions bytes_read peak_bytes budget_bytes decoded_bytes
   grep -q '"stats_version": 1' gather.json || fail "stats_version is not 1"
+  run 0 tune cornell.sft again.ply --memory 64M --sample 100 --check --plot tune.svg --stats tune.json
+  says recommended knee "hit rates are off"
+  jsonHas tune.json "${common[@]}" memory_bytes receivers invalid_receivers sampled_receivers \
+    sample_seconds decoded_cache_bytes receiver_seconds node_load_seconds surfel_load_seconds \
+    hit_rate_error rows curve knee recommended cache_bytes predicted measured frame_bytes requests \
+    loads hit_rate bytes_read seconds
+  grep -q '</svg>' tune.svg || fail "tune.svg is no SVG"
   run 0 view lit.ply -o lit.png --size 32x32 --stats view.json
   jsonHas view.json "${common[@]}" channel records drawn_surfels coverage
 }
@@ -99,9 +106,9 @@ helpAndVersionExitWithZero() {
   run 0 --version
   says "surfeit 0."
   run 0 --help
-  says sample generate index info verify gather view
+  says sample generate index info verify gather tune view
   local command
-  for command in sample generate index info verify gather view; do run 0 "$command" --help; done
+  for command in sample generate index info verify gather tune view; do run 0 "$command" --help; done
 }
 
 generatedScenesAreTheSameByEveryWay() {
@@ -137,6 +144,8 @@ missingFileIsAnIoError() {
   run 74 verify nowhere.sft
   run 74 gather nowhere.sft cornell.ply -o result.ply
   run 74 gather cornell.sft nowhere.ply -o result.ply
+  run 74 tune nowhere.sft cornell.ply
+  run 74 tune cornell.sft nowhere.ply
   run 74 gather cornell.sft cornell.ply -o no/such/directory/result.ply
   run 74 view nowhere.ply -o nowhere.png
   run 74 sample nowhere.obj -o nowhere.ply
@@ -190,6 +199,7 @@ impossibleValuesAreUsageErrors() {
   run 2 "${gather[@]}" --memory -5G
   run 2 "${gather[@]}" --mode glossy
   run 2 "${gather[@]}" --max-dist 0
+  run 2 tune cornell.sft cornell.ply --sample -1
   run 2 "${index[@]}" --leaf 0
   run 2 "${index[@]}" --overlap 0.5
   run 2 "${index[@]}" --precision double
@@ -207,6 +217,8 @@ tooSmallBudgetsSayWhatWouldDo() {
   run 33 index cornell.ply -o result.sft --memory 1M
   says "MiB"
   run 33 gather cornell.sft cornell.ply -o result.ply --memory 1M --threads 1
+  says "least that works"
+  run 33 tune cornell.sft cornell.ply --memory 1M --threads 1
   says "least that works"
   leavesNothing result
   # What it says works

@@ -50,21 +50,6 @@ TEST_F(ReceiverQueueTest, HandsOutAllInOrder) {
   }
 }
 
-TEST_F(ReceiverQueueTest, SamplesAreRunsOfNeighboursOfEveryPeriod) {
-  fill(1000);
-  ReceiverQueue queue(*sorter_, 128, {.keep = 32, .period = 100});
-  std::vector<SortedReceiver> run;
-  std::vector<std::uint64_t> indices;
-  for (;;) {
-    ASSERT_TRUE(queue.take(run, 48).ok());
-    if (run.empty()) break;
-    EXPECT_EQ(run.front().index % 100, 0u) << "a run crosses no gap";
-    for (const SortedReceiver& receiver : run) indices.push_back(receiver.index);
-  }
-  ASSERT_EQ(indices.size(), 320u);
-  for (std::size_t i = 0; i < indices.size(); ++i) EXPECT_EQ(indices[i], i / 32 * 100 + i % 32);
-}
-
 TEST_F(ReceiverQueueTest, LooksAheadOfWhatIsTakenOnceAtEachPlace) {
   fill(1000);
   ReceiverQueue queue(*sorter_, 512);

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <string>
 
+#include "gather/test_clouds.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
 #include "surfeit/gather.h"
-#include "tests/gather/test_clouds.h"
 
 namespace surfeit {
 namespace {
