@@ -88,8 +88,8 @@ struct NamedDesign {
       make;
 };
 
-// This library's cache, through fronts and without; and the baseline: a list in LRU order and a hash
-// table behind one mutex.
+// This library's cache, through fronts and without; and the baseline: a list in LRU order and a
+// hash table behind one mutex.
 std::vector<NamedDesign> ownDesigns();
 
 // RocksDB's caches, or none when it was not there to build with.

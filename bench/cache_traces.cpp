@@ -41,9 +41,7 @@ class SurfaceTree {
   static constexpr double kMostAngle = 0.12;  // edge over distance of a node that is in the cut
 
   static std::size_t levelBegin(int level) { return ((std::size_t{1} << 2 * level) - 1) / 3; }
-  static PageNumber pageCount() {
-    return PageNumber(levelBegin(kLevels + 1) / kNodesPerPage + 1);
-  }
+  static PageNumber pageCount() { return PageNumber(levelBegin(kLevels + 1) / kNodesPerPage + 1); }
 
   // Appends a page for each range of siblings that the cut of a receiver at (x, y) looks at.
   static void visit(double x, double y, std::vector<PageNumber>& pages) {
@@ -153,8 +151,8 @@ Result<CacheTrace> recordedTrace(const std::string& path, std::size_t most_looku
   constexpr PageNumber kMostPages = 1 << 24;
   trace.page_count = *std::max_element(trace.lookups.begin(), trace.lookups.end());
   if (trace.page_count >= kMostPages) {
-    return Status::corruption(fmt::format("{}: page {}, expected less than {}", path,
-                                          trace.page_count, kMostPages));
+    return Status::corruption(
+        fmt::format("{}: page {}, expected less than {}", path, trace.page_count, kMostPages));
   }
   ++trace.page_count;
   trace.frames = std::max<std::size_t>(64, trace.page_count / 50);

@@ -73,7 +73,8 @@ Status copyOf(const Status& status) noexcept {
 std::size_t PageCache::memoryBytes(const Options& options) {
   const Options used = normalised(options);
   return used.frame_count * (frameBytes(used.frame_bytes) + sizeof(Frame) + sizeof(std::uint32_t)) +
-         used.page_count * sizeof(Entry) + (kEpochLists + 1) * sizeof(List);
+         used.page_count * sizeof(Entry) +
+         FrameLists::memoryBytes(kEpochLists + 1, used.frame_count);
 }
 
 Result<std::unique_ptr<PageCache>> PageCache::create(const Options& options, Loader loader) {
@@ -135,6 +136,7 @@ void PageCache::setFrameLimit(std::size_t frames) {
   if (limit > frames_.size()) {
     frames_.reserve(limit);  // exactly, where resize would round up
     strays_.reserve(limit);
+    lists_.reserve(limit);
     frames_.resize(limit);
   }
   frame_limit_ = limit;
@@ -145,7 +147,7 @@ void PageCache::setFrameLimit(std::size_t frames) {
   free_frame_ = kNone;
   for (std::size_t frame = limit; frame-- > 0;) {
     if (frames_[frame].page == kNone) {
-      frames_[frame].next = std::exchange(free_frame_, static_cast<std::uint32_t>(frame));
+      frames_[frame].next_free = std::exchange(free_frame_, static_cast<std::uint32_t>(frame));
     }
   }
   strays_.clear();
@@ -229,8 +231,7 @@ Result<PageCache::Pin> PageCache::pinOrLoad(PageNumber page, Request& request) {
 PageCache::Pin PageCache::takeBack(PageNumber page) {
   std::atomic<Word>& at = entries_[page].word;
   const Word word = at.load();
-  unlink(frameOf(word));
-  link(frameOf(word), epoch_ % kEpochLists);
+  lists_.moveTo(frameOf(word), currentList());
   --leaving_;
   at.store((word ^ kLeaving ^ kLoaded) + kOnePin);
   return Pin(this, page, dataOf(page, word));
@@ -276,7 +277,7 @@ Result<PageCache::Pin> PageCache::load(std::unique_lock<std::mutex>& lock, PageN
   ++(request.is_prefetch ? counts_.prefetches : counts_.misses);
   stamp(page);
   frames_[index].page = page;
-  link(index, epoch_ % kEpochLists);
+  lists_.append(index, currentList());
   at.store(Word{index} << kFrameShift | kOnePin | seen | kLoading, std::memory_order_relaxed);
 
   lock.unlock();
@@ -315,7 +316,7 @@ Result<PageCache::Pin> PageCache::fail(std::unique_lock<std::mutex>& lock, PageN
   while ((at.load() & kPinMask) != kOnePin) load_ended_.wait(lock);
 
   at.store(at.load() & kSeen);
-  unlink(index);
+  lists_.remove(index);
   setFree(index);
   shrink();
   load_ended_.notify_all();
@@ -332,7 +333,9 @@ Result<PageCache::Pin> PageCache::fail(std::unique_lock<std::mutex>& lock, PageN
 // and a limit that changes again and again could break that; then an epoch lasts longer.
 void PageCache::countMiss() {
   if (++misses_in_epoch_ < misses_per_epoch_) return;
-  while (oldest_epoch_ != epoch_ && epochList(oldest_epoch_).first == kNone) ++oldest_epoch_;
+  while (oldest_epoch_ != epoch_ && lists_.first(epochList(oldest_epoch_)) == kNone) {
+    ++oldest_epoch_;
+  }
   const std::uint32_t age = epoch_ - oldest_epoch_;
   if (age + 1 == kEpochLists) return;
   ++epoch_;
@@ -359,10 +362,10 @@ bool PageCache::evictOne() {
     const std::size_t most = std::clamp<std::size_t>(frame_limit_ / 128, 1, kMostLeaving);
     if (makeLeave(most) == 0) return false;
   }
-  const std::uint32_t index = lists_[kLeavingList].first;
+  const std::uint32_t index = lists_.first(kLeavingList);
   std::atomic<Word>& at = entries_[frames_[index].page].word;
   at.store(at.load() & kSeen);
-  unlink(index);
+  lists_.remove(index);
   --leaving_;
   setFree(index);
   ++counts_.evictions;
@@ -381,23 +384,21 @@ std::size_t PageCache::makeLeave(std::size_t most) {
   const std::uint32_t now = epoch_;
   std::size_t made = 0;
   for (std::size_t held = 0; made < most && held < frames_in_use_ - leaving_;) {
-    while (epochList(oldest_epoch_).first == kNone) ++oldest_epoch_;
-    const std::uint32_t index = epochList(oldest_epoch_).first;
+    while (lists_.first(epochList(oldest_epoch_)) == kNone) ++oldest_epoch_;
+    const std::uint32_t index = lists_.first(epochList(oldest_epoch_));
     const Entry& entry = entries_[frames_[index].page];
     const bool is_held = isPinned(entry.word.load()) || frames_[index].held_in_scan == scan_;
     // A thread that was stopped while it let go may have brought an epoch that is past already
     const std::uint32_t age = now - entry.epoch.load(std::memory_order_relaxed);
     if (!is_held && age >= now - oldest_epoch_) {
       if (!tryMakeLeave(index)) continue;  // it was pinned meanwhile
-      unlink(index);
-      link(index, kLeavingList);
+      lists_.moveTo(index, kLeavingList);
       ++leaving_;
       ++made;
       continue;
     }
     held = is_held ? held + 1 : 0;
-    unlink(index);
-    link(index, (is_held ? now : now - age) % kEpochLists);
+    lists_.moveTo(index, epochList(is_held ? now : now - age));
   }
   if (made > 0) keepHeldByFronts();
   return made;
@@ -436,9 +437,8 @@ void PageCache::keepHeldByFronts() {
       std::atomic<Word>& at = entries_[page].word;
       const Word word = at.load();
       if (stateOf(word) != kLeaving) return;
-      if (frames_[frameOf(word)].list == kLeavingList) --leaving_;
-      unlink(frameOf(word));
-      link(frameOf(word), epoch_ % kEpochLists);
+      if (lists_.listOf(frameOf(word)) == kLeavingList) --leaving_;
+      lists_.moveTo(frameOf(word), currentList());
       at.store(word ^ kLeaving ^ kLoaded);
     });
   }
@@ -447,10 +447,12 @@ void PageCache::keepHeldByFronts() {
 void PageCache::setFree(std::uint32_t index) {
   frames_[index].page = kNone;
   --frames_in_use_;
-  if (index < frame_limit_) frames_[index].next = std::exchange(free_frame_, index);
+  if (index < frame_limit_) frames_[index].next_free = std::exchange(free_frame_, index);
 }
 
-std::uint32_t PageCache::popFree() { return std::exchange(free_frame_, frames_[free_frame_].next); }
+std::uint32_t PageCache::popFree() {
+  return std::exchange(free_frame_, frames_[free_frame_].next_free);
+}
 
 // Evicts what is more than the limit, moves what lies beyond it, and gives the memory there back.
 void PageCache::shrink() {
@@ -467,27 +469,26 @@ void PageCache::shrink() {
 
 // Moves pages from beyond the limit to free frames below, but for those that are held.
 void PageCache::moveStrays() {
-  markHeldByFronts();
   bool any = false;
   for (const std::uint32_t from : strays_) {
-    const Frame& frame = frames_[from];
-    if (frame.page == kNone || frame.list == kLeavingList || frame.held_in_scan == scan_) continue;
-    any = tryMakeLeave(from) || any;
+    const bool may_move = frames_[from].page != kNone && lists_.listOf(from) != kLeavingList;
+    any = (may_move && tryMakeLeave(from)) || any;
   }
   if (any) keepHeldByFronts();
 
   for (const std::uint32_t from : strays_) {
-    const Frame& frame = frames_[from];
-    if (frame.page == kNone) continue;
-    std::atomic<Word>& at = entries_[frame.page].word;
+    const PageNumber page = frames_[from].page;
+    if (page == kNone) continue;
+    std::atomic<Word>& at = entries_[page].word;
     Word word = at.load();
     if (stateOf(word) != kLeaving) continue;
-    const std::span<const std::byte> data = dataOf(frame.page, word);
-    if (frame.list != kLeavingList) word ^= kLeaving ^ kLoaded;
+    const std::span<const std::byte> data = dataOf(page, word);
+    if (lists_.listOf(from) != kLeavingList) word ^= kLeaving ^ kLoaded;
     if (free_frame_ != kNone) {  // else there are more pages than the limit allows
       const std::uint32_t to = popFree();
       std::memcpy(pool_.data(to), data.data(), data.size());
-      replaceInList(from, to);
+      lists_.replace(from, to);
+      frames_[to].page = std::exchange(frames_[from].page, kNone);
       word += (Word{to} - Word{from}) << kFrameShift;
     }
     at.store(word);
@@ -503,31 +504,6 @@ void PageCache::giveBackAroundStrays() {
   }
   pool_.giveBackFrom(begin);
   stray_end_ = begin;
-}
-
-void PageCache::link(std::uint32_t index, std::uint32_t list_number) {
-  List& list = lists_[list_number];
-  frames_[index].list = list_number;
-  frames_[index].next = kNone;
-  frames_[index].previous = list.last;
-  (list.last == kNone ? list.first : frames_[list.last].next) = index;
-  list.last = index;
-}
-
-void PageCache::unlink(std::uint32_t index) {
-  const Frame& frame = frames_[index];
-  List& list = lists_[frame.list];
-  (frame.previous == kNone ? list.first : frames_[frame.previous].next) = frame.next;
-  (frame.next == kNone ? list.last : frames_[frame.next].previous) = frame.previous;
-}
-
-// The page of one frame is in another from now on.
-void PageCache::replaceInList(std::uint32_t from, std::uint32_t to) {
-  const Frame& frame = frames_[to] = frames_[from];
-  List& list = lists_[frame.list];
-  (frame.previous == kNone ? list.first : frames_[frame.previous].next) = to;
-  (frame.next == kNone ? list.last : frames_[frame.next].previous) = to;
-  frames_[from].page = kNone;
 }
 
 }  // namespace surfeit

@@ -20,6 +20,7 @@
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
 #include "gather/gather_options.h"
+#include "gather/prefetcher.h"
 #include "gather/quiet_progress.h"
 #include "gather/receiver_sorter.h"
 #include "gather/tune_sample.h"
@@ -113,7 +114,7 @@ Result<TuneReport> Tuning::run() {
            .result_row_bytes = result_rows.rowBytes(),
            .quality = gather_.quality,
            .threads = gather_.threads,
-           .prefetch_threads = gather_.prefetch ? 1 : 0,
+           .prefetch_threads = gather_.prefetch ? Prefetcher::kThreads : 0,
            .cache_split = gather_.cache_split};
   sample_receivers_ = options_.sample_receivers == 0
                           ? work_.receivers
