@@ -1,10 +1,31 @@
 #include "tools/gather_options.h"
 
-#include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace surfeit {
 namespace {
+
+// An option that takes one of some words, of which the first is the default.
+template <typename Value>
+CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& target,
+                       const std::string& help,
+                       const std::vector<std::pair<std::string, Value>>& choices) {
+  std::string words;
+  for (const auto& [word, value] : choices) words += (words.empty() ? "" : "|") + word;
+  const auto choose = [=, &target](const std::string& found) {
+    for (const auto& [word, value] : choices) {
+      if (found != word) continue;
+      target = value;
+      return;
+    }
+    throw CLI::ValidationError(name, found + ", expected " + words);
+  };
+  return command.add_option_function<std::string>(name, choose, help)
+      ->type_name(words)
+      ->default_str(choices.front().first);
+}
 
 void addQualityOptions(CLI::App& command, GatherQuality& quality) {
   constexpr const char* kGroup = "Quality";
@@ -35,23 +56,18 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
                   "Surfels farther away do not count, in scene units")
       ->check(CLI::PositiveNumber)
       ->group(kGroup);
-  command.add_option("--sides", quality.sides, "Sides of surfels that cover: front or both")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, GatherSides>{
-          {"front", GatherSides::kFront}, {"both", GatherSides::kBoth}}))
-      ->default_str("front")
+  addChoice<GatherSides>(command, "--sides", quality.sides, "Sides of surfels that cover",
+                         {{"front", GatherSides::kFront}, {"both", GatherSides::kBoth}})
       ->group(kGroup);
 }
 
 void addPagingOptions(CLI::App& command, GatherOptions& options) {
   constexpr const char* kGroup = "Paging";
-  command
-      .add_option("--order", options.order,
-                  "Order in which receivers are gathered: hilbert, morton or input")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, ReceiverOrder>{{"hilbert", ReceiverOrder::kHilbert},
-                                               {"morton", ReceiverOrder::kMorton},
-                                               {"input", ReceiverOrder::kInput}}))
-      ->default_str("hilbert")
+  addChoice<ReceiverOrder>(command, "--order", options.order,
+                           "Order in which receivers are gathered",
+                           {{"hilbert", ReceiverOrder::kHilbert},
+                            {"morton", ReceiverOrder::kMorton},
+                            {"input", ReceiverOrder::kInput}})
       ->group(kGroup);
   command
       .add_option("--cache-split", options.cache_split,
@@ -76,10 +92,9 @@ void addPagingOptions(CLI::App& command, GatherOptions& options) {
 }  // namespace
 
 void addGatherOptions(CLI::App& command, GatherOptions& options) {
-  command.add_option("--mode", options.mode, "occlusion or bleeding")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, GatherMode>{
-          {"occlusion", GatherMode::kOcclusion}, {"bleeding", GatherMode::kBleeding}}))
-      ->default_str("occlusion");
+  addChoice<GatherMode>(
+      command, "--mode", options.mode, "What is gathered",
+      {{"occlusion", GatherMode::kOcclusion}, {"bleeding", GatherMode::kBleeding}});
   command.add_flag("--strict", options.strict,
                    "Refuse invalid receivers instead of writing NaN for them");
   addQualityOptions(command, options.quality);
