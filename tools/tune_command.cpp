@@ -163,7 +163,7 @@ Status runTune(TuneArguments& arguments, CommandContext& context) {
       tuneGather(arguments.scene, arguments.receivers, arguments.options, context.progress()));
   std::string error_line;
   if (report.hitRateError()) {
-    error_line = fmt::format("\nhit rates are off by {:.4f} percentage points in the mean",
+    error_line = fmt::format("\nhit rates are off by {:.4f} percentage points in the mean, but for the least budget",
                              *report.hitRateError());
   }
   context.say(fmt::format(

@@ -72,7 +72,8 @@ struct TuneReport {
   TuneRow recommended;
 
   // Mean absolute difference of predicted and measured hit rates over the rows, both caches, in
-  // percentage points; nothing unless some row was measured.
+  // percentage points; nothing unless some row was measured. The least budget is left out: nearly
+  // all of its few frames are held by threads, and what they do to each other is not predicted.
   std::optional<double> hitRateError() const;
 };
 

@@ -317,7 +317,8 @@ Status Tuning::check() {
 std::optional<double> TuneReport::hitRateError() const {
   double sum = 0;
   int count = 0;
-  for (const TuneRow& row : rows) {
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    const TuneRow& row = rows[i];
     if (!row.measured) continue;
     for (const auto cache : {&TuneOutcome::node_cache, &TuneOutcome::surfel_cache}) {
       sum += std::abs((row.predicted.*cache).hitRate() - ((*row.measured).*cache).hitRate());
