@@ -10,6 +10,8 @@
 #include <memory>
 #include <utility>
 
+#include "core/thread_scratch.h"
+
 namespace surfeit {
 namespace {
 
@@ -39,10 +41,18 @@ ZSTD_CCtx* createContext() {
   return context.release();
 }
 
+// A thread's own; null when there was no memory.
+struct Compression {
+  std::unique_ptr<ZSTD_CCtx, FreeContext> context{createContext()};
+};
+struct Decompression {
+  std::unique_ptr<ZSTD_DCtx, FreeContext> context{ZSTD_createDCtx()};
+};
+
 }  // namespace
 
 Status compressPage(Bytes payload, std::size_t packed_bytes, std::vector<std::byte>& stored) {
-  thread_local const std::unique_ptr<ZSTD_CCtx, FreeContext> context(createContext());
+  const auto& context = threadScratch<Compression>([] {}).context;
   if (context == nullptr) return Status::failed("zstd: no memory for a compression context");
   const Bytes plain = payload.subspan(packed_bytes);
   stored.resize(ZSTD_compressBound(packed_bytes) + plain.size());
@@ -55,7 +65,7 @@ Status compressPage(Bytes payload, std::size_t packed_bytes, std::vector<std::by
 }
 
 Status decompressPage(Bytes stored, std::span<std::byte> payload) {
-  thread_local const std::unique_ptr<ZSTD_DCtx, FreeContext> context(ZSTD_createDCtx());
+  const auto& context = threadScratch<Decompression>([] {}).context;
   if (context == nullptr) return Status::failed("zstd: no memory for a decompression context");
   // The frame tells how much of the payload it holds; the rest follows it
   const unsigned long long packed_bytes = ZSTD_getFrameContentSize(stored.data(), stored.size());

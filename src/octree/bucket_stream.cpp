@@ -7,6 +7,7 @@
 
 #include "core/assert.h"
 #include "core/first_failure.h"
+#include "core/thread_scratch.h"
 #include "octree/parallel.h"
 #include "octree/surfel_block.h"
 
@@ -150,7 +151,7 @@ Status BucketStream::unpack(std::span<const SurfelStore::Block> blocks,
     const std::size_t size = begin[i + 1] - begin[i];
     const std::span<Surfel> surfels = batch.surfels.subspan(begin[i], size);
     failure.note(unpackSurfels(packed[i], surfels));
-    thread_local std::vector<CurveKey> keys;
+    std::vector<CurveKey>& keys = threadScratch<std::vector<CurveKey>>([] {});
     keys.resize(size);
     if (size > 0) curveKeys(&surfels.front().position, sizeof(Surfel), options_.cube, keys);
     for (std::size_t s = 0; s < size; ++s) batch.tickets[begin[i] + s] = {keys[s], begin[i] + s};
@@ -247,9 +248,9 @@ Status BucketStream::distribute(const SurfelStore& store, std::size_t bucket, in
   const std::span<const SurfelStore::Block> blocks = store.blocks(bucket);
   FirstFailure failure;
   parallelFor(blocks.size(), [&](std::size_t i) {
-    thread_local AlignedBuffer buffer;
-    thread_local std::vector<Surfel> surfels;
-    thread_local std::vector<SortWord> words;
+    AlignedBuffer& buffer = threadScratch<AlignedBuffer>([] {});
+    std::vector<Surfel>& surfels = threadScratch<std::vector<Surfel>>([] {});
+    std::vector<SortWord>& words = threadScratch<std::vector<SortWord>>([] {});
     if (failure.happened()) return;
     const Status status = fetchSurfels(store, blocks[i], buffer, surfels);
     failure.note(status);

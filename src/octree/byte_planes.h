@@ -17,6 +17,7 @@
 #include <emmintrin.h>
 #endif
 
+#include "core/thread_scratch.h"
 #include "io/byte_coding.h"
 
 namespace surfeit {
@@ -60,7 +61,7 @@ class PayloadWriter {
     return bytes.data() + (bytes.size() - count);
   }
   static std::vector<std::byte>& threadPlainPart() {
-    thread_local std::vector<std::byte> bytes;
+    std::vector<std::byte>& bytes = threadScratch<std::vector<std::byte>>([] {});
     return bytes;
   }
 
@@ -99,7 +100,7 @@ class PayloadReader {
 enum class Use { kCodes, kDifferences, kPlanes };
 template <typename T, Use use>
 std::span<T> scratch(std::size_t count) {
-  thread_local std::vector<T> values;
+  std::vector<T>& values = threadScratch<std::vector<T>>([] {});
   if (values.size() < count) values.resize(count);
   return std::span<T>(values).first(count);
 }

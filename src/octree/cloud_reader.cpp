@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/first_failure.h"
+#include "core/thread_scratch.h"
 #include "octree/parallel.h"
 #include "octree/row_fetcher.h"
 
@@ -48,7 +49,7 @@ class InputPass {
 
 Status InputPass::decodePart(Bytes rows, std::uint64_t first_record, CloudTotals& totals,
                              SurfelDefects& defects) {
-  thread_local std::vector<Surfel> surfels;
+  std::vector<Surfel>& surfels = threadScratch<std::vector<Surfel>>([] {});
   surfels.resize(kReadBatch);
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
                            source_.decodeRows(rows, first_record, surfels, defects));

@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "core/job_limits.h"
+#include "core/thread_scratch.h"
 #include "octree/bucket_stream.h"
 #include "octree/cloud_reader.h"
 #include "octree/index_plan.h"
@@ -240,7 +241,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
 
   const auto consume = [&](std::span<Surfel> surfels, const Bounds3& bounds) -> Status {
     if (surfels.empty() || !distributing) return {};
-    thread_local std::vector<CurveKey> keys;
+    std::vector<CurveKey>& keys = threadScratch<std::vector<CurveKey>>([] {});
     keys.resize(surfels.size());
     if (needs_cube) {
       if (!contains(*cube, bounds)) {

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/curve_key.h"
+#include "core/thread_scratch.h"
 #include "octree/column_codec.h"
 
 namespace surfeit {
@@ -31,9 +32,9 @@ Status damaged(const char* field) {
 class Columns {
  public:
   explicit Columns(std::size_t count) {
-    thread_local std::vector<float> floats;
-    thread_local std::vector<std::uint8_t> bytes;
-    thread_local std::vector<std::uint64_t> integers;
+    std::vector<float>& floats = threadScratch<std::vector<float>>([] {});
+    std::vector<std::uint8_t>& bytes = threadScratch<std::vector<std::uint8_t>>([] {});
+    std::vector<std::uint64_t>& integers = threadScratch<std::vector<std::uint64_t>>([] {});
     if (bytes.size() < kByteColumns * count) {
       floats.resize(kFloatColumns * count);
       bytes.resize(kByteColumns * count);
@@ -112,7 +113,7 @@ class Columns {
 // in red, green and blue. Every page of a thread uses the same.
 template <typename T>
 std::array<std::span<T>, kCoefficientKinds> coefficientColumns(std::size_t rough_count) {
-  thread_local std::vector<T> values;
+  std::vector<T>& values = threadScratch<std::vector<T>>([] {});
   const std::size_t count = rough_count * kShCount;
   if (values.size() < kCoefficientKinds * count) values.resize(kCoefficientKinds * count);
   std::array<std::span<T>, kCoefficientKinds> columns;

@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/thread_scratch.h"
+
 namespace surfeit {
 namespace {
 
@@ -76,8 +78,8 @@ PageNumber residentPages(const SceneHeader& header, std::size_t frames) {
   return pages;
 }
 
-SceneFile::Scratch& threadScratch() {
-  thread_local SceneFile::Scratch scratch;
+SceneFile::Scratch& decodeScratch() {
+  SceneFile::Scratch& scratch = threadScratch<SceneFile::Scratch>([] {});
   return scratch;
 }
 
@@ -188,14 +190,14 @@ Result<std::unique_ptr<PagedOctree>> PagedOctree::create(SceneFile file, const M
   }
   SURFEIT_ASSIGN_OR_RETURN(
       state->nodes, PageCache::create(nodes, [&scene](PageNumber page, std::span<std::byte> frame) {
-        return loaded<Node>(scene.decodeNodes(page, threadScratch(), writableRecords<Node>(frame)),
+        return loaded<Node>(scene.decodeNodes(page, decodeScratch(), writableRecords<Node>(frame)),
                             scene.nodePageBytes(page));
       }));
   SURFEIT_ASSIGN_OR_RETURN(
       state->surfels,
       PageCache::create(surfels, [&scene](PageNumber page, std::span<std::byte> frame) {
         return loaded<Surfel>(
-            scene.decodeSurfels(page, threadScratch(), writableRecords<Surfel>(frame)),
+            scene.decodeSurfels(page, decodeScratch(), writableRecords<Surfel>(frame)),
             scene.surfelPageBytes(page));
       }));
   SURFEIT_RETURN_IF_ERROR(state->nodes->keepResident(memory.resident_node_pages));

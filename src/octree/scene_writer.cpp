@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "core/thread_scratch.h"
 #include "io/page_codec.h"
 #include "octree/scene_header.h"
 
@@ -85,7 +86,8 @@ Result<SceneFile> SceneWriter::finishUnnamed(const std::string& provenance) {
 }
 
 Status encodeNodePage(const FullNodePage& page, bool full_precision, EncodedPages& encoded) {
-  thread_local std::vector<std::byte> payload, stored;
+  std::vector<std::byte>& payload = threadScratch<std::vector<std::byte>>([] {});
+  std::vector<std::byte>& stored = threadScratch<std::vector<std::byte>>([] {});
   const std::size_t packed_bytes = encodeNodeGroup(page.nodes, full_precision, payload);
   SURFEIT_RETURN_IF_ERROR(compressPage(payload, packed_bytes, stored));
   encoded.add(stored, payload.size());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/thread_scratch.h"
 #include "io/page_codec.h"
 #include "octree/surfel_group.h"
 
@@ -66,11 +67,11 @@ class SlabBuilder {
 
   // Per thread, because the first touch of memory costs more than what is done with it here
   static std::vector<Surfel>& surfelScratch() {
-    thread_local std::vector<Surfel> surfels;
+    std::vector<Surfel>& surfels = threadScratch<std::vector<Surfel>>([] {});
     return surfels;
   }
   static std::vector<CurveKey>& keyScratch() {
-    thread_local std::vector<CurveKey> keys;
+    std::vector<CurveKey>& keys = threadScratch<std::vector<CurveKey>>([] {});
     return keys;
   }
 };
@@ -157,7 +158,8 @@ GroupPlace SlabBuilder::placeSurfels(std::size_t begin, std::size_t end) {
 }
 
 Status SlabBuilder::encodePages() {
-  thread_local std::vector<std::byte> payload, stored;
+  std::vector<std::byte>& payload = threadScratch<std::vector<std::byte>>([] {});
+  std::vector<std::byte>& stored = threadScratch<std::vector<std::byte>>([] {});
   const PageForm form = {header_.full_precision, header_.channels.albedo};
   for (std::size_t p = 0; p + 1 < page_begins_.size(); ++p) {
     const std::size_t begin = page_begins_[p];

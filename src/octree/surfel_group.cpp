@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/thread_scratch.h"
 #include "octree/column_codec.h"
 #include "octree/local_density.h"
 
@@ -24,8 +25,8 @@ Status damaged(const char* field) {
 class Columns {
  public:
   explicit Columns(std::size_t count) {
-    thread_local std::vector<float> floats;
-    thread_local std::vector<std::uint8_t> bytes;
+    std::vector<float>& floats = threadScratch<std::vector<float>>([] {});
+    std::vector<std::uint8_t>& bytes = threadScratch<std::vector<std::uint8_t>>([] {});
     if (bytes.size() < count) {
       floats.resize(kFloatColumns * count);
       bytes.resize(count);

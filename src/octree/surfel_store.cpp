@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/assert.h"
+#include "core/thread_scratch.h"
 #include "octree/surfel_block.h"
 
 namespace surfeit {
@@ -56,8 +57,9 @@ Status SurfelStore::add(std::span<const Surfel> surfels, std::span<const SortWor
   if (bucket_count_ == 1) return append(buckets_[0], surfels);
 
   // Group by bucket, so that a bucket is locked once for all its surfels
-  thread_local std::vector<std::uint32_t> bucket_of, next;
-  thread_local std::vector<Surfel> grouped;
+  std::vector<std::uint32_t>& bucket_of = threadScratch<std::vector<std::uint32_t>>([] {});
+  std::vector<std::uint32_t>& next = threadScratch<std::vector<std::uint32_t>>([] {});
+  std::vector<Surfel>& grouped = threadScratch<std::vector<Surfel>>([] {});
   bucket_of.resize(surfels.size());
   grouped.resize(surfels.size());
   next.assign(bucket_count_ + 1, 0);
@@ -80,7 +82,7 @@ Status SurfelStore::add(std::span<const Surfel> surfels, std::span<const SortWor
 
 Status SurfelStore::append(Bucket& bucket, std::span<const Surfel> surfels) {
   // Full blocks leave the bucket before they are packed, so that others can go on filling it
-  thread_local std::vector<Surfel> full;
+  std::vector<Surfel>& full = threadScratch<std::vector<Surfel>>([] {});
   while (!surfels.empty()) {
     full.clear();
     {
@@ -102,7 +104,7 @@ Status SurfelStore::append(Bucket& bucket, std::span<const Surfel> surfels) {
 }
 
 Status SurfelStore::store(Bucket& bucket, std::span<const Surfel> surfels) {
-  thread_local std::vector<std::byte> packed;
+  std::vector<std::byte>& packed = threadScratch<std::vector<std::byte>>([] {});
   packSurfels(surfels, packed);
   Block block;
   block.bytes = static_cast<std::uint32_t>(packed.size());
