@@ -199,11 +199,6 @@ struct TracingReader {
   }
 };
 
-struct IgnoreCut {
-  void node(const Node&) {}
-  void surfels(std::span<const Surfel>) {}
-};
-
 void printTable(const std::vector<std::unique_ptr<Replay>>& replays, std::uint64_t lookups) {
   fmt::print("misses, % of {} node look-ups, by cache size\n  {:<12}{:>8}", lookups, "layout",
              "pages");

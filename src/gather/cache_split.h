@@ -15,14 +15,21 @@ struct CacheDemand {
   std::size_t least_frames = 1, most_frames = 1;
 };
 
-// Predicted seconds of loading with so many frames.
-double loadSeconds(const CacheDemand& demand, std::size_t frames);
+struct CacheSplit {
+  std::size_t first_frames = 0, second_frames = 0;
+  double load_seconds = 0;  // predicted, of both
+};
 
-// The share of the first of two caches: the number of its frames, of total_bytes for both, with the
-// least predicted loading; of equal ones the nearest to current_frames. Looks at kSplits divisions
-// and the present one. The limits of both are kept, those of the first going before.
+// The first cache with so many frames, the second with what that leaves of total_bytes, or all that
+// it can use.
+CacheSplit splitAt(const CacheDemand& first, const CacheDemand& second, std::size_t total_bytes,
+                   std::size_t first_frames);
+
+// The split with the least predicted loading; of equal ones the nearest to current_first_frames.
+// Looks at kSplits divisions and the present one. The limits of both are kept, those of the second
+// going before.
 inline constexpr std::size_t kSplits = 64;
-std::size_t bestFrames(const CacheDemand& first, const CacheDemand& second, std::size_t total_bytes,
-                       std::size_t current_frames);
+CacheSplit bestSplit(const CacheDemand& first, const CacheDemand& second, std::size_t total_bytes,
+                     std::size_t current_first_frames);
 
 }  // namespace surfeit

@@ -79,4 +79,10 @@ class CutWalk {
   std::uint64_t nodes_visited_ = 0, surfels_visited_ = 0;
 };
 
+// For walks that are made for the pages they touch.
+struct IgnoreCut {
+  void node(const Node&) {}
+  void surfels(std::span<const Surfel>) {}
+};
+
 }  // namespace surfeit

@@ -18,7 +18,8 @@ namespace surfeit {
 GatherCrew::GatherCrew(const Setup& setup, Sink sink)
     : setup_(setup),
       sink_(std::move(sink)),
-      prefetcher_(setup.octree, setup.queue, setup.options.quality, setup.prefetch_threads) {}
+      prefetcher_(setup.octree, setup.queue, setup.controller, setup.options.quality,
+                  setup.prefetch_threads) {}
 
 Status GatherCrew::run() {
   {
@@ -70,9 +71,7 @@ Status GatherCrew::gatherRuns() {
     }
     SURFEIT_RETURN_IF_ERROR(sink_(results));
     setup_.progress.advance(run.size());
-    if (setup_.controller.advance(run.size())) {
-      prefetcher_.setDepth(setup_.controller.prefetchReceivers());
-    }
+    setup_.controller.advance(run.size());
   }
   return {};
 }
@@ -85,15 +84,16 @@ Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory&
   progress.beginPhase("gather", stats.receivers, "receivers");
   progress.advance(stats.invalid_receivers);
   const auto begin = std::chrono::steady_clock::now();
-  PagingController controller(
-      *octree,
-      {.threads = stats.threads,
-       .adapts_split = options.cache_split<0, .prefetches = memory.prefetch_threads> 0,
-       .memory_bytes = stats.memory_bytes,
-       .receivers = stats.receivers - stats.invalid_receivers,
-       .least_node_frames = memory.caches.least_node_frames,
-       .least_surfel_frames = memory.caches.least_surfel_frames},
-      progress);
+  const bool adapts_split = options.cache_split < 0;
+  PagingController controller(*octree,
+                              {.threads = stats.threads,
+                               .adapts_split = adapts_split,
+                               .prefetches = memory.prefetch_threads != 0,
+                               .memory_bytes = stats.memory_bytes,
+                               .receivers = stats.receivers - stats.invalid_receivers,
+                               .least_node_frames = memory.caches.least_node_frames,
+                               .least_surfel_frames = memory.caches.least_surfel_frames},
+                              progress);
   ReceiverQueue queue(sorter, kQueueReceivers);
   {
     GatherCrew crew({.octree = *octree,
@@ -111,7 +111,7 @@ Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory&
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   stats.node_cache = controller.nodeStats();
   stats.surfel_cache = controller.surfelStats();
-  stats.windows = controller.takeWindows();
+  stats.windows = controller.windows();
   return {};
 }
 

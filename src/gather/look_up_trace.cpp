@@ -10,11 +10,6 @@ constexpr std::uint32_t kNoPage = 0xffffffffu;
 
 }  // namespace
 
-struct LookUpTrace::IgnoreCut {
-  void node(const Node&) {}
-  void surfels(std::span<const Surfel>) {}
-};
-
 class LookUpTrace::Reader {
  public:
   Reader(PagedOctree::Reader& octree, std::uint32_t surfel_group_capacity)

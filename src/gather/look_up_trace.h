@@ -55,7 +55,6 @@ class LookUpTrace {
  private:
   // What CutWalk walks; one of the threads that are imitated.
   class Reader;
-  struct IgnoreCut;
 
   const GatherQuality quality_;
   const std::size_t threads_;

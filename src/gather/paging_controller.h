@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "cache/cache_counters.h"
+#include "gather/window_record.h"
 #include "octree/paged_octree.h"
 #include "surfeit/gather.h"
 #include "surfeit/progress.h"
@@ -31,13 +31,14 @@ class PagingController {
 
   static constexpr std::uint64_t kLeastRun = 16, kFirstRun = 64, kMostRun = 512;
   static constexpr std::uint64_t kMostDepth = 8192;  // receivers
-  static constexpr std::size_t kMostWindows = 256;
 
   // The octree has reuse distances. Both must outlive the controller.
   PagingController(PagedOctree& octree, const Options& options, Progress& progress);
 
   // Bytes that a controller takes.
-  static std::uint64_t memoryBytes();
+  static constexpr std::uint64_t memoryBytes() {
+    return sizeof(PagingController) + WindowRecord::memoryBytes();
+  }
 
   // Receivers that a thread takes at once.
   std::uint64_t runReceivers() const { return run_receivers_.load(std::memory_order_relaxed); }
@@ -46,39 +47,35 @@ class PagingController {
     return prefetch_receivers_.load(std::memory_order_relaxed);
   }
 
-  // `receivers` more are done. Looks at the caches when it is time. Returns true when it did.
-  bool advance(std::uint64_t receivers);
+  // `receivers` more are done. Looks at the caches when it is time.
+  void advance(std::uint64_t receivers);
   // The gather is over: closes the last window, and gives advice that was not given yet.
   void finish();
 
   // Call after finish().
-  std::vector<GatherWindow> takeWindows() { return std::move(windows_); }
+  std::vector<GatherWindow> windows() const { return record_.windows(); }
   GatherCacheStats nodeStats() const;
   GatherCacheStats surfelStats() const;
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Counters {
-    CacheCounters nodes, surfels;
-    std::uint64_t receivers = 0;
-    double seconds = 0;
-  };
+  using Moment = WindowRecord::Moment;
 
+  Moment now() const;
   // All below: mutex_ held
-  Counters count() const;
   void tick();
-  void adaptRun(const Counters& now);
-  void adaptPrefetch(const Counters& now);
-  void adaptSplit(const Counters& now);
-  void advise(const Counters& now);
-  void record(const Counters& now);
-  void mergeWindows();
+  void adaptRun(const Moment& now);
+  void adaptPrefetch(const Moment& now);
+  void adaptSplit(const Moment& now);
+  void advise(const Moment& now);
+  void noteWorkingSets();
   double secondsSinceStart() const;
 
   PagedOctree& octree_;
   const Options options_;
   Progress& progress_;
   const Clock::time_point start_ = Clock::now();
+  const std::size_t frame_bytes_;  // of both caches together, however they are split
 
   std::atomic<std::uint64_t> receivers_{0};
   std::atomic<std::uint64_t> run_receivers_{kFirstRun};
@@ -86,12 +83,13 @@ class PagingController {
   std::atomic<std::int64_t> next_tick_ns_;  // since start_
 
   mutable std::mutex mutex_;
-  Counters last_tick_, last_window_;
+  Moment last_tick_;
   std::uint64_t ticks_ = 0;
   double usual_repeat_rate_ = -1;  // of past ticks, newer ones counting more; negative: none yet
   bool has_advised_ = false;
-  double window_seconds_;
-  std::vector<GatherWindow> windows_;
+  // Bytes of the pages touched in the last kTicksPerHalving ticks
+  std::uint64_t node_working_set_bytes_ = 0, surfel_working_set_bytes_ = 0;
+  WindowRecord record_;
 };
 
 }  // namespace surfeit

@@ -3,25 +3,15 @@
 #include <exception>
 #include <memory>
 #include <optional>
-#include <span>
 #include <system_error>
 
 #include "gather/cut.h"
 
 namespace surfeit {
-namespace {
-
-// To have seen a page is to have it loaded.
-struct IgnoreCut {
-  void node(const Node&) {}
-  void surfels(std::span<const Surfel>) {}
-};
-
-}  // namespace
-
-Prefetcher::Prefetcher(PagedOctree& octree, ReceiverQueue& queue, const GatherQuality& quality,
+Prefetcher::Prefetcher(PagedOctree& octree, ReceiverQueue& queue,
+                       const PagingController& controller, const GatherQuality& quality,
                        int threads)
-    : octree_(octree), queue_(queue), quality_(quality) {
+    : octree_(octree), queue_(queue), controller_(controller), quality_(quality) {
   try {
     for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
   } catch (const std::system_error&) {
@@ -37,12 +27,8 @@ Prefetcher::~Prefetcher() {
   changed_.notify_all();
 }  // the threads join
 
-void Prefetcher::setDepth(std::uint64_t receivers) {
-  if (depth_.exchange(receivers) != receivers && receivers > 0) notify();
-}
-
 void Prefetcher::notify() {
-  if (depth_.load(std::memory_order_relaxed) == 0) return;
+  if (controller_.prefetchReceivers() == 0) return;
   {
     const std::lock_guard lock(mutex_);
     ++moves_;
@@ -60,7 +46,8 @@ void Prefetcher::work() {
     while (!ends_) {
       const std::uint64_t moves = moves_;
       lock.unlock();
-      const std::optional<Receiver> receiver = queue_.lookAhead(depth_, kStride);
+      const std::optional<Receiver> receiver =
+          queue_.lookAhead(controller_.prefetchReceivers(), kStride);
       bool failed = false;
       if (receiver) failed = !cut->walk(*receiver, quality_, reader, IgnoreCut{}).ok();
       if (!receiver) reader.release();

@@ -2,22 +2,21 @@
 // way ahead along the order, one of every few, and what these miss is loaded into the caches.
 #pragma once
 
-#include <atomic>
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <mutex>
 #include <thread>
 #include <vector>
 
+#include "gather/paging_controller.h"
 #include "gather/receiver_queue.h"
 #include "octree/paged_octree.h"
 #include "surfeit/gather.h"
 
 namespace surfeit {
 
-// Its threads begin at once, and sleep while the depth is 0. Pages that cannot be read are left for
-// the gather to find. Must go before octree and queue do.
+// Its threads begin at once, and sleep while the controller wants nothing read ahead. Pages that
+// cannot be read are left for the gather to find. Must go before all that it refers to.
 class Prefetcher {
  public:
   // Enough for the latency of a disk; they hardly compute.
@@ -26,14 +25,13 @@ class Prefetcher {
   static constexpr std::uint64_t kStride = 2 * kPacketReceivers;
 
   // `threads` of them; where none can be started there are fewer.
-  Prefetcher(PagedOctree& octree, ReceiverQueue& queue, const GatherQuality& quality, int threads);
+  Prefetcher(PagedOctree& octree, ReceiverQueue& queue, const PagingController& controller,
+             const GatherQuality& quality, int threads);
   Prefetcher(const Prefetcher&) = delete;
   Prefetcher& operator=(const Prefetcher&) = delete;
   ~Prefetcher();
 
-  // How many receivers ahead of the last one taken it reads. From any thread.
-  void setDepth(std::uint64_t receivers);
-  // The gather has moved on. From any thread; costs nothing while the depth is 0.
+  // The gather has moved on. From any thread; costs nothing while nothing is wanted.
   void notify();
 
  private:
@@ -41,12 +39,12 @@ class Prefetcher {
 
   PagedOctree& octree_;
   ReceiverQueue& queue_;
+  const PagingController& controller_;
   const GatherQuality quality_;
-  std::atomic<std::uint64_t> depth_{0};
   std::mutex mutex_;
   std::condition_variable changed_;  // with mutex_
   bool ends_ = false;                // guarded by mutex_
-  std::uint64_t moves_ = 0;          // guarded by mutex_: counts notify and setDepth
+  std::uint64_t moves_ = 0;          // guarded by mutex_
   std::vector<std::jthread> threads_;
 };
 

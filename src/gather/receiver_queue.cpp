@@ -44,9 +44,4 @@ std::optional<Receiver> ReceiverQueue::lookAhead(std::uint64_t ahead, std::uint6
   return buffer_[begin_ + place].receiver;
 }
 
-std::uint64_t ReceiverQueue::taken() const {
-  const std::lock_guard lock(mutex_);
-  return taken_;
-}
-
 }  // namespace surfeit

@@ -30,16 +30,13 @@ class ReceiverQueue {
   // looked at, if it is less than `ahead` receivers from the last one taken and in the buffer.
   std::optional<Receiver> lookAhead(std::uint64_t ahead, std::uint64_t stride);
 
-  // Number of receivers handed out so far.
-  std::uint64_t taken() const;
-
  private:
   // All: mutex_ held
   Status refill();
 
   ReceiverSorter& sorter_;
 
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   std::vector<SortedReceiver> buffer_;
   std::size_t begin_ = 0, end_ = 0;  // of what is in the buffer
   std::uint64_t taken_ = 0;

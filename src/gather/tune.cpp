@@ -239,13 +239,11 @@ TuneRow Tuning::predict(std::uint64_t memory_bytes) const {
   const CacheDemand surfels{sample_.surfels.curve, sample_.surfels.load_seconds,
                             PagedOctree::surfelFrameBytes(*scene_), caches.least_surfel_frames,
                             scene_->surfelPageCount()};
-  std::size_t node_frames = caches.node_frames, surfel_frames = caches.surfel_frames;
-  if (gather_.cache_split < 0) {
-    const std::size_t total = node_frames * nodes.frame_bytes + surfel_frames * surfels.frame_bytes;
-    node_frames = bestFrames(nodes, surfels, total, node_frames);
-    surfel_frames = std::min<std::size_t>(
-        (total - node_frames * nodes.frame_bytes) / surfels.frame_bytes, surfels.most_frames);
-  }
+  const std::size_t total =
+      caches.node_frames * nodes.frame_bytes + caches.surfel_frames * surfels.frame_bytes;
+  const CacheSplit split = gather_.cache_split < 0
+                               ? bestSplit(nodes, surfels, total, caches.node_frames)
+                               : splitAt(nodes, surfels, total, caches.node_frames);
 
   const auto outcome = [](const CacheSample& cache, std::size_t frames, std::size_t frame_bytes) {
     const double pages = cache.curve.misses(frames);
@@ -254,11 +252,11 @@ TuneRow Tuning::predict(std::uint64_t memory_bytes) const {
                      .loads = pages,
                      .bytes_read = pages * cache.page_bytes};
   };
-  row.predicted.node_cache = outcome(sample_.nodes, node_frames, nodes.frame_bytes);
-  row.predicted.surfel_cache = outcome(sample_.surfels, surfel_frames, surfels.frame_bytes);
+  row.predicted.node_cache = outcome(sample_.nodes, split.first_frames, nodes.frame_bytes);
+  row.predicted.surfel_cache = outcome(sample_.surfels, split.second_frames, surfels.frame_bytes);
   row.predicted.seconds =
       double(report_.receivers - report_.invalid_receivers) * sample_.receiver_seconds +
-      (loadSeconds(nodes, node_frames) + loadSeconds(surfels, surfel_frames)) / gather_.threads;
+      split.load_seconds / gather_.threads;
   return row;
 }
 

@@ -278,7 +278,9 @@ Status Sampling::timeGather(std::span<const SortedReceiver> receivers) {
   SURFEIT_RETURN_IF_ERROR(gather->gather(receivers).status());
   PagedOctree& octree = gather->octree();
   const auto stalled = [&] {
-    return double(octree.nodeCounters().stall_ns + octree.surfelCounters().stall_ns) * 1e-9;
+    return double(octree.nodeCache().counters().stall_ns +
+                  octree.surfelCache().counters().stall_ns) *
+           1e-9;
   };
   const double stalled_before = stalled();
   SURFEIT_ASSIGN_OR_RETURN(double seconds, gather->gather(receivers));
@@ -288,8 +290,8 @@ Status Sampling::timeGather(std::span<const SortedReceiver> receivers) {
   const auto load_seconds = [](const CacheCounters& counters) {
     return counters.misses > 0 ? double(counters.load_ns) * 1e-9 / double(counters.misses) : 0;
   };
-  sample_.nodes.load_seconds = load_seconds(octree.nodeCounters());
-  sample_.surfels.load_seconds = load_seconds(octree.surfelCounters());
+  sample_.nodes.load_seconds = load_seconds(octree.nodeCache().counters());
+  sample_.surfels.load_seconds = load_seconds(octree.surfelCache().counters());
   return {};
 }
 

@@ -79,8 +79,7 @@ PageNumber residentPages(const SceneHeader& header, std::size_t frames) {
 }
 
 SceneFile::Scratch& decodeScratch() {
-  SceneFile::Scratch& scratch = threadScratch<SceneFile::Scratch>([] {});
-  return scratch;
+  return threadScratch<SceneFile::Scratch>([] {});
 }
 
 }  // namespace
@@ -141,15 +140,13 @@ Result<PagedOctree::Memory> PagedOctree::planMemory(const SceneFile& file, std::
         fmt::format("{}: {} bytes for the caches of {} threads, expected at least {}", file.path(),
                     cache_bytes, threads, needed));
   }
-  const auto bytesOf = [](const PageCache::Options& options) {
-    return PageCache::memoryBytes(options);
-  };
   const std::uint32_t node_pages = file.nodePageCount(), surfel_pages = file.surfelPageCount();
-  const std::size_t all_nodes = bytesOf(nodeOptions(file, node_pages));
-  const std::size_t all_surfels = bytesOf(surfelOptions(file, surfel_pages));
-  const std::size_t least_nodes = bytesOf(nodeOptions(file, leastFrames(node_pages, threads)));
+  const std::size_t all_nodes = PageCache::memoryBytes(nodeOptions(file, node_pages));
+  const std::size_t all_surfels = PageCache::memoryBytes(surfelOptions(file, surfel_pages));
+  const std::size_t least_nodes =
+      PageCache::memoryBytes(nodeOptions(file, leastFrames(node_pages, threads)));
   const std::size_t least_surfels =
-      bytesOf(surfelOptions(file, leastFrames(surfel_pages, threads)));
+      PageCache::memoryBytes(surfelOptions(file, leastFrames(surfel_pages, threads)));
 
   // The share, and what the surfels cannot use, but not what they cannot do without
   std::size_t node_bytes = static_cast<std::size_t>(double(cache_bytes) * node_share);
@@ -183,6 +180,11 @@ Result<std::unique_ptr<PagedOctree>> PagedOctree::create(SceneFile file, const M
   const SceneFile& scene = state->file;
   PageCache::Options nodes = nodeOptions(scene, memory.node_frames);
   PageCache::Options surfels = surfelOptions(scene, memory.surfel_frames);
+  // Frames may move from one cache to the other: address space for as many as both have
+  const std::size_t bytes =
+      memory.node_frames * nodeFrameBytes(scene) + memory.surfel_frames * surfelFrameBytes(scene);
+  nodes.most_frames = bytes / nodeFrameBytes(scene);
+  surfels.most_frames = bytes / surfelFrameBytes(scene);
   if (memory.tracked_pages > 0) {
     nodes.reuse_distances = &state->node_distances.emplace(nodes.page_count, memory.tracked_pages);
     surfels.reuse_distances =
@@ -211,8 +213,6 @@ const SceneFile& PagedOctree::file() const { return state_->file; }
 const PagedOctree::Memory& PagedOctree::memory() const { return state_->memory; }
 PageCache& PagedOctree::nodeCache() { return *state_->nodes; }
 PageCache& PagedOctree::surfelCache() { return *state_->surfels; }
-CacheCounters PagedOctree::nodeCounters() const { return state_->nodes->counters(); }
-CacheCounters PagedOctree::surfelCounters() const { return state_->surfels->counters(); }
 ReuseDistances* PagedOctree::nodeDistances() {
   return state_->node_distances ? &*state_->node_distances : nullptr;
 }

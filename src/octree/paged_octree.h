@@ -58,8 +58,6 @@ class PagedOctree {
   const Memory& memory() const;  // as at first
   PageCache& nodeCache();
   PageCache& surfelCache();
-  CacheCounters nodeCounters() const;
-  CacheCounters surfelCounters() const;
   // How pages are reused; null unless memory().tracked_pages > 0. Look-ups of resident pages and
   // those that fronts answer are not seen.
   ReuseDistances* nodeDistances();

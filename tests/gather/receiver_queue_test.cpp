@@ -45,7 +45,6 @@ TEST_F(ReceiverQueueTest, HandsOutAllInOrder) {
       const std::vector<std::uint64_t> indices = takeAll(queue, run);
       ASSERT_EQ(indices.size(), count);
       for (std::uint64_t i = 0; i < count; ++i) ASSERT_EQ(indices[i], i);
-      EXPECT_EQ(queue.taken(), count);
     }
   }
 }
