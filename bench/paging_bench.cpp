@@ -21,7 +21,6 @@
 
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
-#include "gather/prefetcher.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
 #include "surfeit/gather.h"
@@ -129,12 +128,7 @@ double median(const Setting& setting, Value value) {
 Result<std::vector<Setting>> makeSettings(const Arguments& arguments, std::uint64_t& decoded) {
   SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, SceneFile::open(arguments.scene));
   SURFEIT_ASSIGN_OR_RETURN(const GatherInput input, GatherInput::open(arguments.receivers));
-  GatherWork work;
-  work.receivers = input.receiverCount();
-  work.input_row_bytes = work.result_row_bytes = input.receivers().row_bytes + sizeof(GatherResult);
-  work.quality = arguments.options.quality;
-  work.threads = arguments.options.threads;
-  work.prefetch_threads = Prefetcher::kThreads;
+  const GatherWork work = gatherWork(input.receivers(), arguments.options);
   decoded = PagedOctree::unlimitedCacheBytes(scene);
   std::vector<Setting> settings;
   for (const std::string& order : arguments.orders) {

@@ -13,7 +13,6 @@
 #include <string>
 #include <utility>
 
-#include "core/job_limits.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
@@ -31,37 +30,30 @@ namespace {
 
 Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
                                        const std::string& receivers_path,
-                                       const std::string& result_path, const GatherOptions& options,
+                                       const std::string& result_path, const GatherOptions& given,
                                        Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
+  SURFEIT_RETURN_IF_ERROR(checkGatherOptions(given));
   if (result_path == scene_path) {
     return Status::invalidArgument(
         fmt::format("{}: the result would replace the scene", scene_path));
   }
+  const GatherOptions options = withDefaults(given);
   GatherStats stats;
-  stats.threads = options.threads > 0 ? options.threads : defaultThreadCount();
-  stats.memory_bytes = options.memory_bytes > 0 ? options.memory_bytes : memoryLimitBytes() / 4 * 3;
+  stats.threads = options.threads;
+  stats.memory_bytes = options.memory_bytes;
   const std::string temporary_directory =
       options.temporary_directory.empty() ? directoryOf(result_path) : options.temporary_directory;
 
   // Open scene and receivers
-  SURFEIT_ASSIGN_OR_RETURN(
-      SceneFile scene,
-      SceneFile::open(scene_path, options.direct_io ? Access::kDirect : Access::kCached));
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
   SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path));
   const ResultRows result_rows(input.receivers(), options.mode);
   stats.receivers = input.receiverCount();
 
   // Spend the budget before anything large is allocated
-  const GatherWork work{.receivers = stats.receivers,
-                        .input_row_bytes = input.receivers().row_bytes,
-                        .result_row_bytes = result_rows.rowBytes(),
-                        .quality = options.quality,
-                        .threads = stats.threads,
-                        .prefetch_threads = options.prefetch ? Prefetcher::kThreads : 0,
-                        .cache_split = options.cache_split};
-  SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory,
-                           planGatherMemory(scene, stats.memory_bytes, work));
+  SURFEIT_ASSIGN_OR_RETURN(
+      const GatherMemory memory,
+      planGatherMemory(scene, stats.memory_bytes, gatherWork(input.receivers(), options)));
   SURFEIT_ASSIGN_OR_RETURN(PlyWriter writer,
                            PlyWriter::create(result_path, PlyEncoding::kBinaryLittleEndian,
                                              result_rows.properties(), input.comments()));

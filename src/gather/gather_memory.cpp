@@ -8,6 +8,8 @@
 #include "cache/reuse_distances.h"
 #include "gather/gather_point.h"
 #include "gather/paging_controller.h"
+#include "gather/prefetcher.h"
+#include "gather/receiver_rows.h"
 #include "gather/receiver_sorter.h"
 #include "gather/result_store.h"
 
@@ -66,10 +68,6 @@ std::uint64_t leastBytes(const SceneFile& file, const GatherWork& work, int pref
          PagedOctree::leastCacheBytes(file, work.threads + prefetch_threads);
 }
 
-std::string formatMebibytes(std::uint64_t bytes) {
-  return fmt::format("{:.1f} MiB", std::ceil(double(bytes) / (1 << 20) * 10) / 10);
-}
-
 // Divides `bytes` among receivers and results; `spare_bytes` are free until the gather begins.
 void planReceivers(std::uint64_t receivers, std::uint64_t bytes, std::uint64_t spare_bytes,
                    GatherMemory& memory) {
@@ -91,6 +89,20 @@ void planReceivers(std::uint64_t receivers, std::uint64_t bytes, std::uint64_t s
 }
 
 }  // namespace
+
+GatherWork gatherWork(const PlyElement& receivers, const GatherOptions& options) {
+  return {.receivers = receivers.count,
+          .input_row_bytes = receivers.row_bytes,
+          .result_row_bytes = ResultRows(receivers, options.mode).rowBytes(),
+          .quality = options.quality,
+          .threads = options.threads,
+          .prefetch_threads = options.prefetch ? Prefetcher::kThreads : 0,
+          .cache_split = options.cache_split};
+}
+
+std::string formatMebibytes(std::uint64_t bytes) {
+  return fmt::format("{:.1f} MiB", std::ceil(double(bytes) / (1 << 20) * 10) / 10);
+}
 
 std::uint64_t leastGatherMemory(const SceneFile& file, const GatherWork& work) {
   return leastBytes(file, work, 0);

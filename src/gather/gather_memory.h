@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "io/ply_format.h"
 #include "octree/paged_octree.h"
@@ -27,6 +28,9 @@ struct GatherWork {
   double cache_split = -1;   // as in GatherOptions
 };
 
+// The work of a gather at an element of receivers; threads as options have them (not 0).
+GatherWork gatherWork(const PlyElement& receivers, const GatherOptions& options);
+
 struct GatherMemory {
   std::uint64_t sorter_bytes = 0, sorter_reading_bytes = 0;  // of ReceiverSorter
   std::uint64_t result_bytes = 0;                            // of ResultStore
@@ -34,6 +38,9 @@ struct GatherMemory {
   PagedOctree::Memory caches;
   int prefetch_threads = 0;  // for which there is memory
 };
+
+// "5.9 MiB", rounded up.
+std::string formatMebibytes(std::uint64_t bytes);
 
 // The least budget in which a gather works.
 std::uint64_t leastGatherMemory(const SceneFile& file, const GatherWork& work);

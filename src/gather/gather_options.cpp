@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "core/job_limits.h"
 #include "gather/raster_cube.h"
 
 namespace surfeit {
@@ -43,6 +44,12 @@ Status checkGatherOptions(const GatherOptions& options) {
     return refuse("cache split", options.cache_split, "0 to 1, or a negative number to measure");
   }
   return {};
+}
+
+GatherOptions withDefaults(GatherOptions options) {
+  if (options.threads == 0) options.threads = defaultThreadCount();
+  if (options.memory_bytes == 0) options.memory_bytes = memoryLimitBytes() / 4 * 3;
+  return options;
 }
 
 }  // namespace surfeit

@@ -1,6 +1,7 @@
 // Checks of what a caller asks for.
 #pragma once
 
+#include "io/positional_file.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
 
@@ -8,5 +9,13 @@ namespace surfeit {
 
 // kInvalidArgument, naming the option, what was found and what is expected.
 Status checkGatherOptions(const GatherOptions& options);
+
+// With threads and memory that were left open filled in, from what the job may use.
+GatherOptions withDefaults(GatherOptions options);
+
+// How the pages of the scene are read.
+inline Access sceneAccess(const GatherOptions& options) {
+  return options.direct_io ? Access::kDirect : Access::kCached;
+}
 
 }  // namespace surfeit

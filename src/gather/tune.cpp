@@ -14,13 +14,11 @@
 #include <span>
 #include <utility>
 
-#include "core/job_limits.h"
 #include "gather/cache_split.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
 #include "gather/gather_options.h"
-#include "gather/prefetcher.h"
 #include "gather/quiet_progress.h"
 #include "gather/receiver_sorter.h"
 #include "gather/tune_sample.h"
@@ -63,9 +61,7 @@ class Tuning {
   Result<TuneReport> run();
 
  private:
-  Result<SceneFile> openScene() const {
-    return SceneFile::open(scene_path_, gather_.direct_io ? Access::kDirect : Access::kCached);
-  }
+  Result<SceneFile> openScene() const { return SceneFile::open(scene_path_, sceneAccess(gather_)); }
   Result<GatherMemory> planOwnMemory() const;
   Status sample(const GatherMemory& memory);
   void predictAll();
@@ -94,8 +90,7 @@ class Tuning {
 
 Result<TuneReport> Tuning::run() {
   SURFEIT_RETURN_IF_ERROR(checkGatherOptions(gather_));
-  if (gather_.threads == 0) gather_.threads = defaultThreadCount();
-  if (gather_.memory_bytes == 0) gather_.memory_bytes = memoryLimitBytes() / 4 * 3;
+  gather_ = withDefaults(gather_);
   if (gather_.temporary_directory.empty()) {
     std::error_code error;  // where there is none, who spills says so
     gather_.temporary_directory = std::filesystem::temp_directory_path(error).string();
@@ -108,14 +103,7 @@ Result<TuneReport> Tuning::run() {
     SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path_));
     input_ = std::make_unique<GatherInput>(std::move(input));
   }
-  const ResultRows result_rows(input_->receivers(), gather_.mode);
-  work_ = {.receivers = input_->receiverCount(),
-           .input_row_bytes = input_->receivers().row_bytes,
-           .result_row_bytes = result_rows.rowBytes(),
-           .quality = gather_.quality,
-           .threads = gather_.threads,
-           .prefetch_threads = gather_.prefetch ? Prefetcher::kThreads : 0,
-           .cache_split = gather_.cache_split};
+  work_ = gatherWork(input_->receivers(), gather_);
   sample_receivers_ = options_.sample_receivers == 0
                           ? work_.receivers
                           : std::min(options_.sample_receivers, work_.receivers);
@@ -139,10 +127,9 @@ Result<GatherMemory> Tuning::planOwnMemory() const {
   if (gather_.memory_bytes < least) {
     return Status::budgetTooSmall(fmt::format(
         "a memory budget of {:.1f} MiB is too small for tuning {} with {} {} and a sample of {} "
-        "receivers: {:.1f} MiB is the least that works",
+        "receivers: {} is the least that works",
         double(gather_.memory_bytes) / (1 << 20), scene_path_, gather_.threads,
-        gather_.threads == 1 ? "thread" : "threads", sample_receivers_,
-        std::ceil(double(least) / (1 << 20) * 10) / 10));
+        gather_.threads == 1 ? "thread" : "threads", sample_receivers_, formatMebibytes(least)));
   }
   return planGatherMemory(*scene_, gather_.memory_bytes - beside, work_);
 }

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "core/first_failure.h"
+#include "gather/gather_options.h"
 #include "gather/look_up_trace.h"
 #include "gather/sample_curve.h"
 #include "gather/sampled_gather.h"
@@ -106,7 +107,7 @@ class Sampling {
 
  private:
   Result<SceneFile> openScene() const {
-    return SceneFile::open(scene_path_, options_.direct_io ? Access::kDirect : Access::kCached);
+    return SceneFile::open(scene_path_, sceneAccess(options_));
   }
   Status followAll(ReceiverSorter& sorter, Pieces& timed);
   Status followPieces(const Pieces& stretches, const Pieces& spread, double share);

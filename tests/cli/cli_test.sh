@@ -86,10 +86,21 @@ statisticsHaveTheDocumentedFields() {
     surfels_per_second
   run 0 verify cornell.sft --stats verify.json
   jsonHas verify.json "${common[@]}" pages bytes finding_count findings
-  run 0 gather cornell.sft again.ply -o lit.ply --memory 64M --stats gather.json
+  run 0 gather cornell.sft again.ply -o lit.ply --memory 64M --stats gather.json --cache-series series.csv
   jsonHas gather.json "${common[@]}" memory_bytes mode max_solid_angle raster_resolution \
     receivers invalid_receivers receivers_per_second gather_seconds node_cache surfel_cache \
-    requests hits misses evictions bytes_read peak_bytes budget_bytes decoded_bytes
+    requests hits front_hits shared_hits waits misses prefetches repeated_loads evictions bytes_read \
+    repeated_bytes load_seconds stall_seconds peak_bytes budget_bytes decoded_bytes \
+    working_set_bytes temporary_bytes windows begin_seconds end_seconds receivers run_receivers \
+    prefetch_receivers
+  local name
+  for name in begin_seconds run_receivers node_cache.misses surfel_cache.stall_seconds; do
+    head -n 1 series.csv | tr , '\n' | grep -qx "$name" || fail "series.csv has no column $name"
+  done
+  [[ $(awk -F, '{print NF}' series.csv | sort -u | wc -l) == 1 && $(wc -l < series.csv) -ge 2 ]] ||
+    fail "series.csv is no table of windows"
+  run 0 gather cornell.sft again.ply -o lit.ply --memory 64M --cache-series series.json
+  jsonHas series.json begin_seconds node_cache misses
   grep -q '"stats_version": 1' gather.json || fail "stats_version is not 1"
   run 0 tune cornell.sft again.ply --memory 64M --sample 100 --check --plot tune.svg --stats tune.json
   says recommended knee "hit rates are off"

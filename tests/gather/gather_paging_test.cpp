@@ -66,12 +66,9 @@ class GatherPaging : public testing::Test {
     const Result<SceneFile> scene = SceneFile::open(scene_);
     const Result<GatherInput> input = GatherInput::open(receivers_);
     EXPECT_TRUE(scene.ok() && input.ok());
-    const std::size_t row_bytes = input->receivers().row_bytes;
-    return leastGatherMemory(*scene, {.receivers = kReceivers,
-                                      .input_row_bytes = row_bytes,
-                                      .result_row_bytes = row_bytes + 4,
-                                      .quality = coarse().quality,
-                                      .threads = threads});
+    GatherOptions options = coarse();
+    options.threads = threads;
+    return leastGatherMemory(*scene, gatherWork(input->receivers(), options));
   }
 
   // Gathers with caches of so many frames each, whatever a plan would say; results by index. Calls
