@@ -7,7 +7,7 @@ packages=(
   # Tools
   g++ cmake ninja-build ccache
   # Library
-  libglm-dev libfmt-dev libtbb-dev libzstd-dev libxxhash-dev nlohmann-json3-dev
+  libglm-dev libfmt-dev libtbb-dev libzstd-dev libxxhash-dev libhwy-dev nlohmann-json3-dev
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
   libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev libopenexr-dev
   # Tests

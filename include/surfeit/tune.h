@@ -18,7 +18,7 @@ struct TuneOptions {
   // quarters of what the job may use. Its threads are those that predictions are for.
   GatherOptions gather;
   // Receivers whose look-ups are followed; 0: all.
-  std::uint64_t sample_receivers = 200'000;
+  std::uint64_t sample_receivers = 500'000;
   // Runs the whole gather, throwing its results away, in every budget of the table that fits, and
   // in the one recommended.
   bool check = false;

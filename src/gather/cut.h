@@ -1,15 +1,15 @@
-// The cut: the nodes and surfels of the octree that a receiver sees (memo, section 3). Walked by
-// the gather, which draws them, and by whoever wants to know which pages that takes.
+// The cut: the nodes and surfels of the octree that a packet of receivers sees (memo, section 3).
+// Walked by the gather, which draws them, and by whoever wants to know which pages that takes.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <span>
 
 #include "core/curve_key.h"
-#include "gather/receiver_raster.h"
+#include "gather/receiver.h"
 #include "octree/node.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
@@ -17,23 +17,57 @@
 
 namespace surfeit {
 
-// A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
-// solid angle. A flat square of surfels has about 0.6 of its sphere's outline as area, so this is
-// close to the memo's test on the area, but it also opens sparse nodes, whose area says nothing
-// about how far their surfels spread.
-inline bool isFarEnough(const Node& node, float distance_sq, float max_solid_angle) {
-  const float radius_sq = node.radius * node.radius;
-  return distance_sq > radius_sq && kPi * radius_sq < 2 * max_solid_angle * distance_sq;
-}
+// Where the receivers of a packet are and where they look: all that the cut depends on.
+struct PacketView {
+  glm::vec3 centre{0};
+  float radius = 0;      // of a sphere around the centre that holds all receivers
+  bool has_horizon = 0;  // what follows means something; false when some receiver has no normal, or
+                         // when the normals differ too much
+  glm::vec3 axis{0};     // mean normal, unit
+  float cone_cosine = 1, cone_sine = 0;  // of the angle between the axis and the farthest normal
+  float lift = 0;  // the centre lies at most this high above the horizon of a receiver
+};
+
+// `receivers`: at least one.
+PacketView viewPacket(std::span<const Receiver> receivers);
+
+// How a cut is chosen.
+struct CutRules {
+  float max_solid_angle = 0;  // 0: nothing stands in for anything, and nothing visible is left out
+  float max_distance = 0;
+  bool front_only = true;  // GatherSides::kFront
+
+  bool approximates() const { return max_solid_angle > 0; }
+};
+
+// What the test for siblings says.
+struct SiblingClasses {
+  std::uint32_t far = 0;   // bit i: node i is drawn as a whole
+  std::uint32_t open = 0;  // bit i: its children or surfels are looked at
+};
+
+// Sorts siblings (at most 8) by what the packet makes of them; those in neither class are not
+// seen. docs/algorithm.md, "Choosing the cut", has the tests. This is the definition.
+SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView& view,
+                                const CutRules& rules);
+
+// The same, eight at once, for this machine. Results may differ where rounding decides.
+using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const PacketView&,
+                                             const CutRules&);
+SiblingClassifier fastestSiblingClassifier();
 
 // Calls visit.node(const Node&) for the nodes small enough as a whole, and
 // visit.surfels(std::span<const Surfel>) for those of leaves too near. `Reader` has the functions
-// of PagedOctree::Reader. The order depends on the octree alone. One thread at a time.
+// of PagedOctree::Reader. The order depends on octree and view alone. One thread at a time.
 class CutWalk {
  public:
+  explicit CutWalk(const GatherQuality& quality,
+                   SiblingClassifier classify = fastestSiblingClassifier())
+      : rules_{quality.max_solid_angle, quality.max_distance, quality.sides == GatherSides::kFront},
+        classify_(classify) {}
+
   template <typename Reader, typename Visit>
-  Status walk(const Receiver& receiver, const GatherQuality& quality, Reader& octree,
-              Visit&& visit) {
+  Status walk(const PacketView& view, Reader& octree, Visit&& visit) {
     nodes_visited_ = surfels_visited_ = 0;
     std::size_t stack_count = 0;
     stack_[stack_count++] = kRootRange;
@@ -42,16 +76,13 @@ class CutWalk {
                                octree.nodes(stack_[--stack_count]));
       nodes_visited_ += siblings.size();
       SURFEIT_RETURN_IF_ERROR(octree.checkVisits(nodes_visited_, surfels_visited_));
-      for (const Node& node : siblings) {
-        // Skip nodes wholly below the horizon or out of reach
-        const glm::vec3 to_node = node.position - receiver.position;
-        if (heightAboveHorizon(receiver, to_node) <= -node.radius) continue;
-        const float distance_sq = glm::dot(to_node, to_node);
-        const float reach = quality.max_distance + node.radius;
-        if (distance_sq > reach * reach) continue;
-
-        if (isFarEnough(node, distance_sq, quality.max_solid_angle)) {
+      const SiblingClasses classes = classify_(siblings, view, rules_);
+      for (std::size_t i = 0; i < siblings.size(); ++i) {
+        const Node& node = siblings[i];
+        if ((classes.far >> i & 1) != 0) {
           visit.node(node);
+        } else if ((classes.open >> i & 1) == 0) {
+          continue;
         } else if (node.isLeaf()) {
           SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
             surfels_visited_ += run.size();
@@ -75,6 +106,8 @@ class CutWalk {
   // Every level leaves at most 7 sibling ranges behind on the way down, the last one 8.
   static constexpr std::size_t kStackSize = 7 * (kCurveLevels + 1) + 8;
 
+  CutRules rules_;
+  SiblingClassifier classify_;
   std::array<NodeRange, kStackSize> stack_;
   std::uint64_t nodes_visited_ = 0, surfels_visited_ = 0;
 };

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <exception>
 #include <memory>
@@ -11,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "gather/gather_point.h"
+#include "gather/packet_gatherer.h"
 
 namespace surfeit {
 
@@ -50,10 +52,12 @@ void GatherCrew::work() {
 // Takes runs until none is left or some thread has failed.
 Status GatherCrew::gatherRuns() {
   const auto gatherer =
-      std::make_unique<PointGatherer>(setup_.options.mode, setup_.options.quality);
+      std::make_unique<PacketGatherer>(setup_.options.mode, setup_.options.quality);
   PagedOctree::Reader reader(setup_.octree);
   std::vector<SortedReceiver> run;
   std::vector<ResultStore::Entry> results;
+  std::array<Receiver, kPacketReceivers> packet;
+  std::array<GatherResult, kPacketReceivers> packet_results;
   run.reserve(PagingController::kMostRun);
   results.reserve(PagingController::kMostRun);
   while (!failure_.happened()) {
@@ -61,13 +65,15 @@ Status GatherCrew::gatherRuns() {
     if (run.empty()) return {};
     prefetcher_.notify();
     results.clear();
-    for (const SortedReceiver& receiver : run) {
-      if (results.size() % kPacketReceivers == 0 && setup_.progress.isCancelled()) {
-        return Status::interrupted();
+    for (std::size_t begin = 0; begin < run.size(); begin += kPacketReceivers) {
+      if (setup_.progress.isCancelled()) return Status::interrupted();
+      const std::size_t count = std::min(kPacketReceivers, run.size() - begin);
+      for (std::size_t i = 0; i < count; ++i) packet[i] = run[begin + i].receiver;
+      SURFEIT_RETURN_IF_ERROR(gatherer->gather(std::span(packet).first(count), reader,
+                                               std::span(packet_results).first(count)));
+      for (std::size_t i = 0; i < count; ++i) {
+        results.push_back({run[begin + i].index, packet_results[i]});
       }
-      ResultStore::Entry& entry = results.emplace_back();
-      entry.index = receiver.index;
-      SURFEIT_RETURN_IF_ERROR(gatherer->gather(receiver.receiver, reader, entry.result));
     }
     SURFEIT_RETURN_IF_ERROR(sink_(results));
     setup_.progress.advance(run.size());

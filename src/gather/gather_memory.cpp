@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "cache/reuse_distances.h"
-#include "gather/gather_point.h"
+#include "gather/packet_gatherer.h"
 #include "gather/paging_controller.h"
 #include "gather/prefetcher.h"
 #include "gather/receiver_rows.h"
@@ -35,13 +35,13 @@ constexpr std::uint64_t kBytesPerReceiver = sizeof(SortedReceiver) + sizeof(Gath
 // Bytes of a thread beside its part of the caches. A cut larger than a gatherer has room for from
 // the start is foreseen by estimate: some layers of surfaces, seen in pieces of about the max solid
 // angle. With a max solid angle of 0 it is the whole scene.
-std::uint64_t threadBytes(const SceneFile& file, const GatherQuality& quality) {
+std::uint64_t threadBytes(const SceneFile& file, const GatherWork& work) {
   constexpr double kLayers = 8;
   constexpr double kBytes = 128;  // of a contribution, in vectors that grow by doubling
-  const double cut = 4 * double(kPi) / double(quality.max_solid_angle) * kLayers;
+  const double cut = 4 * double(kPi) / double(work.quality.max_solid_angle) * kLayers;
   const double most = std::min(double(file.header().surfel_count), cut);
-  const double more = std::max(0.0, most - double(ReceiverRaster::kReservedContributions));
-  return PointGatherer::memoryBytes(quality) + kThreadBytes +
+  const double more = std::max(0.0, most - double(PacketRaster::kReservedPatches));
+  return PacketGatherer::memoryBytes(work.mode, work.quality) + kThreadBytes +
          PagingController::kMostRun * (sizeof(SortedReceiver) + sizeof(ResultStore::Entry)) +
          static_cast<std::uint64_t>(more * kBytes);
 }
@@ -51,7 +51,7 @@ std::uint64_t fixedBytes(const SceneFile& file, const GatherWork& work, int pref
   const auto threads = static_cast<std::uint64_t>(work.threads);
   const std::uint64_t rows = kSliceRows * (work.input_row_bytes + work.result_row_bytes);
   return PagedOctree::fixedBytes(file, work.threads + prefetch_threads) +
-         threads * threadBytes(file, work.quality) +
+         threads * threadBytes(file, work) +
          static_cast<std::uint64_t>(prefetch_threads) * (kThreadBytes + sizeof(CutWalk)) + rows +
          kStreamBytes + kQueueReceivers * sizeof(SortedReceiver) + PagingController::memoryBytes() +
          ReuseDistances::memoryBytes(file.nodePageCount(), kTrackedPages) +
@@ -94,6 +94,7 @@ GatherWork gatherWork(const PlyElement& receivers, const GatherOptions& options)
   return {.receivers = receivers.count,
           .input_row_bytes = receivers.row_bytes,
           .result_row_bytes = ResultRows(receivers, options.mode).rowBytes(),
+          .mode = options.mode,
           .quality = options.quality,
           .threads = options.threads,
           .prefetch_threads = options.prefetch ? Prefetcher::kThreads : 0,

@@ -22,6 +22,7 @@ inline constexpr std::size_t kQueueReceivers = 16384;
 struct GatherWork {
   std::uint64_t receivers = 0;
   std::size_t input_row_bytes = 0, result_row_bytes = 0;
+  GatherMode mode = GatherMode::kOcclusion;
   GatherQuality quality;
   int threads = 1;
   int prefetch_threads = 0;  // wanted

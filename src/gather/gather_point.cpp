@@ -17,12 +17,12 @@ struct DrawCut {
 }  // namespace
 
 PointGatherer::PointGatherer(GatherMode mode, const GatherQuality& quality)
-    : quality_(quality), raster_(mode, quality) {}
+    : raster_(mode, quality), cut_(quality, classifySiblings) {}
 
 Status PointGatherer::gather(const Receiver& receiver, PagedOctree::Reader& octree,
                              GatherResult& result) {
   raster_.begin(receiver);
-  SURFEIT_RETURN_IF_ERROR(cut_.walk(receiver, quality_, octree, DrawCut{raster_}));
+  SURFEIT_RETURN_IF_ERROR(cut_.walk(viewPacket({&receiver, 1}), octree, DrawCut{raster_}));
   work_ = {.nodes_visited = cut_.nodesVisited(),
            .surfels_visited = cut_.surfelsVisited(),
            .contributions = raster_.contributionCount(),

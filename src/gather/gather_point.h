@@ -39,7 +39,6 @@ class PointGatherer {
   }
 
  private:
-  GatherQuality quality_;
   ReceiverRaster raster_;
   CutWalk cut_;
   Work work_;

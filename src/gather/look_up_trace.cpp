@@ -1,5 +1,7 @@
 #include "gather/look_up_trace.h"
 
+#include <array>
+
 #include "gather/paging_controller.h"
 #include "gather/receiver_queue.h"
 
@@ -76,12 +78,11 @@ class LookUpTrace::Reader {
 
 LookUpTrace::LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int threads,
                          Progress& progress)
-    : quality_(quality),
-      threads_(static_cast<std::size_t>(threads)),
+    : threads_(static_cast<std::size_t>(threads)),
       progress_(progress),
       surfel_group_capacity_(octree.file().header().surfel_group_capacity),
       octree_(octree),
-      cut_(std::make_unique<CutWalk>()) {}
+      cut_(std::make_unique<CutWalk>(quality)) {}
 
 Status LookUpTrace::follow(const NextRun& next, LookUps& every, LookUps* second) {
   struct Thread {
@@ -102,12 +103,15 @@ Status LookUpTrace::follow(const NextRun& next, LookUps& every, LookUps* second)
       }
       if (thread.run.empty()) continue;
       is_at_end = false;
+      const std::size_t count = std::min(kPacketReceivers, thread.run.size() - thread.place);
+      std::array<Receiver, kPacketReceivers> packet;
+      for (std::size_t i = 0; i < count; ++i) packet[i] = thread.run[thread.place++].receiver;
       LookUps* const also = walked++ % 2 == 0 ? second : nullptr;
       thread.reader.tellTo(every, also);
       SURFEIT_RETURN_IF_ERROR(
-          cut_->walk(thread.run[thread.place++].receiver, quality_, thread.reader, IgnoreCut{}));
-      ++every.receivers;
-      if (also != nullptr) ++also->receivers;
+          cut_->walk(viewPacket(std::span(packet).first(count)), thread.reader, IgnoreCut{}));
+      every.receivers += count;
+      if (also != nullptr) also->receivers += count;
     }
   }
   return {};

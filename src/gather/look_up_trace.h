@@ -35,7 +35,7 @@ struct LookUps {
   std::uint64_t receivers = 0;
 };
 
-// Threads are taken in turn, a receiver each, so that what is found depends on the receivers and
+// Threads are taken in turn, a packet each, so that what is found depends on the receivers and
 // the number of threads alone. Surfel pages are counted and never read. One thread at a time.
 class LookUpTrace {
  public:
@@ -46,7 +46,7 @@ class LookUpTrace {
   LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int threads, Progress& progress);
 
   // Adds to `every` the look-ups of all receivers that are to come, and to `second`, unless null,
-  // those of every second one.
+  // those of every second packet.
   Status follow(const NextRun& next, LookUps& every, LookUps* second = nullptr);
   // The same of a piece of the order.
   Status follow(std::span<const SortedReceiver> receivers, LookUps& every,
@@ -56,7 +56,6 @@ class LookUpTrace {
   // What CutWalk walks; one of the threads that are imitated.
   class Reader;
 
-  const GatherQuality quality_;
   const std::size_t threads_;
   Progress& progress_;
   const std::uint32_t surfel_group_capacity_;

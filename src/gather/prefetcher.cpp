@@ -41,7 +41,7 @@ void Prefetcher::notify() {
 void Prefetcher::work() {
   try {
     PagedOctree::Reader reader(octree_, CacheFront::Role::kPrefetch);
-    const auto cut = std::make_unique<CutWalk>();
+    const auto cut = std::make_unique<CutWalk>(quality_);
     std::unique_lock lock(mutex_);
     while (!ends_) {
       const std::uint64_t moves = moves_;
@@ -49,7 +49,7 @@ void Prefetcher::work() {
       const std::optional<Receiver> receiver =
           queue_.lookAhead(controller_.prefetchReceivers(), kStride);
       bool failed = false;
-      if (receiver) failed = !cut->walk(*receiver, quality_, reader, IgnoreCut{}).ok();
+      if (receiver) failed = !cut->walk(viewPacket({&*receiver, 1}), reader, IgnoreCut{}).ok();
       if (!receiver) reader.release();
       lock.lock();
       if (failed) return;

@@ -8,14 +8,10 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "gather/coverage_rules.h"
 
 namespace surfeit {
 namespace {
-
-// How much is added to a layer that nearly fills a pixel. Measured at max solid angle .1 and .05,
-// AO RMSE: .0154 and .0095 with 0, .0100 and .0078 with .1 (spheres on a plane); .0098 and .0095,
-// .0081 and .0080 (bunny on a plane).
-constexpr float kFill = 0.1f;
 
 // Solid angle of the part of a face from its middle to (u, v): atan(u v / sqrt(u^2 + v^2 + 1)).
 double cornerSolidAngle(double u, double v) {
@@ -141,7 +137,6 @@ void RasterCube::splatRectangle(const glm::vec3& direction, const glm::vec3& nor
   // sqrt(g.g - (g.n)^2). The floor keeps a disk seen edge-on from becoming a line.
   const float n_axis = direction[axis] < 0 ? -normal[axis] : normal[axis];
   const float g_u = normal[u_axis] - u * n_axis, g_v = normal[v_axis] - v * n_axis;
-  constexpr float kLeastExtentSq = 1.f / 64;
   const float extent_u_sq = std::max(kLeastExtentSq, 1 + u * u - g_u * g_u);
   const float extent_v_sq = std::max(kLeastExtentSq, 1 + v * v - g_v * g_v);
 

@@ -8,13 +8,11 @@
 #include <optional>
 #include <vector>
 
+#include "gather/receiver.h"
 #include "gather/receiver_sorter.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
-
-// Runs are whole packets, so that packets are formed from the order alone.
-inline constexpr std::size_t kPacketReceivers = 16;
 
 // Safe from any thread.
 class ReceiverQueue {

@@ -8,20 +8,9 @@
 #include <limits>
 
 #include "core/assert.h"
+#include "gather/coverage_rules.h"
 
 namespace surfeit {
-namespace {
-
-// How far before and behind its middle a contribution meets others of its layer, in radii. Less
-// tears surfaces apart (errors double at 0.5), more joins what is apart (a tenth more at 1.5).
-constexpr float kLayerReach = 1;
-
-// A receiver without a normal is itself a sphere of a cloud without normals. Spheres of its own
-// surface, closer than this many of their radii, do not count: they overlap it at random depths,
-// and how much each sticks out is noise of the sampling (speckle), not occlusion.
-constexpr float kSphereClearance = 3;
-
-}  // namespace
 
 ReceiverRaster::ReceiverRaster(GatherMode mode, const GatherQuality& quality)
     : quality_(quality),

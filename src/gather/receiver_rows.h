@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "gather/receiver_raster.h"
+#include "gather/receiver.h"
 #include "io/ply_format.h"
 #include "io/surfel_mapping.h"
 #include "surfeit/gather.h"

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "core/curve_key.h"
-#include "gather/receiver_raster.h"
+#include "gather/receiver.h"
 #include "io/file.h"
 #include "surfeit/status.h"
 

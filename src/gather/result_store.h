@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "gather/receiver_raster.h"
+#include "gather/receiver.h"
 #include "io/file.h"
 #include "surfeit/status.h"
 

@@ -33,8 +33,13 @@ constexpr std::size_t kTrackedPages = 16384;
 constexpr std::uint64_t kStretches = 64;
 // Half of a stretch warms up: the threads' runs follow each other some times in it.
 constexpr std::uint64_t kStretchRuns = 8;
+// Stretches get this part of the sample; the rest are single packets, which must be many to touch
+// most of the pages that the whole gather touches.
+constexpr std::uint64_t kStretchPart = 5;
 // Receivers gathered at for their time: so many, or this part of the sample if that is more.
 constexpr std::uint64_t kLeastTimed = 4096, kTimedPart = 16;
+// A sample has some packets of either kind.
+constexpr std::uint64_t kLeastSample = 4 * kStretchPart * kPacketReceivers;
 
 using Clock = std::chrono::steady_clock;
 
@@ -127,9 +132,9 @@ class Sampling {
 Result<TuneSample> Sampling::run(ReceiverSorter& sorter, std::uint64_t receivers,
                                  std::uint64_t sample_receivers) {
   const Clock::time_point begin = Clock::now();
-  const bool takes_all = sample_receivers == 0 || sample_receivers >= receivers;
-  const std::uint64_t sampled =
-      takes_all ? receivers : std::max<std::uint64_t>(sample_receivers, 2);
+  const std::uint64_t wanted = std::max(sample_receivers, kLeastSample);
+  const bool takes_all = sample_receivers == 0 || wanted >= receivers;
+  const std::uint64_t sampled = takes_all ? receivers : wanted;
   const std::uint64_t timed = std::max(kLeastTimed, sampled / kTimedPart);
   progress_.beginPhase("sample", sampled + 2 * std::min(timed, sampled), "receivers");
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openScene());
@@ -144,10 +149,10 @@ Result<TuneSample> Sampling::run(ReceiverSorter& sorter, std::uint64_t receivers
     SURFEIT_RETURN_IF_ERROR(followAll(sorter, pieces));
     timed_receivers.assign(pieces.all().begin(), pieces.all().end());
   } else {
-    const std::uint64_t half = sampled / 2;
-    const std::uint64_t length = stretchLength(half, threads_);
-    Pieces stretches(receivers, half / length, length);
-    Pieces spread(receivers, sampled - half, 1);
+    const std::uint64_t in_stretches = sampled / kStretchPart;
+    const std::uint64_t length = stretchLength(in_stretches, threads_);
+    Pieces stretches(receivers, in_stretches / length, length);
+    Pieces spread(receivers, (sampled - in_stretches) / kPacketReceivers, kPacketReceivers);
     std::vector<SortedReceiver> block(kQueueReceivers);
     for (std::size_t count = 1; count > 0;) {
       SURFEIT_ASSIGN_OR_RETURN(count, sorter.next(block));

@@ -1,0 +1,207 @@
+#include "gather/cut.h"
+
+#include <cstddef>
+
+// Compiled once for every instruction set (Highway, "foreach_target").
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "gather/cut.cpp"
+#include <hwy/foreach_target.h>
+// Highway's own headers come after
+#include <hwy/highway.h>
+
+#ifndef SURFEIT_CUT_CONSTANTS
+#define SURFEIT_CUT_CONSTANTS
+namespace surfeit {
+namespace {
+
+// What rises less than this above the horizon, in radians, is left out: even a full circle of it
+// covers no more than the square of this.
+constexpr float kHorizonSlope = 0.01f;
+
+// The normals of a node with flatness f spread about their mean by sqrt(2 (1 - f)), root mean
+// square; what counts is all within twice that.
+constexpr float kNormalSpread = 2;
+
+// A node turns its back on the packet for sure only when it looks smaller than this: radius over
+// distance.
+constexpr float kMostTurnedAway = 0.5f;
+
+float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
+
+}  // namespace
+}  // namespace surfeit
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Siblings as columns.
+constexpr std::size_t kMostSiblings = 8;
+struct alignas(64) Columns {
+  float x[kMostSiblings] = {}, y[kMostSiblings] = {}, z[kMostSiblings] = {};
+  float normal_x[kMostSiblings] = {}, normal_y[kMostSiblings] = {}, normal_z[kMostSiblings] = {};
+  float radius[kMostSiblings] = {}, flatness[kMostSiblings] = {}, flat[kMostSiblings] = {};
+};
+
+SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView& view,
+                                const CutRules& rules) {
+  Columns columns;
+  for (std::size_t i = 0; i < siblings.size(); ++i) {
+    const Node& node = siblings[i];
+    columns.x[i] = node.position.x;
+    columns.y[i] = node.position.y;
+    columns.z[i] = node.position.z;
+    columns.normal_x[i] = node.normal.x;
+    columns.normal_y[i] = node.normal.y;
+    columns.normal_z[i] = node.normal.z;
+    columns.radius[i] = node.radius;
+    columns.flatness[i] = node.flatness;
+    columns.flat[i] = node.isFlat() ? 1 : 0;
+  }
+
+  const hn::CappedTag<float, kMostSiblings> d;
+  const auto zero = hn::Zero(d), one = hn::Set(d, 1.f);
+  const auto packet_radius = hn::Set(d, view.radius);
+  SiblingClasses classes;
+  for (std::size_t at = 0; at < siblings.size(); at += hn::Lanes(d)) {
+    const auto x = hn::Sub(hn::Load(d, columns.x + at), hn::Set(d, view.centre.x));
+    const auto y = hn::Sub(hn::Load(d, columns.y + at), hn::Set(d, view.centre.y));
+    const auto z = hn::Sub(hn::Load(d, columns.z + at), hn::Set(d, view.centre.z));
+    const auto nx = hn::Load(d, columns.normal_x + at), ny = hn::Load(d, columns.normal_y + at);
+    const auto nz = hn::Load(d, columns.normal_z + at);
+    const auto radius = hn::Load(d, columns.radius + at);
+    const auto flatness = hn::Load(d, columns.flatness + at);
+    const auto distance_sq = hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
+    const auto distance = hn::Sqrt(distance_sq);
+    const auto nearest = hn::Sub(distance, packet_radius);
+    const auto spread = hn::Mul(hn::Set(d, kNormalSpread),
+                                hn::Sqrt(hn::Mul(hn::Set(d, 2.f), hn::Sub(one, flatness))));
+
+    // Below the horizon of all
+    auto seen = hn::Lt(nearest, hn::Add(radius, hn::Set(d, rules.max_distance)));
+    if (view.has_horizon) {
+      const auto ax = hn::Set(d, view.axis.x), ay = hn::Set(d, view.axis.y);
+      const auto az = hn::Set(d, view.axis.z);
+      const auto height = hn::MulAdd(x, ax, hn::MulAdd(y, ay, hn::Mul(z, az)));
+      const auto aside = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(height, height, distance_sq)));
+      const auto cone_cosine = hn::Set(d, view.cone_cosine);
+      const auto tilted =
+          hn::MulAdd(height, cone_cosine, hn::Mul(aside, hn::Set(d, view.cone_sine)));
+      const auto top =
+          hn::IfThenElse(hn::Ge(height, hn::Mul(distance, cone_cosine)), distance, tilted);
+      const auto cosine = hn::MulAdd(nx, ax, hn::MulAdd(ny, ay, hn::Mul(nz, az)));
+      const auto lean = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one)));
+      const auto lift = hn::Add(hn::Add(lean, spread), hn::Set(d, view.cone_sine));
+      const auto rise = rules.approximates() ? hn::Mul(radius, hn::Min(one, lift)) : radius;
+      const auto reach = hn::Max(zero, hn::Sub(nearest, radius));
+      seen = hn::And(seen, hn::Gt(hn::Add(hn::Add(top, rise), hn::Set(d, view.lift)),
+                                  hn::Mul(reach, hn::Set(d, horizonSlope(rules)))));
+    }
+
+    // Small enough
+    const auto area = hn::Mul(hn::Set(d, kPi), hn::Mul(radius, radius));
+    const auto limit = hn::Mul(hn::Set(d, 2 * rules.max_solid_angle), hn::Mul(nearest, nearest));
+    const auto far = hn::And(hn::Gt(nearest, radius), hn::Lt(area, limit));
+
+    // Turned away from all
+    if (rules.front_only && rules.approximates()) {
+      const auto away = hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz)));
+      const auto is_disk = hn::And(far, hn::Gt(hn::Load(d, columns.flat + at), zero));
+      const auto size = hn::Add(packet_radius, hn::IfThenZeroElse(is_disk, radius));
+      const auto turn = hn::MulAdd(hn::IfThenZeroElse(is_disk, spread), distance,
+                                   hn::Mul(hn::Set(d, 1.2f), size));
+      const auto small = hn::Lt(size, hn::Mul(distance, hn::Set(d, kMostTurnedAway)));
+      seen = hn::AndNot(hn::And(small, hn::Gt(away, turn)), seen);
+    }
+    const auto far_bits = hn::And(seen, far), open_bits = hn::AndNot(far, seen);
+    std::uint8_t bits[2][8] = {};
+    hn::StoreMaskBits(d, far_bits, bits[0]);
+    hn::StoreMaskBits(d, open_bits, bits[1]);
+    classes.far |= std::uint32_t{bits[0][0]} << at;
+    classes.open |= std::uint32_t{bits[1][0]} << at;
+  }
+  const std::uint32_t present = (1u << siblings.size()) - 1;
+  classes.far &= present;
+  classes.open &= present;
+  return classes;
+}
+
+SiblingClassifier Classifier() { return ClassifySiblings; }
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace surfeit {
+namespace {
+
+// The highest that a node may rise above the horizon of a receiver of the packet.
+float highestPoint(const Node& node, const glm::vec3& to_node, float distance, float spread,
+                   const PacketView& view, const CutRules& rules) {
+  // Height of the middle for the normal in the cone that comes closest to it
+  const float height = glm::dot(to_node, view.axis);
+  const float aside = std::sqrt(std::max(0.f, distance * distance - height * height));
+  const float top = height >= distance * view.cone_cosine
+                        ? distance
+                        : height * view.cone_cosine + aside * view.cone_sine;
+  if (!rules.approximates()) return top + view.lift + node.radius;
+
+  // A flat node reaches less far up than aside
+  const float cosine = glm::dot(node.normal, view.axis);
+  const float lean = std::sqrt(std::max(0.f, 1 - cosine * cosine));
+  return top + view.lift + node.radius * std::min(1.f, lean + spread + view.cone_sine);
+}
+
+}  // namespace
+
+SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView& view,
+                                const CutRules& rules) {
+  SiblingClasses classes;
+  for (std::size_t i = 0; i < siblings.size(); ++i) {
+    const Node& node = siblings[i];
+    const glm::vec3 to_node = node.position - view.centre;
+    const float distance = glm::length(to_node), nearest = distance - view.radius;
+    const float spread = kNormalSpread * std::sqrt(2 * (1 - node.flatness));
+
+    // Out of reach, or below the horizon of all
+    if (!(nearest < rules.max_distance + node.radius)) continue;
+    if (view.has_horizon && !(highestPoint(node, to_node, distance, spread, view, rules) >
+                              horizonSlope(rules) * std::max(0.f, nearest - node.radius))) {
+      continue;
+    }
+
+    // A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
+    // solid angle. A flat square of surfels has about 0.6 of its sphere's outline as area, so this
+    // is close to the memo's test on the area, but it also opens sparse nodes, whose area says
+    // nothing about how far their surfels spread.
+    const float radius_sq = node.radius * node.radius;
+    const bool is_far =
+        nearest > node.radius && kPi * radius_sq < 2 * rules.max_solid_angle * nearest * nearest;
+
+    // Turned away from all: as one disk, or all the surfels below
+    if (rules.front_only && rules.approximates()) {
+      const bool is_disk = is_far && node.isFlat();
+      const float size = view.radius + (is_disk ? 0 : node.radius);
+      const float turn = (is_disk ? 0 : spread) * distance + 1.2f * size;
+      if (size < kMostTurnedAway * distance && glm::dot(to_node, node.normal) > turn) continue;
+    }
+    (is_far ? classes.far : classes.open) |= 1u << i;
+  }
+  return classes;
+}
+
+HWY_EXPORT(Classifier);
+SiblingClassifier fastestSiblingClassifier() { return HWY_DYNAMIC_DISPATCH(Classifier)(); }
+
+}  // namespace surfeit
+#endif

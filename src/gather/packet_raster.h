@@ -1,0 +1,75 @@
+// The rasters of a packet of receivers side by side: 16 raster cubes interleaved by pixel, so that
+// a footprint of a few pixels is a few vector operations for all receivers at once. Collects what
+// the packet's cut gives, sorts it by distance from the packet's centre, draws it front to back and
+// integrates (memo 3.4 and 3.5).
+//
+// Each lane is the raster of one receiver by the rules of ReceiverRaster, which is the definition;
+// what the lanes share is the cut and the order. A rough node is seen from the packet's centre.
+#pragma once
+
+#include <hwy/aligned_allocator.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "gather/contribution.h"
+#include "gather/cut.h"
+#include "gather/packet_kernel.h"
+#include "gather/raster_cube.h"
+#include "gather/receiver.h"
+#include "octree/node.h"
+#include "surfeit/gather.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// One thread at a time. Has room for kReservedPatches from the start; for what grows beyond, see
+// ReceiverRaster.
+class PacketRaster {
+ public:
+  static constexpr std::size_t kReservedPatches = 4096;
+
+  // `quality` must be valid, as for PointGatherer.
+  PacketRaster(GatherMode mode, const GatherQuality& quality,
+               const PacketKernel& kernel = fastestPacketKernel());
+  PacketRaster(const PacketRaster&) = delete;
+  PacketRaster& operator=(const PacketRaster&) = delete;
+
+  // Starts over for 1 to kPacketReceivers receivers.
+  void begin(std::span<const Receiver> receivers, const PacketView& view);
+  // Adds a node as a whole. All receivers must lie outside its radius.
+  void addNode(const Node& node);
+  // Adds those of the surfels that some receiver may see.
+  void addSurfels(std::span<const Surfel> surfels);
+  // Sorts what was added; then draws it; then integrates, one result per receiver.
+  void sort();
+  void draw();
+  void integrate(std::span<GatherResult> results);
+
+  std::size_t patchCount() const { return patches_.size(); }
+
+  // Bytes that a raster of this quality holds from the start.
+  static std::size_t memoryBytes(GatherMode mode, const GatherQuality& quality);
+
+ private:
+  void addPatch(const Patch& patch, float distance_sq);
+  PacketCanvas canvas();
+
+  const PacketKernel& kernel_;
+  GatherQuality quality_;
+  ContributionRules rules_;
+  float max_distance_sq_;
+  RasterGeometry geometry_;
+  hwy::AlignedFreeUniquePtr<float[]> pixels_;
+  std::array<bool, RasterGeometry::kFaces> is_face_used_{};
+
+  PacketLanes lanes_;
+  PacketView view_;
+  std::vector<Patch> patches_;
+  std::vector<std::uint64_t> order_, order_scratch_;  // [ distance_sq as bits : 32 | index : 32 ]
+};
+
+}  // namespace surfeit

@@ -1,0 +1,169 @@
+// Packets are held to the scalar gather, and instruction sets to each other.
+#include "gather/packet_gatherer.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "gather/gather_point.h"
+#include "gather/test_scene.h"
+
+namespace surfeit {
+namespace {
+
+// What instruction sets may differ by (packet_kernel.h).
+constexpr float kTolerance = 1e-4f;
+
+using Cloud = std::vector<Surfel>;
+
+void addSphere(Cloud& cloud, int count, const glm::vec3& centre, float radius,
+               std::uint32_t flags = 0) {
+  const float area = 4 * kPi * radius * radius / float(count);
+  for (int i = 0; i < count; ++i) {
+    const float z = 1 - float(2 * i + 1) / float(count), phi = float(i) * 2.39996323f;
+    const float rho = std::sqrt(1 - z * z);
+    const glm::vec3 outward(rho * std::cos(phi), rho * std::sin(phi), z);
+    Surfel surfel;
+    surfel.position = centre + radius * outward;
+    surfel.normal = (flags & kSurfelSphere) != 0 ? glm::vec3(0) : outward;
+    surfel.flags = flags;
+    surfel.area = area;
+    surfel.radius = std::sqrt(2 * area / kPi);
+    surfel.radiosity = glm::vec3(.5f) + .4f * glm::sin(9.f * surfel.position);
+    cloud.push_back(surfel);
+  }
+}
+
+void addGround(Cloud& cloud, int side, float extent) {
+  const float step = extent / float(side);
+  for (int i = 0; i < side * side; ++i) {
+    Surfel surfel;
+    surfel.position = {(float(i % side) + .5f) * step - extent / 2,
+                       (float(i / side) + .5f) * step - extent / 2, 0};
+    surfel.normal = {0, 0, 1};
+    surfel.area = step * step;
+    surfel.radius = step;
+    surfel.radiosity = glm::vec3(.5f) + .4f * glm::sin(5.f * surfel.position);
+    cloud.push_back(surfel);
+  }
+}
+
+// Spheres of every kind on and above a ground.
+Cloud mixedCloud() {
+  Cloud cloud;
+  addGround(cloud, 80, 8);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (int i = 0; i < 24; ++i) {
+    const float radius = .3f + .2f * uniform(random);
+    const std::uint32_t flags = i % 8 == 3   ? std::uint32_t{kSurfelTwoSided}
+                                : i % 8 == 5 ? std::uint32_t{kSurfelSphere}
+                                             : 0;
+    addSphere(cloud, 600, {3 * uniform(random), 3 * uniform(random), radius + (i % 3) * .6f},
+              radius, flags);
+  }
+  return cloud;
+}
+
+constexpr std::size_t kRuns = 40;
+
+// Packets of neighbours on the surfaces of the cloud, where few surfels are anywhere else.
+std::vector<Receiver> neighbours(const Cloud& cloud, std::size_t first) {
+  std::vector<Receiver> receivers;
+  for (std::size_t i = 0; i < kPacketReceivers; ++i) {
+    const Surfel& surfel = cloud[std::min(first + i, cloud.size() - 1)];
+    receivers.push_back({surfel.position, surfel.normal});
+  }
+  return receivers;
+}
+
+std::vector<GatherResult> gatherPacket(PacketGatherer& gatherer, Scene& scene,
+                                       const std::vector<Receiver>& receivers) {
+  std::vector<GatherResult> results(receivers.size());
+  const Status status = gatherer.gather(receivers, scene.reader(), results);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return results;
+}
+
+double difference(const GatherResult& a, const GatherResult& b) {
+  const glm::vec3 color = glm::abs(a.irradiance - b.irradiance);
+  return double(std::max({std::abs(a.occlusion - b.occlusion), color.x, color.y, color.z}));
+}
+
+// 16 times the same receiver: cut and order are those of the scalar gather.
+TEST(PacketGatherer, EqualReceiversGiveWhatTheScalarGatherGives) {
+  const Cloud cloud = mixedCloud();
+  Scene scene(cloud);
+  for (const float max_solid_angle : {.02f, .1f, .4f}) {
+    for (const GatherSides sides : {GatherSides::kFront, GatherSides::kBoth}) {
+      GatherQuality quality;
+      quality.max_solid_angle = max_solid_angle;
+      quality.sides = sides;
+      PacketGatherer gatherer(GatherMode::kBleeding, quality);
+      double worst = 0;
+      for (std::size_t run = 0; run < kRuns; ++run) {
+        const Surfel& surfel = cloud[run * cloud.size() / kRuns];
+        const Receiver receiver = {surfel.position, surfel.normal};
+        const GatherResult expected = scene.gather(receiver, quality);
+        for (const GatherResult& result :
+             gatherPacket(gatherer, scene, std::vector<Receiver>(kPacketReceivers, receiver))) {
+          worst = std::max(worst, difference(result, expected));
+        }
+      }
+      EXPECT_LT(worst, 1e-3) << max_solid_angle << ' ' << int(sides);
+    }
+  }
+}
+
+// One cut for all is finer than each would choose, and the order is shared: close, not equal.
+TEST(PacketGatherer, NeighboursComeCloseToWhatEachGathersAlone) {
+  const Cloud cloud = mixedCloud();
+  Scene scene(cloud);
+  GatherQuality quality;
+  PacketGatherer gatherer(GatherMode::kBleeding, quality);
+  double square = 0;
+  for (std::size_t run = 0; run < kRuns; ++run) {
+    const std::vector<Receiver> receivers = neighbours(cloud, run * cloud.size() / kRuns);
+    const std::vector<GatherResult> results = gatherPacket(gatherer, scene, receivers);
+    for (std::size_t i = 0; i < receivers.size(); ++i) {
+      const double error = difference(results[i], scene.gather(receivers[i], quality));
+      square += error * error;
+    }
+  }
+  EXPECT_LT(std::sqrt(square / double(kRuns * kPacketReceivers)), .01);
+}
+
+TEST(PacketGatherer, InstructionSetsAgree) {
+  const Cloud cloud = mixedCloud();
+  Scene scene(cloud);
+  ASSERT_GE(packetKernels().size(), 2u);
+  for (const GatherMode mode : {GatherMode::kOcclusion, GatherMode::kBleeding}) {
+    const GatherQuality quality;
+    PacketGatherer definition(mode, quality, packetKernels().back());
+    for (const PacketKernel& kernel : packetKernels()) {
+      PacketGatherer gatherer(mode, quality, kernel);
+      double worst = 0;
+      for (std::size_t run = 0; run < kRuns; ++run) {
+        const std::vector<Receiver> receivers = neighbours(cloud, run * cloud.size() / kRuns);
+        const std::vector<GatherResult> expected = gatherPacket(definition, scene, receivers);
+        const std::vector<GatherResult> results = gatherPacket(gatherer, scene, receivers);
+        for (std::size_t i = 0; i < results.size(); ++i) {
+          worst = std::max(worst, difference(results[i], expected[i]));
+        }
+      }
+      fmt::print("{}: largest difference {:.2g}\n", kernel.name, worst);
+      EXPECT_LT(worst, kTolerance) << kernel.name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace surfeit

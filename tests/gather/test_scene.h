@@ -1,0 +1,69 @@
+// A cloud indexed and opened with everything in memory, for the gather's tests.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gather/gather_point.h"
+#include "gather/test_clouds.h"
+#include "io/surfel_source.h"
+#include "io/surfel_writer.h"
+#include "octree/paged_octree.h"
+#include "octree/scene_file.h"
+#include "surfeit/index.h"
+
+namespace surfeit {
+
+// A cloud as a paged octree, all in memory.
+class Scene {
+ public:
+  explicit Scene(const std::vector<Surfel>& cloud) {
+    CloudChannels channels;
+    channels.normal = channels.radius = channels.area = channels.radiosity = true;
+    channels.two_sided = true;
+    const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file("c.sft");
+    Result<SurfelWriter> writer =
+        SurfelWriter::create(cloud_path, channels, PlyEncoding::kBinaryLittleEndian);
+    expectOk(writer.status());
+    expectOk(writer->write(cloud));
+    expectOk(writer->finish());
+    IndexOptions options;
+    options.full_precision = true;
+    Progress progress;
+    expectOk(indexClouds({cloud_path}, path, options, progress).status());
+    Result<SceneFile> file = SceneFile::open(path);
+    expectOk(file.status());
+    Result<PagedOctree::Memory> memory =
+        PagedOctree::planMemory(*file, PagedOctree::unlimitedCacheBytes(*file), 1);
+    expectOk(memory.status());
+    Result<std::unique_ptr<PagedOctree>> octree = PagedOctree::create(std::move(*file), *memory);
+    expectOk(octree.status());
+    octree_ = std::move(*octree);
+    reader_ = std::make_unique<PagedOctree::Reader>(*octree_);
+  }
+
+  GatherResult gather(const Receiver& receiver, const GatherQuality& quality,
+                      GatherMode mode = GatherMode::kBleeding) {
+    PointGatherer gatherer(mode, quality);
+    GatherResult result;
+    expectOk(gatherer.gather(receiver, *reader_, result));
+    work_ = gatherer.work();
+    return result;
+  }
+  PagedOctree::Reader& reader() { return *reader_; }
+  const PointGatherer::Work& work() const { return work_; }
+
+ private:
+  static void expectOk(const Status& status) { ASSERT_TRUE(status.ok()) << status.message(); }
+
+  TestDirectory directory_;
+  std::unique_ptr<PagedOctree> octree_;
+  std::unique_ptr<PagedOctree::Reader> reader_;
+  PointGatherer::Work work_;
+};
+
+}  // namespace surfeit
