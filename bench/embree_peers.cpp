@@ -261,7 +261,12 @@ Result<PeerScene> makeDiskPeer(const GatherScene& scene, std::span<const Surfel>
                                const ReceiverSet& set, std::span<const GatherResult> truth,
                                int threads) {
   PeerScene peer{.name = "disks"};
-  for (const Surfel& surfel : surfels) peer.radiosity.emplace_back(surfel.radiosity, 0);
+  double area = 0, disk_area = 0;
+  for (const Surfel& surfel : surfels) {
+    peer.radiosity.emplace_back(surfel.radiosity, 0);
+    area += double(surfel.area);
+    disk_area += 3.14159265 * double(surfel.radius) * double(surfel.radius);
+  }
   const RayDirections directions(kTrialRays);
   const EmbreeBuild build{.rejects_backs = !scene.geometry().is_two_sided, .threads = threads};
   double least_error = std::numeric_limits<double>::infinity();
@@ -297,7 +302,9 @@ Result<PeerScene> makeDiskPeer(const GatherScene& scene, std::span<const Surfel>
   }
   peer.embree = std::move(best);
   peer.offset_radii = best_offset;
-  peer.notes = fmt::format("{}; tried (occlusion RMSE / color RMSE) {}", chosen, peer.notes);
+  peer.notes = fmt::format(
+      "{}; disks have {:.2f} times their surfels' area; tried (occlusion RMSE / color RMSE) {}",
+      chosen, disk_area / area, peer.notes);
   return peer;
 }
 

@@ -55,6 +55,9 @@ void addGatherBenchOptions(CLI::App& app, GatherBenchOptions& options) {
       ->capture_default_str();
   app.add_option("--raster-resolution", quality.raster_resolution, "Pixels along a cube face, even")
       ->check(CLI::Range(2, 64))
+      ->check([](const std::string& text) {
+        return std::stoi(text) % 2 == 0 ? std::string() : text + ": expected an even number";
+      })
       ->capture_default_str();
   app.add_option("--near-field", quality.near_field_radii, "Reach of tracing, in surfel radii")
       ->check(CLI::Range(0.0, 100.0))

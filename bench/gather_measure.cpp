@@ -42,35 +42,37 @@ class ScalarEngine : public GatherEngine {
   GatherWork work_;
 };
 
-// Packets of neighbours.
+// Packets of neighbours, and clusters of packets.
 class PacketEngine : public GatherEngine {
  public:
   PacketEngine(GatherMode mode, const GatherQuality& quality) : gatherer_(mode, quality) {}
 
   Status gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
                 std::span<GatherResult> results) override {
-    for (std::size_t i = 0; i < receivers.size(); i += kPacketReceivers) {
-      const std::size_t count = std::min(kPacketReceivers, receivers.size() - i);
+    for (std::size_t i = 0; i < receivers.size(); i += kClusterReceivers) {
+      const std::size_t count = std::min(kClusterReceivers, receivers.size() - i);
       SURFEIT_RETURN_IF_ERROR(
           gatherer_.gather(receivers.subspan(i, count), octree, results.subspan(i, count)));
-      const PacketGatherer::Work& work = gatherer_.work();
-      work_.nodes_visited += work.nodes_visited;
-      work_.surfels_visited += work.surfels_visited;
-      work_.contributions += work.patches;
-      work_.phases.walk += work.walk_seconds;
-      work_.phases.sort += work.sort_seconds;
-      work_.phases.draw += work.draw_seconds;
-      work_.phases.integrate += work.integrate_seconds;
     }
-    work_.receivers += receivers.size();
+    receivers_ += receivers.size();
     return {};
   }
-  GatherWork work() const override { return work_; }
+  GatherWork work() const override {
+    const PacketGatherer::Work& work = gatherer_.work();
+    return {.receivers = receivers_,
+            .nodes_visited = work.nodes_visited,
+            .surfels_visited = work.surfels_visited,
+            .contributions = work.patches + work.shared_patches,
+            .phases = {.walk = work.walk_seconds,
+                       .sort = work.sort_seconds,
+                       .draw = work.draw_seconds,
+                       .integrate = work.integrate_seconds}};
+  }
   void measurePhases() override { gatherer_.measurePhases(true); }
 
  private:
   PacketGatherer gatherer_;
-  GatherWork work_;
+  std::uint64_t receivers_ = 0;
 };
 
 struct EngineKind {
@@ -86,7 +88,7 @@ std::unique_ptr<GatherEngine> make(GatherMode mode, const GatherQuality& quality
 
 constexpr EngineKind kEngines[] = {
     {"scalar", 1, make<ScalarEngine>},
-    {"packet", kPacketReceivers, make<PacketEngine>},
+    {"packet", kClusterReceivers, make<PacketEngine>},
 };
 
 double meanOf(const glm::vec3& rgb) { return (double(rgb.x) + double(rgb.y) + double(rgb.z)) / 3; }

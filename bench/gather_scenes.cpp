@@ -17,6 +17,8 @@
 namespace surfeit {
 namespace {
 
+// Part of the names of scene files that are kept; raise it whenever a scene changes.
+constexpr int kSceneVersion = 1;
 constexpr std::size_t kDenseRuns = 64, kRunLength = 1024;
 constexpr std::size_t kScattered = 50'000;
 constexpr std::size_t kJudged = 2048;
@@ -119,7 +121,8 @@ Result<GatherScene> GatherScene::open(const std::string& name, const SceneOption
     scene.geometry_ = name == "city" ? makeCity() : makeSpheres();
   }
   const std::uint64_t count = options.surfels > 0 ? options.surfels : scene.geometry_.surfels;
-  scene.octree_path_ = fmt::format("{}/{}_{}.sft", scene.directory_.path(), name, count);
+  scene.octree_path_ =
+      fmt::format("{}/{}_{}_v{}.sft", scene.directory_.path(), name, count, kSceneVersion);
   if (!std::filesystem::exists(scene.octree_path_)) {
     const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
     SURFEIT_RETURN_IF_ERROR(scene.makeOctree(count, threads, progress));

@@ -250,7 +250,7 @@ Status runBench(const std::string& scene_path, const std::string& receivers_path
     SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, sorter.next(run));
     if (count == 0) break;
     for (std::size_t i = 0; i < count; ++i) {
-      SURFEIT_RETURN_IF_ERROR(cut->walk(viewPacket({&run[i].receiver, 1}), tracing, IgnoreCut{}));
+      SURFEIT_RETURN_IF_ERROR(cut->walk(viewPacket({&run[i].receiver, 1}), {}, tracing, IgnoreCut{}));
     }
   }
   fmt::print("{} surfels, {} nodes, {} to a page; {} receivers, {:.0f} node look-ups each\n",

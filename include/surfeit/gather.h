@@ -21,12 +21,17 @@ enum class GatherSides : std::uint8_t { kFront, kBoth };
 
 // How the gather approximates. Scene units are the cloud's own.
 struct GatherQuality {
-  float max_solid_angle = 0.05f;  // sigma_max, steradians, >= 0; 0 opens every node (memo 5)
-  int raster_resolution = 12;     // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
+  // sigma_max, steradians, >= 0; 0 opens every node (memo 5). Rough nodes keep below a
+  // quarter of it.
+  float max_solid_angle = 0.08f;
+  int raster_resolution = 12;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
   // Rays and horizon start this far above the receiver, in radii of the surfel looked at.
   float bias = 0.15f;
   // Surfels closer than this many of their radii are ray traced (memo 3.4.1).
   float near_field_radii = 8;
+  // The far field is seen from the middle of 16 neighbouring receivers where that moves it by less
+  // than this part of a raster pixel; 0: by every receiver for itself.
+  float far_field_parallax = 0.2f;
   // Surfels farther than this do not count; scene units.
   float max_distance = 1e30f;
   GatherSides sides = GatherSides::kFront;

@@ -5,14 +5,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "gather/coverage_rules.h"
+
 namespace surfeit {
-namespace {
-
-// A rough node that shows less than this part of its area shows nothing: three bands cannot tell so
-// little from zero, and dividing power by it would make up bright specks.
-constexpr float kLeastVisiblePart = 0.01f;
-
-}  // namespace
 
 // With w_i the weights, x_i = d . n_i and T = sum w_i, band by band the expansion is
 //
@@ -53,7 +48,7 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   const glm::vec3 direction = to_node / std::sqrt(distance_sq);
 
   // Area that the receiver sees, and what of it sends light
-  float area, front_area;
+  float area, front_area, overlap = 0;
   glm::vec3 power(0);
   if (node.isFlat()) {
     const float cosine = -node.flatness * glm::dot(direction, node.normal);
@@ -64,13 +59,18 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   } else {
     const ShCoefficients basis = shBasis(-direction);
     float back_area;
-    front_area = projectedSum(node.area_sh, basis, back_area);
-    area = rules.sides == GatherSides::kBoth ? front_area + back_area : front_area;
+    front_area = projectedSum(node.coefficients(kAreaKind), basis, back_area);
+    if (rules.sides == GatherSides::kBoth) {
+      area = front_area + back_area;
+    } else {
+      area = front_area;
+      overlap = overlapOf(front_area, back_area);
+    }
     if (!(area > kLeastVisiblePart * node.area)) return false;
     if (rules.has_color) {
       float ignored;
       for (int channel = 0; channel < 3; ++channel) {
-        power[channel] = projectedSum(node.power_sh[channel], basis, ignored);
+        power[channel] = projectedSum(node.coefficients(powerKind(channel)), basis, ignored);
       }
     }
   }
@@ -83,6 +83,8 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   contribution.radius = node.radius;
   contribution.direction = direction;
   contribution.solid_angle = visible_area / distance_sq;
+  contribution.spread = node.area / distance_sq;
+  contribution.overlap = overlap;
   contribution.normal = node.flatness * node.normal;
   contribution.radiosity = rules.has_color ? power / area : glm::vec3(0);
   return contribution.solid_angle > 0;
@@ -103,6 +105,8 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.radius = surfel.radius;
   contribution.direction = direction;
   contribution.solid_angle = surfel.area * std::abs(cosine) / distance_sq;
+  contribution.spread = surfel.area / distance_sq;
+  contribution.overlap = 0;
   contribution.normal = surfel.normal;
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);
   return contribution.solid_angle > 0;

@@ -10,16 +10,22 @@
 
 namespace surfeit {
 
+// A rough node that shows less than this part of its area shows nothing: three bands cannot tell so
+// little from zero, and dividing power by it would make up bright specks.
+inline constexpr float kLeastVisiblePart = 0.01f;
+
 // A patch as the receiver sees it. Plain floats without padding.
 struct Contribution {
   float distance_sq;    // from the receiver, > 0
   float radius;         // of what it stands for: how far that reaches before and behind
   glm::vec3 direction;  // unit, from the receiver
   float solid_angle;    // steradians, > 0
-  glm::vec3 normal;     // shape for RasterCube::splatRectangle; zero: looks round
+  float spread;         // area / distance^2: the solid angle that it would have head-on
+  float overlap;        // of its parts with those of its layer, 0..1; see RasterCube::Patch
+  glm::vec3 normal;     // shape for RasterCube::splat; zero: looks round
   glm::vec3 radiosity;  // of what covers; back sides are black. Zero when color is not asked for.
 };
-static_assert(sizeof(Contribution) == 12 * sizeof(float));
+static_assert(sizeof(Contribution) == 14 * sizeof(float));
 
 // How contributions are to be made.
 struct ContributionRules {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 
@@ -31,6 +32,25 @@ struct PacketView {
 // `receivers`: at least one.
 PacketView viewPacket(std::span<const Receiver> receivers);
 
+// A cluster of packets divides what lies around it: what is closer to its centre than the limit
+// each packet looks at by itself, the rest they look at together (docs/algorithm.md, "The shared
+// far field"). The cluster's two kinds of walk take every surfel exactly once between them.
+struct CutRegion {
+  enum class Part : std::uint8_t { kAll, kNear, kFar };
+  Part part = Part::kAll;
+  glm::vec3 centre{0};  // of the cluster
+  float radius = 0;     // of a sphere around it that holds all receivers
+  float limit = 0;
+
+  // Whether a surfel here is of the part.
+  bool holds(const glm::vec3& position) const {
+    if (part == Part::kAll) return true;
+    const glm::vec3 offset = position - centre;
+    const bool is_near = glm::dot(offset, offset) < limit * limit;
+    return is_near == (part == Part::kNear);
+  }
+};
+
 // How a cut is chosen.
 struct CutRules {
   float max_solid_angle = 0;  // 0: nothing stands in for anything, and nothing visible is left out
@@ -49,15 +69,16 @@ struct SiblingClasses {
 // Sorts siblings (at most 8) by what the packet makes of them; those in neither class are not
 // seen. docs/algorithm.md, "Choosing the cut", has the tests. This is the definition.
 SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView& view,
-                                const CutRules& rules);
+                                const CutRegion& region, const CutRules& rules);
 
 // The same, eight at once, for this machine. Results may differ where rounding decides.
 using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const PacketView&,
-                                             const CutRules&);
+                                             const CutRegion&, const CutRules&);
 SiblingClassifier fastestSiblingClassifier();
 
 // Calls visit.node(const Node&) for the nodes small enough as a whole, and
-// visit.surfels(std::span<const Surfel>) for those of leaves too near. `Reader` has the functions
+// visit.surfels(std::span<const Surfel>) for those of leaves too near, some of which the region may
+// not hold. `Reader` has the functions
 // of PagedOctree::Reader. The order depends on octree and view alone. One thread at a time.
 class CutWalk {
  public:
@@ -67,7 +88,7 @@ class CutWalk {
         classify_(classify) {}
 
   template <typename Reader, typename Visit>
-  Status walk(const PacketView& view, Reader& octree, Visit&& visit) {
+  Status walk(const PacketView& view, const CutRegion& region, Reader& octree, Visit&& visit) {
     nodes_visited_ = surfels_visited_ = 0;
     std::size_t stack_count = 0;
     stack_[stack_count++] = kRootRange;
@@ -76,7 +97,7 @@ class CutWalk {
                                octree.nodes(stack_[--stack_count]));
       nodes_visited_ += siblings.size();
       SURFEIT_RETURN_IF_ERROR(octree.checkVisits(nodes_visited_, surfels_visited_));
-      const SiblingClasses classes = classify_(siblings, view, rules_);
+      const SiblingClasses classes = classify_(siblings, view, region, rules_);
       for (std::size_t i = 0; i < siblings.size(); ++i) {
         const Node& node = siblings[i];
         if ((classes.far >> i & 1) != 0) {

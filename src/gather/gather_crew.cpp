@@ -56,8 +56,8 @@ Status GatherCrew::gatherRuns() {
   PagedOctree::Reader reader(setup_.octree);
   std::vector<SortedReceiver> run;
   std::vector<ResultStore::Entry> results;
-  std::array<Receiver, kPacketReceivers> packet;
-  std::array<GatherResult, kPacketReceivers> packet_results;
+  std::array<Receiver, kClusterReceivers> cluster;
+  std::array<GatherResult, kClusterReceivers> cluster_results;
   run.reserve(PagingController::kMostRun);
   results.reserve(PagingController::kMostRun);
   while (!failure_.happened()) {
@@ -65,14 +65,14 @@ Status GatherCrew::gatherRuns() {
     if (run.empty()) return {};
     prefetcher_.notify();
     results.clear();
-    for (std::size_t begin = 0; begin < run.size(); begin += kPacketReceivers) {
+    for (std::size_t begin = 0; begin < run.size(); begin += kClusterReceivers) {
       if (setup_.progress.isCancelled()) return Status::interrupted();
-      const std::size_t count = std::min(kPacketReceivers, run.size() - begin);
-      for (std::size_t i = 0; i < count; ++i) packet[i] = run[begin + i].receiver;
-      SURFEIT_RETURN_IF_ERROR(gatherer->gather(std::span(packet).first(count), reader,
-                                               std::span(packet_results).first(count)));
+      const std::size_t count = std::min(kClusterReceivers, run.size() - begin);
+      for (std::size_t i = 0; i < count; ++i) cluster[i] = run[begin + i].receiver;
+      SURFEIT_RETURN_IF_ERROR(gatherer->gather(std::span(cluster).first(count), reader,
+                                               std::span(cluster_results).first(count)));
       for (std::size_t i = 0; i < count; ++i) {
-        results.push_back({run[begin + i].index, packet_results[i]});
+        results.push_back({run[begin + i].index, cluster_results[i]});
       }
     }
     SURFEIT_RETURN_IF_ERROR(sink_(results));

@@ -22,7 +22,7 @@ PointGatherer::PointGatherer(GatherMode mode, const GatherQuality& quality)
 Status PointGatherer::gather(const Receiver& receiver, PagedOctree::Reader& octree,
                              GatherResult& result) {
   raster_.begin(receiver);
-  SURFEIT_RETURN_IF_ERROR(cut_.walk(viewPacket({&receiver, 1}), octree, DrawCut{raster_}));
+  SURFEIT_RETURN_IF_ERROR(cut_.walk(viewPacket({&receiver, 1}), {}, octree, DrawCut{raster_}));
   work_ = {.nodes_visited = cut_.nodesVisited(),
            .surfels_visited = cut_.surfelsVisited(),
            .contributions = raster_.contributionCount(),

@@ -78,11 +78,25 @@ class LookUpTrace::Reader {
 
 LookUpTrace::LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int threads,
                          Progress& progress)
-    : threads_(static_cast<std::size_t>(threads)),
+    : quality_(quality),
+      threads_(static_cast<std::size_t>(threads)),
       progress_(progress),
       surfel_group_capacity_(octree.file().header().surfel_group_capacity),
       octree_(octree),
       cut_(std::make_unique<CutWalk>(quality)) {}
+
+// As PacketGatherer::gather walks.
+Status LookUpTrace::walk(std::span<const Receiver> receivers, Reader& reader) {
+  const PacketCluster cluster(receivers, quality_);
+  if (cluster.shares()) {
+    SURFEIT_RETURN_IF_ERROR(cut_->walk(cluster.view(), cluster.farRegion(), reader, IgnoreCut{}));
+  }
+  for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
+    SURFEIT_RETURN_IF_ERROR(
+        cut_->walk(cluster.packet(i), cluster.regionOf(i), reader, IgnoreCut{}));
+  }
+  return {};
+}
 
 Status LookUpTrace::follow(const NextRun& next, LookUps& every, LookUps* second) {
   struct Thread {
@@ -103,13 +117,12 @@ Status LookUpTrace::follow(const NextRun& next, LookUps& every, LookUps* second)
       }
       if (thread.run.empty()) continue;
       is_at_end = false;
-      const std::size_t count = std::min(kPacketReceivers, thread.run.size() - thread.place);
-      std::array<Receiver, kPacketReceivers> packet;
-      for (std::size_t i = 0; i < count; ++i) packet[i] = thread.run[thread.place++].receiver;
+      const std::size_t count = std::min(kClusterReceivers, thread.run.size() - thread.place);
+      std::array<Receiver, kClusterReceivers> receivers;
+      for (std::size_t i = 0; i < count; ++i) receivers[i] = thread.run[thread.place++].receiver;
       LookUps* const also = walked++ % 2 == 0 ? second : nullptr;
       thread.reader.tellTo(every, also);
-      SURFEIT_RETURN_IF_ERROR(
-          cut_->walk(viewPacket(std::span(packet).first(count)), thread.reader, IgnoreCut{}));
+      SURFEIT_RETURN_IF_ERROR(walk(std::span(receivers).first(count), thread.reader));
       every.receivers += count;
       if (also != nullptr) also->receivers += count;
     }

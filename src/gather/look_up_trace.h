@@ -11,6 +11,7 @@
 
 #include "cache/reuse_distances.h"
 #include "gather/cut.h"
+#include "gather/packet_cluster.h"
 #include "gather/receiver_sorter.h"
 #include "octree/paged_octree.h"
 #include "surfeit/gather.h"
@@ -35,7 +36,7 @@ struct LookUps {
   std::uint64_t receivers = 0;
 };
 
-// Threads are taken in turn, a packet each, so that what is found depends on the receivers and
+// Threads are taken in turn, a cluster each, so that what is found depends on the receivers and
 // the number of threads alone. Surfel pages are counted and never read. One thread at a time.
 class LookUpTrace {
  public:
@@ -46,7 +47,7 @@ class LookUpTrace {
   LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int threads, Progress& progress);
 
   // Adds to `every` the look-ups of all receivers that are to come, and to `second`, unless null,
-  // those of every second packet.
+  // those of every second cluster.
   Status follow(const NextRun& next, LookUps& every, LookUps* second = nullptr);
   // The same of a piece of the order.
   Status follow(std::span<const SortedReceiver> receivers, LookUps& every,
@@ -55,7 +56,9 @@ class LookUpTrace {
  private:
   // What CutWalk walks; one of the threads that are imitated.
   class Reader;
+  Status walk(std::span<const Receiver> receivers, Reader& reader);
 
+  const GatherQuality quality_;
   const std::size_t threads_;
   Progress& progress_;
   const std::uint32_t surfel_group_capacity_;

@@ -1,11 +1,13 @@
-// The gather of a packet of neighbouring receivers from a paged octree: one traversal, one cut, one
-// order front to back, and a raster cube per receiver in the lanes of vectors (memo, section 3).
+// The gather of neighbouring receivers from a paged octree: for every packet of 16 one traversal,
+// one cut, one order front to back, and a raster cube per receiver in the lanes of vectors (memo,
+// section 3); and one far field for a cluster of packets.
 #pragma once
 
 #include <cstddef>
 #include <span>
 
 #include "gather/cut.h"
+#include "gather/packet_cluster.h"
 #include "gather/packet_raster.h"
 #include "gather/receiver.h"
 #include "octree/paged_octree.h"
@@ -21,18 +23,19 @@ class PacketGatherer {
   PacketGatherer(GatherMode mode, const GatherQuality& quality,
                  const PacketKernel& kernel = fastestPacketKernel());
 
-  // Gathers at 1 to kPacketReceivers receivers, whose values must be finite; results are as many.
-  // On an error (a page that cannot be read or decoded) the results are unchanged. They depend on
-  // the scene, the packet, mode, quality and instruction set alone, bit for bit.
+  // Gathers at 1 to kClusterReceivers receivers, whose values must be finite; results are as many.
+  // On an error (a page that cannot be read or decoded) results are incomplete. They depend on the
+  // scene, the receivers given together, mode, quality and instruction set alone, bit for bit.
   Status gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
                 std::span<GatherResult> results);
 
-  // What the last gather took, for benches and tests.
+  // What all gathers so far took, for benches and tests.
   struct Work {
-    std::size_t nodes_visited = 0;
-    std::size_t surfels_visited = 0;
-    std::size_t patches = 0;  // drawn
-    // CPU time by phase, seconds; measured only when asked for with measurePhases().
+    std::size_t packets = 0;
+    std::size_t nodes_visited = 0, surfels_visited = 0;
+    std::size_t patches = 0;         // drawn for single packets
+    std::size_t shared_patches = 0;  // drawn for clusters
+    // Time by phase; measured only when asked for with measurePhases().
     double walk_seconds = 0, sort_seconds = 0, draw_seconds = 0, integrate_seconds = 0;
   };
   const Work& work() const { return work_; }
@@ -40,17 +43,20 @@ class PacketGatherer {
 
   // Bytes that a gatherer holds from the start.
   static std::size_t memoryBytes(GatherMode mode, const GatherQuality& quality) {
-    return sizeof(PacketGatherer) + PacketRaster::memoryBytes(mode, quality);
+    return sizeof(PacketGatherer) + 2 * PacketRaster::memoryBytes(mode, quality);
   }
 
  private:
-  double phaseSeconds();
+  Status draw(const PacketView& view, const CutRegion& region, std::span<const Receiver> receivers,
+              PagedOctree::Reader& octree, PacketRaster& raster);
+  void endPhase(double& seconds);
 
-  PacketRaster raster_;
+  const GatherQuality quality_;
+  PacketRaster raster_, far_raster_;
   CutWalk cut_;
   Work work_;
   bool measures_phases_ = false;
-  double last_seconds_ = 0;
+  double phase_begin_ = 0;
 };
 
 }  // namespace surfeit

@@ -82,7 +82,7 @@ struct Sight {
   M traced;  // near, and seen by the rays
 };
 
-inline Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers& receivers) {
+HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers& receivers) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
   Sight sight;
@@ -97,7 +97,7 @@ inline Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers
   sight.bias = zero;
   if (!(patch.near_distance > 0)) return sight;
 
-  if (patch.kind == PatchKind::kRound) {
+  if (patch.isRound()) {
     const float clearance = kSphereClearance * patch.radius;
     const M too_close =
         hn::And(receivers.spherical, hn::Lt(sight.distance_sq, Splat(clearance * clearance)));
@@ -116,10 +116,10 @@ inline Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers
   sight.traced = hn::And(sight.is_near, rises);
 
   // ... and show its front, or the sphere its outside, to where the rays begin
-  if (patch.kind == PatchKind::kFront) {
+  if (patch.facing_limit == Patch::kFrontOnly) {
     sight.traced =
         hn::And(sight.traced, hn::Lt(hn::NegMulAdd(sight.bias, cosine, sight.facing), zero));
-  } else if (patch.kind == PatchKind::kRound) {
+  } else if (patch.isRound()) {
     const V along =
         hn::MulAdd(sight.bias, sight.bias,
                    hn::NegMulAdd(hn::Mul(Splat(2), sight.bias), sight.height, sight.distance_sq));
@@ -129,12 +129,10 @@ inline Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers
 }
 
 // Lanes to which the patch is a patch of solid angle: the mid or the far field.
-inline M SeenAsPatch(const Patch& patch, const Receivers& receivers, const Sight& sight) {
-  const V zero = hn::Zero(D());
-  const M above = hn::Or(receivers.spherical, hn::Gt(sight.height, zero));
-  M seen = hn::And(hn::AndNot(sight.is_near, sight.in_reach), above);
-  if (patch.kind == PatchKind::kFront) seen = hn::And(seen, hn::Lt(sight.facing, zero));
-  return seen;
+HWY_INLINE M SeenAsPatch(const Patch& patch, const Receivers& receivers, const Sight& sight) {
+  const M above = hn::Or(receivers.spherical, hn::Gt(sight.height, hn::Zero(D())));
+  const M faces = hn::Lt(sight.facing, Splat(patch.facing_limit));
+  return hn::And(hn::AndNot(sight.is_near, sight.in_reach), hn::And(above, faces));
 }
 
 HWY_ATTR bool IsSeen(const PacketCanvas& canvas, const Patch& patch) {
@@ -146,18 +144,49 @@ HWY_ATTR bool IsSeen(const PacketCanvas& canvas, const Patch& patch) {
   return false;
 }
 
+// All four kinds of coefficients at once; the derivation is at projectedSum.
+void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sight) {
+  const hn::CappedTag<float, kNodeShKinds> d4;
+  const ShCoefficients basis = shBasis(-direction);
+  alignas(16) std::array<float, kNodeShKinds> facing_of, opposite_of;
+  for (std::size_t kind = 0; kind < kNodeShKinds; kind += hn::Lanes(d4)) {
+    const auto term = [&](std::size_t i) {
+      return hn::Mul(hn::LoadU(d4, node.sh[i].data() + kind), hn::Set(d4, basis[i]));
+    };
+    const auto plus = [&](auto sum, std::size_t i) {
+      return hn::MulAdd(hn::LoadU(d4, node.sh[i].data() + kind), hn::Set(d4, basis[i]), sum);
+    };
+    const auto zero = hn::Zero(d4);
+    const auto band_1 = plus(plus(term(1), 2), 3);
+    const auto band_2 = plus(plus(plus(plus(term(4), 5), 6), 7), 8);
+    const auto total = hn::Mul(hn::Set(d4, 4.f), term(0));
+    const auto mean = hn::Add(band_1, band_1);
+    // (total + 6.4 band_2) / 3 is the mean square; range^2 = 3 (total * mean square - mean^2)
+    const auto mean_sq = hn::MulAdd(hn::Set(d4, 6.4f), band_2, total);
+    const auto range_sq =
+        hn::NegMulAdd(hn::Mul(hn::Set(d4, 3.f), mean), mean, hn::Mul(total, mean_sq));
+    const auto range = hn::Sqrt(hn::Max(zero, range_sq));
+    const auto sum = hn::Add(mean, range);
+    const auto between =
+        hn::Div(hn::Mul(sum, sum), hn::Max(hn::Mul(hn::Set(d4, 4.f), range), hn::Set(d4, 1e-37f)));
+    const auto partly = hn::IfThenElse(hn::Le(sum, zero), zero, between);
+    const auto facing = hn::IfThenElse(hn::Ge(mean, range), mean, partly);
+    hn::Store(facing, d4, facing_of.data() + kind);
+    hn::Store(hn::Sub(facing, mean), d4, opposite_of.data() + kind);
+  }
+  sight.area = facing_of[kAreaKind];
+  sight.opposite_area = opposite_of[kAreaKind];
+  sight.power = {facing_of[powerKind(0)], facing_of[powerKind(1)], facing_of[powerKind(2)]};
+}
+
 // How some of the receivers' pixels are covered.
 struct Cover {
   V depth_begin, depth_end;
   M is_lit;
   bool is_all_lit;
+  float overlap;
   glm::vec3 radiosity;
 };
-
-inline V Filled(V layer) {
-  const V cubed = hn::Mul(hn::Mul(layer, layer), layer);
-  return hn::Min(Splat(1), hn::MulAdd(Splat(kFill), cubed, layer));
-}
 
 // As RasterCube::coverPixel, where `amount` is positive.
 template <bool kColor>
@@ -168,22 +197,23 @@ inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
   float* const layer_at = pixel + kPacketReceivers;
   float* const end_at = pixel + 2 * kPacketReceivers;
   const V end = hn::Load(d, end_at);
-  V room = hn::Load(d, room_at), layer = hn::Load(d, layer_at);
-  V filled = Filled(layer);
+  V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
   // A gap in depth begins a new layer
   const M touched = hn::Gt(amount, zero);
   const M is_new = hn::And(touched, hn::Gt(cover.depth_begin, end));
-  room = hn::IfThenElse(is_new, hn::NegMulAdd(room, filled, room), room);
-  layer = hn::IfThenZeroElse(is_new, layer);
-  filled = hn::IfThenZeroElse(is_new, filled);
+  room = hn::IfThenElse(is_new, hn::NegMulAdd(room, before, room), room);
+  before = hn::IfThenZeroElse(is_new, before);
   hn::Store(room, d, room_at);
   hn::Store(hn::IfThenElse(touched, hn::Max(end, cover.depth_end), end), d, end_at);
 
-  layer = hn::Min(hn::Add(layer, amount), one);
+  const V middle = hn::Min(one, hn::MulAdd(Splat(0.5f), amount, before));
+  const V slope =
+      hn::MulAdd(middle, hn::MulAdd(Splat(3 * kFill), middle, Splat(-cover.overlap)), one);
+  const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
   hn::Store(layer, d, layer_at);
   if constexpr (kColor) {
-    V added = hn::Mul(room, hn::Sub(Filled(layer), filled));
+    V added = hn::Mul(room, hn::Sub(layer, before));
     if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
     for (std::size_t c = 0; c < PacketCanvas::kColorChannels; ++c) {
       float* const at = pixel + (PacketCanvas::kCoverageChannels + c) * kPacketReceivers;
@@ -213,9 +243,9 @@ inline PixelRange RangeOf(M active, V x0, V x1, V y0, V y1, int resolution) {
   return range;
 }
 
-// On a face, in its coordinates.
-struct Rectangle {
-  V u_begin, u_end, v_begin, v_end;
+// As RasterCube::Parallelogram, in pixels.
+struct Parallelogram {
+  V x, y, half_x, half_y, shear;
 };
 
 template <bool kColor>
@@ -227,7 +257,15 @@ class Brush {
         resolution_(canvas.geometry->resolution()),
         receivers_(*canvas.lanes, lane) {}
 
-  void DrawPatch(const Patch& patch) {
+  // What follows draws to this face alone.
+  void BeginFace(int face) {
+    face_ = face;
+    pixels_ = canvas_.pixels + std::size_t(face * resolution_ * resolution_) * kPixelFloats;
+    if (!(*canvas_.is_face_used)[std::size_t(face)]) ClearFace();
+    pixels_ += lane_;
+  }
+
+  HWY_INLINE void DrawPatch(const Patch& patch) {
     const Sight sight = See(canvas_, patch, receivers_);
     if (!hn::AllFalse(D(), sight.traced)) Trace(patch, sight);
     const M seen = SeenAsPatch(patch, receivers_, sight);
@@ -237,24 +275,17 @@ class Brush {
  private:
   static constexpr std::size_t kPixelFloats = PacketCanvas::pixelFloats(kColor);
 
-  float* Face(int face) {
-    if (!(*canvas_.is_face_used)[std::size_t(face)]) ClearFace(face);
-    const std::size_t face_pixels = std::size_t(resolution_ * resolution_);
-    return canvas_.pixels + std::size_t(face) * face_pixels * kPixelFloats + lane_;
-  }
-
   // For all lanes.
-  void ClearFace(int face) {
+  void ClearFace() {
     const D d;
-    const std::size_t face_pixels = std::size_t(resolution_ * resolution_);
-    float* at = canvas_.pixels + std::size_t(face) * face_pixels * kPixelFloats;
-    for (std::size_t i = 0; i < face_pixels; ++i) {
+    float* at = pixels_;
+    for (int i = 0; i < resolution_ * resolution_; ++i) {
       for (std::size_t lane = 0; lane < kPixelFloats; lane += kStep) {
         hn::Store(Splat(lane < kPacketReceivers ? 1.f : 0.f), d, at + lane);
       }
       at += kPixelFloats;
     }
-    (*canvas_.is_face_used)[std::size_t(face)] = true;
+    (*canvas_.is_face_used)[std::size_t(face_)] = true;
   }
 
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance) const {
@@ -262,136 +293,94 @@ class Brush {
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
     cover.depth_end = hn::Add(distance, reach);
-    cover.is_all_lit = patch.kind != PatchKind::kDarkBack;
+    cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
+    cover.overlap = patch.overlap;
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
     return cover;
   }
 
-  // As RasterCube::splatRectangle.
-  void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
-    const D d;
-    const V zero = hn::Zero(d);
+  // As RasterCube::splat, onto face_.
+  HWY_INLINE void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
+    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(sight.offset, face_ / 2));
     const V inverse = InverseSqrt(sight.distance_sq);
-    const V3 direction = {hn::Mul(sight.offset.x, inverse), hn::Mul(sight.offset.y, inverse),
-                          hn::Mul(sight.offset.z, inverse)};
-    V area = Splat(patch.area);
-    if (patch.kind != PatchKind::kRound) {
-      area = hn::Mul(area, hn::Abs(hn::Mul(sight.facing, inverse)));
-    }
-    area = hn::Min(area, Splat(patch.most_area));
-    const V solid_angle = hn::Mul(area, hn::Mul(inverse, inverse));
-    seen = hn::And(seen, hn::Gt(solid_angle, zero));
-    if (hn::AllFalse(d, seen)) return;
-    const Cover cover = MakeCover(patch, sight, hn::Mul(sight.distance_sq, inverse));
+    const V distance = hn::Mul(sight.distance_sq, inverse);
+    seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kLeastAxis), distance)));
+    if (hn::AllFalse(D(), seen)) return;
 
-    // Lanes share a face but where the direction is close to an edge
-    const V3 size = {hn::Abs(direction.x), hn::Abs(direction.y), hn::Abs(direction.z)};
-    const M x_over_y = hn::Ge(size.x, size.y);
-    const M on_z = hn::Gt(size.z, hn::Max(size.x, size.y));
-    const std::array<M, 3> on_axis = {hn::AndNot(on_z, x_over_y),
-                                      hn::AndNot(hn::Or(on_z, x_over_y), seen), on_z};
-    for (int axis = 0; axis < 3; ++axis) {
-      const M on = hn::And(seen, on_axis[std::size_t(axis)]);
-      if (hn::AllFalse(d, on)) continue;
-      const M negative = hn::Lt(Axis(direction, axis), zero);
-      const M on_front = hn::AndNot(negative, on), on_back = hn::And(negative, on);
-      if (!hn::AllFalse(d, on_front)) {
-        SplatOnFace(axis, 1, direction, patch.normal, solid_angle, on_front, cover);
-      }
-      if (!hn::AllFalse(d, on_back)) {
-        SplatOnFace(axis, -1, direction, patch.normal, solid_angle, on_back, cover);
-      }
-    }
+    // The visible area, times the distance
+    const V area = hn::Min(hn::MulAdd(Splat(patch.disk_area), hn::Abs(sight.facing),
+                                      hn::Mul(Splat(patch.round_area), distance)),
+                           hn::Mul(Splat(patch.most_area), distance));
+    // Numbers of lanes that see nothing must be numbers, too
+    const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
+    CoverParallelogram(OnFace(patch, sight, hn::IfThenElseZero(seen, area), inverse_w), seen,
+                       MakeCover(patch, sight, distance));
   }
 
-  void SplatOnFace(int axis, float sign, const V3& direction, const glm::vec3& normal,
-                   V solid_angle, M seen, const Cover& cover) {
-    const D d;
-    const V one = Splat(1);
-    const int u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-    const V inverse = Reciprocal(hn::Mul(Splat(sign), Axis(direction, axis)));
-    const V u = hn::Mul(Axis(direction, u_axis), inverse);
-    const V v = hn::Mul(Axis(direction, v_axis), inverse);
+  // As RasterCube::onFace; `area` is the visible area times the distance.
+  HWY_INLINE Parallelogram OnFace(const Patch& patch, const Sight& sight, V area, V inverse) const {
+    const V one = Splat(1), least = Splat(kLeastSpread);
+    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    const V u = hn::Mul(Axis(sight.offset, u_axis), inverse);
+    const V v = hn::Mul(Axis(sight.offset, v_axis), inverse);
+    const float n = face_ % 2 == 0 ? patch.normal[axis] : -patch.normal[axis];
+    const V n_axis = Splat(n);
+    const V g_u = hn::NegMulAdd(u, n_axis, Splat(patch.normal[u_axis]));
+    const V g_v = hn::NegMulAdd(v, n_axis, Splat(patch.normal[v_axis]));
 
-    // The sides are in the ratio of the extents of a disk with this normal
-    const V n_axis = Splat(sign * normal[axis]), least = Splat(kLeastExtentSq);
-    const V g_u = hn::NegMulAdd(u, n_axis, Splat(normal[u_axis]));
-    const V g_v = hn::NegMulAdd(v, n_axis, Splat(normal[v_axis]));
-    const V extent_u = hn::Max(least, hn::NegMulAdd(g_u, g_u, hn::MulAdd(u, u, one)));
-    const V extent_v = hn::Max(least, hn::NegMulAdd(g_v, g_v, hn::MulAdd(v, v, one)));
-    const V ratio = hn::Mul(extent_u, InverseSqrt(hn::Mul(extent_u, extent_v)));
+    // The spread of a disk, and what is left of a row's when it is sheared
+    const V a = hn::Max(least, hn::NegMulAdd(g_u, g_u, hn::MulAdd(u, u, one)));
+    const V c = hn::Max(least, hn::NegMulAdd(g_v, g_v, hn::MulAdd(v, v, one)));
+    const V b = hn::NegMulAdd(g_u, g_v, hn::Mul(u, v));
+    const V inverse_c = Reciprocal(c);
+    const V shear = hn::Mul(b, inverse_c);
+    const V row_a = hn::Max(hn::Mul(least, a), hn::NegMulAdd(b, shear, a));
+    const V ratio_sq = hn::Mul(row_a, inverse_c);
+    const V ratio = hn::Mul(ratio_sq, InverseSqrt(ratio_sq));
+
+    // Area on the face: du dv = area / distance^2 * (distance / w)^3, and more for large ones
+    const V inverse_sq = hn::Mul(inverse, inverse);
+    const V extent = hn::Min(Splat(kMostExtent), hn::Mul(Splat(patch.area), inverse_sq));
+    const V bulge = hn::MulAdd(extent, Splat(0.5f * (1 - n * n)), one);
     const V half_area =
-        hn::Mul(hn::Mul(Splat(0.25f), solid_angle), hn::Mul(inverse, hn::Mul(inverse, inverse)));
-    const V half_u_sq = hn::Mul(half_area, ratio);
+        hn::Mul(hn::Mul(Splat(0.25f), area), hn::Mul(hn::Mul(inverse, inverse_sq), bulge));
+    const V half_u_sq = hn::Max(hn::Mul(half_area, ratio), Splat(1e-30f));
     const V inverse_half_u = InverseSqrt(half_u_sq);
-    const V half_u = hn::Mul(half_u_sq, inverse_half_u);
-    const V half_v = hn::Mul(half_area, inverse_half_u);
-    const Rectangle on_face = {hn::Sub(u, half_u), hn::Add(u, half_u), hn::Sub(v, half_v),
-                               hn::Add(v, half_v)};
-    CoverRectangle(2 * axis + (sign < 0 ? 1 : 0), on_face, seen, cover);
-
-    const V farthest = hn::Max(hn::Max(on_face.u_end, hn::Neg(on_face.u_begin)),
-                               hn::Max(on_face.v_end, hn::Neg(on_face.v_begin)));
-    const M spills = hn::And(seen, hn::Gt(farthest, one));
-    if (!hn::AllFalse(d, spills)) SpillOver(axis, sign, on_face, spills, cover);
+    const V shift = hn::Mul(extent, Splat(1.f / 3));
+    const V scale = Splat(0.5f * float(resolution_));
+    const V middle_u = hn::MulAdd(shift, hn::MulAdd(n_axis, g_u, u), u);
+    const V middle_v = hn::MulAdd(shift, hn::MulAdd(n_axis, g_v, v), v);
+    return {hn::MulAdd(middle_u, scale, scale), hn::MulAdd(middle_v, scale, scale),
+            hn::Mul(hn::Mul(half_u_sq, inverse_half_u), scale),
+            hn::Mul(hn::Mul(half_area, inverse_half_u), scale), shear};
   }
 
-  // To the neighbours of a face.
-  void SpillOver(int axis, float sign, const Rectangle& on_face, M seen, const Cover& cover) {
+  // Covers pixels by the part of them that lies in the shape, row by row.
+  HWY_INLINE void CoverParallelogram(const Parallelogram& shape, M seen, const Cover& cover) {
     const D d;
-    const V one = Splat(1);
-    const int u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-    for (const int side : {0, 1}) {
-      const V v_far = side == 0 ? on_face.v_end : hn::Neg(on_face.v_begin);
-      const M over_v = hn::And(seen, hn::Gt(v_far, one));
-      if (!hn::AllFalse(d, over_v)) {
-        const V depth = Reciprocal(v_far), shrink = Shrink(v_far);
-        CoverRectangle(2 * v_axis + side,
-                       {sign > 0 ? depth : Splat(-1), sign > 0 ? one : hn::Neg(depth),
-                        hn::Mul(on_face.u_begin, shrink), hn::Mul(on_face.u_end, shrink)},
-                       over_v, cover);
-      }
-      const V u_far = side == 0 ? on_face.u_end : hn::Neg(on_face.u_begin);
-      const M over_u = hn::And(seen, hn::Gt(u_far, one));
-      if (!hn::AllFalse(d, over_u)) {
-        const V depth = Reciprocal(u_far), shrink = Shrink(u_far);
-        CoverRectangle(2 * u_axis + side,
-                       {hn::Mul(on_face.v_begin, shrink), hn::Mul(on_face.v_end, shrink),
-                        sign > 0 ? depth : Splat(-1), sign > 0 ? one : hn::Neg(depth)},
-                       over_u, cover);
-      }
-    }
-  }
-  static V Shrink(V far) { return hn::Mul(Splat(2), Reciprocal(hn::Add(Splat(1), far))); }
-
-  // Covers the pixels of a face by the part of them that lies in the rectangle.
-  void CoverRectangle(int face, const Rectangle& rectangle, M seen, const Cover& cover) {
-    const D d;
-    const V zero = hn::Zero(d);
-    const V size = Splat(float(resolution_)), scale = Splat(0.5f * float(resolution_));
-    const V x0 = hn::Max(zero, hn::MulAdd(rectangle.u_begin, scale, scale));
-    const V x1 = hn::Min(size, hn::MulAdd(rectangle.u_end, scale, scale));
-    const V y0 = hn::Max(zero, hn::MulAdd(rectangle.v_begin, scale, scale));
-    const V y1 = hn::Min(size, hn::MulAdd(rectangle.v_end, scale, scale));
+    const V zero = hn::Zero(d), size = Splat(float(resolution_));
+    const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, shape.half_x);
+    const V x0 = hn::Max(zero, hn::Sub(shape.x, reach));
+    const V x1 = hn::Min(size, hn::Add(shape.x, reach));
+    const V y0 = hn::Max(zero, hn::Sub(shape.y, shape.half_y));
+    const V y1 = hn::Min(size, hn::Add(shape.y, shape.half_y));
     seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)));
     if (hn::AllFalse(d, seen)) return;
-    CoverPixels(face, seen, x0, hn::IfThenElseZero(seen, x1), y0, y1, cover);
-  }
-
-  // Lanes outside of `seen` have x1 = 0, and with it no width.
-  void CoverPixels(int face, M seen, V x0, V x1, V y0, V y1, const Cover& cover) {
-    const V zero = hn::Zero(D());
     const PixelRange range = RangeOf(seen, x0, x1, y0, y1, resolution_);
     if (range.isEmpty()) return;
-    float* const pixels = Face(face);
+
+    const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
     for (int row = range.row_begin; row < range.row_end; ++row) {
-      const V height = hn::Max(
-          zero, hn::Sub(hn::Min(y1, Splat(float(row + 1))), hn::Max(y0, Splat(float(row)))));
-      float* pixel = pixels + std::size_t(row * resolution_ + range.column_begin) * kPixelFloats;
+      const V bottom = hn::Max(y0, Splat(float(row))), top = hn::Min(y1, Splat(float(row + 1)));
+      const V height = hn::Max(zero, hn::Sub(top, bottom));
+      const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
+      const V x = hn::NegMulAdd(shape.shear, along, shape.x);
+      const V left = hn::Sub(x, half_x), right = hn::Add(x, half_x);
+      float* pixel = pixels_ + std::size_t(row * resolution_ + range.column_begin) * kPixelFloats;
       for (int column = range.column_begin; column < range.column_end; ++column) {
-        const V width = hn::Max(zero, hn::Sub(hn::Min(x1, Splat(float(column + 1))),
-                                              hn::Max(x0, Splat(float(column)))));
+        const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
+                                              hn::Max(left, Splat(float(column)))));
         CoverPixel<kColor>(pixel, hn::Mul(width, height), cover);
         pixel += kPixelFloats;
       }
@@ -406,24 +395,21 @@ class Brush {
     Sight from_ray = sight;
     from_ray.facing = Dot(centre, patch.normal);
     const Cover cover = MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq));
-    const V power = hn::Sub(Dot(centre, centre), Splat(patch.radius * patch.radius));
-    const bool is_sphere = patch.kind == PatchKind::kRound;
+    const V centre_sq = Dot(centre, centre);
+    const bool is_sphere = patch.isRound();
     // Half the sides of the box around the disk
-    const glm::vec3 normal = patch.normal;
+    const glm::vec3& normal = patch.normal;
     const glm::vec3 half =
         patch.radius *
         (is_sphere ? glm::vec3(1) : glm::sqrt(glm::max(glm::vec3(0), 1.f - normal * normal)));
-    for (int face = 0; face < RasterGeometry::kFaces; ++face) {
-      TraceOnFace(face, centre, half, sight.traced, is_sphere, normal, from_ray.facing, power,
-                  cover);
-    }
+    TraceBox(patch, centre, half, sight.traced, from_ray.facing, centre_sq, cover);
   }
 
-  void TraceOnFace(int face, const V3& centre, const glm::vec3& half, M traced, bool is_sphere,
-                   const glm::vec3& normal, V c_n, V power, const Cover& cover) {
+  void TraceBox(const Patch& patch, const V3& centre, const glm::vec3& half, M traced, V c_n,
+                V centre_sq, const Cover& cover) {
     const D d;
-    const int axis = face / 2;
-    const V w = hn::Mul(Splat(face % 2 == 0 ? 1.f : -1.f), Axis(centre, axis));
+    const int axis = face_ / 2;
+    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(centre, axis));
     const V w_far = hn::Add(w, Splat(half[axis]));
     traced = hn::And(traced, hn::Gt(w_far, hn::Zero(d)));
     if (hn::AllFalse(d, traced)) return;
@@ -438,16 +424,16 @@ class Brush {
     const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_);
     if (range.isEmpty()) return;
 
-    float* const pixels = Face(face);
-    const std::size_t face_first = std::size_t(face * resolution_ * resolution_);
+    const std::size_t face_first = std::size_t(face_ * resolution_ * resolution_);
     for (int row = range.row_begin; row < range.row_end; ++row) {
       for (int column = range.column_begin; column < range.column_end; ++column) {
         const std::size_t in_face = std::size_t(row * resolution_ + column);
         const glm::vec3& ray = canvas_.geometry->pixels()[face_first + in_face].direction;
-        const M hit = hn::And(traced, IsHit(ray, centre, is_sphere, normal, c_n, power));
-        if (hn::AllFalse(d, hit)) continue;
-        CoverPixel<kColor>(pixels + in_face * kPixelFloats, hn::IfThenElseZero(hit, Splat(1)),
-                           cover);
+        const V amount = hn::IfThenElseZero(
+            traced, patch.isRound() ? SphereAmount(patch, ray, centre, centre_sq)
+                                    : DiskAmount(patch, ray, centre, c_n, centre_sq));
+        if (hn::AllFalse(d, hn::Gt(amount, hn::Zero(d)))) continue;
+        CoverPixel<kColor>(pixels_ + in_face * kPixelFloats, amount, cover);
       }
     }
   }
@@ -465,22 +451,32 @@ class Brush {
     end = hn::Min(size, hn::Max(zero, hn::Add(hn::MulAdd(slope_high, scale, scale), spare)));
   }
 
-  static M IsHit(const glm::vec3& ray, const V3& centre, bool is_sphere, const glm::vec3& normal,
-                 V c_n, V power) {
-    const V zero = hn::Zero(D());
+  static V SphereAmount(const Patch& patch, const glm::vec3& ray, const V3& centre, V centre_sq) {
     const V along = Dot(centre, ray);
-    if (is_sphere) return hn::And(hn::Gt(along, zero), hn::Ge(hn::Mul(along, along), power));
-    const float d_n = glm::dot(ray, normal);
-    const V n = Splat(d_n);
-    const V inside = hn::MulAdd(hn::Mul(power, n), n,
-                                hn::Mul(c_n, hn::NegMulAdd(hn::Mul(Splat(2), n), along, c_n)));
-    return hn::And(hn::Gt(hn::Mul(c_n, n), zero), hn::Le(inside, zero));
+    const V power = hn::Sub(centre_sq, Splat(patch.radius * patch.radius));
+    const M hit = hn::And(hn::Gt(along, hn::Zero(D())), hn::Ge(hn::Mul(along, along), power));
+    return hn::IfThenElseZero(hit, Splat(1));
+  }
+
+  // How much of the ray's pixel the soft disk covers; zero or less where the ray misses it.
+  static V DiskAmount(const Patch& patch, const glm::vec3& ray, const V3& centre, V c_n,
+                      V centre_sq) {
+    const float d_n = glm::dot(ray, patch.normal);
+    const V t = hn::Mul(c_n, Splat(1 / (d_n != 0 ? d_n : 1e-20f)));
+    const V along = Dot(centre, ray);
+    const V miss_sq = hn::MulAdd(t, hn::NegMulAdd(Splat(2), along, t), centre_sq);
+    const V part_sq = hn::Mul(miss_sq, Splat(1 / (patch.radius * patch.radius)));
+    const V peak = Splat(patch.soft_peak);
+    const V amount = hn::Min(Splat(1), hn::NegMulAdd(peak, part_sq, peak));
+    return hn::IfThenElseZero(hn::Gt(t, hn::Zero(D())), hn::Max(amount, hn::Zero(D())));
   }
 
   const PacketCanvas& canvas_;
   const std::size_t lane_;
   const int resolution_;
   const Receivers receivers_;
+  int face_ = 0;
+  float* pixels_ = nullptr;  // of the face, from the first of our lanes
 };
 
 template <bool kColor>
@@ -488,7 +484,14 @@ void DrawAll(const PacketCanvas& canvas, const Patch* patches,
              std::span<const std::uint64_t> order) {
   for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
     Brush<kColor> brush(canvas, lane);
-    for (const std::uint64_t key : order) brush.DrawPatch(patches[std::uint32_t(key)]);
+    int face = -1;
+    for (const std::uint64_t key : order) {
+      if (draw_order::face(key) != face) {
+        face = draw_order::face(key);
+        brush.BeginFace(face);
+      }
+      brush.DrawPatch(patches[draw_order::index(key)]);
+    }
   }
 }
 
@@ -496,38 +499,113 @@ void Draw(const PacketCanvas& canvas, const Patch* patches, std::span<const std:
   canvas.has_color ? DrawAll<true>(canvas, patches, order) : DrawAll<false>(canvas, patches, order);
 }
 
-// As ReceiverRaster::integrate.
-void Integrate(const PacketCanvas& canvas, std::span<GatherResult> results) {
+void FinishFarField(const PacketCanvas& canvas) {
   const D d;
-  const std::span<const RasterGeometry::Pixel> pixels = canvas.geometry->pixels();
-  const std::size_t face_pixels = pixels.size() / RasterGeometry::kFaces;
-  const std::size_t pixel_floats = PacketCanvas::pixelFloats(canvas.has_color);
   const V one = Splat(1);
+  const std::size_t pixel_count = canvas.geometry->pixels().size();
+  const std::size_t pixel_floats = PacketCanvas::pixelFloats(canvas.has_color);
+  for (std::size_t i = 0; i < pixel_count; ++i) {
+    if (!(*canvas.is_face_used)[i * RasterGeometry::kFaces / pixel_count]) continue;
+    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+      float* const pixel = canvas.pixels + i * pixel_floats + lane;
+      const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
+      const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
+      hn::Store(total, d, pixel);
+      if (!canvas.has_color) continue;
+      const V inverse = hn::Div(one, hn::Max(total, Splat(1e-20f)));
+      for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats; c += kPacketReceivers) {
+        hn::Store(hn::Mul(hn::Load(d, pixel + c), inverse), d, pixel + c);
+      }
+    }
+  }
+}
+
+// Sums over the pixels for some of the receivers.
+class Integral {
+ public:
+  Integral(const PacketCanvas& canvas, const SharedFarField* far, std::size_t lane)
+      : canvas_(canvas), far_(far), lane_(lane), receivers_(*canvas.lanes, lane) {
+    weight_sum_ = covered_ = red_ = green_ = blue_ = hn::Zero(D());
+  }
+
+  void Add(std::size_t face, std::size_t first, std::size_t end) {
+    const bool has_near = (*canvas_.is_face_used)[face];
+    const bool has_far = far_ != nullptr && (*far_->canvas->is_face_used)[face];
+    const V spherical = hn::IfThenElseZero(receivers_.spherical, Splat(1));
+    for (std::size_t i = first; i < end; ++i) {
+      const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
+      const V cosine = hn::Max(spherical, Dot(receivers_.normal, pixel.direction));
+      const V weight = hn::Mul(cosine, Splat(pixel.solid_angle));
+      weight_sum_ = hn::Add(weight_sum_, weight);
+      if (has_near || has_far) AddPixel(i, weight, has_near, has_far);
+    }
+  }
+
+  void Store(std::array<std::array<float, kPacketReceivers>, 4>& out) const {
+    const D d;
+    const V inverse = hn::Div(Splat(1), weight_sum_);
+    hn::Store(hn::Mul(covered_, inverse), d, out[0].data() + lane_);
+    hn::Store(hn::Mul(red_, inverse), d, out[1].data() + lane_);
+    hn::Store(hn::Mul(green_, inverse), d, out[2].data() + lane_);
+    hn::Store(hn::Mul(blue_, inverse), d, out[3].data() + lane_);
+  }
+
+ private:
+  void AddPixel(std::size_t i, V weight, bool has_near, bool has_far) {
+    const D d;
+    const V zero = hn::Zero(d), one = Splat(1);
+    const std::size_t pixel_floats = PacketCanvas::pixelFloats(canvas_.has_color);
+    V room = one, layer = zero, end = zero;
+    if (has_near) {
+      const float* const near = canvas_.pixels + i * pixel_floats + lane_;
+      room = hn::Load(d, near);
+      layer = hn::Load(d, near + kPacketReceivers);
+      end = hn::Load(d, near + 2 * kPacketReceivers);
+      if (canvas_.has_color) {
+        red_ = hn::MulAdd(weight, hn::Load(d, near + 3 * kPacketReceivers), red_);
+        green_ = hn::MulAdd(weight, hn::Load(d, near + 4 * kPacketReceivers), green_);
+        blue_ = hn::MulAdd(weight, hn::Load(d, near + 5 * kPacketReceivers), blue_);
+      }
+    }
+    // The far field comes last, as one contribution: a surface that reaches it goes on there
+    const float* far = nullptr;
+    if (has_far) far = far_->canvas->pixels + i * pixel_floats + far_->lane;
+    if (has_far && *far > 0) {
+      const V amount = Splat(*far);
+      const M is_new = hn::Gt(Splat(far_->distance), end);
+      room = hn::IfThenElse(is_new, hn::NegMulAdd(room, layer, room), room);
+      layer = hn::IfThenZeroElse(is_new, layer);
+      const V after = hn::Min(hn::Add(layer, amount), one);
+      if (canvas_.has_color) {
+        const V added = hn::Mul(weight, hn::Mul(room, hn::Sub(after, layer)));
+        red_ = hn::MulAdd(added, Splat(far[3 * kPacketReceivers]), red_);
+        green_ = hn::MulAdd(added, Splat(far[4 * kPacketReceivers]), green_);
+        blue_ = hn::MulAdd(added, Splat(far[5 * kPacketReceivers]), blue_);
+      }
+      layer = after;
+    }
+    const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
+    covered_ = hn::MulAdd(weight, total, covered_);
+  }
+
+  const PacketCanvas& canvas_;
+  const SharedFarField* const far_;
+  const std::size_t lane_;
+  const Receivers receivers_;
+  V weight_sum_, covered_, red_, green_, blue_;
+};
+
+// As ReceiverRaster::integrate.
+void Integrate(const PacketCanvas& canvas, const SharedFarField* far,
+               std::span<GatherResult> results) {
+  const std::size_t face_pixels = canvas.geometry->pixels().size() / RasterGeometry::kFaces;
   alignas(64) std::array<std::array<float, kPacketReceivers>, 4> out;
   for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-    const Receivers receivers(*canvas.lanes, lane);
-    const V spherical = hn::IfThenElseZero(receivers.spherical, one);
-    V weight_sum = hn::Zero(d), covered = weight_sum;
-    V red = weight_sum, green = weight_sum, blue = weight_sum;
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const V cosine = hn::Max(spherical, Dot(receivers.normal, pixels[i].direction));
-      const V weight = hn::Mul(cosine, Splat(pixels[i].solid_angle));
-      weight_sum = hn::Add(weight_sum, weight);
-      if (!(*canvas.is_face_used)[i / face_pixels]) continue;
-      const float* const pixel = canvas.pixels + i * pixel_floats + lane;
-      const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
-      const V total = hn::Sub(one, hn::NegMulAdd(room, Filled(layer), room));
-      covered = hn::MulAdd(weight, total, covered);
-      if (!canvas.has_color) continue;
-      red = hn::MulAdd(weight, hn::Load(d, pixel + 3 * kPacketReceivers), red);
-      green = hn::MulAdd(weight, hn::Load(d, pixel + 4 * kPacketReceivers), green);
-      blue = hn::MulAdd(weight, hn::Load(d, pixel + 5 * kPacketReceivers), blue);
+    Integral integral(canvas, far, lane);
+    for (std::size_t face = 0; face < RasterGeometry::kFaces; ++face) {
+      integral.Add(face, face * face_pixels, (face + 1) * face_pixels);
     }
-    const V inverse = hn::Div(one, weight_sum);
-    hn::Store(hn::Mul(covered, inverse), d, out[0].data() + lane);
-    hn::Store(hn::Mul(red, inverse), d, out[1].data() + lane);
-    hn::Store(hn::Mul(green, inverse), d, out[2].data() + lane);
-    hn::Store(hn::Mul(blue, inverse), d, out[3].data() + lane);
+    integral.Store(out);
   }
   for (std::size_t i = 0; i < results.size(); ++i) {
     results[i] = {out[0][i], {out[1][i], out[2][i], out[3][i]}};

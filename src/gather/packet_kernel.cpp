@@ -14,8 +14,12 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 
 PacketKernel Kernel() {
-  return {
-      .name = hwy::TargetName(HWY_TARGET), .isSeen = IsSeen, .draw = Draw, .integrate = Integrate};
+  return {.name = hwy::TargetName(HWY_TARGET),
+          .isSeen = IsSeen,
+          .seeRoughNode = SeeRoughNode,
+          .draw = Draw,
+          .finishFarField = FinishFarField,
+          .integrate = Integrate};
 }
 
 }  // namespace HWY_NAMESPACE

@@ -4,39 +4,43 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 
 #include "gather/raster_cube.h"
 #include "gather/receiver.h"
+#include "octree/node.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 
-// What a patch shows to whom.
-enum class PatchKind : std::uint32_t {
-  kRound,     // the same area to everyone, and light: rough nodes, spheres
-  kFront,     // a disk that is seen from its front
-  kTwoSided,  // a disk that is seen and sends light on both sides
-  kDarkBack,  // a disk that is seen on both sides and sends light from its front
-};
-
-// A node or surfel of the cut, ready for the lanes. 64 bytes.
+// A node or surfel of the cut, ready for the lanes.
 struct Patch {
   glm::vec3 position{0};
   float radius = 0;
   glm::vec3 normal{0};  // of a node: times its flatness; zero: looks round
-  float area = 0;       // seen head-on; of kRound: seen at all
+  float area = 0;       // all of it, whatever shows
+  // The area that it shows: disk_area times the cosine, plus round_area, which everyone sees
+  float disk_area = 0, round_area = 0;
+  float most_area = 0;  // and no more than this
+  float overlap = 0;    // RasterCube::Patch
   glm::vec3 radiosity{0};
-  float most_area = 0;  // that it shows at any angle
-  PatchKind kind = PatchKind::kRound;
+  // It is seen where offset . normal, from the receiver, is below this: kFrontOnly, kBothSides, or
+  // kDarkBack, when it is seen from both sides and sends light from its front
+  float facing_limit = 0;
   float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
-  std::array<std::uint32_t, 2> reserved{};
+  float soft_peak = 0;      // of the ray traced disk; see softDiskPeak
+
+  static constexpr float kFrontOnly = 0;
+  static constexpr float kBothSides = std::numeric_limits<float>::infinity();
+  static constexpr float kDarkBack = std::numeric_limits<float>::max();
+  bool isRound() const { return disk_area == 0; }
 };
-static_assert(sizeof(Patch) == 64);
 
 // The receivers as columns, one per lane; lanes without a receiver repeat the last one.
 struct alignas(64) PacketLanes {
@@ -64,14 +68,47 @@ struct PacketCanvas {
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
 };
 
+// The far field of a packet: a lane of a canvas that was drawn for many packets and finished.
+struct SharedFarField {
+  const PacketCanvas* canvas;
+  std::size_t lane;
+  float distance;  // that it is away, at least
+};
+
+struct RoughSight {
+  float area, opposite_area;
+  glm::vec3 power;
+};
+
+// An entry of the order: one patch on one face of the cube, [ face : 3 | distance : 29 | index of
+// the patch : 32 ]. Faces are drawn one after the other, because the pixels of one face of 16
+// receivers fill the fastest cache. `distance` is the upper part of the squared distance's bits,
+// which sort like the distance.
+namespace draw_order {
+inline std::uint64_t key(int face, float distance_sq, std::uint32_t index) {
+  const std::uint64_t distance = std::bit_cast<std::uint32_t>(distance_sq) >> 2;
+  return static_cast<std::uint64_t>(face) << 61 | distance << 32 | index;
+}
+inline int face(std::uint64_t key) { return static_cast<int>(key >> 61); }
+inline std::uint32_t index(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
+}  // namespace draw_order
+
 struct PacketKernel {
   const char* name;  // of the instruction set
   // Whether any receiver sees something of the patch, which stands for a surfel.
   bool (*isSeen)(const PacketCanvas& canvas, const Patch& patch);
-  // Draws patches in this order: [ ignored : 32 | index : 32 ].
+  // What the receivers see of a rough node in unit direction `direction` from them: the areas that
+  // face them and turn away, and of the former the power. As projectedSum.
+  void (*seeRoughNode)(const Node& node, const glm::vec3& direction, RoughSight& sight);
+  // Draws patches in this order, all of one face after those of another.
   void (*draw)(const PacketCanvas& canvas, const Patch* patches,
                std::span<const std::uint64_t> order);
-  void (*integrate)(const PacketCanvas& canvas, std::span<GatherResult> results);
+  // Makes a drawn canvas a far field: `room` becomes the coverage of a pixel, and the colors are
+  // divided by it.
+  void (*finishFarField)(const PacketCanvas& canvas);
+  // `far`: what is behind everything drawn, or null.
+  void (*integrate)(const PacketCanvas& canvas, const SharedFarField* far,
+                    std::span<GatherResult> results);
 };
 
 // For the fastest instruction set of this machine.

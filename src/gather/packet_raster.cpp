@@ -2,17 +2,24 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <new>
 #include <utility>
 
 #include "core/assert.h"
+#include "gather/coverage_rules.h"
 
 namespace surfeit {
 namespace {
 
-// Sorts by the upper 32 bits of keys that are below 2^63, stable: a radix sort of 11 bits a pass.
+// How far from its middle a patch may be drawn, in halves of its side: at the edge of a face, where
+// it matters, everything shows larger by the root of 2, and sides need not be equal.
+constexpr float kReach = 1.8f;
+constexpr float kDiagonal = 1.415f;
+
+// Sorts by the upper 32 bits of keys, stable: a radix sort of 11 bits a pass.
 // `order` is replaced, `scratch` gets its size.
 void sortByUpperHalf(std::vector<std::uint64_t>& order, std::vector<std::uint64_t>& scratch) {
   constexpr int kBits = 11, kPasses = 3;
@@ -71,58 +78,75 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
   order_.clear();
 }
 
-// Distances are positive, and positive floats sort like their bits.
-void PacketRaster::addPatch(const Patch& patch, float distance_sq) {
+// A patch goes to every face that some receiver may see some of it on.
+void PacketRaster::addPatch(const Patch& patch) {
   SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
-  order_.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(distance_sq)} << 32 |
-                   patches_.size());
+  const auto index = static_cast<std::uint32_t>(patches_.size());
   patches_.push_back(patch);
+  const glm::vec3 middle = patch.position - view_.centre;
+  const float distance_sq = glm::dot(middle, middle);
+  const glm::vec3 size = glm::abs(middle);
+  const float largest = std::max({size.x, size.y, size.z});
+  const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
+  const float half = patch.near_distance > 0 ? std::max(0.5f * side, patch.radius) : 0.5f * side;
+  const float shift = std::min(patch.area / (2 * largest), largest / 2);
+  const float reach = kReach * half + shift + kDiagonal * view_.radius;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (size[axis] + reach < largest) continue;
+    for (const int back : {0, 1}) {
+      if ((back == 0 ? middle[axis] : -middle[axis]) + reach < 0) continue;
+      order_.push_back(draw_order::key(2 * axis + back, distance_sq, index));
+    }
+  }
 }
 
 void PacketRaster::addNode(const Node& node) {
-  const glm::vec3 to_node = node.position - view_.centre;
   Patch patch;
   patch.position = node.position;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
+  patch.area = node.area;
   patch.most_area = std::min(node.area, kPi * node.radius * node.radius);
+  const bool shows_backs = rules_.sides == GatherSides::kBoth;
   if (node.isFlat()) {
-    patch.kind = rules_.sides == GatherSides::kBoth ? PatchKind::kDarkBack : PatchKind::kFront;
-    patch.area = node.area;
+    patch.disk_area = node.area;
     patch.radiosity = node.radiosity;
+    patch.facing_limit = shows_backs ? Patch::kDarkBack : Patch::kFrontOnly;
   } else {
-    Contribution seen;
-    if (!makeContribution(node, to_node, rules_, seen)) return;
-    patch.kind = PatchKind::kRound;
-    patch.area = seen.solid_angle * seen.distance_sq;
-    patch.radiosity = seen.radiosity;
+    RoughSight seen;
+    kernel_.seeRoughNode(node, glm::normalize(node.position - view_.centre), seen);
+    patch.round_area = shows_backs ? seen.area + seen.opposite_area : seen.area;
+    if (!(patch.round_area > kLeastVisiblePart * node.area)) return;
+    patch.radiosity = seen.power / patch.round_area;
+    patch.overlap = shows_backs ? 0 : overlapOf(seen.area, seen.opposite_area);
+    patch.facing_limit = Patch::kBothSides;
   }
-  addPatch(patch, glm::dot(to_node, to_node));
+  addPatch(patch);
 }
 
-void PacketRaster::addSurfels(std::span<const Surfel> surfels) {
+void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region) {
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& surfel : surfels) {
+    if (!region.holds(surfel.position)) continue;
     Patch patch;
     patch.position = surfel.position;
-    patch.radius = surfel.radius;
+    patch.radius = effectiveRadius(surfel.radius, surfel.area);
     patch.normal = surfel.normal;
     patch.area = patch.most_area = surfel.area;
+    (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
     patch.radiosity = surfel.radiosity;
-    patch.kind = surfel.isSphere()                    ? PatchKind::kRound
-                 : surfel.isTwoSided()                ? PatchKind::kTwoSided
-                 : rules_.sides == GatherSides::kBoth ? PatchKind::kDarkBack
-                                                      : PatchKind::kFront;
+    patch.facing_limit = surfel.isSphere() || surfel.isTwoSided() ? Patch::kBothSides
+                         : rules_.sides == GatherSides::kBoth     ? Patch::kDarkBack
+                                                                  : Patch::kFrontOnly;
+    patch.soft_peak = softDiskPeak(patch.radius, surfel.area);
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =
-        std::max(quality_.near_field_radii * surfel.radius, std::numeric_limits<float>::min());
-    if (!kernel_.isSeen(canvas, patch)) continue;
-    const glm::vec3 to_surfel = surfel.position - view_.centre;
-    addPatch(patch, glm::dot(to_surfel, to_surfel));
+        std::max(quality_.near_field_radii * patch.radius, std::numeric_limits<float>::min());
+    if (kernel_.isSeen(canvas, patch)) addPatch(patch);
   }
 }
 
-PacketCanvas PacketRaster::canvas() {
+PacketCanvas PacketRaster::canvas() const {
   return {.lanes = &lanes_,
           .geometry = &geometry_,
           .has_color = rules_.has_color,
@@ -138,8 +162,17 @@ void PacketRaster::sort() { sortByUpperHalf(order_, order_scratch_); }
 
 void PacketRaster::draw() { kernel_.draw(canvas(), patches_.data(), order_); }
 
-void PacketRaster::integrate(std::span<GatherResult> results) {
-  kernel_.integrate(canvas(), results);
+void PacketRaster::finishFarField() { kernel_.finishFarField(canvas()); }
+
+void PacketRaster::integrate(std::span<GatherResult> results, const PacketRaster* far,
+                             std::size_t far_lane, float far_distance) {
+  if (far == nullptr) {
+    kernel_.integrate(canvas(), nullptr, results);
+    return;
+  }
+  const PacketCanvas far_canvas = far->canvas();
+  const SharedFarField shared = {&far_canvas, far_lane, far_distance};
+  kernel_.integrate(canvas(), &shared, results);
 }
 
 std::size_t PacketRaster::memoryBytes(GatherMode mode, const GatherQuality& quality) {

@@ -42,12 +42,19 @@ class PacketRaster {
   void begin(std::span<const Receiver> receivers, const PacketView& view);
   // Adds a node as a whole. All receivers must lie outside its radius.
   void addNode(const Node& node);
-  // Adds those of the surfels that some receiver may see.
-  void addSurfels(std::span<const Surfel> surfels);
-  // Sorts what was added; then draws it; then integrates, one result per receiver.
+  // Adds those of the surfels that are of the region and that some receiver may see.
+  void addSurfels(std::span<const Surfel> surfels, const CutRegion& region);
+
+  // Sorts what was added, and draws it.
   void sort();
   void draw();
-  void integrate(std::span<GatherResult> results);
+
+  // Makes what was drawn a far field for others: lane i for a packet around receiver i.
+  void finishFarField();
+  // One result per receiver. `far`: the raster whose lane has what is behind, at least
+  // `far_distance` away; or null.
+  void integrate(std::span<GatherResult> results, const PacketRaster* far = nullptr,
+                 std::size_t far_lane = 0, float far_distance = 0);
 
   std::size_t patchCount() const { return patches_.size(); }
 
@@ -55,8 +62,8 @@ class PacketRaster {
   static std::size_t memoryBytes(GatherMode mode, const GatherQuality& quality);
 
  private:
-  void addPatch(const Patch& patch, float distance_sq);
-  PacketCanvas canvas();
+  void addPatch(const Patch& patch);
+  PacketCanvas canvas() const;
 
   const PacketKernel& kernel_;
   GatherQuality quality_;
@@ -64,12 +71,12 @@ class PacketRaster {
   float max_distance_sq_;
   RasterGeometry geometry_;
   hwy::AlignedFreeUniquePtr<float[]> pixels_;
-  std::array<bool, RasterGeometry::kFaces> is_face_used_{};
+  mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;
   PacketView view_;
   std::vector<Patch> patches_;
-  std::vector<std::uint64_t> order_, order_scratch_;  // [ distance_sq as bits : 32 | index : 32 ]
+  std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order
 };
 
 }  // namespace surfeit

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "gather/packet_cluster.h"
 #include "gather/window_record.h"
 #include "octree/paged_octree.h"
 #include "surfeit/gather.h"
@@ -29,7 +30,8 @@ class PagingController {
     std::size_t least_node_frames = 1, least_surfel_frames = 1;
   };
 
-  static constexpr std::uint64_t kLeastRun = 16, kFirstRun = 64, kMostRun = 512;
+  static constexpr std::uint64_t kLeastRun = kClusterReceivers, kFirstRun = kClusterReceivers,
+                                 kMostRun = 1024;
   static constexpr std::uint64_t kMostDepth = 8192;  // receivers
 
   // The octree has reuse distances. Both must outlive the controller.

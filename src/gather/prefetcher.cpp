@@ -49,7 +49,7 @@ void Prefetcher::work() {
       const std::optional<Receiver> receiver =
           queue_.lookAhead(controller_.prefetchReceivers(), kStride);
       bool failed = false;
-      if (receiver) failed = !cut->walk(viewPacket({&*receiver, 1}), reader, IgnoreCut{}).ok();
+      if (receiver) failed = !cut->walk(viewPacket({&*receiver, 1}), {}, reader, IgnoreCut{}).ok();
       if (!receiver) reader.release();
       lock.lock();
       if (failed) return;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <utility>
 
 #include "core/assert.h"
 #include "gather/coverage_rules.h"
@@ -71,10 +70,9 @@ void RasterCube::clear() {
   std::fill(radiosity_.begin(), radiosity_.end(), glm::vec3(0));
 }
 
-// A layer with less room than `amount` ends at exactly 1, for a + (1 - a) is 1 in floats too, and
-// the pixel is exactly 1 then.
-inline void RasterCube::coverPixel(std::size_t pixel, float amount, const DepthRange& depth,
-                                   const glm::vec3& radiosity) {
+// A layer with less room than `amount` ends at exactly 1, and the pixel is exactly 1 then.
+inline void RasterCube::coverPixel(std::size_t pixel, float amount, float overlap,
+                                   const DepthRange& depth, const glm::vec3& radiosity) {
   Coverage& coverage = coverage_[pixel];
   if (coverage.total >= 1) return;
 
@@ -85,98 +83,96 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, const DepthR
   }
   coverage.layer_end = std::max(coverage.layer_end, depth.end);
 
-  // Rectangles do not tile: where a surface fills a pixel their sum scatters around 1, and the
-  // limit at 1 takes from what is above without giving to what is below. kFill gives it back, and
-  // leaves alone what covers little
-  coverage.layer += std::min(amount, 1 - coverage.layer);
-  const float sum = coverage.layer;
-  const float filled = std::min(1.f, sum + kFill * sum * sum * sum);
+  // Patches do not tile: where a surface fills a pixel their sum scatters around 1, and the limit
+  // at 1 takes from what is above without giving to what is below. The slope of s + kFill s^3 in
+  // the middle of what is added gives it back, and leaves alone what covers little; that of s - s^2
+  // / 2 leaves out what hides behind the layer
+  const float middle = std::min(1.f, coverage.layer + 0.5f * amount);
+  const float slope = 1 + middle * (3 * kFill * middle - overlap);
+  coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
   coverage.total =
-      filled >= 1 ? 1 : std::clamp(1 - coverage.room + filled * coverage.room, before, 1.f);
+      coverage.layer >= 1
+          ? 1
+          : std::clamp(1 - coverage.room + coverage.layer * coverage.room, before, 1.f);
   if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
 }
 
-// Covers pixels by the part of them that lies in the rectangle.
-void RasterCube::coverRectangle(int face, const Rectangle& rectangle, const DepthRange& depth,
-                                const glm::vec3& radiosity) {
+// Covers pixels by the part of them that lies in the shape, row by row.
+void RasterCube::coverParallelogram(int face, const Parallelogram& shape, float overlap,
+                                    const DepthRange& depth, const glm::vec3& radiosity) {
   // From face coordinates to pixels
   const int resolution = geometry_->resolution();
   const float size = float(resolution), scale = 0.5f * size;
-  const float x_begin = std::max(0.f, (rectangle.u_begin + 1) * scale);
-  const float x_end = std::min(size, (rectangle.u_end + 1) * scale);
-  const float y_begin = std::max(0.f, (rectangle.v_begin + 1) * scale);
-  const float y_end = std::min(size, (rectangle.v_end + 1) * scale);
-  if (!(x_begin < x_end && y_begin < y_end)) return;
+  const float x_middle = (shape.u + 1) * scale, y_middle = (shape.v + 1) * scale;
+  const float half_x = shape.half_u * scale, half_y = shape.half_v * scale;
+  const float y_begin = std::max(0.f, y_middle - half_y);
+  const float y_end = std::min(size, y_middle + half_y);
+  if (!(y_begin < y_end)) return;
 
-  const int column_last = std::min(resolution - 1, int(x_end));
   const int row_last = std::min(resolution - 1, int(y_end));
   for (int row = int(y_begin); row <= row_last; ++row) {
-    const float height = std::min(y_end, float(row + 1)) - std::max(y_begin, float(row));
+    const float top = std::min(y_end, float(row + 1)), bottom = std::max(y_begin, float(row));
+    const float x = x_middle + shape.shear * (0.5f * (top + bottom) - y_middle);
+    const float x_begin = std::max(0.f, x - half_x), x_end = std::min(size, x + half_x);
+    if (!(bottom < top && x_begin < x_end)) continue;
+    const int column_last = std::min(resolution - 1, int(x_end));
     const std::size_t row_first = std::size_t((face * resolution + row) * resolution);
     for (int column = int(x_begin); column <= column_last; ++column) {
       const float width = std::min(x_end, float(column + 1)) - std::max(x_begin, float(column));
-      coverPixel(row_first + std::size_t(column), width * height, depth, radiosity);
+      coverPixel(row_first + std::size_t(column), width * (top - bottom), overlap, depth,
+                 radiosity);
     }
   }
 }
 
-void RasterCube::splatRectangle(const glm::vec3& direction, const glm::vec3& normal,
-                                float solid_angle, const DepthRange& depth,
-                                const glm::vec3& radiosity) {
-  // The face of the largest component, and the direction's place on it
-  const glm::vec3 magnitude = glm::abs(direction);
-  int axis = magnitude.x >= magnitude.y ? 0 : 1;
-  if (magnitude.z > magnitude[axis]) axis = 2;
+// The shape of a patch on the plane of the face that its direction meets along `axis`; it may lie
+// outside the face.
+//
+// A disk with normal n spreads by I - n n^T, and on the face by the gradients of u and v, which are
+// (e_u - u e_axis) / |d[axis]| and the same with v. With a, b, c the entries of that spread on the
+// face, a row is shifted by b / c for each unit of v and as wide as what is left of a. For a square
+// on a plane of the world, as cells of the octree cut it, that is its exact image to first order,
+// so neighbours tile.
+//
+// The area on the face is du dv = solid angle / |d[axis]|^3 for something small. Distances along
+// the axis vary by area (1 - n[axis]^2) / 12 over a square, and the mean of 1 / w^3 is greater than
+// that of its middle by 6 times that over w^2. For the same reason the middle of the image lies
+// farther out than the image of the middle, by 4 times the covariance of u and w over w.
+RasterCube::Parallelogram RasterCube::onFace(const Patch& patch, int axis) {
+  const glm::vec3 &d = patch.direction, &n = patch.normal;
   const int u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-  const float inverse = 1 / magnitude[axis];
-  const float u = direction[u_axis] * inverse, v = direction[v_axis] * inverse;
+  const float inverse = 1 / std::abs(d[axis]);
+  const float u = d[u_axis] * inverse, v = d[v_axis] * inverse;
+  const float n_axis = d[axis] < 0 ? -n[axis] : n[axis];
+  const float g_u = n[u_axis] - u * n_axis, g_v = n[v_axis] - v * n_axis;
 
-  // Half extents on the face of a unit disk with this normal, times a common factor: the gradient
-  // of u is (e_u - u e_axis) / |d[axis]|, and a disk extends along a gradient g by
-  // sqrt(g.g - (g.n)^2). The floor keeps a disk seen edge-on from becoming a line.
-  const float n_axis = direction[axis] < 0 ? -normal[axis] : normal[axis];
-  const float g_u = normal[u_axis] - u * n_axis, g_v = normal[v_axis] - v * n_axis;
-  const float extent_u_sq = std::max(kLeastExtentSq, 1 + u * u - g_u * g_u);
-  const float extent_v_sq = std::max(kLeastExtentSq, 1 + v * v - g_v * g_v);
+  const float a = std::max(kLeastSpread, 1 + u * u - g_u * g_u);
+  const float c = std::max(kLeastSpread, 1 + v * v - g_v * g_v);
+  const float b = u * v - g_u * g_v;
+  const float shear = b / c;
+  const float row_a = std::max(kLeastSpread * a, a - b * shear);
 
-  // Area on the face: du dv = solid angle / |d[axis]|^3
-  const float half_area = 0.25f * solid_angle * inverse * inverse * inverse;
-  const float half_u_sq = half_area * std::sqrt(extent_u_sq / extent_v_sq);
-  const float half_u = std::sqrt(half_u_sq), half_v = half_area / half_u;
-  const Rectangle on_face = {u - half_u, u + half_u, v - half_v, v + half_v};
-  const int face = 2 * axis + (direction[axis] < 0 ? 1 : 0);
-  coverRectangle(face, on_face, depth, radiosity);
+  const float extent = std::min(kMostExtent, patch.spread * inverse * inverse);
+  const float bulge = 0.5f * extent * (1 - n_axis * n_axis), shift = extent / 3;
+  const float half_area = 0.25f * patch.solid_angle * inverse * inverse * inverse * (1 + bulge);
+  const float half_u = std::sqrt(half_area * std::sqrt(row_a / c));
+  return {u + shift * (u + n_axis * g_u), v + shift * (v + n_axis * g_v), half_u,
+          half_area / half_u, shear};
+}
 
-  // Spill over: the point (u, v) of the face's plane, |v| > 1, is the direction that the face of
-  // v's axis has at 1 / |v| along our axis and u / |v| along u's. The overhang becomes a trapezoid
-  // there; we cover the rectangle through its middle.
-  const float sign = direction[axis] < 0 ? -1.f : 1.f;
-  const auto order = [](float a, float b) { return std::pair(std::min(a, b), std::max(a, b)); };
-  for (const int side : {0, 1}) {
-    const float v_far = side == 0 ? on_face.v_end : -on_face.v_begin;
-    if (v_far > 1) {
-      const auto [begin, end] = order(sign / v_far, sign);
-      const float shrink = 2 / (1 + v_far);
-      coverRectangle(2 * v_axis + side,
-                     {begin, end, on_face.u_begin * shrink, on_face.u_end * shrink}, depth,
-                     radiosity);
-    }
-    const float u_far = side == 0 ? on_face.u_end : -on_face.u_begin;
-    if (u_far > 1) {
-      const auto [begin, end] = order(sign / u_far, sign);
-      const float shrink = 2 / (1 + u_far);
-      coverRectangle(2 * u_axis + side,
-                     {on_face.v_begin * shrink, on_face.v_end * shrink, begin, end}, depth,
-                     radiosity);
-    }
+void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::vec3& radiosity) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(patch.direction[axis]) > kLeastAxis)) continue;
+    const int face = 2 * axis + (patch.direction[axis] < 0 ? 1 : 0);
+    coverParallelogram(face, onFace(patch, axis), patch.overlap, depth, radiosity);
   }
 }
 
-// Asks isHit(direction) for the pixels that may see the sphere around `centre`.
-template <typename IsHit>
+// Asks amountOf(direction) for the pixels that may see the sphere around `centre`.
+template <typename AmountOf>
 void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthRange& depth,
-                             const glm::vec3& radiosity, const IsHit& isHit) {
+                             const glm::vec3& radiosity, const AmountOf& amountOf) {
   const int resolution = geometry_->resolution();
   const float size = float(resolution), scale = 0.5f * size;
   const std::span<const RasterGeometry::Pixel> pixels = geometry_->pixels();
@@ -197,22 +193,24 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthR
       const std::size_t row_first = std::size_t((face * resolution + row) * resolution);
       for (int column = column_begin; column < column_end; ++column) {
         const std::size_t pixel = row_first + std::size_t(column);
-        if (isHit(pixels[pixel].direction)) coverPixel(pixel, 1, depth, radiosity);
+        const float amount = amountOf(pixels[pixel].direction);
+        if (amount > 0) coverPixel(pixel, amount, 0, depth, radiosity);
       }
     }
   }
 }
 
 // The ray t d meets the plane of the disk at t = c.n / d.n, and the disk when |t d - c| <= r.
-// Multiplied by (d.n)^2, so that nothing is divided.
 void RasterCube::traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius,
-                           const DepthRange& depth, const glm::vec3& radiosity) {
-  const float c_n = glm::dot(centre, normal);
-  const float power = glm::dot(centre, centre) - radius * radius;
+                           float peak, const DepthRange& depth, const glm::vec3& radiosity) {
+  const float c_n = glm::dot(centre, normal), c_c = glm::dot(centre, centre);
+  const float inverse_sq = 1 / (radius * radius);
   tracePixels(centre, radius, depth, radiosity, [&](const glm::vec3& d) {
     const float d_n = glm::dot(d, normal);
-    return c_n * d_n > 0 &&
-           c_n * c_n - 2 * c_n * d_n * glm::dot(d, centre) + power * d_n * d_n <= 0;
+    if (!(c_n * d_n > 0)) return 0.f;
+    const float t = c_n / d_n;
+    const float part_sq = (t * (t - 2 * glm::dot(d, centre)) + c_c) * inverse_sq;
+    return std::min(1.f, peak * (1 - part_sq));
   });
 }
 
@@ -222,7 +220,7 @@ void RasterCube::traceSphere(const glm::vec3& centre, float radius, const DepthR
   const float power = glm::dot(centre, centre) - radius * radius;
   tracePixels(centre, radius, depth, radiosity, [&](const glm::vec3& d) {
     const float d_c = glm::dot(d, centre);
-    return d_c > 0 && d_c * d_c >= power;
+    return d_c > 0 && d_c * d_c >= power ? 1.f : 0.f;
   });
 }
 

@@ -69,16 +69,26 @@ class RasterCube {
   // Uncovers every pixel.
   void clear();
 
-  // Covers a rectangle of `solid_angle` around the unit `direction`, aligned with the pixels,
-  // for the mid and the far field (memo 3.4.2). What sticks out of a face spills over to its
-  // neighbours. The sides of the rectangle follow the extents on the face of a disk with
-  // `normal`: unit length for a disk; zero for a sphere, in between for what is partly flat.
-  void splatRectangle(const glm::vec3& direction, const glm::vec3& normal, float solid_angle,
-                      const DepthRange& depth, const glm::vec3& radiosity);
+  // Something of the mid or the far field, as the receiver sees it.
+  struct Patch {
+    glm::vec3 direction;  // unit
+    glm::vec3 normal;     // unit length for a disk, zero for a sphere, in between when partly flat
+    float solid_angle;
+    float spread = 0;  // area / distance^2
+    // How far it hides behind its own layer, 0..1: 0 for a tile beside the others, 1 for what lies
+    // anywhere before or behind them.
+    float overlap = 0;
+  };
+  // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
+  // image of a square with the patch's normal whose sides follow the rows, to first order.
+  void splat(const Patch& patch, const DepthRange& depth, const glm::vec3& radiosity);
 
-  // Covers every pixel whose ray hits the disk, fully: the near field (memo 3.4.1). `centre` is
-  // relative to the origin of the rays. Both sides are hit: facing is the caller's business.
-  void traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius,
+  // Peak of a disk that covers all its pixels fully.
+  static constexpr float kHardDisk = 1e6f;
+  // Covers the pixels whose rays hit the disk: the near field (memo 3.4.1). Coverage falls off from
+  // the middle as peak (1 - (distance / radius)^2), limited to 1. `centre` is relative to the
+  // origin of the rays. Both sides are hit: facing is the caller's business.
+  void traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius, float peak,
                  const DepthRange& depth, const glm::vec3& radiosity);
   // The same with a sphere, which must not contain the origin.
   void traceSphere(const glm::vec3& centre, float radius, const DepthRange& depth,
@@ -100,16 +110,18 @@ class RasterCube {
     float layer = 0;      // of the last layer by itself
     float layer_end = 0;  // where the depth ranges of the last layer end
   };
-  struct Rectangle {  // on a face
-    float u_begin, u_end, v_begin, v_end;
+  // On a face: rows of width 2 half_u around the line u + shear (row - v).
+  struct Parallelogram {
+    float u, v, half_u, half_v, shear;
   };
-  void coverPixel(std::size_t pixel, float amount, const DepthRange& depth,
+  static Parallelogram onFace(const Patch& patch, int axis);
+  void coverPixel(std::size_t pixel, float amount, float overlap, const DepthRange& depth,
                   const glm::vec3& radiosity);
-  void coverRectangle(int face, const Rectangle& rectangle, const DepthRange& depth,
-                      const glm::vec3& radiosity);
-  template <typename IsHit>
+  void coverParallelogram(int face, const Parallelogram& shape, float overlap,
+                          const DepthRange& depth, const glm::vec3& radiosity);
+  template <typename AmountOf>
   void tracePixels(const glm::vec3& centre, float radius, const DepthRange& depth,
-                   const glm::vec3& radiosity, const IsHit& isHit);
+                   const glm::vec3& radiosity, const AmountOf& amountOf);
 
   const RasterGeometry* geometry_;
   std::vector<Coverage> coverage_;

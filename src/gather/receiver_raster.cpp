@@ -40,7 +40,9 @@ void ReceiverRaster::addNode(const Node& node) {
   contributions_.push_back(entry);
 }
 
-void ReceiverRaster::addSurfel(const Surfel& surfel) {
+void ReceiverRaster::addSurfel(const Surfel& stored) {
+  Surfel surfel = stored;
+  surfel.radius = effectiveRadius(surfel.radius, surfel.area);
   const glm::vec3 to_surfel = surfel.position - receiver_.position;
   const float distance_sq = glm::dot(to_surfel, to_surfel);
   if (!(distance_sq <= max_distance_sq_)) return;
@@ -137,8 +139,8 @@ void ReceiverRaster::trace(const Surfel& surfel, const DepthRange& depth) {
     return;
   }
   const bool sends_light = surfel.isTwoSided() || glm::dot(centre, surfel.normal) < 0;
-  cube_.traceDisk(centre, surfel.normal, surfel.radius, depth,
-                  sends_light ? surfel.radiosity : glm::vec3(0));
+  cube_.traceDisk(centre, surfel.normal, surfel.radius, softDiskPeak(surfel.radius, surfel.area),
+                  depth, sends_light ? surfel.radiosity : glm::vec3(0));
 }
 
 GatherResult ReceiverRaster::finish() {
@@ -153,8 +155,8 @@ GatherResult ReceiverRaster::finish() {
     if (entry.near_index >= 0) {
       trace(near_surfels_[std::size_t(entry.near_index)], depth);
     } else {
-      cube_.splatRectangle(patch.direction, patch.normal, patch.solid_angle, depth,
-                           patch.radiosity);
+      cube_.splat({patch.direction, patch.normal, patch.solid_angle, patch.spread, patch.overlap},
+                  depth, patch.radiosity);
     }
   }
   return integrate();

@@ -38,7 +38,7 @@ class ReceiverRaster {
   // Adds a node as a whole: the far field. The receiver must lie outside the node's radius.
   void addNode(const Node& node);
   // Adds a surfel: the mid or the near field, or nothing when it cannot be seen.
-  void addSurfel(const Surfel& surfel);
+  void addSurfel(const Surfel& stored);
 
   // Draws everything added since begin() and integrates.
   GatherResult finish();

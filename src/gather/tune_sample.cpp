@@ -33,13 +33,13 @@ constexpr std::size_t kTrackedPages = 16384;
 constexpr std::uint64_t kStretches = 64;
 // Half of a stretch warms up: the threads' runs follow each other some times in it.
 constexpr std::uint64_t kStretchRuns = 8;
-// Stretches get this part of the sample; the rest are single packets, which must be many to touch
+// Stretches get this part of the sample; the rest are single clusters, which must be many to touch
 // most of the pages that the whole gather touches.
 constexpr std::uint64_t kStretchPart = 5;
 // Receivers gathered at for their time: so many, or this part of the sample if that is more.
 constexpr std::uint64_t kLeastTimed = 4096, kTimedPart = 16;
-// A sample has some packets of either kind.
-constexpr std::uint64_t kLeastSample = 4 * kStretchPart * kPacketReceivers;
+// A sample has some clusters of either kind.
+constexpr std::uint64_t kLeastSample = 4 * kStretchPart * kClusterReceivers;
 
 using Clock = std::chrono::steady_clock;
 
@@ -152,7 +152,7 @@ Result<TuneSample> Sampling::run(ReceiverSorter& sorter, std::uint64_t receivers
     const std::uint64_t in_stretches = sampled / kStretchPart;
     const std::uint64_t length = stretchLength(in_stretches, threads_);
     Pieces stretches(receivers, in_stretches / length, length);
-    Pieces spread(receivers, (sampled - in_stretches) / kPacketReceivers, kPacketReceivers);
+    Pieces spread(receivers, (sampled - in_stretches) / kClusterReceivers, kClusterReceivers);
     std::vector<SortedReceiver> block(kQueueReceivers);
     for (std::size_t count = 1; count > 0;) {
       SURFEIT_ASSIGN_OR_RETURN(count, sorter.next(block));

@@ -2,6 +2,7 @@
 // the stored form.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 
@@ -17,6 +18,12 @@ enum NodeFlags : std::uint8_t {
   kNodeFlat = 1u << 0,
 };
 
+// What coefficients a rough node has: of its projected area, and of its projected power in red,
+// green and blue (memo 3.2).
+inline constexpr int kNodeShKinds = 4;
+inline constexpr int kAreaKind = 0;
+inline constexpr int powerKind(int channel) { return channel + 1; }
+
 // A cluster of surfels: one octree cell, single-child levels skipped.
 struct Node {
   glm::vec3 position;   // area-weighted mean of the surfel positions
@@ -30,11 +37,17 @@ struct Node {
   std::uint8_t child_count;    // 0: a leaf
   std::uint8_t flags;          // NodeFlags
   std::uint64_t surfel_count;  // below this node; those of a leaf may run on into following pages
-  ShCoefficients area_sh;      // projected area, clamped cosine (memo 3.2)
-  ShCoefficients power_sh[3];  // projected power, rgb
+  // By coefficient, then by kind: kAreaKind, and a kind per color. Side by side, so that a gather
+  // evaluates all kinds at once.
+  std::array<std::array<float, kNodeShKinds>, kShCount> sh;
 
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
+  ShCoefficients coefficients(int kind) const {
+    ShCoefficients values;
+    for (int i = 0; i < kShCount; ++i) values[i] = sh[i][kind];
+    return values;
+  }
 };
 static_assert(sizeof(Node) == 208);
 

@@ -22,7 +22,7 @@ constexpr float kPositionTolerance = 1e-3f;
 constexpr float kCoefficientLimit = 4;
 
 // Of a rough node: 9 of projected area, and 9 of projected power in each color.
-constexpr std::size_t kCoefficientKinds = 4;
+constexpr std::size_t kCoefficientKinds = kNodeShKinds;
 
 Status damaged(const char* field) {
   return Status::corruption(fmt::format("node group: damaged field {}", field));
@@ -123,14 +123,6 @@ std::array<std::span<T>, kCoefficientKinds> coefficientColumns(std::size_t rough
   return columns;
 }
 
-const ShCoefficients& coefficientsOf(const Node& node, std::size_t kind) {
-  return kind == 0 ? node.area_sh : node.power_sh[kind - 1];
-}
-
-ShCoefficients& coefficientsOf(Node& node, std::size_t kind) {
-  return kind == 0 ? node.area_sh : node.power_sh[kind - 1];
-}
-
 // What coefficients of a kind are stored relative to.
 float coefficientScale(const Node& node, std::size_t kind) {
   return kind == 0 ? node.area : node.area * node.radiosity[static_cast<int>(kind) - 1];
@@ -217,20 +209,19 @@ Status decodeCoefficients(PayloadReader& reader, bool full_precision, std::span<
     }
     std::size_t next = 0;
     for (Node& node : nodes) {
-      ShCoefficients& coefficients = coefficientsOf(node, kind);
       if (node.isFlat()) {
-        coefficients.fill(0);
+        for (std::size_t i = 0; i < kShCount; ++i) node.sh[i][kind] = 0;
         continue;
       }
       if (full_precision) {
-        std::copy_n(&floats[kind][next], kShCount, coefficients.begin());
+        for (std::size_t i = 0; i < kShCount; ++i) node.sh[i][kind] = floats[kind][next + i];
       } else {
         const float scale = coefficientScale(node, kind) * (kCoefficientLimit / 32767);
         for (std::size_t i = 0; i < kShCount; ++i) {
           // Each kind is stored as what it differs from the one before
           std::int16_t& code = codes[kind][next + i];
           if (kind > 0) code = static_cast<std::int16_t>(code + codes[kind - 1][next + i]);
-          coefficients[i] = float(code) * scale;
+          node.sh[i][kind] = float(code) * scale;
         }
       }
       next += kShCount;
@@ -250,7 +241,7 @@ void encodeCoefficients(std::span<const LevelNode> nodes, bool full_precision,
     if (n.node.isFlat()) continue;
     std::array<std::int16_t, kShCount> before{};
     for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
-      const ShCoefficients& coefficients = coefficientsOf(n.node, kind);
+      const ShCoefficients coefficients = n.node.coefficients(static_cast<int>(kind));
       if (full_precision) {
         std::copy(coefficients.begin(), coefficients.end(), &floats[kind][next]);
         continue;

@@ -78,8 +78,7 @@ Node NodeSums::toNode(float flatness_limit) const {
     return node;
   }
   for (int i = 0; i < kShCount; ++i) {
-    node.area_sh[i] = float(sh[i][0]);
-    for (int c = 0; c < 3; ++c) node.power_sh[c][i] = float(sh[i][c + 1]);
+    for (int kind = 0; kind < kNodeShKinds; ++kind) node.sh[i][kind] = float(sh[i][kind]);
   }
   return node;
 }

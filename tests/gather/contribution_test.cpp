@@ -41,10 +41,10 @@ Node makeNode(std::span<const glm::vec3> normals, const glm::vec3& radiosity) {
   node.flatness = glm::length(sum) / float(normals.size());
   node.normal = glm::length(sum) > 0 ? glm::normalize(sum) : glm::vec3(0);
   node.radiosity = radiosity;
-  node.area_sh = projectLobes(normals, kClampedCosine);
+  const ShCoefficients lobes = projectLobes(normals, kClampedCosine);
   for (std::size_t i = 0; i < kShCount; ++i) {
-    node.area_sh[i] /= float(normals.size());
-    for (int c = 0; c < 3; ++c) node.power_sh[c][i] = node.area_sh[i] * radiosity[c];
+    node.sh[i][kAreaKind] = lobes[i] / float(normals.size());
+    for (int c = 0; c < 3; ++c) node.sh[i][powerKind(c)] = node.sh[i][kAreaKind] * radiosity[c];
   }
   return node;
 }
@@ -104,7 +104,7 @@ TEST(NodeContribution, FlatNodeIsADisk) {
   const glm::vec3 normal{0, 0, -1};
   Node node = makeNode(std::span(&normal, 1), {3, 2, 1});
   node.flags = kNodeFlat;
-  node.area_sh = {};
+  node.sh = {};
   Contribution patch;
   ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
   EXPECT_FLOAT_EQ(patch.solid_angle, .25f);
@@ -128,6 +128,21 @@ TEST(NodeContribution, RoughNodeShowsAQuarterOfItsAreaOnAverage) {
   ASSERT_TRUE(makeContribution(node, node.position, {GatherSides::kBoth, true}, patch));
   EXPECT_NEAR(patch.solid_angle, 2.f / 16, 1e-3);
   EXPECT_NEAR(patch.radiosity.x, 1.5, .02);  // half of what covers is black
+}
+
+TEST(NodeContribution, FrontsOverlapWhereBacksPrevail) {
+  std::vector<glm::vec3> normals;  // of a bumpy sheet that faces +z
+  for (const glm::vec3& direction : evenDirections(500)) {
+    normals.push_back(glm::normalize(direction + glm::vec3(0, 0, .4f)));
+  }
+  const Node node = makeNode(normals, {1, 1, 1});
+  Contribution patch;
+  ASSERT_TRUE(makeContribution(node, {0, 0, 2}, {}, patch));  // from behind
+  EXPECT_EQ(patch.overlap, 1);
+  ASSERT_TRUE(makeContribution(node, {0, 0, -2}, {}, patch));
+  EXPECT_EQ(patch.overlap, 0);
+  ASSERT_TRUE(makeContribution(node, {0, 0, 2}, {GatherSides::kBoth, true}, patch));
+  EXPECT_EQ(patch.overlap, 0);
 }
 
 TEST(NodeContribution, NeverExceedsTheOutlineOfItsSphere) {

@@ -340,7 +340,8 @@ TEST(Gather, ZeroMaxSolidAngleEqualsBruteForceBitForBit) {
   Scene scene(cloud);
   for (const GatherMode mode : {GatherMode::kBleeding, GatherMode::kOcclusion}) {
     for (const Receiver& receiver : receiversOn(cloud, 1500)) {
-      expectEqual(scene.gather(receiver, qualityOf(0), mode), bruteForce(cloud, receiver, mode));
+      expectEqual(scene.gather(receiver, qualityOf(0), mode),
+                  bruteForce(scene.cloud(), receiver, mode));
     }
   }
 }

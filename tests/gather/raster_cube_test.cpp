@@ -73,7 +73,7 @@ TEST(RasterCube, SplatKeepsItsSolidAngleEverywhere) {
     for (const glm::vec3& direction : testDirections()) {
       for (const float solid_angle : {1e-4f, .01f, .05f}) {
         cube.clear();
-        cube.splatRectangle(direction, kRound, solid_angle, kDepth, kWhite);
+        cube.splat({direction, kRound, solid_angle, solid_angle}, kDepth, kWhite);
         // What spills over an edge is drawn as a rectangle instead of a trapezoid, the part of a
         // pixel that is covered is measured on the face, and pixels nearly full are filled
         const double tolerance = resolution == 12 ? .18 : .10;
@@ -90,7 +90,7 @@ TEST(RasterCube, SplatsOfAllDirectionsConserveSolidAngleOnAverage) {
   double ratio = 0;
   for (const glm::vec3& direction : testDirections()) {
     cube.clear();
-    cube.splatRectangle(direction, kRound, 2e-4f, kDepth, kWhite);
+    cube.splat({direction, kRound, 2e-4f}, kDepth, kWhite);
     ratio += coveredSolidAngle(cube) / 2e-4;
   }
   EXPECT_NEAR(ratio / double(testDirections().size()), 1, .01);
@@ -100,7 +100,7 @@ TEST(RasterCube, SplatOfSlantedDiskFollowsItsShape) {
   const RasterGeometry geometry(64);
   RasterCube cube(geometry, false);
   // Seen from straight below, a disk leaning in z is narrow in z and wide in y on the +x face
-  cube.splatRectangle({1, 0, 0}, glm::normalize(glm::vec3(-.3f, 0, 1)), .01f, kDepth, kWhite);
+  cube.splat({{1, 0, 0}, glm::normalize(glm::vec3(-.3f, 0, 1)), .01f}, kDepth, kWhite);
   int columns = 0, rows = 0;
   for (std::size_t i = 0; i < 64; ++i) {
     columns += cube.coverage(32 * 64 + i) > 0;
@@ -115,7 +115,7 @@ TEST(RasterCube, TracedDiskHasItsAnalyticSolidAngle) {
   for (const glm::vec3& direction : testDirections()) {
     for (const float distance : {.2f, 1.f, 3.f}) {
       cube.clear();
-      cube.traceDisk(distance * direction, direction, 1, kDepth, kWhite);
+      cube.traceDisk(distance * direction, direction, 1, RasterCube::kHardDisk, kDepth, kWhite);
       const double expected =
           2 * double(kPi) *
           (1 - double(distance) / std::sqrt(1 + double(distance) * double(distance)));
@@ -128,7 +128,7 @@ TEST(RasterCube, TracedDiskAcrossTheOriginCoversHalfTheSphere) {
   const RasterGeometry geometry(16);
   RasterCube cube(geometry, false);
   const glm::vec3 normal = glm::normalize(glm::vec3(1, 2, 3));
-  cube.traceDisk(1e-4f * normal, normal, 100, kDepth, kWhite);
+  cube.traceDisk(1e-4f * normal, normal, 100, RasterCube::kHardDisk, kDepth, kWhite);
   EXPECT_NEAR(coveredSolidAngle(cube), 2 * double(kPi), .06);
 }
 
@@ -152,7 +152,7 @@ TEST(RasterCube, CoverageAddsWithinALayerAndNeverExceedsOne) {
   for (int i = 0; i < 1000; ++i) {
     for (const glm::vec3& direction : testDirections()) {
       const DepthRange depth = {1 + float(i) / 100, 1 + float(i + 7) / 100};
-      cube.splatRectangle(direction, kRound, .06f, depth, kWhite);
+      cube.splat({direction, kRound, .06f}, depth, kWhite);
     }
   }
   for (std::size_t i = 0; i < geometry.pixels().size(); ++i) {
@@ -167,12 +167,13 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
   const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
   const float axis_cubed = direction.x * direction.x * direction.x;
   const auto splatHalf = [&](DepthRange depth, const glm::vec3& radiosity) {
-    cube.splatRectangle(direction, kRound, .5f * axis_cubed, depth, radiosity);
+    cube.splat({direction, kRound, .5f * axis_cubed}, depth, radiosity);
   };
   const std::size_t pixel = 3;
 
   splatHalf({1, 2}, {1, 0, 0});
-  const float half = .5f + .1f * .125f;  // with what is given back to surfaces that fill pixels
+  // With what is given back to surfaces that fill pixels
+  const float half = .5f * (1 + 3 * .15f * .25f * .25f);
   EXPECT_NEAR(cube.coverage(pixel), half, 1e-5);
   splatHalf({3, 4}, {0, 1, 0});  // half of what is left
   EXPECT_NEAR(cube.coverage(pixel), 1 - (1 - half) * (1 - half), 1e-5);
@@ -186,14 +187,61 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
   EXPECT_NEAR(cube.radiosity(pixel).y, 1 - half, 1e-5);
 }
 
+TEST(RasterCube, WhatOverlapsHidesBehindItsOwnLayer) {
+  const RasterGeometry geometry(2);
+  RasterCube cube(geometry, false);
+  const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
+  const float axis_cubed = direction.x * direction.x * direction.x;
+  const auto cover = [&](float overlap) {
+    cube.clear();
+    for (int i = 0; i < 10; ++i) {
+      cube.splat({direction, kRound, .1f * axis_cubed, 0, overlap}, {1, 2}, kWhite);
+    }
+    return double(cube.coverage(3));
+  };
+  EXPECT_GT(cover(0), .99);
+  EXPECT_NEAR(cover(1), 1 - std::exp(-1.), .06);  // as anything spread at random
+}
+
+TEST(RasterCube, NeighboursOfASlantedPlaneTile) {
+  // Squares of a floor, as octree cells cut it, on the side faces and across the edges of the cube
+  const RasterGeometry geometry(12);
+  RasterCube cube(geometry, false);
+  constexpr float kSide = .2f;
+  for (int i = -100; i < 100; ++i) {
+    for (int j = -100; j < 100; ++j) {
+      const glm::vec3 to_square((float(i) + .5f) * kSide, (float(j) + .5f) * kSide, -1);
+      const float distance_sq = glm::dot(to_square, to_square);
+      const glm::vec3 direction = to_square / std::sqrt(distance_sq);
+      const float spread = kSide * kSide / distance_sq;
+      cube.splat({direction, {0, 0, 1}, spread * -direction.z, spread, 0}, kDepth, kWhite);
+    }
+  }
+  double error = 0, weight = 0;
+  for (std::size_t i = 0; i < geometry.pixels().size(); ++i) {
+    const RasterGeometry::Pixel& pixel = geometry.pixels()[i];
+    if (pixel.direction.z > -.15f) continue;  // the end of the floor
+    error += double(1 - cube.coverage(i)) * double(pixel.solid_angle);
+    weight += double(pixel.solid_angle);
+  }
+  EXPECT_LT(error / weight, .002);
+}
+
+TEST(RasterCube, SoftDiskCoversItsShare) {
+  const RasterGeometry geometry(64);
+  RasterCube cube(geometry, false);
+  cube.traceDisk({0, 0, 20}, {0, 0, -1}, 2, 1, kDepth, kWhite);
+  EXPECT_NEAR(coveredSolidAngle(cube) / double(kPi / 100), .5, .03);
+}
+
 TEST(RasterCube, ClearForgetsEverything) {
   const RasterGeometry geometry(4);
   RasterCube cube(geometry, true);
-  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, {5, 6}, kWhite);
+  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, RasterCube::kHardDisk, {5, 6}, kWhite);
   EXPECT_GT(coveredSolidAngle(cube), 1);
   cube.clear();
   EXPECT_EQ(coveredSolidAngle(cube), 0);
-  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, {1, 2}, kWhite);
+  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, RasterCube::kHardDisk, {1, 2}, kWhite);
   EXPECT_GT(coveredSolidAngle(cube), 1);
 }
 

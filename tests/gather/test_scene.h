@@ -31,6 +31,7 @@ class Scene {
     expectOk(writer.status());
     expectOk(writer->write(cloud));
     expectOk(writer->finish());
+    readBack(cloud_path, cloud.size());
     IndexOptions options;
     options.full_precision = true;
     Progress progress;
@@ -55,12 +56,27 @@ class Scene {
     return result;
   }
   PagedOctree::Reader& reader() { return *reader_; }
+  // The surfels as they are read: with normals normalized once more, in their last bits.
+  const std::vector<Surfel>& cloud() const { return cloud_; }
   const PointGatherer::Work& work() const { return work_; }
 
  private:
   static void expectOk(const Status& status) { ASSERT_TRUE(status.ok()) << status.message(); }
 
+  void readBack(const std::string& path, std::size_t count) {
+    Result<std::unique_ptr<SurfelSource>> source = openSurfelSource(path, true);
+    expectOk(source.status());
+    cloud_.resize(count);
+    for (std::size_t got = 0; got < count;) {
+      const Result<std::size_t> read = (*source)->read(std::span(cloud_).subspan(got));
+      expectOk(read.status());
+      if (*read == 0) break;
+      got += *read;
+    }
+  }
+
   TestDirectory directory_;
+  std::vector<Surfel> cloud_;
   std::unique_ptr<PagedOctree> octree_;
   std::unique_ptr<PagedOctree::Reader> reader_;
   PointGatherer::Work work_;

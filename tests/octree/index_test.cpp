@@ -57,7 +57,7 @@ class IndexTest : public SceneTest {
       // Only a leaf that begins a page may run over its end
       EXPECT_LE(node.first + node.surfel_count, header.surfel_group_capacity);
     }
-    EXPECT_EQ(node.isFlat(), node.area_sh[0] == 0);
+    EXPECT_EQ(node.isFlat(), node.sh[0][kAreaKind] == 0);
     for (const Surfel& surfel : surfels) {
       ASSERT_LE(glm::length(surfel.position - node.position) + surfel.radius, node.radius * 1.002f);
     }
@@ -266,8 +266,8 @@ TEST_F(IndexTest, NodesAreTheSumsOfTheirSurfels) {
         ASSERT_NEAR(double(node.normal[axis]) * length / area, normal[axis] / area, tolerance);
       }
       for (int k = 0; k < kShCount && !node.isFlat(); ++k) {
-        ASSERT_NEAR(double(node.area_sh[k]), area_sh[k], tolerance * area);
-        ASSERT_NEAR(double(node.power_sh[1][k]), power_sh[k], tolerance * area);
+        ASSERT_NEAR(double(node.sh[k][kAreaKind]), area_sh[k], tolerance * area);
+        ASSERT_NEAR(double(node.sh[k][powerKind(1)]), power_sh[k], tolerance * area);
       }
     }
   }

@@ -69,8 +69,7 @@ TEST_F(NodeGroupTest, FullPrecisionIsExact) {
     EXPECT_EQ(a.flags, b.flags);
     EXPECT_EQ(a.child_count, b.child_count);
     EXPECT_EQ(a.surfel_count, b.surfel_count);
-    EXPECT_EQ(a.area_sh, b.area_sh);
-    for (int c = 0; c < 3; ++c) EXPECT_EQ(a.power_sh[c], b.power_sh[c]);
+    EXPECT_EQ(a.sh, b.sh);
     // Pages count within the level of the children in the file, and through it afterwards
     EXPECT_EQ(b.page, a.isLeaf() ? a.page : a.page + first_page_[2]);
   }
@@ -92,9 +91,9 @@ TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
     EXPECT_LE(glm::length(a.normal - b.normal), 1e-4f);
     EXPECT_NEAR(a.flatness, b.flatness, 2e-5f);
     for (std::size_t k = 0; k < kShCount; ++k) {
-      EXPECT_NEAR(a.area_sh[k], b.area_sh[k], 2e-3f * a.area);
+      EXPECT_NEAR(a.sh[k][kAreaKind], b.sh[k][kAreaKind], 2e-3f * a.area);
       for (int c = 0; c < 3; ++c) {
-        EXPECT_NEAR(a.power_sh[c][k], b.power_sh[c][k], 4e-3f * a.area * a.radiosity[c]);
+        EXPECT_NEAR(a.sh[k][powerKind(c)], b.sh[k][powerKind(c)], 4e-3f * a.area * a.radiosity[c]);
       }
     }
   }
@@ -144,7 +143,7 @@ TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
         ASSERT_TRUE(node.flatness >= 0 && node.flatness <= 1);
         for (int c = 0; c < 3; ++c) {
           ASSERT_TRUE(std::isfinite(node.position[c]) && node.radiosity[c] >= 0);
-          for (const float k : node.power_sh[c]) ASSERT_TRUE(std::isfinite(k));
+          for (const float k : node.coefficients(powerKind(c))) ASSERT_TRUE(std::isfinite(k));
         }
         if (node.isLeaf()) {
           ASSERT_LT(node.page, 10u);

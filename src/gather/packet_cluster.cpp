@@ -1,0 +1,96 @@
+#include "gather/packet_cluster.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "core/assert.h"
+
+namespace surfeit {
+namespace {
+
+// A packet that is wider than this many times the median one would push the far field away for all:
+// it looks by itself.
+constexpr float kMostWidth = 1.5f;
+
+// A difference of normals of 1 counts like this part of the cluster's radius.
+constexpr float kNormalWeight = 0.5f;
+
+using Places = std::span<std::uint16_t>;
+
+// Position and weighted normal.
+float coordinate(const Receiver& receiver, int axis, float normal_weight) {
+  return axis < 3 ? receiver.position[axis] : normal_weight * receiver.normal[axis - 3];
+}
+
+// Orders places so that each kPacketReceivers of them, but for the last, are a packet.
+void divide(Places places, std::span<const Receiver> receivers, float normal_weight) {
+  if (places.size() <= kPacketReceivers) return;
+  int widest = 0;
+  float width = -1;
+  for (int axis = 0; axis < 6; ++axis) {
+    float least = std::numeric_limits<float>::max(), most = std::numeric_limits<float>::lowest();
+    for (const std::uint16_t place : places) {
+      const float x = coordinate(receivers[place], axis, normal_weight);
+      least = std::min(least, x);
+      most = std::max(most, x);
+    }
+    if (most - least > width) {
+      width = most - least;
+      widest = axis;
+    }
+  }
+  const std::size_t packets = (places.size() + kPacketReceivers - 1) / kPacketReceivers;
+  const std::size_t half = packets / 2 * kPacketReceivers;
+  std::nth_element(places.begin(), places.begin() + std::ptrdiff_t(half), places.end(),
+                   [&](std::uint16_t a, std::uint16_t b) {
+                     const float x = coordinate(receivers[a], widest, normal_weight);
+                     const float y = coordinate(receivers[b], widest, normal_weight);
+                     return x != y ? x < y : a < b;
+                   });
+  divide(places.first(half), receivers, normal_weight);
+  divide(places.subspan(half), receivers, normal_weight);
+}
+
+}  // namespace
+
+PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherQuality& quality)
+    : receiver_count_(receivers.size()) {
+  SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kClusterReceivers);
+  const Places places = std::span(places_).first(receiver_count_);
+  std::iota(places.begin(), places.end(), std::uint16_t{0});
+  divide(places, receivers, kNormalWeight * viewPacket(receivers).radius);
+  for (std::size_t i = 0; i < receiver_count_; ++i) receivers_[i] = receivers[places_[i]];
+
+  std::array<float, kClusterPackets> widths{};
+  for (std::size_t at = 0; at < receiver_count_; at += kPacketReceivers) {
+    packets_[packet_count_] = viewPacket(this->receivers(packet_count_));
+    widths[packet_count_] = packets_[packet_count_].radius;
+    ++packet_count_;
+  }
+  if (packet_count_ < 2 || !(quality.far_field_parallax > 0)) return;
+
+  const auto middle = widths.begin() + std::ptrdiff_t(packet_count_ / 2);
+  std::nth_element(widths.begin(), middle, widths.begin() + std::ptrdiff_t(packet_count_));
+  const float most_width = kMostWidth * *middle;
+
+  // Those that share, and the sphere and cone around them
+  std::array<Receiver, kClusterReceivers> members;
+  std::size_t member_count = 0;
+  float width = 0;
+  for (std::size_t i = 0; i < packet_count_; ++i) {
+    const PacketView& view = packets_[i];
+    centres_[i] = {view.centre, view.has_horizon ? view.axis : glm::vec3(0)};
+    if (view.radius > most_width) continue;
+    sharing_ |= 1u << i;
+    width = std::max(width, view.radius);
+    for (const Receiver& receiver : this->receivers(i)) members[member_count++] = receiver;
+  }
+  view_ = viewPacket(std::span(members).first(member_count));
+
+  // Seen from a packet's centre instead of its rim, what is at distance d moves by width / d
+  const float pixel = 2 / float(quality.raster_resolution);
+  limit_ = view_.radius + width / (quality.far_field_parallax * pixel);
+}
+
+}  // namespace surfeit
