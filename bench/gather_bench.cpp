@@ -52,11 +52,11 @@ struct Row {
   GatherMode mode = GatherMode::kOcclusion;
   Workers workers{};
   std::vector<double> rates{}, wall_rates{};  // of the rounds
-  GatherWork work{};                          // of one pass, on one thread
+  EngineWork work{};                          // of one pass, on one thread
 };
 
 // What a pass over the set takes; with phases when the engine has them.
-Result<GatherWork> measureWork(const Row& row, const CostOptions& options, PagedOctree& octree,
+Result<EngineWork> measureWork(const Row& row, const CostOptions& options, PagedOctree& octree,
                                const ReceiverSet& set) {
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<GatherEngine> made,
                            makeEngine(row.engine, row.mode, options.common.quality));

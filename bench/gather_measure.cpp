@@ -35,11 +35,11 @@ class ScalarEngine : public GatherEngine {
     work_.receivers += receivers.size();
     return {};
   }
-  GatherWork work() const override { return work_; }
+  EngineWork work() const override { return work_; }
 
  private:
   PointGatherer gatherer_;
-  GatherWork work_;
+  EngineWork work_;
 };
 
 // Packets of neighbours, and clusters of packets.
@@ -57,7 +57,7 @@ class PacketEngine : public GatherEngine {
     receivers_ += receivers.size();
     return {};
   }
-  GatherWork work() const override {
+  EngineWork work() const override {
     const PacketGatherer::Work& work = gatherer_.work();
     return {.receivers = receivers_,
             .nodes_visited = work.nodes_visited,

@@ -27,7 +27,7 @@ struct GatherPhases {
 };
 
 // What gathers took, summed. Receivers that are gathered together share what they visit and draw.
-struct GatherWork {
+struct EngineWork {
   std::uint64_t receivers = 0;
   std::uint64_t nodes_visited = 0, surfels_visited = 0;
   std::uint64_t contributions = 0;  // nodes and surfels drawn
@@ -42,7 +42,7 @@ class GatherEngine {
   virtual Status gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
                         std::span<GatherResult> results) = 0;
   // Of all gathers so far.
-  virtual GatherWork work() const = 0;
+  virtual EngineWork work() const = 0;
   // Measures phases from now on, which costs time; an engine that cannot measures none.
   virtual void measurePhases() {}
 };

@@ -39,6 +39,8 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
                              {"mode", modeName(options.mode)},
                              {"max_solid_angle", options.quality.max_solid_angle},
                              {"raster_resolution", options.quality.raster_resolution},
+                             {"near_field_radii", options.quality.near_field_radii},
+                             {"far_field_parallax", options.quality.far_field_parallax},
                              {"memory_bytes", stats.memory_bytes},
                              {"receivers", stats.receivers},
                              {"invalid_receivers", stats.invalid_receivers},
@@ -70,6 +72,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
       "Examples:\n"
       "  surfeit gather lion.sft lion.ply -o lion_ao.ply\n"
       "  surfeit gather city.sft street.ply -o street_gi.ply --mode bleeding --memory 2G\n"
+      "  surfeit gather city.sft street.ply -o look.ply --quality draft\n"
       "  surfeit gather city.sft street.ply -o street_ao.ply --memory 512M --direct-io \\\n"
       "      --cache-series paging.csv");
   command->callback(

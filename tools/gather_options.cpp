@@ -29,6 +29,24 @@ CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& target
 
 void addQualityOptions(CLI::App& command, GatherQuality& quality) {
   constexpr const char* kGroup = "Quality";
+  // First, so that options that are given themselves come after and win
+  const std::vector<std::pair<std::string, QualityPreset>> presets = {
+      {"draft", QualityPreset::kDraft},
+      {"standard", QualityPreset::kStandard},
+      {"final", QualityPreset::kFinal}};
+  command
+      .add_option_function<std::string>(
+          "--quality",
+          [presets, &quality](const std::string& found) {
+            for (const auto& [word, preset] : presets) {
+              if (found == word) return setQuality(preset, quality);
+            }
+            throw CLI::ValidationError("--quality", found + ", expected draft|standard|final");
+          },
+          "Sets the options below that are not given, but for --bias, --max-dist and --sides")
+      ->type_name("draft|standard|final")
+      ->default_str("standard")
+      ->group(kGroup);
   command
       .add_option("--max-solid-angle,--maxsolidangle", quality.max_solid_angle,
                   "Largest cluster drawn as one, in steradians; 0 opens all")
@@ -49,6 +67,13 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
       .add_option("--near-field", quality.near_field_radii,
                   "Surfels closer than this many radii are ray traced")
       ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option("--far-parallax", quality.far_field_parallax,
+                  "Neighbours share a far field where that moves it by less than this part of a "
+                  "pixel; 0: none do")
+      ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str()
       ->group(kGroup);
   command

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -98,13 +99,12 @@ class CutWalk {
       nodes_visited_ += siblings.size();
       SURFEIT_RETURN_IF_ERROR(octree.checkVisits(nodes_visited_, surfels_visited_));
       const SiblingClasses classes = classify_(siblings, view, region, rules_);
-      for (std::size_t i = 0; i < siblings.size(); ++i) {
-        const Node& node = siblings[i];
-        if ((classes.far >> i & 1) != 0) {
-          visit.node(node);
-        } else if ((classes.open >> i & 1) == 0) {
-          continue;
-        } else if (node.isLeaf()) {
+      for (std::uint32_t far = classes.far; far != 0; far &= far - 1) {
+        visit.node(siblings[static_cast<std::size_t>(std::countr_zero(far))]);
+      }
+      for (std::uint32_t open = classes.open; open != 0; open &= open - 1) {
+        const Node& node = siblings[static_cast<std::size_t>(std::countr_zero(open))];
+        if (node.isLeaf()) {
           SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
             surfels_visited_ += run.size();
             visit.surfels(run);

@@ -34,6 +34,9 @@ Status checkGatherOptions(const GatherOptions& options) {
   if (!isFromZero(quality.near_field_radii)) {
     return refuse("near field", quality.near_field_radii, "0 or more surfel radii");
   }
+  if (!isFromZero(quality.far_field_parallax)) {
+    return refuse("parallax of the far field", quality.far_field_parallax, "0 or more pixels");
+  }
   if (!(quality.max_distance > 0)) {
     return refuse("max distance", quality.max_distance, "more than 0 scene units");
   }
@@ -44,6 +47,28 @@ Status checkGatherOptions(const GatherOptions& options) {
     return refuse("cache split", options.cache_split, "0 to 1, or a negative number to measure");
   }
   return {};
+}
+
+void setQuality(QualityPreset preset, GatherQuality& quality) {
+  const GatherQuality standard;
+  const auto set = [&](float max_solid_angle, int resolution, float near_field, float parallax) {
+    quality.max_solid_angle = max_solid_angle;
+    quality.raster_resolution = resolution;
+    quality.near_field_radii = near_field;
+    quality.far_field_parallax = parallax;
+  };
+  switch (preset) {
+    case QualityPreset::kDraft:
+      set(0.3f, 12, 4, 0.5f);
+      break;
+    case QualityPreset::kStandard:
+      set(standard.max_solid_angle, standard.raster_resolution, standard.near_field_radii,
+          standard.far_field_parallax);
+      break;
+    case QualityPreset::kFinal:
+      set(0.03f, 20, 16, 0.1f);
+      break;
+  }
 }
 
 GatherOptions withDefaults(GatherOptions options) {

@@ -16,6 +16,10 @@ constexpr float kMostWidth = 1.5f;
 // A difference of normals of 1 counts like this part of the cluster's radius.
 constexpr float kNormalWeight = 0.5f;
 
+// Receivers whose normals lie farther from their mean (cosine) have no horizon in common: nothing
+// of their far field may be dropped for lying below it.
+constexpr float kOneHorizon = 0.99f;
+
 using Places = std::span<std::uint16_t>;
 
 // Position and weighted normal.
@@ -80,7 +84,8 @@ PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherQu
   float width = 0;
   for (std::size_t i = 0; i < packet_count_; ++i) {
     const PacketView& view = packets_[i];
-    centres_[i] = {view.centre, view.has_horizon ? view.axis : glm::vec3(0)};
+    const bool has_one_horizon = view.has_horizon && view.cone_cosine > kOneHorizon;
+    centres_[i] = {view.centre, has_one_horizon ? view.axis : glm::vec3(0)};
     if (view.radius > most_width) continue;
     sharing_ |= 1u << i;
     width = std::max(width, view.radius);

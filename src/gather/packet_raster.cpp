@@ -20,22 +20,23 @@ constexpr float kReach = 1.8f;
 constexpr float kDiagonal = 1.415f;
 
 // Sorts by the upper 32 bits of keys, stable: a radix sort of 11 bits a pass.
-// `order` is replaced, `scratch` gets its size.
-void sortByUpperHalf(std::vector<std::uint64_t>& order, std::vector<std::uint64_t>& scratch) {
+// The first `count` of `order` are replaced; `scratch` grows to hold as many.
+void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
+                     std::vector<std::uint64_t>& scratch) {
   constexpr int kBits = 11, kPasses = 3;
   constexpr std::size_t kBuckets = std::size_t{1} << kBits;
   const auto digit = [](std::uint64_t key, int pass) {
     return std::size_t(key >> (32 + pass * kBits)) & (kBuckets - 1);
   };
   std::array<std::array<std::uint32_t, kBuckets>, kPasses> begin{};
-  for (const std::uint64_t key : order) {
+  for (const std::uint64_t key : std::span(order).first(count)) {
     for (int pass = 0; pass < kPasses; ++pass) ++begin[std::size_t(pass)][digit(key, pass)];
   }
-  scratch.resize(order.size());
+  if (scratch.size() < count) scratch.resize(order.size());
   for (int pass = 0; pass < kPasses; ++pass) {
     std::uint32_t sum = 0;
-    for (std::uint32_t& count : begin[std::size_t(pass)]) sum += std::exchange(count, sum);
-    for (const std::uint64_t key : order) {
+    for (std::uint32_t& place : begin[std::size_t(pass)]) sum += std::exchange(place, sum);
+    for (const std::uint64_t key : std::span(order).first(count)) {
       scratch[begin[std::size_t(pass)][digit(key, pass)]++] = key;
     }
     order.swap(scratch);
@@ -56,8 +57,8 @@ PacketRaster::PacketRaster(GatherMode mode, const GatherQuality& quality,
                                           PacketCanvas::pixelFloats(rules_.has_color))) {
   if (pixels_ == nullptr) throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
-  order_.reserve(kReservedPatches);
-  order_scratch_.reserve(kReservedPatches);
+  order_.resize(kReservedEntries);
+  order_scratch_.resize(kReservedEntries);
 }
 
 void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& view) {
@@ -75,14 +76,14 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
   }
   is_face_used_.fill(false);
   patches_.clear();
-  order_.clear();
+  order_count_ = 0;
 }
 
-// A patch goes to every face that some receiver may see some of it on.
-void PacketRaster::addPatch(const Patch& patch) {
+// Puts the last patch in the order of every face that some receiver may see some of it on.
+void PacketRaster::orderLastPatch() {
   SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
-  const auto index = static_cast<std::uint32_t>(patches_.size());
-  patches_.push_back(patch);
+  const auto index = static_cast<std::uint32_t>(patches_.size() - 1);
+  const Patch& patch = patches_.back();
   const glm::vec3 middle = patch.position - view_.centre;
   const float distance_sq = glm::dot(middle, middle);
   const glm::vec3 size = glm::abs(middle);
@@ -91,44 +92,54 @@ void PacketRaster::addPatch(const Patch& patch) {
   const float half = patch.near_distance > 0 ? std::max(0.5f * side, patch.radius) : 0.5f * side;
   const float shift = std::min(patch.area / (2 * largest), largest / 2);
   const float reach = kReach * half + shift + kDiagonal * view_.radius;
+
+  // Written in any case and counted if wanted: no branch to be guessed wrong
+  if (order_.size() < order_count_ + RasterGeometry::kFaces) order_.resize(2 * order_.size());
+  std::uint64_t* const order = order_.data();
+  std::size_t count = order_count_;
   for (int axis = 0; axis < 3; ++axis) {
-    if (size[axis] + reach < largest) continue;
-    for (const int back : {0, 1}) {
-      if ((back == 0 ? middle[axis] : -middle[axis]) + reach < 0) continue;
-      order_.push_back(draw_order::key(2 * axis + back, distance_sq, index));
-    }
+    const bool is_wide = size[axis] + reach >= largest;
+    order[count] = draw_order::key(2 * axis, distance_sq, index);
+    count += (is_wide & (middle[axis] + reach >= 0)) ? 1 : 0;
+    order[count] = draw_order::key(2 * axis + 1, distance_sq, index);
+    count += (is_wide & (reach - middle[axis] >= 0)) ? 1 : 0;
   }
+  order_count_ = count;
 }
 
 void PacketRaster::addNode(const Node& node) {
-  Patch patch;
+  RoughSight seen{};
+  const bool shows_backs = rules_.sides == GatherSides::kBoth;
+  float round_area = 0;
+  if (!node.isFlat()) {
+    kernel_.seeRoughNode(node, glm::normalize(node.position - view_.centre), seen);
+    round_area = shows_backs ? seen.area + seen.opposite_area : seen.area;
+    if (!(round_area > kLeastVisiblePart * node.area)) return;
+  }
+  Patch& patch = patches_.emplace_back();
   patch.position = node.position;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
   patch.area = node.area;
   patch.most_area = std::min(node.area, kPi * node.radius * node.radius);
-  const bool shows_backs = rules_.sides == GatherSides::kBoth;
   if (node.isFlat()) {
     patch.disk_area = node.area;
     patch.radiosity = node.radiosity;
     patch.facing_limit = shows_backs ? Patch::kDarkBack : Patch::kFrontOnly;
   } else {
-    RoughSight seen;
-    kernel_.seeRoughNode(node, glm::normalize(node.position - view_.centre), seen);
-    patch.round_area = shows_backs ? seen.area + seen.opposite_area : seen.area;
-    if (!(patch.round_area > kLeastVisiblePart * node.area)) return;
-    patch.radiosity = seen.power / patch.round_area;
+    patch.round_area = round_area;
+    patch.radiosity = seen.power / round_area;
     patch.overlap = shows_backs ? 0 : overlapOf(seen.area, seen.opposite_area);
     patch.facing_limit = Patch::kBothSides;
   }
-  addPatch(patch);
+  orderLastPatch();
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region) {
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& surfel : surfels) {
     if (!region.holds(surfel.position)) continue;
-    Patch patch;
+    Patch& patch = patches_.emplace_back();
     patch.position = surfel.position;
     patch.radius = effectiveRadius(surfel.radius, surfel.area);
     patch.normal = surfel.normal;
@@ -142,7 +153,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =
         std::max(quality_.near_field_radii * patch.radius, std::numeric_limits<float>::min());
-    if (kernel_.isSeen(canvas, patch)) addPatch(patch);
+    if (kernel_.isSeen(canvas, patch)) {
+      orderLastPatch();
+    } else {
+      patches_.pop_back();
+    }
   }
 }
 
@@ -158,9 +173,11 @@ PacketCanvas PacketRaster::canvas() const {
           .is_face_used = &is_face_used_};
 }
 
-void PacketRaster::sort() { sortByUpperHalf(order_, order_scratch_); }
+void PacketRaster::sort() { sortByUpperHalf(order_, order_count_, order_scratch_); }
 
-void PacketRaster::draw() { kernel_.draw(canvas(), patches_.data(), order_); }
+void PacketRaster::draw() {
+  kernel_.draw(canvas(), patches_.data(), std::span(order_).first(order_count_));
+}
 
 void PacketRaster::finishFarField() { kernel_.finishFarField(canvas()); }
 
@@ -181,7 +198,7 @@ std::size_t PacketRaster::memoryBytes(GatherMode mode, const GatherQuality& qual
       PacketCanvas::pixelFloats(mode == GatherMode::kBleeding) * sizeof(float);
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(quality.raster_resolution) * pixel_bytes +
-         kReservedPatches * (sizeof(Patch) + 2 * sizeof(std::uint64_t));
+         kReservedPatches * sizeof(Patch) + 2 * kReservedEntries * sizeof(std::uint64_t);
 }
 
 }  // namespace surfeit

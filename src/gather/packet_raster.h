@@ -31,6 +31,7 @@ namespace surfeit {
 class PacketRaster {
  public:
   static constexpr std::size_t kReservedPatches = 4096;
+  static constexpr std::size_t kReservedEntries = 8192;  // of the order
 
   // `quality` must be valid, as for PointGatherer.
   PacketRaster(GatherMode mode, const GatherQuality& quality,
@@ -62,7 +63,7 @@ class PacketRaster {
   static std::size_t memoryBytes(GatherMode mode, const GatherQuality& quality);
 
  private:
-  void addPatch(const Patch& patch);
+  void orderLastPatch();
   PacketCanvas canvas() const;
 
   const PacketKernel& kernel_;
@@ -76,7 +77,8 @@ class PacketRaster {
   PacketLanes lanes_;
   PacketView view_;
   std::vector<Patch> patches_;
-  std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order
+  std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling
+  std::size_t order_count_ = 0;
 };
 
 }  // namespace surfeit

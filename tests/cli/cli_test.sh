@@ -202,6 +202,8 @@ impossibleValuesAreUsageErrors() {
   local gather=(gather cornell.sft cornell.ply -o result.ply) index=(index cornell.ply -o result.sft)
   run 2 "${gather[@]}" --max-solid-angle -1
   run 2 "${gather[@]}" --max-solid-angle nan
+  run 2 "${gather[@]}" --quality best
+  says "expected draft|standard|final"
   run 2 "${gather[@]}" --raster-resolution 13
   run 2 "${gather[@]}" --raster-resolution 1000
   run 2 "${gather[@]}" --threads 0

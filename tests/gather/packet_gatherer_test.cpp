@@ -141,6 +141,32 @@ TEST(PacketGatherer, NeighboursComeCloseToWhatEachGathersAlone) {
   EXPECT_LT(std::sqrt(square / double(kRuns * kPacketReceivers)), .01);
 }
 
+// Dense receivers on the ground: most of the scene is shared.
+TEST(PacketGatherer, SharingTheFarFieldChangesLittle) {
+  const Cloud cloud = mixedCloud();
+  Scene scene(cloud);
+  std::vector<Receiver> receivers;
+  for (int i = 0; i < int(kClusterReceivers); ++i) {
+    receivers.push_back({{.2f + .002f * float(i % 16), .1f + .002f * float(i / 16), 0}, {0, 0, 1}});
+  }
+  GatherQuality quality;
+  quality.far_field_parallax = 0;
+  PacketGatherer alone(GatherMode::kBleeding, quality);
+  const std::vector<GatherResult> expected = gatherPacket(alone, scene, receivers);
+  EXPECT_EQ(alone.work().shared_patches, 0u);
+  quality.far_field_parallax = .3f;
+  PacketGatherer sharing(GatherMode::kBleeding, quality);
+  const std::vector<GatherResult> results = gatherPacket(sharing, scene, receivers);
+  EXPECT_GT(sharing.work().shared_patches, 0u);
+  EXPECT_LT(sharing.work().patches, alone.work().patches / 2);
+  double square = 0;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    square += std::pow(difference(results[i], expected[i]), 2);
+    EXPECT_LT(difference(results[i], expected[i]), .02);
+  }
+  EXPECT_LT(std::sqrt(square / double(results.size())), .005);
+}
+
 TEST(PacketGatherer, InstructionSetsAgree) {
   const Cloud cloud = mixedCloud();
   Scene scene(cloud);

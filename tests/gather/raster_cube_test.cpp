@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/spherical_harmonics.h"
+#include "gather/coverage_rules.h"
 
 namespace surfeit {
 namespace {
@@ -173,7 +174,7 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
 
   splatHalf({1, 2}, {1, 0, 0});
   // With what is given back to surfaces that fill pixels
-  const float half = .5f * (1 + 3 * .15f * .25f * .25f);
+  const float half = .5f * (1 + 3 * kFill * .25f * .25f);
   EXPECT_NEAR(cube.coverage(pixel), half, 1e-5);
   splatHalf({3, 4}, {0, 1, 0});  // half of what is left
   EXPECT_NEAR(cube.coverage(pixel), 1 - (1 - half) * (1 - half), 1e-5);

@@ -1,0 +1,162 @@
+#include "gather/cut.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <random>
+#include <vector>
+
+#include "gather/packet_cluster.h"
+#include "gather/test_scene.h"
+
+namespace surfeit {
+namespace {
+
+glm::vec3 randomDirection(std::mt19937& random) {
+  std::normal_distribution<float> normal;
+  return glm::normalize(glm::vec3(normal(random), normal(random), normal(random)));
+}
+
+// Surfels on a box and a sphere in it.
+std::vector<Surfel> boxWithSphere(int count) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(-2, 2);
+  std::vector<Surfel> cloud;
+  for (int i = 0; i < count; ++i) {
+    Surfel surfel;
+    surfel.position = {uniform(random), uniform(random), uniform(random)};
+    if (i % 2 == 0) {
+      const int axis = i / 2 % 3;
+      surfel.position[axis] = i / 6 % 2 == 0 ? 2.f : -2.f;
+      surfel.normal[axis] = -surfel.position[axis] / 2;
+    } else {
+      surfel.normal = randomDirection(random);
+      surfel.position = .5f * surfel.normal;
+    }
+    surfel.area = 100.f / float(count);
+    surfel.radius = std::sqrt(surfel.area);
+    surfel.radiosity = {1, 1, 1};
+    cloud.push_back(surfel);
+  }
+  return cloud;
+}
+
+Node randomNode(std::mt19937& random) {
+  std::uniform_real_distribution<float> uniform(0, 1);
+  Node node{};
+  node.position = 3 * uniform(random) * randomDirection(random);
+  node.normal = randomDirection(random);
+  node.radius = .5f * uniform(random) * uniform(random);
+  node.flatness = 1 - uniform(random) * uniform(random);
+  node.flags = node.flatness > .97f ? kNodeFlat : 0;
+  return node;
+}
+
+TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
+  std::mt19937 random(5);
+  int differing = 0, far = 0, open = 0, dropped = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::vector<Node> siblings;
+    for (int i = 0; i < 1 + trial % 8; ++i) siblings.push_back(randomNode(random));
+    std::vector<Receiver> receivers;
+    const glm::vec3 axis = randomDirection(random);
+    for (int i = 0; i < 1 + trial % 5; ++i) {
+      receivers.push_back(
+          {.05f * randomDirection(random), glm::normalize(axis + .2f * randomDirection(random))});
+    }
+    const CutRules rules = {trial % 7 == 0 ? 0.f : .1f, trial % 3 == 0 ? 2.f : 1e30f,
+                            trial % 2 == 0};
+    CutRegion region;
+    region.part = CutRegion::Part(trial % 3);
+    region.radius = .2f;
+    region.limit = 1;
+    const PacketView view = viewPacket(receivers);
+    const SiblingClasses expected = classifySiblings(siblings, view, region, rules);
+    const SiblingClasses found = fastestSiblingClassifier()(siblings, view, region, rules);
+    EXPECT_EQ(found.far & found.open, 0u);
+    for (std::size_t i = 0; i < siblings.size(); ++i) {
+      const auto bit = [i](std::uint32_t bits) { return bits >> i & 1; };
+      differing += bit(expected.far) != bit(found.far) || bit(expected.open) != bit(found.open);
+      far += int(bit(expected.far));
+      open += int(bit(expected.open));
+      dropped += !bit(expected.far) && !bit(expected.open);
+    }
+  }
+  EXPECT_LE(differing, 3);  // where rounding decides
+  EXPECT_GT(far, 500);
+  EXPECT_GT(open, 500);
+  EXPECT_GT(dropped, 500);
+}
+
+// Counts the surfels that a walk stands for.
+struct CountSurfels {
+  const CutRegion& region;
+  std::uint64_t count = 0;
+  void node(const Node& node) { count += node.surfel_count; }
+  void surfels(std::span<const Surfel> run) {
+    for (const Surfel& surfel : run) count += region.holds(surfel.position) ? 1 : 0;
+  }
+};
+
+TEST(Cut, NearAndFarWalkTakeEverySurfelOnce) {
+  const std::vector<Surfel> cloud = boxWithSphere(20'000);
+  Scene scene(cloud);
+  GatherQuality quality;
+  quality.sides = GatherSides::kBoth;  // and no normals below: nothing is dropped
+  std::mt19937 random(9);
+  std::uint64_t all_far = 0;
+  for (const float extent : {.01f, .1f, .5f}) {
+    for (const float parallax : {.1f, .5f, 2.f}) {
+      quality.far_field_parallax = parallax;
+      std::vector<Receiver> receivers(kClusterReceivers - 5);
+      for (Receiver& receiver : receivers) {
+        receiver.position = glm::vec3(1, .5f, -1) + extent * randomDirection(random);
+      }
+      const PacketCluster cluster(receivers, quality);
+      ASSERT_TRUE(cluster.shares());
+      CutWalk walk(quality);
+      const CutRegion far_region = cluster.farRegion();
+      CountSurfels far{far_region};
+      ASSERT_TRUE(walk.walk(cluster.view(), far_region, scene.reader(), far).ok());
+      all_far += far.count;
+      for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
+        const CutRegion region = cluster.regionOf(i);
+        CountSurfels near{region};
+        ASSERT_TRUE(walk.walk(cluster.packet(i), region, scene.reader(), near).ok());
+        EXPECT_EQ(near.count + (cluster.shares(i) ? far.count : 0), cloud.size())
+            << extent << ' ' << parallax << ' ' << i;
+      }
+    }
+  }
+  EXPECT_GT(all_far, 0u);
+}
+
+TEST(PacketCluster, DividesByPlaceAndNormal) {
+  std::mt19937 random(3);
+  std::vector<Receiver> receivers;
+  for (int i = 0; i < 200; ++i) {  // two walls back to back, far from a third one
+    const glm::vec3 at = .1f * randomDirection(random) * glm::vec3(1, 1, 0);
+    receivers.push_back(i % 3 == 0   ? Receiver{at, {0, 0, 1}}
+                        : i % 3 == 1 ? Receiver{at, {0, 0, -1}}
+                                     : Receiver{at + glm::vec3(5, 0, 0), {0, 0, 1}});
+  }
+  const PacketCluster cluster(receivers, GatherQuality());
+  ASSERT_EQ(cluster.packetCount(), 13u);
+  std::vector<int> seen(receivers.size(), 0);
+  int mixed = 0;
+  for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
+    for (std::size_t k = 0; k < cluster.places(i).size(); ++k) {
+      ++seen[cluster.places(i)[k]];
+      EXPECT_EQ(cluster.receivers(i)[k].position, receivers[cluster.places(i)[k]].position);
+    }
+    mixed += cluster.packet(i).radius > .3f || !cluster.packet(i).has_horizon;
+  }
+  EXPECT_EQ(seen, std::vector<int>(receivers.size(), 1));
+  // Those that halving by number leaves between two groups; in the order given all would be
+  EXPECT_LE(mixed, 4);
+}
+
+}  // namespace
+}  // namespace surfeit
