@@ -121,7 +121,7 @@ class Fidelity : public DirectoryTest {
 
 TEST_F(Fidelity, CornellBoxWithSpheres) {
   ASSERT_EQ(std::system(fmt::format("'{}' '{}' >/dev/null", CORNELL_SCENE, path("")).c_str()), 0);
-  measure("cornell", path("cornell.obj"), {}, {0.014, 0.0115, 0.046});
+  measure("cornell", path("cornell.obj"), {}, {0.0053, 0.002, 0.036});
 }
 
 TEST_F(Fidelity, BunnyOnAPlane) {
@@ -130,7 +130,7 @@ TEST_F(Fidelity, BunnyOnAPlane) {
   Surroundings surroundings;
   surroundings.ground.enabled = true;
   surroundings.lights.directionals.push_back({{-1, -2, -0.5f}, {3, 3, 3}});
-  measure("bunny", mesh, surroundings, {0.0075, 0.003, 0.065});
+  measure("bunny", mesh, surroundings, {0.0051, 0.002, 0.058});
 }
 
 }  // namespace
