@@ -78,8 +78,8 @@ using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const Packet
 SiblingClassifier fastestSiblingClassifier();
 
 // Calls visit.node(const Node&) for the nodes small enough as a whole, and
-// visit.surfels(std::span<const Surfel>) for those of leaves too near, some of which the region may
-// not hold. `Reader` has the functions
+// visit.leaf(const Node&) and visit.surfels(std::span<const Surfel>) for leaves too near, of whose
+// surfels the region may not hold all. `Reader` has the functions
 // of PagedOctree::Reader. The order depends on octree and view alone. One thread at a time.
 class CutWalk {
  public:
@@ -105,6 +105,7 @@ class CutWalk {
       for (std::uint32_t open = classes.open; open != 0; open &= open - 1) {
         const Node& node = siblings[static_cast<std::size_t>(std::countr_zero(open))];
         if (node.isLeaf()) {
+          visit.leaf(node);
           SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
             surfels_visited_ += run.size();
             visit.surfels(run);
@@ -136,6 +137,7 @@ class CutWalk {
 // For walks that are made for the pages they touch.
 struct IgnoreCut {
   void node(const Node&) {}
+  void leaf(const Node&) {}
   void surfels(std::span<const Surfel>) {}
 };
 

@@ -9,6 +9,7 @@ namespace {
 struct DrawCut {
   ReceiverRaster& raster;
   void node(const Node& node) { raster.addNode(node); }
+  void leaf(const Node&) {}
   void surfels(std::span<const Surfel> run) {
     for (const Surfel& surfel : run) raster.addSurfel(surfel);
   }

@@ -88,14 +88,25 @@ LookUpTrace::LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int 
 // As PacketGatherer::gather walks.
 Status LookUpTrace::walk(std::span<const Receiver> receivers, Reader& reader) {
   const PacketCluster cluster(receivers, quality_);
+  cost_.begin(cluster.receivers(0)[0].position);
+  SURFEIT_RETURN_IF_ERROR(cut_->walk(viewPacket(cluster.receivers(0).first(1)), {}, reader, cost_));
   if (cluster.shares()) {
     SURFEIT_RETURN_IF_ERROR(cut_->walk(cluster.view(), cluster.farRegion(), reader, IgnoreCut{}));
   }
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
-    SURFEIT_RETURN_IF_ERROR(
-        cut_->walk(cluster.packet(i), cluster.regionOf(i), reader, IgnoreCut{}));
+    SURFEIT_RETURN_IF_ERROR(walkPart(cluster.receivers(i), cluster.regionOf(i), reader));
   }
   return {};
+}
+
+Status LookUpTrace::walkPart(std::span<const Receiver> receivers, const CutRegion& region,
+                             Reader& reader) {
+  if (cost_.isBetterDivided(receivers)) {
+    const std::size_t half = firstHalf(receivers.size());
+    SURFEIT_RETURN_IF_ERROR(walkPart(receivers.first(half), region, reader));
+    return walkPart(receivers.subspan(half), region, reader);
+  }
+  return cut_->walk(viewPacket(receivers), region, reader, IgnoreCut{});
 }
 
 Status LookUpTrace::follow(const NextRun& next, LookUps& every, LookUps* second) {

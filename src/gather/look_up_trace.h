@@ -12,6 +12,7 @@
 #include "cache/reuse_distances.h"
 #include "gather/cut.h"
 #include "gather/packet_cluster.h"
+#include "gather/packet_cost.h"
 #include "gather/receiver_sorter.h"
 #include "octree/paged_octree.h"
 #include "surfeit/gather.h"
@@ -57,6 +58,7 @@ class LookUpTrace {
   // What CutWalk walks; one of the threads that are imitated.
   class Reader;
   Status walk(std::span<const Receiver> receivers, Reader& reader);
+  Status walkPart(std::span<const Receiver> receivers, const CutRegion& region, Reader& reader);
 
   const GatherQuality quality_;
   const std::size_t threads_;
@@ -64,6 +66,7 @@ class LookUpTrace {
   const std::uint32_t surfel_group_capacity_;
   PagedOctree::Reader octree_;
   const std::unique_ptr<CutWalk> cut_;
+  PacketCost cost_;
 };
 
 }  // namespace surfeit

@@ -27,9 +27,10 @@ float coordinate(const Receiver& receiver, int axis, float normal_weight) {
   return axis < 3 ? receiver.position[axis] : normal_weight * receiver.normal[axis - 3];
 }
 
-// Orders places so that each kPacketReceivers of them, but for the last, are a packet.
+// Orders places so that each kPacketReceivers of them, but for the last, are a packet, and halves
+// of packets lie together as well.
 void divide(Places places, std::span<const Receiver> receivers, float normal_weight) {
-  if (places.size() <= kPacketReceivers) return;
+  if (places.size() <= 1) return;
   int widest = 0;
   float width = -1;
   for (int axis = 0; axis < 6; ++axis) {
@@ -45,7 +46,7 @@ void divide(Places places, std::span<const Receiver> receivers, float normal_wei
     }
   }
   const std::size_t packets = (places.size() + kPacketReceivers - 1) / kPacketReceivers;
-  const std::size_t half = packets / 2 * kPacketReceivers;
+  const std::size_t half = packets > 1 ? packets / 2 * kPacketReceivers : firstHalf(places.size());
   std::nth_element(places.begin(), places.begin() + std::ptrdiff_t(half), places.end(),
                    [&](std::uint16_t a, std::uint16_t b) {
                      const float x = coordinate(receivers[a], widest, normal_weight);

@@ -20,6 +20,9 @@ namespace surfeit {
 inline constexpr std::size_t kClusterPackets = 16;
 inline constexpr std::size_t kClusterReceivers = kClusterPackets * kPacketReceivers;
 
+// Where a packet of this size is halved.
+inline std::size_t firstHalf(std::size_t packet_size) { return packet_size / 2; }
+
 class PacketCluster {
  public:
   // `receivers`: 1 to kClusterReceivers. They are divided into packets again and again where they

@@ -1,7 +1,9 @@
 #include "gather/packet_gatherer.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdint>
 
 namespace surfeit {
 namespace {
@@ -11,6 +13,7 @@ struct DrawCut {
   PacketRaster& raster;
   const CutRegion& region;
   void node(const Node& node) { raster.addNode(node); }
+  void leaf(const Node&) {}
   void surfels(std::span<const Surfel> run) { raster.addSurfels(run, region); }
 };
 
@@ -47,11 +50,52 @@ Status PacketGatherer::draw(const PacketView& view, const CutRegion& region,
   return {};
 }
 
+// Some receivers of a packet.
+struct PacketGatherer::Part {
+  std::span<const Receiver> receivers;
+  std::span<const std::uint16_t> places;  // of their results
+  PacketView view;
+  CutRegion region;
+  const PacketRaster* far = nullptr;
+  std::size_t far_lane = 0;
+  float far_distance = 0;
+
+  Part of(std::size_t begin, std::size_t count) const {
+    Part part = *this;
+    part.receivers = receivers.subspan(begin, count);
+    part.places = places.subspan(begin, count);
+    part.view = viewPacket(part.receivers);
+    return part;
+  }
+};
+
+// As one packet, or in halves if those together draw less.
+Status PacketGatherer::gatherPart(const Part& part, PagedOctree::Reader& octree,
+                                  std::span<GatherResult> results) {
+  const std::size_t count = part.receivers.size(), half = firstHalf(count);
+  if (cost_.isBetterDivided(part.receivers)) {
+    const Part first = part.of(0, half), second = part.of(half, count - half);
+    SURFEIT_RETURN_IF_ERROR(gatherPart(first, octree, results));
+    return gatherPart(second, octree, results);
+  }
+  SURFEIT_RETURN_IF_ERROR(draw(part.view, part.region, part.receivers, octree, raster_));
+  work_.patches += raster_.patchCount();
+  ++work_.packets;
+  std::array<GatherResult, kPacketReceivers> packet_results;
+  raster_.integrate(std::span(packet_results).first(count), part.far, part.far_lane,
+                    part.far_distance);
+  for (std::size_t k = 0; k < count; ++k) results[part.places[k]] = packet_results[k];
+  endPhase(work_.integrate_seconds);
+  return {};
+}
+
 Status PacketGatherer::gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
                               std::span<GatherResult> results) {
   double ignored = 0;
   endPhase(ignored);
   const PacketCluster cluster(receivers, quality_);
+  cost_.begin(cluster.receivers(0)[0].position);
+  SURFEIT_RETURN_IF_ERROR(cut_.walk(viewPacket(cluster.receivers(0).first(1)), {}, octree, cost_));
   if (cluster.shares()) {
     SURFEIT_RETURN_IF_ERROR(
         draw(cluster.view(), cluster.farRegion(), cluster.centres(), octree, far_raster_));
@@ -59,16 +103,14 @@ Status PacketGatherer::gather(std::span<const Receiver> receivers, PagedOctree::
     work_.shared_patches += far_raster_.patchCount();
   }
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
-    SURFEIT_RETURN_IF_ERROR(
-        draw(cluster.packet(i), cluster.regionOf(i), cluster.receivers(i), octree, raster_));
-    work_.patches += raster_.patchCount();
-    ++work_.packets;
-    const std::span<const std::uint16_t> places = cluster.places(i);
-    std::array<GatherResult, kPacketReceivers> packet_results;
-    raster_.integrate(std::span(packet_results).first(places.size()),
-                      cluster.shares(i) ? &far_raster_ : nullptr, i, cluster.farDistance());
-    for (std::size_t k = 0; k < places.size(); ++k) results[places[k]] = packet_results[k];
-    endPhase(work_.integrate_seconds);
+    const Part packet = {.receivers = cluster.receivers(i),
+                         .places = cluster.places(i),
+                         .view = cluster.packet(i),
+                         .region = cluster.regionOf(i),
+                         .far = cluster.shares(i) ? &far_raster_ : nullptr,
+                         .far_lane = i,
+                         .far_distance = cluster.farDistance()};
+    SURFEIT_RETURN_IF_ERROR(gatherPart(packet, octree, results));
   }
   return {};
 }

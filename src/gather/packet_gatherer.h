@@ -8,6 +8,7 @@
 
 #include "gather/cut.h"
 #include "gather/packet_cluster.h"
+#include "gather/packet_cost.h"
 #include "gather/packet_raster.h"
 #include "gather/receiver.h"
 #include "octree/paged_octree.h"
@@ -31,7 +32,7 @@ class PacketGatherer {
 
   // What all gathers so far took, for benches and tests.
   struct Work {
-    std::size_t packets = 0;
+    std::size_t packets = 0;  // drawn, of whatever size
     std::size_t nodes_visited = 0, surfels_visited = 0;
     std::size_t patches = 0;         // drawn for single packets
     std::size_t shared_patches = 0;  // drawn for clusters
@@ -43,10 +44,13 @@ class PacketGatherer {
 
   // Bytes that a gatherer holds from the start.
   static std::size_t memoryBytes(GatherMode mode, const GatherQuality& quality) {
-    return sizeof(PacketGatherer) + 2 * PacketRaster::memoryBytes(mode, quality);
+    return sizeof(PacketGatherer) + PacketCost::memoryBytes() +
+           2 * PacketRaster::memoryBytes(mode, quality);
   }
 
  private:
+  struct Part;
+  Status gatherPart(const Part& part, PagedOctree::Reader& octree, std::span<GatherResult> results);
   Status draw(const PacketView& view, const CutRegion& region, std::span<const Receiver> receivers,
               PagedOctree::Reader& octree, PacketRaster& raster);
   void endPhase(double& seconds);
@@ -54,6 +58,7 @@ class PacketGatherer {
   const GatherQuality quality_;
   PacketRaster raster_, far_raster_;
   CutWalk cut_;
+  PacketCost cost_;
   Work work_;
   bool measures_phases_ = false;
   double phase_begin_ = 0;

@@ -95,6 +95,7 @@ struct CountSurfels {
   const CutRegion& region;
   std::uint64_t count = 0;
   void node(const Node& node) { count += node.surfel_count; }
+  void leaf(const Node&) {}
   void surfels(std::span<const Surfel> run) {
     for (const Surfel& surfel : run) count += region.holds(surfel.position) ? 1 : 0;
   }
