@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -262,6 +264,17 @@ class NameLog : public FaultInjector {
 inline std::ptrdiff_t entryCount(const char* directory) {
   return std::distance(std::filesystem::directory_iterator(directory),
                        std::filesystem::directory_iterator());
+}
+
+// Whether no more than `threads` threads are left. The kernel may list a thread for a moment after
+// it was joined, so this waits for those to go.
+inline bool threadsComeDownTo(std::ptrdiff_t threads) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (entryCount("/proc/self/task") > threads) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
 }
 
 }  // namespace surfeit
