@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/error_summary.h"
 #include "core/job_limits.h"
 #include "io/ply_reader.h"
 #include "sample/reference.h"
@@ -109,37 +110,10 @@ double luminance(const glm::vec3& rgb) {
   return 0.2126 * double(rgb.x) + 0.7152 * double(rgb.y) + 0.0722 * double(rgb.z);
 }
 
-// Errors of the gather against one reference, over all receivers.
-struct ErrorSummary {
-  double mean = 0;  // of the reference
-  double bias = 0, rmse = 0, p95 = 0, max = 0;
-};
-
-template <typename ErrorOf, typename TruthOf>
-ErrorSummary summarise(std::size_t count, ErrorOf errorOf, TruthOf truthOf) {
-  ErrorSummary summary;
-  std::vector<double> magnitudes;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double error = errorOf(i);
-    summary.mean += truthOf(i);
-    summary.bias += error;
-    summary.rmse += error * error;
-    magnitudes.push_back(std::abs(error));
-  }
-  const double n = double(count);
-  summary.mean /= n;
-  summary.bias /= n;
-  summary.rmse = std::sqrt(summary.rmse / n);
-  std::sort(magnitudes.begin(), magnitudes.end());
-  summary.p95 = magnitudes[std::size_t(0.95 * (n - 1))];
-  summary.max = magnitudes.back();
-  return summary;
-}
-
 void printOcclusion(const char* name, const std::vector<Measured>& receivers,
                     const std::vector<ReferenceGather>& truths, float ReferenceGather::*truth) {
   const auto truthOf = [&](std::size_t i) { return double(truths[i].*truth); };
-  const ErrorSummary errors = summarise(
+  const ErrorFigures errors = summariseErrors(
       receivers.size(), [&](std::size_t i) { return double(receivers[i].occlusion) - truthOf(i); },
       truthOf);
   fmt::print("occlusion  {:5}  mean {:.4f}  RMSE {:.4f}  bias {:+.4f}  p95 {:.4f}  max {:.4f}\n",
@@ -150,11 +124,11 @@ void printIrradiance(const char* name, const std::vector<Measured>& receivers,
                      const std::vector<ReferenceGather>& truths,
                      glm::vec3 ReferenceGather::*truth) {
   const auto truthOf = [&](std::size_t i) { return luminance(truths[i].*truth); };
-  const ErrorSummary bias = summarise(
+  const ErrorFigures bias = summariseErrors(
       receivers.size(),
       [&](std::size_t i) { return luminance(receivers[i].irradiance) - truthOf(i); }, truthOf);
   // Over the three channels, so that a wrong color of the right luminance counts
-  const ErrorSummary errors = summarise(
+  const ErrorFigures errors = summariseErrors(
       receivers.size(),
       [&](std::size_t i) {
         const glm::vec3 error = receivers[i].irradiance - truths[i].*truth;

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <latch>
 #include <mutex>
 #include <thread>
@@ -180,30 +179,17 @@ Result<std::vector<GatherResult>> gatherJudged(const ReceiverSet& set, std::size
 }
 
 ErrorSummary summarise(std::span<const GatherResult> results, std::span<const GatherResult> truth) {
-  ErrorSummary summary;
-  std::vector<double> magnitudes;
-  double color_mean = 0;
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    const double error = double(results[i].occlusion) - double(truth[i].occlusion);
-    summary.mean += double(truth[i].occlusion);
-    summary.bias += error;
-    summary.rmse += error * error;
-    magnitudes.push_back(std::abs(error));
-    const double color = meanOf(truth[i].irradiance);
-    const double color_error = meanOf(results[i].irradiance) - color;
-    color_mean += color;
-    summary.color_bias += color_error;
-    summary.color_rmse += color_error * color_error;
-  }
-  const double n = double(results.size());
-  summary.mean /= n;
-  summary.bias /= n;
-  summary.rmse = std::sqrt(summary.rmse / n);
-  std::sort(magnitudes.begin(), magnitudes.end());
-  summary.p95 = magnitudes[std::size_t(0.95 * (n - 1))];
-  summary.max = magnitudes.back();
-  summary.color_bias /= color_mean;
-  summary.color_rmse = std::sqrt(summary.color_rmse / n) / (color_mean / n);
+  const auto figuresOf = [&](auto valueOf) {
+    return summariseErrors(
+        results.size(), [&](std::size_t i) { return valueOf(results[i]) - valueOf(truth[i]); },
+        [&](std::size_t i) { return valueOf(truth[i]); });
+  };
+  ErrorSummary summary{
+      figuresOf([](const GatherResult& result) { return double(result.occlusion); })};
+  const ErrorFigures color =
+      figuresOf([](const GatherResult& result) { return meanOf(result.irradiance); });
+  summary.color_bias = color.bias / color.mean;
+  summary.color_rmse = color.rmse / color.mean;
   return summary;
 }
 

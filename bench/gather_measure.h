@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/error_summary.h"
 #include "bench/gather_scenes.h"
 #include "gather/receiver_raster.h"
 #include "octree/paged_octree.h"
@@ -104,11 +105,9 @@ Result<Timing> timeGather(const ReceiverSet& set, std::size_t per_run,
 Result<std::vector<GatherResult>> gatherJudged(const ReceiverSet& set, std::size_t block,
                                                Worker& worker);
 
-// Results against the truth, over all judged receivers.
-struct ErrorSummary {
-  double mean = 0;                              // of the true occlusion
-  double rmse = 0, bias = 0, p95 = 0, max = 0;  // of occlusion
-  double color_rmse = 0, color_bias = 0;        // of the mean of rgb, over the mean of the truth
+// Results against the truth, over all judged receivers. The figures are those of occlusion.
+struct ErrorSummary : ErrorFigures {
+  double color_rmse = 0, color_bias = 0;  // of the mean of rgb, over the mean of the truth
 };
 ErrorSummary summarise(std::span<const GatherResult> results, std::span<const GatherResult> truth);
 

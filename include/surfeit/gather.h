@@ -93,7 +93,8 @@ struct GatherCacheStats {
 };
 
 // The monitor's record of a stretch of time. Counts are those of the window alone; peak_bytes and
-// budget_bytes hold at its end, and working_set_bytes is what pages touched in it would fill.
+// budget_bytes hold at its end. working_set_bytes is what the pages would fill that were looked up
+// in the two seconds or so before, by samples; 0 at first (docs/stats.md).
 struct GatherWindow {
   double begin_seconds = 0, end_seconds = 0;  // since the gather began
   std::uint64_t receivers = 0;

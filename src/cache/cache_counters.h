@@ -25,12 +25,6 @@ struct CacheCounters {
   std::uint64_t peak_bytes = 0;      // most frame bytes in use at any time
   std::uint64_t budget_bytes = 0;    // of all frames allowed now
   std::uint64_t decoded_bytes = 0;   // of the frames that would hold every page
-
-  // Pages ever loaded, or being loaded: what a cache must hold that reads nothing twice.
-  std::uint64_t distinctPages() const {
-    return misses + prefetches - repeated_loads - failed_loads;
-  }
-  double hitRate() const { return requests > 0 ? double(hits) / double(requests) : 1; }
 };
 
 }  // namespace surfeit

@@ -64,10 +64,6 @@ std::optional<std::uint64_t> MissRatioCurve::framesForMisses(double most_misses)
   return enough;
 }
 
-std::optional<std::uint64_t> MissRatioCurve::framesForHitRate(double least_hit_rate) const {
-  return framesForMisses((1 - least_hit_rate) * lookups_);
-}
-
 std::uint64_t MissRatioCurve::saturation() const { return *framesForMisses(unavoidableMisses()); }
 
 std::uint64_t MissRatioCurve::knee() const {

@@ -32,10 +32,8 @@ class MissRatioCurve {
   // What the largest cache misses too: the first touches.
   double unavoidableMisses() const;
 
-  // The smallest cache that misses no more than that, or hits at least that share of look-ups;
-  // nothing when even the largest cache does worse.
+  // The smallest cache that misses no more than that; nothing when even the largest misses more.
   std::optional<std::uint64_t> framesForMisses(double most_misses) const;
-  std::optional<std::uint64_t> framesForHitRate(double least_hit_rate) const;
 
   // The smallest cache that nothing larger would beat: its frames hold all that is ever reused.
   std::uint64_t saturation() const;

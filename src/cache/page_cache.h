@@ -274,6 +274,7 @@ class PageCache {
   void keepHeldByFronts();
   void setFree(std::uint32_t frame);
   std::uint32_t popFree();
+  // Frames beyond the limit (frame_limit.cpp):
   void shrink();
   void moveStrays();
   void giveBackAroundStrays();

@@ -37,8 +37,10 @@ constexpr std::uint64_t kBytesPerReceiver = sizeof(SortedReceiver) + sizeof(Gath
 // angle. With a max solid angle of 0 it is the whole scene.
 std::uint64_t threadBytes(const SceneFile& file, const GatherWork& work) {
   constexpr double kLayers = 8;
-  constexpr double kBytes = 128;  // of a contribution, in vectors that grow by doubling
-  const double cut = 4 * double(kPi) / double(work.quality.max_solid_angle) * kLayers;
+  // Rough nodes open to a quarter of the solid angle
+  constexpr double kPatches = 4;
+  constexpr double kBytes = 2 * (sizeof(Patch) + 2 * sizeof(std::uint64_t));  // vectors double
+  const double cut = kPatches * 4 * double(kPi) / double(work.quality.max_solid_angle) * kLayers;
   const double most = std::min(double(file.header().surfel_count), cut);
   const double more = std::max(0.0, most - double(PacketRaster::kReservedPatches));
   return PacketGatherer::memoryBytes(work.mode, work.quality) + kThreadBytes +

@@ -83,7 +83,8 @@ LookUpTrace::LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int 
       progress_(progress),
       surfel_group_capacity_(octree.file().header().surfel_group_capacity),
       octree_(octree),
-      cut_(std::make_unique<CutWalk>(quality)) {}
+      cut_(std::make_unique<CutWalk>(quality)),
+      cost_(quality.raster_resolution) {}
 
 // As PacketGatherer::gather walks.
 Status LookUpTrace::walk(std::span<const Receiver> receivers, Reader& reader) {
@@ -94,19 +95,13 @@ Status LookUpTrace::walk(std::span<const Receiver> receivers, Reader& reader) {
     SURFEIT_RETURN_IF_ERROR(cut_->walk(cluster.view(), cluster.farRegion(), reader, IgnoreCut{}));
   }
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
-    SURFEIT_RETURN_IF_ERROR(walkPart(cluster.receivers(i), cluster.regionOf(i), reader));
+    const std::span<const Receiver> packet = cluster.receivers(i);
+    SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(packet, [&](std::size_t begin, std::size_t count) {
+      return cut_->walk(viewPacket(packet.subspan(begin, count)), cluster.regionOf(i), reader,
+                        IgnoreCut{});
+    }));
   }
   return {};
-}
-
-Status LookUpTrace::walkPart(std::span<const Receiver> receivers, const CutRegion& region,
-                             Reader& reader) {
-  if (cost_.isBetterDivided(receivers)) {
-    const std::size_t half = firstHalf(receivers.size());
-    SURFEIT_RETURN_IF_ERROR(walkPart(receivers.first(half), region, reader));
-    return walkPart(receivers.subspan(half), region, reader);
-  }
-  return cut_->walk(viewPacket(receivers), region, reader, IgnoreCut{});
 }
 
 Status LookUpTrace::follow(const NextRun& next, LookUps& every, LookUps* second) {

@@ -58,7 +58,6 @@ class LookUpTrace {
   // What CutWalk walks; one of the threads that are imitated.
   class Reader;
   Status walk(std::span<const Receiver> receivers, Reader& reader);
-  Status walkPart(std::span<const Receiver> receivers, const CutRegion& region, Reader& reader);
 
   const GatherQuality quality_;
   const std::size_t threads_;

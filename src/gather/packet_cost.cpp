@@ -8,48 +8,57 @@
 namespace surfeit {
 namespace {
 
-// A packet that draws no more than this many times what a receiver alone does is not divided.
-constexpr float kCheapPacket = 1.5f;
+// Walking to a patch and preparing it costs as much as drawing this many pixels.
+constexpr float kPatchPixels = 25;
+
+// Pixels along a patch of a packet without width.
+constexpr float kPatchSide = 2.7f;
+
+// So many clusters of a cut tell about the whole.
+constexpr std::size_t kSampledClusters = 512;
 
 }  // namespace
 
-PacketCost::PacketCost() {
-  distances_.reserve(kReservedNodes);
-  surfel_counts_.reserve(kReservedNodes);
+PacketCost::PacketCost(int raster_resolution) : pixels_per_slope_(0.5f * float(raster_resolution)) {
+  clusters_.reserve(kReservedClusters);
 }
 
 void PacketCost::begin(const glm::vec3& position) {
   position_ = position;
-  single_surfels_ = 0;
-  distances_.clear();
-  surfel_counts_.clear();
+  clusters_.clear();
 }
 
-void PacketCost::node(const Node& node) {
-  distances_.push_back(glm::distance(node.position, position_));
-  surfel_counts_.push_back(float(node.surfel_count));
+void PacketCost::add(const Node& node, float least_patches) {
+  clusters_.push_back(
+      {glm::distance(node.position, position_), least_patches, float(node.surfel_count)});
 }
 
-float PacketCost::patches(float radius) const {
-  float sum = single_surfels_;
-  for (std::size_t i = 0; i < distances_.size(); ++i) {
-    const float nearest = std::max(distances_[i] - radius, 1e-3f * distances_[i]);
-    const float ratio = distances_[i] / nearest;
-    sum += std::min(surfel_counts_[i], ratio * ratio);
+float PacketCost::cost(float radius) const {
+  const std::size_t step = clusters_.size() / kSampledClusters + 1;
+  const float most_side = 2 * pixels_per_slope_;
+  float sum = 0;
+  for (std::size_t i = 0; i < clusters_.size(); i += step) {
+    const auto& [distance, least, most] = clusters_[i];
+    const float nearest = std::max(distance - radius, 1e-3f * distance);
+    const float ratio = distance / std::max(nearest, 1e-30f);
+    const float patches = std::min(most, least * ratio * ratio);
+    const float shift = 2 * radius * pixels_per_slope_ / std::max(distance, 1e-30f);
+    const float side = std::min(most_side, kPatchSide + shift);
+    sum += patches * (kPatchPixels + side * side);
   }
-  return sum;
+  return sum * float(step);
 }
 
-// Divided as is best.
-float PacketCost::leastPatches(std::span<const Receiver> packet) const {
-  const float together = patches(viewPacket(packet).radius);
+// Halves cost no less than two receivers alone.
+PacketCost::Division PacketCost::divide(std::span<const Receiver> packet, float least_cost) const {
+  const Division together = {cost(viewPacket(packet).radius), 1};
   const std::size_t half = firstHalf(packet.size());
-  if (half == 0 || together <= kCheapPacket * patches(0)) return together;
-  return std::min(together, leastPatches(packet.first(half)) + leastPatches(packet.subspan(half)));
-}
-
-bool PacketCost::isBetterDivided(std::span<const Receiver> packet) const {
-  return packet.size() > 1 && leastPatches(packet) < patches(viewPacket(packet).radius);
+  if (half == 0 || together.cost <= 2 * least_cost) return together;
+  const Division first = divide(packet.first(half), least_cost);
+  const Division second = divide(packet.subspan(half), least_cost);
+  const float apart = first.cost + second.cost;
+  if (together.cost <= apart) return together;
+  return {apart, first.begins | second.begins << half};
 }
 
 }  // namespace surfeit

@@ -2,6 +2,7 @@
 // is near to any of its receivers, so scattered receivers are cheaper in narrow packets or alone.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -10,6 +11,7 @@
 
 #include "gather/receiver.h"
 #include "octree/node.h"
+#include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
@@ -17,33 +19,56 @@ namespace surfeit {
 // Visits the cut of a receiver (CutWalk), then answers. One thread at a time.
 class PacketCost {
  public:
-  // Room for the nodes of a cut; more for larger ones, as PacketRaster.
-  static constexpr std::size_t kReservedNodes = 4096;
-  PacketCost();
+  // Room for the clusters of a cut; more for larger ones, as PacketRaster.
+  static constexpr std::size_t kReservedClusters = 4096;
+  explicit PacketCost(int raster_resolution);
 
   // Starts over for a receiver here.
   void begin(const glm::vec3& position);
-  void node(const Node& node);
-  void leaf(const Node& node) { single_surfels_ += float(node.surfel_count); }
+  void node(const Node& node) { add(node, 1); }
+  void leaf(const Node& node) { add(node, float(node.surfel_count)); }
   void surfels(std::span<const Surfel>) {}
 
-  // About how many patches a packet of this radius around the receiver draws. A node of s surfels
-  // at distance d is seen from d - radius at nearest, and gives way to about (d / (d - radius))^2
-  // smaller ones, at most to its surfels.
-  float patches(float radius) const;
+  // What a packet of this radius around the receiver takes, in some unit of time. A node of s
+  // surfels at distance d is seen from d - radius at nearest, and gives way to about
+  // (d / (d - radius))^2 smaller ones, at most to its surfels; and what is drawn covers more
+  // pixels, as every receiver sees it elsewhere.
+  float cost(float radius) const;
 
-  static constexpr std::size_t memoryBytes() { return kReservedNodes * 2 * sizeof(float); }
+  static constexpr std::size_t memoryBytes() { return kReservedClusters * sizeof(Cluster); }
 
-  // Whether receivers of a packet draw less in halves (firstHalf), or parts of these, than
-  // together.
-  bool isBetterDivided(std::span<const Receiver> packet) const;
+  // Calls visit(begin, count), which answers a Status, for the parts that the receivers of a packet
+  // are best gathered in: all, or halves (firstHalf), or halves of these, whatever draws least.
+  // Stops at the first failure.
+  template <typename Visit>
+  Status forEachPart(std::span<const Receiver> packet, Visit&& visit) const {
+    std::uint32_t begins = divide(packet, cost(0)).begins;
+    while (begins != 0) {
+      const auto begin = static_cast<std::size_t>(std::countr_zero(begins));
+      begins &= begins - 1;
+      const std::size_t end =
+          begins != 0 ? static_cast<std::size_t>(std::countr_zero(begins)) : packet.size();
+      SURFEIT_RETURN_IF_ERROR(visit(begin, end - begin));
+    }
+    return {};
+  }
 
  private:
-  float leastPatches(std::span<const Receiver> packet) const;
+  // A node, or the surfels of a leaf.
+  struct Cluster {
+    float distance;
+    float least, most;  // patches that it is drawn as
+  };
+  struct Division {
+    float cost;            // of all parts
+    std::uint32_t begins;  // bit i: a part begins at receiver i
+  };
+  void add(const Node& node, float least_patches);
+  Division divide(std::span<const Receiver> packet, float least_cost) const;
 
+  const float pixels_per_slope_;
   glm::vec3 position_{0};
-  float single_surfels_ = 0;
-  std::vector<float> distances_, surfel_counts_;  // of the nodes
+  std::vector<Cluster> clusters_;
 };
 
 }  // namespace surfeit

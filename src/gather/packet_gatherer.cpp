@@ -24,7 +24,8 @@ PacketGatherer::PacketGatherer(GatherMode mode, const GatherQuality& quality,
     : quality_(quality),
       raster_(mode, quality, kernel),
       far_raster_(mode, quality, kernel),
-      cut_(quality) {}
+      cut_(quality),
+      cost_(quality.raster_resolution) {}
 
 // Adds the time since the last call.
 void PacketGatherer::endPhase(double& seconds) {
@@ -54,7 +55,6 @@ Status PacketGatherer::draw(const PacketView& view, const CutRegion& region,
 struct PacketGatherer::Part {
   std::span<const Receiver> receivers;
   std::span<const std::uint16_t> places;  // of their results
-  PacketView view;
   CutRegion region;
   const PacketRaster* far = nullptr;
   std::size_t far_lane = 0;
@@ -64,23 +64,17 @@ struct PacketGatherer::Part {
     Part part = *this;
     part.receivers = receivers.subspan(begin, count);
     part.places = places.subspan(begin, count);
-    part.view = viewPacket(part.receivers);
     return part;
   }
 };
 
-// As one packet, or in halves if those together draw less.
 Status PacketGatherer::gatherPart(const Part& part, PagedOctree::Reader& octree,
                                   std::span<GatherResult> results) {
-  const std::size_t count = part.receivers.size(), half = firstHalf(count);
-  if (cost_.isBetterDivided(part.receivers)) {
-    const Part first = part.of(0, half), second = part.of(half, count - half);
-    SURFEIT_RETURN_IF_ERROR(gatherPart(first, octree, results));
-    return gatherPart(second, octree, results);
-  }
-  SURFEIT_RETURN_IF_ERROR(draw(part.view, part.region, part.receivers, octree, raster_));
+  SURFEIT_RETURN_IF_ERROR(
+      draw(viewPacket(part.receivers), part.region, part.receivers, octree, raster_));
   work_.patches += raster_.patchCount();
   ++work_.packets;
+  const std::size_t count = part.receivers.size();
   std::array<GatherResult, kPacketReceivers> packet_results;
   raster_.integrate(std::span(packet_results).first(count), part.far, part.far_lane,
                     part.far_distance);
@@ -105,12 +99,14 @@ Status PacketGatherer::gather(std::span<const Receiver> receivers, PagedOctree::
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
     const Part packet = {.receivers = cluster.receivers(i),
                          .places = cluster.places(i),
-                         .view = cluster.packet(i),
                          .region = cluster.regionOf(i),
                          .far = cluster.shares(i) ? &far_raster_ : nullptr,
                          .far_lane = i,
                          .far_distance = cluster.farDistance()};
-    SURFEIT_RETURN_IF_ERROR(gatherPart(packet, octree, results));
+    SURFEIT_RETURN_IF_ERROR(
+        cost_.forEachPart(packet.receivers, [&](std::size_t begin, std::size_t count) {
+          return gatherPart(packet.of(begin, count), octree, results);
+        }));
   }
   return {};
 }

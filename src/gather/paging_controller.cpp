@@ -98,7 +98,7 @@ void PagingController::advance(std::uint64_t receivers) {
 
 void PagingController::finish() {
   const std::lock_guard lock(mutex_);
-  noteWorkingSets();
+  noteWorkingSets(false);
   const Moment end = now();
   record_.add(end);
   advise(end);
@@ -111,7 +111,7 @@ void PagingController::tick() {
   if (options_.prefetches) adaptPrefetch(at);
   if (options_.adapts_split) adaptSplit(at);
   if (ticks_ % kTicksPerHalving == 0) {
-    noteWorkingSets();
+    noteWorkingSets(true);
     octree_.nodeDistances()->endWindow(at.nodes.requests);
     octree_.surfelDistances()->endWindow(at.surfels.requests);
     if (double(at.receivers) > kAdvicePart * double(options_.receivers)) advise(at);
@@ -120,15 +120,14 @@ void PagingController::tick() {
   if (record_.isDue(at.seconds)) record_.add(now());
 }
 
-// What was touched since the last halving.
-void PagingController::noteWorkingSets() {
+// What was touched since the last halving. A stretch that the end of the gather cuts short has
+// touched less than is usual.
+void PagingController::noteWorkingSets(bool is_whole) {
   const SceneFile& file = octree_.file();
   const std::uint64_t nodes = octree_.nodeDistances()->windowPages();
   const std::uint64_t surfels = octree_.surfelDistances()->windowPages();
-  // A gather that ends soon after a halving has touched little since
-  const bool is_short = ticks_ % kTicksPerHalving != 0 && ticks_ > kTicksPerHalving;
-  const auto noted = [is_short](std::uint64_t before, std::uint64_t bytes) {
-    return is_short ? std::max(before, bytes) : bytes;
+  const auto noted = [is_whole](std::uint64_t before, std::uint64_t bytes) {
+    return is_whole ? bytes : std::max(before, bytes);
   };
   node_working_set_bytes_ =
       noted(node_working_set_bytes_, nodes * PagedOctree::nodeFrameBytes(file));

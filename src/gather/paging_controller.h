@@ -70,7 +70,7 @@ class PagingController {
   void adaptPrefetch(const Moment& now);
   void adaptSplit(const Moment& now);
   void advise(const Moment& now);
-  void noteWorkingSets();
+  void noteWorkingSets(bool is_whole);
   double secondsSinceStart() const;
 
   PagedOctree& octree_;

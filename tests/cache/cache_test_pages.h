@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <memory>
 #include <span>
@@ -52,6 +53,11 @@ inline std::unique_ptr<PageCache> makeCache(PageNumber pages, std::size_t frames
 // Bytes of `frames` frames of test pages.
 inline std::uint64_t frameBytes(std::size_t frames) {
   return frames * PageCache::frameBytes(kTestPageBytes);
+}
+
+// Pages ever loaded, or being loaded.
+inline std::uint64_t distinctPages(const CacheCounters& counters) {
+  return counters.misses + counters.prefetches - counters.repeated_loads - counters.failed_loads;
 }
 
 // A gate that a loader waits at. Closed until open() is called; gives up after ten seconds, so that

@@ -36,8 +36,6 @@ TEST(MissRatioCurve, FindsTheSmallestCacheThatDoes) {
   EXPECT_EQ(curve.framesForMisses(100), 10u);
   EXPECT_EQ(curve.framesForMisses(99), std::nullopt);
   EXPECT_EQ(curve.framesForMisses(std::numeric_limits<double>::quiet_NaN()), std::nullopt);
-  EXPECT_EQ(curve.framesForHitRate(0.75), 4u);
-  EXPECT_EQ(curve.framesForHitRate(0.95), std::nullopt);
   EXPECT_EQ(curve.saturation(), 10u);
 }
 
@@ -79,7 +77,7 @@ TEST(MissRatioCurve, WithoutLookupsThereIsNothingToMiss) {
   EXPECT_EQ(curve.hitRate(0), 1);
   EXPECT_EQ(curve.saturation(), 0u);
   EXPECT_EQ(curve.knee(), 0u);
-  EXPECT_EQ(curve.framesForHitRate(0.99), 0u);
+  EXPECT_EQ(curve.framesForMisses(0), 0u);
 }
 
 }  // namespace

@@ -81,7 +81,7 @@ TEST(PageCache, CountersAddUp) {
   EXPECT_EQ(counters.hits + counters.misses, 1000u);
   EXPECT_EQ(counters.front_hits + counters.shared_hits, counters.hits);
   EXPECT_EQ(counters.evictions, counters.misses - 8);
-  EXPECT_EQ(counters.distinctPages(), 50u);
+  EXPECT_EQ(distinctPages(counters), 50u);
   EXPECT_EQ(counters.repeated_loads, counters.misses - 50);
   EXPECT_EQ(counters.failed_loads, 0u);
   EXPECT_EQ(counters.bytes_read, counters.misses * kTestStoredBytes);
@@ -228,7 +228,7 @@ TEST(PageCache, FailedLoadReachesAllWaitersAndIsNotCached) {
   const CacheCounters counters = cache->counters();
   EXPECT_EQ(counters.misses, 4u);
   EXPECT_EQ(counters.failed_loads, 2u);
-  EXPECT_EQ(counters.distinctPages(), 2u);
+  EXPECT_EQ(distinctPages(counters), 2u);
   EXPECT_EQ(counters.peak_bytes, frameBytes(2));
 }
 
@@ -244,7 +244,7 @@ TEST(PageCache, FailedReloadIsNoDistinctPage) {
   ASSERT_TRUE(front.lookup(2).ok());
   broken = true;
   EXPECT_FALSE(front.lookup(1).ok());
-  EXPECT_EQ(cache->counters().distinctPages(), 2u);
+  EXPECT_EQ(distinctPages(cache->counters()), 2u);
   EXPECT_EQ(cache->counters().repeated_loads, 0u);
 }
 
@@ -304,7 +304,7 @@ TEST(PageCache, ResidentPagesAreNeverEvicted) {
   const CacheCounters counters = cache->counters();
   EXPECT_EQ(counters.misses, 3 * 95u);
   EXPECT_EQ(counters.front_hits, 3 * 5u);
-  EXPECT_EQ(counters.distinctPages(), 100u);
+  EXPECT_EQ(distinctPages(counters), 100u);
 
   // No limit takes them, nor the last frame of the others
   cache->setFrameLimit(1);

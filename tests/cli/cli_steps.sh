@@ -41,3 +41,20 @@ jsonHas() {
     grep -q "\"$key\":" "$file" || fail "$file has no \"$key\": $(cat "$file")"
   done
 }
+
+# jsonIs FILE [KEY NUMBER]...: every key has that value, as near as a float comes.
+jsonIs() {
+  local file=$1 found
+  shift
+  while (($# > 0)); do
+    found=$(sed -nE "s/^ *\"$1\": ([-+.0-9e]+),?$/\1/p" "$file")
+    awk -v found="$found" -v expected="$2" \
+      'BEGIN { e = found - expected; exit !(found != "" && e * e <= 1e-12 * expected * expected) }' ||
+      fail "$file: $1 is \"$found\", expected $2"
+    shift 2
+  done
+}
+
+differentBytes() {
+  if cmp -s "$1" "$2"; then fail "$1 and $2 are the same"; fi
+}

@@ -281,6 +281,81 @@ cutScenesAreRefused() {
   leavesNothing result
 }
 
+# gatherPatch NAME OPTION...: gathers at patch.ply to NAME.ply, with the statistics in NAME.json.
+gatherPatch() {
+  local name=$1
+  shift
+  run 0 gather cornell.sft patch.ply -o "$name.ply" --mode bleeding --memory 64M \
+    --stats "$name.json" "$@"
+}
+
+# A patch of 32 x 32 receivers on the floor, patch.ply: clusters that share a far field.
+makePatch() {
+  {
+    printf '%s\n' ply 'format ascii 1.0' 'element vertex 1024' 'property float x' \
+      'property float y' 'property float z' 'property float nx' 'property float ny' \
+      'property float nz' end_header
+    awk 'BEGIN { for (i = 0; i < 1024; ++i) print .1 + .0005 * (i % 32), 0, .1 + .0005 * int(i / 32), 0, 1, 0 }'
+  } > patch.ply
+}
+
+optionsOfTheirOwnWinOverThePreset() {
+  makeScene 5000
+  makePatch
+  gatherPatch default
+  jsonIs default.json max_solid_angle 0.08 raster_resolution 12 near_field_radii 8 \
+    far_field_parallax 0.3
+  gatherPatch standard --quality standard
+  sameBytes standard.ply default.ply
+  gatherPatch draft --quality draft
+  jsonIs draft.json max_solid_angle 0.3 raster_resolution 12 near_field_radii 4 \
+    far_field_parallax 0.5
+  differentBytes draft.ply default.ply
+  gatherPatch final --quality final
+  jsonIs final.json max_solid_angle 0.03 raster_resolution 20 near_field_radii 16 \
+    far_field_parallax 0.1
+
+  # One, all, before and after; what is not given comes from the preset
+  local own=(--max-solid-angle 0.2 --raster-resolution 8 --near-field 5 --far-parallax 0.4)
+  gatherPatch own "${own[@]}"
+  gatherPatch after --quality final "${own[@]}"
+  gatherPatch before "${own[@]}" --quality final
+  gatherPatch around --raster-resolution 8 --near-field 5 --quality final --far-parallax 0.4 \
+    --max-solid-angle 0.2
+  local name
+  for name in own after before around; do
+    jsonIs $name.json max_solid_angle 0.2 raster_resolution 8 near_field_radii 5 \
+      far_field_parallax 0.4
+    sameBytes $name.ply own.ply
+  done
+  gatherPatch after --quality draft --raster-resolution 8
+  gatherPatch before --raster-resolution 8 --quality draft
+  for name in after before; do
+    jsonIs $name.json max_solid_angle 0.3 raster_resolution 8 near_field_radii 4 \
+      far_field_parallax 0.5
+  done
+  sameBytes after.ply before.ply
+  differentBytes after.ply draft.ply
+
+  # No preset touches these
+  local limits=(--max-dist 0.7 --sides both --bias 0.3)
+  gatherPatch own --max-solid-angle 0.3 --near-field 4 --far-parallax 0.5 "${limits[@]}"
+  gatherPatch after --quality draft "${limits[@]}"
+  gatherPatch before "${limits[@]}" --quality draft
+  sameBytes after.ply own.ply
+  sameBytes before.ply own.ply
+  differentBytes own.ply draft.ply
+}
+
+sharedFarFieldCanBeSwitchedOff() {
+  makeScene 5000
+  makePatch
+  gatherPatch shared
+  gatherPatch alone --far-parallax 0
+  jsonIs alone.json far_field_parallax 0
+  differentBytes alone.ply shared.ply
+}
+
 invalidReceiversGetNanOrAreRefused() {
   makeScene 1000
   cat > receivers.ply << 'PLY'

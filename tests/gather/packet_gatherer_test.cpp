@@ -57,9 +57,9 @@ void addGround(Cloud& cloud, int side, float extent) {
 }
 
 // Spheres of every kind on and above a ground.
-Cloud mixedCloud() {
+Cloud spheresOnGround(int ground_side, int sphere_surfels) {
   Cloud cloud;
-  addGround(cloud, 80, 8);
+  addGround(cloud, ground_side, 8);
   std::mt19937 random(3);
   std::uniform_real_distribution<float> uniform(-1, 1);
   for (int i = 0; i < 24; ++i) {
@@ -67,11 +67,15 @@ Cloud mixedCloud() {
     const std::uint32_t flags = i % 8 == 3   ? std::uint32_t{kSurfelTwoSided}
                                 : i % 8 == 5 ? std::uint32_t{kSurfelSphere}
                                              : 0;
-    addSphere(cloud, 600, {3 * uniform(random), 3 * uniform(random), radius + (i % 3) * .6f},
-              radius, flags);
+    addSphere(cloud, sphere_surfels,
+              {3 * uniform(random), 3 * uniform(random), radius + (i % 3) * .6f}, radius, flags);
   }
   return cloud;
 }
+
+Cloud mixedCloud() { return spheresOnGround(80, 600); }
+// So fine that it would be a waste to open all of it.
+Cloud fineCloud() { return spheresOnGround(200, 2000); }
 
 constexpr std::size_t kRuns = 40;
 
@@ -141,30 +145,93 @@ TEST(PacketGatherer, NeighboursComeCloseToWhatEachGathersAlone) {
   EXPECT_LT(std::sqrt(square / double(kRuns * kPacketReceivers)), .01);
 }
 
-// Dense receivers on the ground: most of the scene is shared.
-TEST(PacketGatherer, SharingTheFarFieldChangesLittle) {
-  const Cloud cloud = mixedCloud();
-  Scene scene(cloud);
+// A cluster on a patch of the ground.
+std::vector<Receiver> denseReceivers() {
   std::vector<Receiver> receivers;
   for (int i = 0; i < int(kClusterReceivers); ++i) {
     receivers.push_back({{.2f + .002f * float(i % 16), .1f + .002f * float(i / 16), 0}, {0, 0, 1}});
   }
+  return receivers;
+}
+
+// A cluster anywhere above the ground, inside spheres too, facing anywhere.
+std::vector<Receiver> scatteredReceivers() {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  const auto anywhere = [&] {
+    const float x = uniform(random), y = uniform(random);
+    return glm::vec3(x, y, uniform(random));
+  };
+  std::vector<Receiver> receivers;
+  while (receivers.size() < kClusterReceivers) {
+    const glm::vec3 position = anywhere(), normal = anywhere();
+    const float length = glm::length(normal);
+    if (length < .1f || length > 1) continue;
+    receivers.push_back({{4 * position.x, 4 * position.y, 1 + .99f * position.z}, normal / length});
+  }
+  return receivers;
+}
+
+struct Differences {
+  double rms = 0, largest = 0;
+};
+
+Differences differences(const std::vector<GatherResult>& a, const std::vector<GatherResult>& b) {
+  Differences found;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double error = difference(a[i], b[i]);
+    found.rms += error * error / double(a.size());
+    found.largest = std::max(found.largest, error);
+  }
+  found.rms = std::sqrt(found.rms);
+  return found;
+}
+
+// Most of the scene is shared.
+TEST(PacketGatherer, SharingTheFarFieldChangesLittleButSomething) {
+  Scene scene(mixedCloud());
+  const std::vector<Receiver> receivers = denseReceivers();
   GatherQuality quality;
   quality.far_field_parallax = 0;
   PacketGatherer alone(GatherMode::kBleeding, quality);
   const std::vector<GatherResult> expected = gatherPacket(alone, scene, receivers);
   EXPECT_EQ(alone.work().shared_patches, 0u);
-  quality.far_field_parallax = .3f;
-  PacketGatherer sharing(GatherMode::kBleeding, quality);
+  PacketGatherer sharing(GatherMode::kBleeding, GatherQuality());
   const std::vector<GatherResult> results = gatherPacket(sharing, scene, receivers);
   EXPECT_GT(sharing.work().shared_patches, 0u);
   EXPECT_LT(sharing.work().patches, alone.work().patches / 2);
-  double square = 0;
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    square += std::pow(difference(results[i], expected[i]), 2);
-    EXPECT_LT(difference(results[i], expected[i]), .02);
+  const Differences found = differences(results, expected);
+  EXPECT_GT(found.rms, 0);
+  EXPECT_LT(found.rms, .005);
+  EXPECT_LT(found.largest, .02);
+}
+
+// What is near to any receiver of a packet is opened for all: scattered ones are better off in less
+// company. Measured: 234 packets, differences of 0.0017 RMS and 0.022 at most.
+TEST(PacketGatherer, ScatteredReceiversAreDividedAndComeCloseToWhatEachGathersAlone) {
+  Scene scene(fineCloud());
+  const std::vector<Receiver> receivers = scatteredReceivers();
+  const GatherQuality quality;
+  PacketGatherer gatherer(GatherMode::kBleeding, quality);
+  const std::vector<GatherResult> results = gatherPacket(gatherer, scene, receivers);
+  EXPECT_GT(gatherer.work().packets, 4 * kClusterPackets);
+  EXPECT_LE(gatherer.work().packets, kClusterReceivers);
+  std::vector<GatherResult> expected;
+  for (const Receiver& receiver : receivers) expected.push_back(scene.gather(receiver, quality));
+  const Differences found = differences(results, expected);
+  EXPECT_LT(found.rms, .004);
+  EXPECT_LT(found.largest, .04);
+}
+
+TEST(PacketGatherer, DenseReceiversAreNotDivided) {
+  Scene scene(fineCloud());
+  for (const float parallax : {0.f, .3f}) {
+    GatherQuality quality;
+    quality.far_field_parallax = parallax;
+    PacketGatherer gatherer(GatherMode::kBleeding, quality);
+    gatherPacket(gatherer, scene, denseReceivers());
+    EXPECT_EQ(gatherer.work().packets, kClusterPackets) << parallax;
   }
-  EXPECT_LT(std::sqrt(square / double(results.size())), .005);
 }
 
 TEST(PacketGatherer, InstructionSetsAgree) {

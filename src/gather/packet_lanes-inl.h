@@ -1,0 +1,138 @@
+// The receivers of a packet in lanes, and how they see a patch; for one instruction set (see
+// packet_kernel-inl.h).
+#if defined(SURFEIT_PACKET_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_LANES_INL_H_
+#undef SURFEIT_PACKET_LANES_INL_H_
+#else
+#define SURFEIT_PACKET_LANES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <array>
+#include <glm/vec3.hpp>
+
+#include "gather/coverage_rules.h"
+#include "gather/packet_kernel.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<float, kPacketReceivers>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+constexpr std::size_t kStep = hn::MaxLanes(D());
+
+inline V Splat(float value) { return hn::Set(D(), value); }
+inline V LoadLanes(const std::array<float, kPacketReceivers>& column, std::size_t lane) {
+  return hn::Load(D(), column.data() + lane);
+}
+
+// One step of Newton's method on the machine's estimate: 22 bits or more everywhere.
+inline V Reciprocal(V x) {
+  const V estimate = hn::ApproximateReciprocal(x);
+  return hn::Mul(estimate, hn::NegMulAdd(x, estimate, Splat(2)));
+}
+inline V InverseSqrt(V x) {
+  const V estimate = hn::ApproximateReciprocalSqrt(x);
+  const V half = hn::Mul(Splat(0.5f), x);
+  return hn::Mul(estimate, hn::NegMulAdd(hn::Mul(half, estimate), estimate, Splat(1.5f)));
+}
+
+struct V3 {
+  V x, y, z;
+};
+inline V Dot(const V3& a, const V3& b) {
+  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
+}
+inline V Dot(const V3& a, const glm::vec3& b) {
+  return hn::MulAdd(a.x, Splat(b.x), hn::MulAdd(a.y, Splat(b.y), hn::Mul(a.z, Splat(b.z))));
+}
+inline V Axis(const V3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+// Some of the receivers.
+struct Receivers {
+  V3 position, normal;
+  M spherical;
+
+  Receivers(const PacketLanes& lanes, std::size_t lane)
+      : position{LoadLanes(lanes.x, lane), LoadLanes(lanes.y, lane), LoadLanes(lanes.z, lane)},
+        normal{LoadLanes(lanes.normal_x, lane), LoadLanes(lanes.normal_y, lane),
+               LoadLanes(lanes.normal_z, lane)},
+        spherical(hn::Gt(LoadLanes(lanes.spherical, lane), hn::Zero(D()))) {}
+};
+
+// A patch as some of the receivers see it.
+struct Sight {
+  V3 offset;  // from the receivers
+  V distance_sq, height;
+  V facing;    // offset . normal: negative in front
+  M in_reach;  // not too far away, and for spheres around spherical receivers, not too close
+  M is_near;
+  V bias;    // of rays: see ReceiverRaster::rayBias
+  M traced;  // near, and seen by the rays
+};
+
+HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers& receivers) {
+  const D d;
+  const V zero = hn::Zero(d), one = Splat(1);
+  Sight sight;
+  sight.offset = {hn::Sub(Splat(patch.position.x), receivers.position.x),
+                  hn::Sub(Splat(patch.position.y), receivers.position.y),
+                  hn::Sub(Splat(patch.position.z), receivers.position.z)};
+  sight.distance_sq = Dot(sight.offset, sight.offset);
+  sight.height = Dot(sight.offset, receivers.normal);
+  sight.facing = Dot(sight.offset, patch.normal);
+  sight.in_reach = hn::Le(sight.distance_sq, Splat(canvas.max_distance_sq));
+  sight.is_near = sight.traced = hn::Gt(zero, zero);
+  sight.bias = zero;
+  if (!(patch.near_distance > 0)) return sight;
+
+  if (patch.isRound()) {
+    const float clearance = kSphereClearance * patch.radius;
+    const M too_close =
+        hn::And(receivers.spherical, hn::Lt(sight.distance_sq, Splat(clearance * clearance)));
+    sight.in_reach = hn::AndNot(too_close, sight.in_reach);
+  }
+  sight.is_near = hn::And(
+      sight.in_reach, hn::Lt(sight.distance_sq, Splat(patch.near_distance * patch.near_distance)));
+  if (hn::AllFalse(d, sight.is_near)) return sight;
+
+  // As ReceiverRaster::addSurfel: the disk must rise above the horizon of the rays
+  const V cosine = Dot(receivers.normal, patch.normal);
+  sight.bias = hn::Mul(Splat(canvas.bias * patch.radius), hn::Min(one, hn::Add(one, cosine)));
+  const V rise =
+      hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
+  const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));
+  sight.traced = hn::And(sight.is_near, rises);
+
+  // ... and show its front, or the sphere its outside, to where the rays begin
+  if (patch.facing_limit == Patch::kFrontOnly) {
+    sight.traced =
+        hn::And(sight.traced, hn::Lt(hn::NegMulAdd(sight.bias, cosine, sight.facing), zero));
+  } else if (patch.isRound()) {
+    const V along =
+        hn::MulAdd(sight.bias, sight.bias,
+                   hn::NegMulAdd(hn::Mul(Splat(2), sight.bias), sight.height, sight.distance_sq));
+    sight.traced = hn::And(sight.traced, hn::Gt(along, Splat(patch.radius * patch.radius)));
+  }
+  return sight;
+}
+
+// Lanes to which the patch is a patch of solid angle: the mid or the far field.
+HWY_INLINE M SeenAsPatch(const Patch& patch, const Receivers& receivers, const Sight& sight) {
+  const M above = hn::Or(receivers.spherical, hn::Gt(sight.height, hn::Zero(D())));
+  const M faces = hn::Lt(sight.facing, Splat(patch.facing_limit));
+  return hn::And(hn::AndNot(sight.is_near, sight.in_reach), hn::And(above, faces));
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target guard
