@@ -304,10 +304,10 @@ void measureNodes(const Tree& tree) {
   measurePages(
       "nodes", tree.nodeCount(), groups.size(),
       [&](std::size_t i, std::vector<std::byte>& payload) {
-        return encodeNodeGroup(groups[i], false, payload);
+        return encodeNodeGroup(groups[i], {}, payload);
       },
       [&](std::size_t i, Bytes payload) {
-        return decodeNodeGroup(payload, false, static_cast<std::uint32_t>(i), limits, decoded).ok();
+        return decodeNodeGroup(payload, {}, static_cast<std::uint32_t>(i), limits, decoded).ok();
       });
 }
 

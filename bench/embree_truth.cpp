@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "bench/embree_scene.h"
+#include "gather/gather_outputs.h"
 #include "io/file.h"
 #include "io/square_strata.h"
 
@@ -94,17 +95,23 @@ class TruthTracer {
   const int side_;
 };
 
+constexpr std::uint32_t kTruthOutputs = kOutputOcclusion | kOutputIrradiance;
+
 // What earlier runs left; empty when there is none, or of something else.
 std::vector<GatherResult> readTruth(const std::string& path, std::uint64_t key, std::size_t count) {
   std::vector<GatherResult> truth;
+  const std::size_t floats = resultFloats(kTruthOutputs);
+  std::vector<float> rows(count * floats);
   const Result<InputFile> file = InputFile::open(path);
   std::uint64_t found = 0;
-  if (!file.ok() || file->size() != sizeof key + count * sizeof(GatherResult)) return truth;
+  if (!file.ok() || file->size() != sizeof key + count * floats * sizeof(float)) return truth;
   if (!file->readAt(0, std::as_writable_bytes(std::span(&found, 1))).ok() || found != key) {
     return truth;
   }
-  truth.resize(count);
-  if (!file->readAt(sizeof key, std::as_writable_bytes(std::span(truth))).ok()) truth.clear();
+  if (!file->readAt(sizeof key, std::as_writable_bytes(std::span(rows))).ok()) return truth;
+  for (std::size_t i = 0; i < count; ++i) {
+    truth.push_back(unpackResult(&rows[i * floats], kTruthOutputs));
+  }
   return truth;
 }
 
@@ -112,7 +119,12 @@ Status writeTruth(const std::string& path, std::uint64_t key,
                   const std::vector<GatherResult>& truth) {
   SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
   SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(&key, 1))));
-  SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(truth))));
+  const std::size_t floats = resultFloats(kTruthOutputs);
+  std::vector<float> rows(truth.size() * floats);
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    packResult(truth[i], kTruthOutputs, &rows[i * floats]);
+  }
+  SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(rows))));
   return file.commit();
 }
 

@@ -244,13 +244,14 @@ Status runBench(const std::string& scene_path, const std::string& receivers_path
   std::uint64_t lookups = 0;
   PagedOctree::Reader reader(*octree);
   TracingReader tracing{reader, tree, replays, trace, lookups};
-  const auto cut = std::make_unique<CutWalk>(quality);
+  const auto cut = std::make_unique<CutWalk>(GatherRules(GatherMode::kBleeding, quality));
   std::vector<SortedReceiver> run(kPacketReceivers);
   for (;;) {
     SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, sorter.next(run));
     if (count == 0) break;
     for (std::size_t i = 0; i < count; ++i) {
-      SURFEIT_RETURN_IF_ERROR(cut->walk(viewPacket({&run[i].receiver, 1}), {}, tracing, IgnoreCut{}));
+      SURFEIT_RETURN_IF_ERROR(
+          cut->walk(viewPacket({&run[i].receiver, 1}), {}, tracing, IgnoreCut{}));
     }
   }
   fmt::print("{} surfels, {} nodes, {} to a page; {} receivers, {:.0f} node look-ups each\n",

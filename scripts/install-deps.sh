@@ -8,8 +8,9 @@ packages=(
   g++ cmake ninja-build ccache
   # Library
   libglm-dev libfmt-dev libtbb-dev libzstd-dev libxxhash-dev libhwy-dev nlohmann-json3-dev
+  libopenexr-dev
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
-  libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev libopenexr-dev
+  libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev
   # Tests
   libgtest-dev libgmock-dev
 )

@@ -92,6 +92,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context);
 void addInfoCommand(CLI::App& app, CommandContext& context);
 void addVerifyCommand(CLI::App& app, CommandContext& context);
 void addGatherCommand(CLI::App& app, CommandContext& context);
+void addRadianceCommand(CLI::App& app, CommandContext& context);
+void addBounceCommand(CLI::App& app, CommandContext& context);
 void addTuneCommand(CLI::App& app, CommandContext& context);
 void addViewCommand(CLI::App& app, CommandContext& context);
 

@@ -5,10 +5,12 @@
 #include <string>
 
 #include "core/job_limits.h"
+#include "gather/gather_options.h"
 #include "surfeit/gather.h"
 #include "tools/cache_report.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
+#include "tools/light_options.h"
 
 namespace surfeit {
 namespace {
@@ -37,13 +39,16 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
   }
   return context.writeStats({{"command", "gather"},
                              {"mode", modeName(options.mode)},
+                             {"outputs", outputWords(withDefaults(options).outputs)},
                              {"max_solid_angle", options.quality.max_solid_angle},
                              {"raster_resolution", options.quality.raster_resolution},
                              {"near_field_radii", options.quality.near_field_radii},
                              {"far_field_parallax", options.quality.far_field_parallax},
+                             {"max_variation", options.quality.max_variation},
                              {"memory_bytes", stats.memory_bytes},
                              {"receivers", stats.receivers},
                              {"invalid_receivers", stats.invalid_receivers},
+                             {"interpolated_receivers", stats.interpolated_receivers},
                              {"receivers_per_second", rate},
                              {"gather_seconds", stats.gather_seconds},
                              {"temporary_bytes", stats.temporary_bytes},
@@ -55,24 +60,35 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
 }  // namespace
 
 void addGatherCommand(CLI::App& app, CommandContext& context) {
-  CLI::App* command =
-      app.add_subcommand("gather", "Gather occlusion or color bleeding at receivers");
+  CLI::App* command = app.add_subcommand(
+      "gather", "Gather occlusion, color bleeding, reflection or environment light at receivers");
   const auto arguments = std::make_shared<GatherArguments>();
   command->add_option("SCENE", arguments->scene, "Scene file (.sft)")->required();
   command->add_option("RECEIVERS", arguments->receivers, "Cloud (PLY) with x y z and nx ny nz")
       ->required();
   command->add_option("-o,--output", arguments->result, "Result cloud (PLY)")->required();
   addGatherOptions(*command, arguments->options);
+  addLightOptions(*command, arguments->options);
+  addSubsetOption(*command, arguments->options.groups);
   command->add_option("--cache-series", arguments->series,
                       "Write what the caches did over time to this file, .csv or .json");
   context.addCommonOptions(*command);
   command->footer(
       "The result holds the receivers in their order with all their properties, and `occlusion`;\n"
-      "with --mode bleeding also `irradiance_r irradiance_g irradiance_b`.\n"
+      "with --mode bleeding also `irradiance_r irradiance_g irradiance_b`, with --mode glossy\n"
+      "`reflection_r reflection_g reflection_b`, with --environment also `environment_r ...`;\n"
+      "--outputs chooses. Lights are in units of radiosity: albedo times them is reflected.\n"
       "Examples:\n"
       "  surfeit gather lion.sft lion.ply -o lion_ao.ply\n"
       "  surfeit gather city.sft street.ply -o street_gi.ply --mode bleeding --memory 2G\n"
       "  surfeit gather city.sft street.ply -o look.ply --quality draft\n"
+      "  surfeit gather lion.sft lion.ply -o lit.ply --environment sky.exr \\\n"
+      "      --outputs occlusion,bent_normal,environment\n"
+      "  surfeit gather hall.sft floor.ply -o mirror.ply --mode glossy --roughness 0.05 \\\n"
+      "      --camera 2,-6,1.7\n"
+      "  surfeit gather hall.sft walls.ply -o ao.ply --max-dist 2 --falloff 1 \\\n"
+      "      --falloff-mode polynomial\n"
+      "  surfeit gather city.sft street.ply -o neon.ply --mode bleeding --subset 0,2-5\n"
       "  surfeit gather city.sft street.ply -o street_ao.ply --memory 512M --direct-io \\\n"
       "      --cache-series paging.csv");
   command->callback(

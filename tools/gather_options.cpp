@@ -4,28 +4,14 @@
 #include <utility>
 #include <vector>
 
+#include "octree/group_set.h"
+
 namespace surfeit {
 namespace {
 
-// An option that takes one of some words, of which the first is the default.
-template <typename Value>
-CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& target,
-                       const std::string& help,
-                       const std::vector<std::pair<std::string, Value>>& choices) {
-  std::string words;
-  for (const auto& [word, value] : choices) words += (words.empty() ? "" : "|") + word;
-  const auto choose = [=, &target](const std::string& found) {
-    for (const auto& [word, value] : choices) {
-      if (found != word) continue;
-      target = value;
-      return;
-    }
-    throw CLI::ValidationError(name, found + ", expected " + words);
-  };
-  return command.add_option_function<std::string>(name, choose, help)
-      ->type_name(words)
-      ->default_str(choices.front().first);
-}
+constexpr const char* kPagingGroup = "Paging";
+
+}  // namespace
 
 void addQualityOptions(CLI::App& command, GatherQuality& quality) {
   constexpr const char* kGroup = "Quality";
@@ -81,45 +67,64 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
                   "Surfels farther away do not count, in scene units")
       ->check(CLI::PositiveNumber)
       ->group(kGroup);
-  addChoice<GatherSides>(command, "--sides", quality.sides, "Sides of surfels that cover",
-                         {{"front", GatherSides::kFront}, {"both", GatherSides::kBoth}})
+  addChoice<GatherSides>(
+      command, "--sides", quality.sides, "Sides of surfels that cover",
+      {{"front", GatherSides::kFront}, {"both", GatherSides::kBoth}, {"back", GatherSides::kBack}})
       ->group(kGroup);
 }
 
+void addSubsetOption(CLI::App& command, std::uint64_t& groups) {
+  command
+      .add_option_function<std::string>(
+          "--subset",
+          [&groups](const std::string& found) {
+            const Result<std::uint64_t> chosen = parseGroups(found);
+            if (!chosen.ok()) throw CLI::ValidationError("--subset", chosen.status().message());
+            groups = *chosen;
+          },
+          "Groups of surfels that send light and cover, such as 0,2-5; others are as if not there")
+      ->type_name("GROUPS")
+      ->default_str("all");
+}
+
+void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io) {
+  command
+      .add_option("--cache-split", cache_split,
+                  "Share of the cache memory for nodes, 0 to 1; else found by measurement")
+      ->check(CLI::Range(0.0, 1.0))
+      ->default_str("")
+      ->group(kPagingGroup);
+  command.add_flag("--direct-io", direct_io, "Read the scene past the page cache of the system")
+      ->group(kPagingGroup);
+}
+
+namespace {
+
 void addPagingOptions(CLI::App& command, GatherOptions& options) {
-  constexpr const char* kGroup = "Paging";
   addChoice<ReceiverOrder>(command, "--order", options.order,
                            "Order in which receivers are gathered",
                            {{"hilbert", ReceiverOrder::kHilbert},
                             {"morton", ReceiverOrder::kMorton},
                             {"input", ReceiverOrder::kInput}})
-      ->group(kGroup);
-  command
-      .add_option("--cache-split", options.cache_split,
-                  "Share of the cache memory for nodes, 0 to 1; else found by measurement")
-      ->check(CLI::Range(0.0, 1.0))
-      ->default_str("")
-      ->group(kGroup);
-  command
-      .add_flag("--direct-io", options.direct_io,
-                "Read the scene past the page cache of the system")
-      ->group(kGroup);
+      ->group(kPagingGroup);
+  addCacheOptions(command, options.cache_split, options.direct_io);
   command
       .add_flag("--prefetch,!--no-prefetch", options.prefetch,
                 "Read ahead along the order when reading is slow (default: on)")
-      ->group(kGroup);
+      ->group(kPagingGroup);
   command
       .add_option("--temp", options.temporary_directory,
                   "Directory of temporary files, for what does not fit the memory")
-      ->group(kGroup);
+      ->group(kPagingGroup);
 }
 
 }  // namespace
 
 void addGatherOptions(CLI::App& command, GatherOptions& options) {
-  addChoice<GatherMode>(
-      command, "--mode", options.mode, "What is gathered",
-      {{"occlusion", GatherMode::kOcclusion}, {"bleeding", GatherMode::kBleeding}});
+  addChoice<GatherMode>(command, "--mode", options.mode, "What is gathered",
+                        {{"occlusion", GatherMode::kOcclusion},
+                         {"bleeding", GatherMode::kBleeding},
+                         {"glossy", GatherMode::kGlossy}});
   command.add_flag("--strict", options.strict,
                    "Refuse invalid receivers instead of writing NaN for them");
   addQualityOptions(command, options.quality);
@@ -127,7 +132,15 @@ void addGatherOptions(CLI::App& command, GatherOptions& options) {
 }
 
 const char* modeName(GatherMode mode) {
-  return mode == GatherMode::kBleeding ? "bleeding" : "occlusion";
+  switch (mode) {
+    case GatherMode::kBleeding:
+      return "bleeding";
+    case GatherMode::kGlossy:
+      return "glossy";
+    case GatherMode::kOcclusion:
+      break;
+  }
+  return "occlusion";
 }
 
 }  // namespace surfeit

@@ -2,17 +2,49 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "surfeit/gather.h"
 
 namespace surfeit {
+
+// An option that takes one of some words, of which the first is the default.
+template <typename Value>
+CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& target,
+                       const std::string& help,
+                       const std::vector<std::pair<std::string, Value>>& choices) {
+  std::string words;
+  for (const auto& [word, value] : choices) words += (words.empty() ? "" : "|") + word;
+  const auto choose = [=, &target](const std::string& found) {
+    for (const auto& [word, value] : choices) {
+      if (found != word) continue;
+      target = value;
+      return;
+    }
+    throw CLI::ValidationError(name, found + ", expected " + words);
+  };
+  return command.add_option_function<std::string>(name, choose, help)
+      ->type_name(words)
+      ->default_str(choices.front().first);
+}
 
 // Adds everything that says what is gathered and how pages are read: mode, quality, order of the
 // receivers, caches. Parsing fills `options`, which must outlive `command`; threads and memory are
 // left to the program's own options.
 void addGatherOptions(CLI::App& command, GatherOptions& options);
 
-// "occlusion" or "bleeding"
+// Parts of it, for commands that gather at the surfels of a scene: what decides about errors, and
+// the caches.
+void addQualityOptions(CLI::App& command, GatherQuality& quality);
+void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io);
+
+// --subset, the groups of surfels that are seen.
+void addSubsetOption(CLI::App& command, std::uint64_t& groups);
+
+// "occlusion", "bleeding", "glossy"
 const char* modeName(GatherMode mode);
 
 }  // namespace surfeit

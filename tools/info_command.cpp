@@ -9,6 +9,7 @@
 #include "io/file.h"
 #include "io/ply_reader.h"
 #include "io/surfel_source.h"
+#include "octree/group_set.h"
 #include "surfeit/scene.h"
 #include "tools/command.h"
 
@@ -30,6 +31,7 @@ std::vector<std::string> channelNames(const CloudChannels& channels) {
   if (channels.radiosity) names.emplace_back("radiosity");
   if (channels.albedo) names.emplace_back("albedo");
   if (channels.two_sided) names.emplace_back("two_sided");
+  if (channels.group) names.emplace_back("group");
   return names;
 }
 
@@ -52,23 +54,27 @@ nlohmann::json sceneJson(const SceneInfo& info) {
       {"surfel_decoded_bytes", info.surfel_cache_bytes},
       {"node_pages_by_level", info.level_pages},
   };
+  if (info.channels.group) json["groups"] = describeGroups(info.groups);
   json["provenance"] = nlohmann::json::parse(info.provenance, nullptr, false);
   return json;
 }
 
 std::string sceneText(const std::string& path, const SceneInfo& info) {
+  const std::string groups =
+      info.channels.group ? fmt::format("  groups         {}\n", describeGroups(info.groups)) : "";
   return fmt::format(
       "{}: Surfeit scene, {} surfels, {} nodes\n"
       "  file           {} ({:.1f} bytes per surfel)\n"
       "  bounds         {:g} {:g} {:g} .. {:g} {:g} {:g}\n"
       "  input had      {}\n"
+      "{}"
       "  precision      {}\n"
       "  node pages     {} in {}, decoded {}\n"
       "  surfel pages   {} in {}, decoded {}\n"
       "  provenance     {}",
       path, formatCount(info.surfels), formatCount(info.nodes), formatBytes(info.file_bytes),
       double(info.file_bytes) / double(info.surfels), info.min.x, info.min.y, info.min.z,
-      info.max.x, info.max.y, info.max.z, fmt::join(channelNames(info.channels), ", "),
+      info.max.x, info.max.y, info.max.z, fmt::join(channelNames(info.channels), ", "), groups,
       info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
       formatBytes(info.node_page_bytes), formatBytes(info.node_cache_bytes),
       formatCount(info.surfel_pages), formatBytes(info.surfel_page_bytes),

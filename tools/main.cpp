@@ -20,6 +20,8 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addInfoCommand(app, context);
   addVerifyCommand(app, context);
   addGatherCommand(app, context);
+  addRadianceCommand(app, context);
+  addBounceCommand(app, context);
   addTuneCommand(app, context);
   addViewCommand(app, context);
 }

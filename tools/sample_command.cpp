@@ -1,8 +1,10 @@
-// surfeit sample: triangle meshes to a surfel cloud with direct light.
+// surfeit sample: triangle meshes to a surfel cloud with direct light, or to a photon map.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
+#include "sample/photon_tracer.h"
 #include "sample/sample.h"
 #include "tools/command.h"
 #include "tools/sample_options.h"
@@ -10,7 +12,44 @@
 namespace surfeit {
 namespace {
 
+nlohmann::json jsonOf(const glm::dvec3& rgb) { return {rgb.r, rgb.g, rgb.b}; }
+
+Status runPhotons(const SampleArguments& arguments, CommandContext& context) {
+  PhotonTracingOptions options;
+  options.surroundings = arguments.options.surroundings;
+  options.photons = arguments.photons;
+  options.seed = arguments.photon_seed;
+  options.threads = context.threads();
+  SURFEIT_ASSIGN_OR_RETURN(
+      const PhotonTracingStats stats,
+      tracePhotons(arguments.meshes, arguments.output, options, context.progress()));
+  context.say(fmt::format("{}: {} photons stored of {} sent in {:.1f} s ({:.2f} M photons/s)",
+                          arguments.output, formatCount(stats.stored), formatCount(stats.emitted),
+                          context.wallSeconds(),
+                          double(stats.emitted) / std::max(stats.trace_seconds, 1e-9) / 1e6));
+  if (stats.lost_at_backs * 20 > stats.emitted) {
+    context.say(
+        fmt::format("warning: {} photons met the back of a surface, which is black: do "
+                    "normals point the right way?",
+                    formatCount(stats.lost_at_backs)));
+  }
+  return context.writeStats({{"command", "sample"},
+                             {"triangles", stats.triangles},
+                             {"degenerate_faces", stats.degenerate_faces},
+                             {"emitted_photons", stats.emitted},
+                             {"stored_photons", stats.stored},
+                             {"escaped_photons", stats.escaped},
+                             {"photons_lost_at_backs", stats.lost_at_backs},
+                             {"emitted_power", jsonOf(stats.emitted_power)},
+                             {"stored_power", jsonOf(stats.stored_power)},
+                             {"phases",
+                              {{"load", stats.load_seconds},
+                               {"build", stats.build_seconds},
+                               {"trace", stats.trace_seconds}}}});
+}
+
 Status runSample(SampleArguments& arguments, CommandContext& context) {
+  if (arguments.photons > 0) return runPhotons(arguments, context);
   arguments.options.threads = context.threads();
   SURFEIT_ASSIGN_OR_RETURN(
       const SampleStats stats,
@@ -45,7 +84,8 @@ void addSampleCommand(CLI::App& app, CommandContext& context) {
       "Examples:\n"
       "  surfeit sample cornell.obj -o cornell.ply --count 1000000\n"
       "  surfeit sample lion.ply -o lion.ply --spacing 0.01 --ground-plane --up z \\\n"
-      "      --light-directional \"-1 -1 -2  3 3 3\"");
+      "      --light-directional \"-1 -1 -2  3 3 3\"\n"
+      "  surfeit sample cornell.obj -o photons.ply --photons 1000000");
   command->callback(
       [arguments, &context] { context.run([&] { return runSample(*arguments, context); }); });
 }

@@ -119,10 +119,20 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
                      "Surfels, shared out by area; long thin triangles add some")
           ->capture_default_str()
           ->check(CLI::PositiveNumber);
-  app.add_option("--spacing", arguments.options.spacing,
-                 "Distance between surfels in scene units, instead of a count")
-      ->check(CLI::PositiveNumber)
-      ->excludes(count);
+  CLI::Option* const spacing =
+      app.add_option("--spacing", arguments.options.spacing,
+                     "Distance between surfels in scene units, instead of a count")
+          ->check(CLI::PositiveNumber)
+          ->excludes(count);
+  CLI::Option* const photons =
+      app.add_option("--photons", arguments.photons,
+                     "Send so many photons from the lights and write where they arrive, for "
+                     "surfeit radiance, instead of surfels")
+          ->check(CLI::PositiveNumber)
+          ->excludes(count)
+          ->excludes(spacing);
+  app.add_option("--seed", arguments.photon_seed, "Another seed, other photons of the same lights")
+      ->needs(photons);
   addSurroundingsOptions(app, arguments.options.surroundings);
 }
 

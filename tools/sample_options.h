@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -19,10 +20,12 @@ struct SampleArguments {
   std::vector<std::string> meshes;
   std::string output;
   SampleOptions options;
+  std::uint64_t photons = 0;      // > 0: a photon map instead of surfels
+  std::uint64_t photon_seed = 0;  // of PhotonTracingOptions
 };
 
-// Adds MESH..., -o, --count or --spacing, and the options above. Parsing fills `arguments`, which
-// must outlive `app`; threads are left to the program's own options.
+// Adds MESH..., -o, --count, --spacing or --photons, and the options above. Parsing fills
+// `arguments`, which must outlive `app`; threads are left to the program's own options.
 void addSampleOptions(CLI::App& app, SampleArguments& arguments);
 
 }  // namespace surfeit

@@ -3,21 +3,72 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
+#include "surfeit/surfel.h"
 
 namespace surfeit {
 
+// What is gathered, by which weights of directions.
 enum class GatherMode : std::uint8_t {
-  kOcclusion,  // cosine-weighted coverage of the hemisphere, 0..1
-  kBleeding,   // occlusion, and irradiance from the radiosity of the surfels
+  kOcclusion,  // over the hemisphere above the receiver; coverage alone (memo 7.5)
+  kBleeding,   // the same with light (memo 3)
+  kGlossy,     // over a lobe around the direction of mirror reflection (memo 7.6)
 };
 
-// Which side of a one-sided surfel covers the raster. Only front sides send light.
-enum class GatherSides : std::uint8_t { kFront, kBoth };
+// What receivers get, any set of it in one pass. Light is in units of radiosity: E = pi * mean
+// radiance by the weights of the mode, so that inside a closed shell of radiosity B it is B.
+enum GatherOutput : std::uint32_t {
+  kOutputOcclusion = 1u << 0,   // covered part, 0..1
+  kOutputIrradiance = 1u << 1,  // light from surfels: irradiance; with kGlossy the reflection
+  kOutputBentNormal = 1u << 2,  // mean direction of what is open, unit; 0 when nothing is (slides)
+  // Mean direction that light comes from, weighted by luminance, unit; 0 without light (slides)
+  kOutputIlluminationDirection = 1u << 3,
+  kOutputEnvironment = 1u << 4,  // light of the environment map where nothing covers (memo 7.3)
+  // For volumes: 4 pi * mean radiance over the sphere, of surfels and environment; the hemisphere
+  // of a receiver with a normal counts twice
+  kOutputFluence = 1u << 5,
+  // 9 spherical harmonics coefficients per color of pi times the incident radiance, of surfels and
+  // environment, over what the receiver sees: the sphere, or the hemisphere
+  kOutputRadianceSh = 1u << 6,
+};
+
+// How directions weigh, and what is found there (app note 2.3). To a receiver without a normal all
+// directions weigh alike.
+struct GatherWeights {
+  enum class Distribution : std::uint8_t { kCosine, kUniform };
+  enum class FalloffMode : std::uint8_t { kExponential, kPolynomial };
+
+  Distribution distribution = Distribution::kCosine;  // not with kGlossy
+  // Half the opening angle of the cone around the normal, or around the reflection with kGlossy,
+  // outside of which directions have no weight; radians, to pi / 2. 0: the hemisphere, and with
+  // kGlossy to where the lobe falls to a hundredth.
+  float cone_angle = 0;
+  // With kGlossy: within the cone, directions weigh like cos^n of the angle to the reflection with
+  // n = 2 / roughness^2 - 2; 1: all alike. Over 0 to 1.
+  float roughness = 0.1f;
+  // How occlusion fades with distance: exp(-falloff * distance), or (1 - distance / max_distance)
+  // ^ falloff, which needs a max distance. 0: not at all. Light does not fade.
+  float falloff = 0;
+  FalloffMode falloff_mode = FalloffMode::kExponential;
+};
+
+// Light from all around, infinitely far away (memo 7.3).
+struct GatherEnvironment {
+  std::string path;  // lat-long picture in OpenEXR or Radiance (.hdr), or OpenEXR cube; empty: none
+  float rotation = 0;    // about the up axis, radians, counterclockwise seen from above
+  bool y_is_up = false;  // else z
+  float intensity = 1;   // multiplies it, >= 0
+};
+
+// Which side of a one-sided surfel covers the raster. Only front sides send light; with kBack
+// nothing does.
+enum class GatherSides : std::uint8_t { kFront, kBoth, kBack };
 
 // How the gather approximates. Scene units are the cloud's own.
 struct GatherQuality {
@@ -35,13 +86,17 @@ struct GatherQuality {
   // Surfels farther than this do not count; scene units.
   float max_distance = 1e30f;
   GatherSides sides = GatherSides::kFront;
+  // Where results vary less than this from receiver to receiver, only some are gathered and the
+  // others interpolated between them: occlusion may differ by this, lights by this part of the
+  // brightest nearby, directions by this part of a turn to the opposite (app note 2.2). 0: off.
+  float max_variation = 0;
 };
 
 // Settings from measured tables (docs/benchmarks.md, "Errors and rates"). Standard is the default.
 enum class QualityPreset : std::uint8_t { kDraft, kStandard, kFinal };
 
-// Sets what decides about errors: max solid angle, raster resolution, near field, parallax. The rest,
-// such as sides and distances, stays as it is.
+// Sets what decides about errors: max solid angle, raster resolution, near field, parallax. The
+// rest, such as sides and distances, stays as it is.
 void setQuality(QualityPreset preset, GatherQuality& quality);
 
 // The order in which receivers are gathered. Decides how often pages are read, and which receivers
@@ -55,7 +110,16 @@ enum class ReceiverOrder : std::uint8_t {
 
 struct GatherOptions {
   GatherMode mode = GatherMode::kOcclusion;
+  std::uint32_t outputs = 0;  // set of GatherOutput; 0: occlusion, and light unless kOcclusion
   GatherQuality quality;
+  GatherWeights weights;
+  GatherEnvironment environment;
+  // Set of the groups of surfels that send light and cover, as bits (surfeit/surfel.h); others are
+  // as if they were not there. At least one must be in the scene; kAllGroups is right for any.
+  std::uint64_t groups = kAllGroups;
+  // With kGlossy, receivers without view_x view_y view_z are looked at from here; NaN: all need
+  // theirs.
+  glm::vec3 eye{std::numeric_limits<float>::quiet_NaN()};
   // Budget of the process: its peak resident memory stays below this plus 64 MiB. 0: three quarters
   // of what the job may use.
   std::uint64_t memory_bytes = 0;
@@ -106,6 +170,7 @@ struct GatherWindow {
 struct GatherStats {
   std::uint64_t receivers = 0;
   std::uint64_t invalid_receivers = 0;
+  std::uint64_t interpolated_receivers = 0;  // the rest of the valid ones was gathered
   double gather_seconds = 0;  // wall time inside the gather proper, without reading and writing
   int threads = 0;
   std::uint64_t memory_bytes = 0;

@@ -24,9 +24,11 @@ struct SceneInfo {
   bool full_precision = false;
   std::vector<std::uint32_t> level_pages;  // node pages of levels 0..21
   std::string provenance;                  // JSON
+  std::uint64_t groups = 0;  // set of those that surfels have; group 0 alone without the channel
 };
 
-// Reads header and directory, but no page. Errors: kIoError, kCorruption.
+// Reads header and directory, and of a scene with groups the first page. Errors: kIoError,
+// kCorruption.
 Result<SceneInfo> readSceneInfo(const std::string& path);
 
 struct VerifyReport {

@@ -12,6 +12,14 @@ enum SurfelFlags : std::uint32_t {
   kSurfelTwoSided = 1u << 1,  // both sides send and block light (leaves, cloth, hair)
 };
 
+// A surfel belongs to one of so many groups: objects or lights that a gather may look at alone.
+// (A surfel group, in contrast, is what a page of the file holds.)
+inline constexpr std::uint32_t kMaxGroups = 64;
+
+// Sets of groups have a bit for each.
+inline constexpr std::uint64_t kAllGroups = ~std::uint64_t{0};
+constexpr std::uint64_t groupBit(std::uint32_t group) { return std::uint64_t{1} << group; }
+
 // Plain data, 64 bytes without padding, so that a surfel can be spilled and compared as bytes.
 struct Surfel {
   glm::vec3 position{0};    // world units
@@ -21,7 +29,7 @@ struct Surfel {
   glm::vec3 radiosity{0};   // radiant exitance, scene-linear rgb, >= 0
   std::uint32_t flags = 0;  // SurfelFlags
   glm::vec3 albedo{0};      // diffuse reflectance, scene-linear rgb, for further bounces
-  std::uint32_t reserved = 0;
+  std::uint32_t group = 0;  // 0 to kMaxGroups - 1; 0 in clouds without groups
 
   bool isSphere() const { return (flags & kSurfelSphere) != 0; }
   bool isTwoSided() const { return (flags & kSurfelTwoSided) != 0; }
@@ -36,6 +44,7 @@ struct CloudChannels {
   bool radiosity = false;
   bool albedo = false;
   bool two_sided = false;
+  bool group = false;
 };
 
 }  // namespace surfeit

@@ -3,10 +3,12 @@
 namespace surfeit {
 
 GatherResult gatherBruteForce(const Receiver& receiver, std::span<const Surfel> surfels,
-                              GatherMode mode, const GatherQuality& quality) {
-  ReceiverRaster raster(mode, quality);
+                              const GatherRules& rules) {
+  ReceiverRaster raster(rules);
   raster.begin(receiver);
-  for (const Surfel& surfel : surfels) raster.addSurfel(surfel);
+  for (const Surfel& surfel : surfels) {
+    if ((rules.groups & groupBit(surfel.group)) != 0) raster.addSurfel(surfel);
+  }
   return raster.finish();
 }
 

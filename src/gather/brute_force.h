@@ -4,15 +4,16 @@
 
 #include <span>
 
+#include "gather/gather_rules.h"
 #include "gather/receiver_raster.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 
-// `quality` must be valid, as for PointGatherer; its max_solid_angle does not matter. Takes time
+// `rules` must be valid, as for PointGatherer; their max_solid_angle does not matter. Takes time
 // and memory (120 bytes per surfel at worst) in proportion to the surfels, at every call.
 GatherResult gatherBruteForce(const Receiver& receiver, std::span<const Surfel> surfels,
-                              GatherMode mode, const GatherQuality& quality);
+                              const GatherRules& rules);
 
 }  // namespace surfeit

@@ -8,6 +8,30 @@
 #include "gather/coverage_rules.h"
 
 namespace surfeit {
+namespace {
+
+// What a side of something flat shows, by the cosine of its front.
+float shownCosine(float cosine, GatherSides sides) {
+  switch (sides) {
+    case GatherSides::kBoth:
+      return std::abs(cosine);
+    case GatherSides::kBack:
+      return std::max(0.f, -cosine);
+    case GatherSides::kFront:
+      break;
+  }
+  return std::max(0.f, cosine);
+}
+
+}  // namespace
+
+Surfel withSides(const Surfel& surfel, GatherSides sides) {
+  if (sides != GatherSides::kBack) return surfel;
+  Surfel turned = surfel;
+  if (!surfel.isTwoSided()) turned.normal = -surfel.normal;
+  turned.radiosity = glm::vec3(0);
+  return turned;
+}
 
 // With w_i the weights, x_i = d . n_i and T = sum w_i, band by band the expansion is
 //
@@ -48,26 +72,33 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   const glm::vec3 direction = to_node / std::sqrt(distance_sq);
 
   // Area that the receiver sees, and what of it sends light
-  float area, front_area, overlap = 0;
+  float area = 0, front_area = 0, overlap = 0;
   glm::vec3 power(0);
   if (node.isFlat()) {
     const float cosine = -node.flatness * glm::dot(direction, node.normal);
     front_area = node.area * std::max(0.f, cosine);
-    area = rules.sides == GatherSides::kBoth ? node.area * std::abs(cosine) : front_area;
+    area = node.area * shownCosine(cosine, rules.sides);
     if (!(area > 0)) return false;
     power = front_area * node.radiosity;
   } else {
     const ShCoefficients basis = shBasis(-direction);
     float back_area;
     front_area = projectedSum(node.coefficients(kAreaKind), basis, back_area);
-    if (rules.sides == GatherSides::kBoth) {
-      area = front_area + back_area;
-    } else {
-      area = front_area;
-      overlap = overlapOf(front_area, back_area);
+    switch (rules.sides) {
+      case GatherSides::kBoth:
+        area = front_area + back_area;
+        break;
+      case GatherSides::kBack:
+        area = back_area;
+        overlap = overlapOf(back_area, front_area);
+        break;
+      case GatherSides::kFront:
+        area = front_area;
+        overlap = overlapOf(front_area, back_area);
+        break;
     }
     if (!(area > kLeastVisiblePart * node.area)) return false;
-    if (rules.has_color) {
+    if (rules.has_color && rules.sides != GatherSides::kBack) {
       float ignored;
       for (int channel = 0; channel < 3; ++channel) {
         power[channel] = projectedSum(node.coefficients(powerKind(channel)), basis, ignored);
@@ -99,7 +130,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   // Which side the receiver sees, and how much of it
   const float cosine = surfel.isSphere() ? 1 : -glm::dot(direction, surfel.normal);
   const bool sends_light = cosine > 0 || surfel.isTwoSided();
-  if (!sends_light && rules.sides == GatherSides::kFront) return false;
+  if (!sends_light && rules.sides != GatherSides::kBoth) return false;
 
   contribution.distance_sq = distance_sq;
   contribution.radius = surfel.radius;

@@ -33,6 +33,10 @@ struct ContributionRules {
   bool has_color = true;
 };
 
+// The surfel as one whose front is the side that covers: with GatherSides::kBack turned round, and
+// dark.
+Surfel withSides(const Surfel& surfel, GatherSides sides);
+
 // Sum over the surfels of a node of weight * max(d . n, 0), from the 9 coefficients of that sum
 // (clamped cosine, memo 3.2) and the basis in direction d. Never negative, exact when all surfels
 // have one normal and when normals are spread evenly. `opposite` gets the sum for direction -d.

@@ -50,8 +50,22 @@ constexpr std::size_t kMostSiblings = 8;
 struct alignas(64) Columns {
   float x[kMostSiblings] = {}, y[kMostSiblings] = {}, z[kMostSiblings] = {};
   float normal_x[kMostSiblings] = {}, normal_y[kMostSiblings] = {}, normal_z[kMostSiblings] = {};
-  float radius[kMostSiblings] = {}, flatness[kMostSiblings] = {}, flat[kMostSiblings] = {};
+  float radius[kMostSiblings] = {}, flatness[kMostSiblings] = {};
+  float share[kMostSiblings] = {};  // what it may look like, as a part of the max solid angle
 };
+constexpr float kFlatNodeShare = 2, kRoughNodeShare = 2 * kRoughShare;
+
+// Nodes with surfels of groups that are not seen are opened wherever they face. Returns, as bits,
+// those with some that are.
+std::uint32_t ChooseGroups(std::span<const Node> siblings, const CutRules& rules,
+                           Columns& columns) {
+  std::uint32_t seen = 0;
+  for (std::size_t i = 0; i < siblings.size(); ++i) {
+    if (rules.isMixed(siblings[i])) columns.share[i] = columns.flatness[i] = 0;
+    seen |= (rules.sees(siblings[i].groups) ? 1u : 0u) << i;
+  }
+  return seen;
+}
 
 SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView& view,
                                 const CutRegion& region, const CutRules& rules) {
@@ -66,8 +80,10 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     columns.normal_z[i] = node.normal.z;
     columns.radius[i] = node.radius;
     columns.flatness[i] = node.flatness;
-    columns.flat[i] = node.isFlat() ? 1 : 0;
+    columns.share[i] = node.isFlat() ? kFlatNodeShare : kRoughNodeShare;
   }
+  std::uint32_t present = (1u << siblings.size()) - 1;
+  if (!rules.seesAllGroups()) present = ChooseGroups(siblings, rules, columns);
 
   const hn::CappedTag<float, kMostSiblings> d;
   const auto zero = hn::Zero(d), one = hn::Set(d, 1.f);
@@ -108,13 +124,24 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
                                   hn::Mul(reach, hn::Set(d, horizonSlope(rules)))));
     }
 
+    // Outside the cones of all
+    if (view.has_cone) {
+      const auto along = hn::MulAdd(
+          x, hn::Set(d, view.lobe_axis.x),
+          hn::MulAdd(y, hn::Set(d, view.lobe_axis.y), hn::Mul(z, hn::Set(d, view.lobe_axis.z))));
+      const auto aside = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(along, along, distance_sq)));
+      const auto outside = hn::Sub(hn::Mul(aside, hn::Set(d, view.lobe_cosine)),
+                                   hn::Mul(along, hn::Set(d, view.lobe_sine)));
+      seen = hn::And(seen, hn::Le(outside, hn::Add(radius, packet_radius)));
+    }
+
     // Small enough
     const auto area = hn::Mul(hn::Set(d, kPi), hn::Mul(radius, radius));
-    const auto away = hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz)));
-    const auto is_flat = hn::Gt(hn::Load(d, columns.flat + at), zero);
-    const auto most_solid_angle =
-        hn::IfThenElse(is_flat, hn::Set(d, 2 * rules.max_solid_angle),
-                       hn::Set(d, 2 * kRoughShare * rules.max_solid_angle));
+    const auto away =
+        hn::Mul(hn::Set(d, rules.facing), hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz))));
+    const auto share = hn::Load(d, columns.share + at);
+    const auto is_flat = hn::Ge(share, hn::Set(d, kFlatNodeShare));
+    const auto most_solid_angle = hn::Mul(share, hn::Set(d, rules.max_solid_angle));
     const auto limit = hn::Mul(most_solid_angle, hn::Mul(nearest, nearest));
     auto far = hn::And(hn::Gt(nearest, radius), hn::Lt(area, limit));
 
@@ -142,7 +169,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     }
 
     // Turned away from all
-    if (rules.front_only && rules.approximates()) {
+    if (rules.facing != 0 && rules.approximates()) {
       const auto is_disk = hn::And(far, is_flat);
       const auto size = hn::Add(packet_radius, hn::IfThenZeroElse(is_disk, radius));
       const auto turn = hn::MulAdd(hn::IfThenZeroElse(is_disk, spread), distance,
@@ -157,7 +184,6 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     classes.far |= std::uint32_t{bits[0][0]} << at;
     classes.open |= std::uint32_t{bits[1][0]} << at;
   }
-  const std::uint32_t present = (1u << siblings.size()) - 1;
   classes.far &= present;
   classes.open &= present;
   return classes;
@@ -198,8 +224,9 @@ float highestPoint(const Node& node, const glm::vec3& to_node, float distance, f
 // A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
 // solid angle, or that share of it. A flat square of surfels has about 0.6 of its sphere's outline
 // as area, so this is close to the memo's test on the area, but it also opens sparse nodes, whose
-// area says nothing about how far their surfels spread.
+// area says nothing about how far their surfels spread. Never when only some of these are seen.
 bool isFarEnough(const Node& node, float nearest, const CutRules& rules) {
+  if (rules.isMixed(node)) return false;
   const float limit = node.isFlat() ? rules.max_solid_angle : kRoughShare * rules.max_solid_angle;
   return nearest > node.radius && kPi * node.radius * node.radius < 2 * limit * nearest * nearest;
 }
@@ -227,9 +254,12 @@ SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView
   SiblingClasses classes;
   for (std::size_t i = 0; i < siblings.size(); ++i) {
     const Node& node = siblings[i];
+    if (!rules.sees(node.groups)) continue;
     const glm::vec3 to_node = node.position - view.centre;
     const float distance = glm::length(to_node), nearest = distance - view.radius;
-    const float spread = kNormalSpread * std::sqrt(2 * (1 - node.flatness));
+    // The surfels that are seen may face anywhere when they are few of all
+    const float flatness = rules.isMixed(node) ? 0 : node.flatness;
+    const float spread = kNormalSpread * std::sqrt(2 * (1 - flatness));
 
     // Out of reach, or below the horizon of all
     if (!(nearest < rules.max_distance + node.radius)) continue;
@@ -238,15 +268,23 @@ SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView
       continue;
     }
 
+    // Outside the cones of all
+    if (view.has_cone) {
+      const float along = glm::dot(to_node, view.lobe_axis);
+      const float aside = std::sqrt(std::max(0.f, distance * distance - along * along));
+      if (aside * view.lobe_cosine - along * view.lobe_sine > node.radius + view.radius) continue;
+    }
+
     bool is_far = isFarEnough(node, nearest, rules);
     if (!isOfRegion(node, region, rules, is_far)) continue;
 
     // Turned away from all: as one disk, or all the surfels below
-    if (rules.front_only && rules.approximates()) {
+    if (rules.facing != 0 && rules.approximates()) {
       const bool is_disk = is_far && node.isFlat();
       const float size = view.radius + (is_disk ? 0 : node.radius);
       const float turn = (is_disk ? 0 : spread) * distance + 1.2f * size;
-      if (size < kMostTurnedAway * distance && glm::dot(to_node, node.normal) > turn) continue;
+      if (size < kMostTurnedAway * distance && rules.facing * glm::dot(to_node, node.normal) > turn)
+        continue;
     }
     (is_far ? classes.far : classes.open) |= 1u << i;
   }

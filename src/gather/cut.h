@@ -11,6 +11,7 @@
 #include <span>
 
 #include "core/curve_key.h"
+#include "gather/gather_rules.h"
 #include "gather/receiver.h"
 #include "octree/node.h"
 #include "surfeit/gather.h"
@@ -28,10 +29,15 @@ struct PacketView {
   glm::vec3 axis{0};     // mean normal, unit
   float cone_cosine = 1, cone_sine = 0;  // of the angle between the axis and the farthest normal
   float lift = 0;  // the centre lies at most this high above the horizon of a receiver
+
+  bool has_cone = false;   // nothing is looked at outside a cone around each receiver's lobe
+  glm::vec3 lobe_axis{0};  // mean axis of the lobes, unit
+  float lobe_cosine = 0, lobe_sine = 1;  // of the angle to the farthest direction in any cone
 };
 
-// `receivers`: at least one.
+// `receivers`: at least one. Without rules, as for a hemisphere.
 PacketView viewPacket(std::span<const Receiver> receivers);
+PacketView viewPacket(std::span<const Receiver> receivers, const GatherRules& rules);
 
 // A cluster of packets divides what lies around it: what is closer to its centre than the limit
 // each packet looks at by itself, the rest they look at together (docs/algorithm.md, "The shared
@@ -56,9 +62,15 @@ struct CutRegion {
 struct CutRules {
   float max_solid_angle = 0;  // 0: nothing stands in for anything, and nothing visible is left out
   float max_distance = 0;
-  bool front_only = true;  // GatherSides::kFront
+  float facing = 1;                   // 1: only fronts are seen, -1: only backs, 0: both
+  std::uint64_t groups = kAllGroups;  // set of the groups that are seen
 
   bool approximates() const { return max_solid_angle > 0; }
+  bool seesAllGroups() const { return groups == kAllGroups; }
+  bool sees(std::uint64_t some_of) const { return seesAllGroups() || (groups & some_of) != 0; }
+  // Whether surfels that are not seen lie below: what the node says is not what those seen are
+  // like.
+  bool isMixed(const Node& node) const { return (node.groups & ~groups) != 0; }
 };
 
 // What the test for siblings says.
@@ -79,13 +91,15 @@ SiblingClassifier fastestSiblingClassifier();
 
 // Calls visit.node(const Node&) for the nodes small enough as a whole, and
 // visit.leaf(const Node&) and visit.surfels(std::span<const Surfel>) for leaves too near, of whose
-// surfels the region may not hold all. `Reader` has the functions
-// of PagedOctree::Reader. The order depends on octree and view alone. One thread at a time.
+// surfels the region may not hold all. Surfels of groups that are not seen are left out. `Reader`
+// has the functions of PagedOctree::Reader. The order depends on octree and view alone. One thread
+// at a time.
 class CutWalk {
  public:
-  explicit CutWalk(const GatherQuality& quality,
+  explicit CutWalk(const GatherRules& rules,
                    SiblingClassifier classify = fastestSiblingClassifier())
-      : rules_{quality.max_solid_angle, quality.max_distance, quality.sides == GatherSides::kFront},
+      : rules_{maxSolidAngle(rules), rules.quality.max_distance, facingOf(rules.quality.sides),
+               rules.groups},
         classify_(classify) {}
 
   template <typename Reader, typename Visit>
@@ -108,7 +122,7 @@ class CutWalk {
           visit.leaf(node);
           SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
             surfels_visited_ += run.size();
-            visit.surfels(run);
+            visitSeen(run, visit);
           }));
         } else if (stack_count < kStackSize) {
           stack_[stack_count++] = childrenOf(node);
@@ -125,6 +139,23 @@ class CutWalk {
   std::uint64_t surfelsVisited() const { return surfels_visited_; }
 
  private:
+  static float facingOf(GatherSides sides) {
+    return sides == GatherSides::kFront ? 1.f : sides == GatherSides::kBack ? -1.f : 0.f;
+  }
+  // Hands over the surfels of groups that are seen, as runs: neighbours are often of one group.
+  template <typename Visit>
+  void visitSeen(std::span<const Surfel> surfels, Visit& visit) const {
+    if (rules_.seesAllGroups()) return visit.surfels(surfels);
+    const auto isSeen = [&](std::size_t i) { return rules_.sees(groupBit(surfels[i].group)); };
+    for (std::size_t end = 0; end < surfels.size();) {
+      std::size_t begin = end;
+      while (begin < surfels.size() && !isSeen(begin)) ++begin;
+      end = begin;
+      while (end < surfels.size() && isSeen(end)) ++end;
+      if (end > begin) visit.surfels(surfels.subspan(begin, end - begin));
+    }
+  }
+
   // Every level leaves at most 7 sibling ranges behind on the way down, the last one 8.
   static constexpr std::size_t kStackSize = 7 * (kCurveLevels + 1) + 8;
 

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <exception>
 #include <memory>
 #include <new>
@@ -21,12 +22,20 @@
 #include "gather/result_store.h"
 #include "io/file.h"
 #include "io/ply_writer.h"
+#include "octree/group_set.h"
 #include "octree/parallel.h"
 #include "octree/scene_file.h"
 #include "surfeit/gather.h"
 
 namespace surfeit {
 namespace {
+
+Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
+                                                                 Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, EnvironmentMap::load(options.environment, progress));
+  EnvironmentCube cube(map, RasterGeometry(options.quality.raster_resolution));
+  return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
+}
 
 Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
                                        const std::string& receivers_path,
@@ -46,14 +55,24 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
+  SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path));
-  const ResultRows result_rows(input.receivers(), options.mode);
+  SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
+  const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();
+
+  std::unique_ptr<const LoadedEnvironment> environment;
+  if (!options.environment.path.empty()) {
+    SURFEIT_ASSIGN_OR_RETURN(environment, loadEnvironment(options, progress));
+  }
+  const std::uint64_t environment_bytes =
+      environment != nullptr ? environment->map.memoryBytes() : 0;
 
   // Spend the budget before anything large is allocated
   SURFEIT_ASSIGN_OR_RETURN(
       const GatherMemory memory,
-      planGatherMemory(scene, stats.memory_bytes, gatherWork(input.receivers(), options)));
+      planGatherMemory(scene, stats.memory_bytes - std::min(stats.memory_bytes, environment_bytes),
+                       gatherWork(input.receivers(), options)));
   SURFEIT_ASSIGN_OR_RETURN(PlyWriter writer,
                            PlyWriter::create(result_path, PlyEncoding::kBinaryLittleEndian,
                                              result_rows.properties(), input.comments()));
@@ -79,11 +98,13 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   // Gather
   ResultStore results({.count = stats.receivers,
+                       .outputs = options.outputs,
                        .memory_bytes = memory.result_bytes,
                        .temporary_directory = temporary_directory});
   SURFEIT_RETURN_IF_ERROR(gatherSorted(
       std::move(scene), *sorter, memory, options, stats,
-      [&](std::span<const ResultStore::Entry> entries) { return results.put(entries); }, progress));
+      [&](std::span<const ResultStore::Entry> entries) { return results.put(entries); }, progress,
+      environment.get()));
   stats.temporary_bytes = sorter->temporaryBytes() + results.temporaryBytes();
   sorter.reset();
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <exception>
 #include <memory>
@@ -13,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "gather/interpolating_gatherer.h"
 #include "gather/packet_gatherer.h"
 
 namespace surfeit {
@@ -20,8 +20,8 @@ namespace surfeit {
 GatherCrew::GatherCrew(const Setup& setup, Sink sink)
     : setup_(setup),
       sink_(std::move(sink)),
-      prefetcher_(setup.octree, setup.queue, setup.controller, setup.options.quality,
-                  setup.prefetch_threads) {}
+      prefetcher_(setup_.octree, setup_.queue, setup_.controller, setup_.rules,
+                  setup_.prefetch_threads) {}
 
 Status GatherCrew::run() {
   {
@@ -49,30 +49,43 @@ void GatherCrew::work() {
   }
 }
 
-// Takes runs until none is left or some thread has failed.
 Status GatherCrew::gatherRuns() {
-  const auto gatherer =
-      std::make_unique<PacketGatherer>(setup_.options.mode, setup_.options.quality);
+  if (!(setup_.rules.quality.max_variation > 0)) {
+    const auto gatherer = std::make_unique<PacketGatherer>(setup_.rules);
+    return gatherRuns(*gatherer, kClusterReceivers);
+  }
+  const auto gatherer = std::make_unique<InterpolatingGatherer>(setup_.rules);
+  const Status status = gatherRuns(*gatherer, kGroupReceivers);
+  interpolated_count_ += gatherer->interpolatedCount();
+  return status;
+}
+
+// Takes runs until none is left or some thread has failed. Runs are whole groups, so that what is
+// gathered together is a matter of the order alone.
+template <typename Gatherer>
+Status GatherCrew::gatherRuns(Gatherer& gatherer, std::size_t group_size) {
   PagedOctree::Reader reader(setup_.octree);
   std::vector<SortedReceiver> run;
   std::vector<ResultStore::Entry> results;
-  std::array<Receiver, kClusterReceivers> cluster;
-  std::array<GatherResult, kClusterReceivers> cluster_results;
-  run.reserve(PagingController::kMostRun);
-  results.reserve(PagingController::kMostRun);
+  std::vector<Receiver> group(group_size);
+  std::vector<GatherResult> group_results(group_size);
+  const std::size_t most_run = std::max<std::size_t>(PagingController::kMostRun, group_size);
+  run.reserve(most_run);
+  results.reserve(most_run);
   while (!failure_.happened()) {
-    SURFEIT_RETURN_IF_ERROR(setup_.queue.take(run, setup_.controller.runReceivers()));
+    const std::size_t run_size = std::max<std::size_t>(setup_.controller.runReceivers(), group_size);
+    SURFEIT_RETURN_IF_ERROR(setup_.queue.take(run, run_size));
     if (run.empty()) return {};
     prefetcher_.notify();
     results.clear();
-    for (std::size_t begin = 0; begin < run.size(); begin += kClusterReceivers) {
+    for (std::size_t begin = 0; begin < run.size(); begin += group_size) {
       if (setup_.progress.isCancelled()) return Status::interrupted();
-      const std::size_t count = std::min(kClusterReceivers, run.size() - begin);
-      for (std::size_t i = 0; i < count; ++i) cluster[i] = run[begin + i].receiver;
-      SURFEIT_RETURN_IF_ERROR(gatherer->gather(std::span(cluster).first(count), reader,
-                                               std::span(cluster_results).first(count)));
+      const std::size_t count = std::min(group_size, run.size() - begin);
+      for (std::size_t i = 0; i < count; ++i) group[i] = run[begin + i].receiver;
+      SURFEIT_RETURN_IF_ERROR(gatherer.gather(std::span(group).first(count), reader,
+                                              std::span(group_results).first(count)));
       for (std::size_t i = 0; i < count; ++i) {
-        results.push_back({run[begin + i].index, cluster_results[i]});
+        results.push_back({run[begin + i].index, group_results[i]});
       }
     }
     SURFEIT_RETURN_IF_ERROR(sink_(results));
@@ -84,7 +97,7 @@ Status GatherCrew::gatherRuns() {
 
 Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
                     const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
-                    Progress& progress) {
+                    Progress& progress, const LoadedEnvironment* environment) {
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(scene), memory.caches));
   progress.beginPhase("gather", stats.receivers, "receivers");
@@ -105,12 +118,13 @@ Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory&
     GatherCrew crew({.octree = *octree,
                      .queue = queue,
                      .controller = controller,
-                     .options = options,
+                     .rules = GatherRules(options, environment),
                      .threads = stats.threads,
                      .prefetch_threads = memory.prefetch_threads,
                      .progress = progress},
                     std::move(sink));
     SURFEIT_RETURN_IF_ERROR(crew.run());
+    stats.interpolated_receivers = crew.interpolatedCount();
   }  // the readers go, and with them their last counts reach the caches
   controller.finish();
   stats.gather_seconds =

@@ -3,6 +3,7 @@
 // others find in the caches.
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <span>
 
@@ -29,7 +30,7 @@ class GatherCrew {
     PagedOctree& octree;
     ReceiverQueue& queue;
     PagingController& controller;
-    const GatherOptions& options;
+    GatherRules rules;
     int threads = 1;
     int prefetch_threads = 0;
     Progress& progress;
@@ -40,20 +41,26 @@ class GatherCrew {
   // failure, kInterrupted when the progress is cancelled. Once.
   Status run();
 
+  // Receivers of these that were interpolated. After run().
+  std::uint64_t interpolatedCount() const { return interpolated_count_; }
+
  private:
   void work();
   Status gatherRuns();
+  template <typename Gatherer>
+  Status gatherRuns(Gatherer& gatherer, std::size_t group_size);
 
   const Setup setup_;
   const Sink sink_;
   Prefetcher prefetcher_;
   FirstFailure failure_;
+  std::atomic<std::uint64_t> interpolated_count_{0};
 };
 
 // The gather proper: opens the caches of `scene`, gathers at what is in `sorter` (finished), and
 // fills in the statistics of that; threads of `stats` work, as many prefetch as `memory` says.
 Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
                     const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
-                    Progress& progress);
+                    Progress& progress, const LoadedEnvironment* environment = nullptr);
 
 }  // namespace surfeit

@@ -50,6 +50,19 @@ Result<GatherInput> GatherInput::open(const std::string& path) {
 GatherInput::GatherInput(PlyReader reader, std::size_t element, ReceiverMapping mapping)
     : reader_(std::move(reader)), element_(element), mapping_(std::move(mapping)) {}
 
+Status GatherInput::check(const GatherRules& rules) const {
+  if (!rules.isGlossy()) return {};
+  if (!mapping_.hasNormals()) {
+    return Status::corruption(fmt::format(
+        "{}: no normals (nx ny nz), expected some to reflect the view at", reader_.path()));
+  }
+  if (mapping_.hasViews() || glm::length(rules.eye) >= 0) return {};
+  return Status::corruption(
+      fmt::format("{}: no view directions (view_x view_y view_z), expected these, or the position "
+                  "of a camera (--camera X,Y,Z)",
+                  reader_.path()));
+}
+
 void GatherInput::note(Progress& progress) const {
   const PlyHeader& header = reader_.header();
   if (!mapping_.hasNormals()) {

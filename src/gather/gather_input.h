@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/bounds.h"
+#include "gather/gather_rules.h"
 #include "gather/receiver_rows.h"
 #include "gather/receiver_sorter.h"
 #include "gather/result_store.h"
@@ -27,6 +28,9 @@ class GatherInput {
 
   std::uint64_t receiverCount() const { return receivers().count; }
   const PlyElement& receivers() const { return reader_.header().elements[element_]; }
+
+  // kCorruption when receivers lack what the mode needs.
+  Status check(const GatherRules& rules) const;
 
   // Tells what of the input the result does not keep, and what the gather makes of the rest.
   void note(Progress& progress) const;

@@ -6,6 +6,9 @@
 #include <cmath>
 
 #include "cache/reuse_distances.h"
+#include "gather/gather_options.h"
+#include "gather/gather_outputs.h"
+#include "gather/interpolating_gatherer.h"
 #include "gather/packet_gatherer.h"
 #include "gather/paging_controller.h"
 #include "gather/prefetcher.h"
@@ -30,8 +33,6 @@ constexpr std::uint64_t kPrefetchPart = 16;
 constexpr std::uint64_t kMostSorterBytes = std::uint64_t{1} << 30;
 constexpr std::uint64_t kMostReadingBytes = std::uint64_t{32} << 20;
 
-constexpr std::uint64_t kBytesPerReceiver = sizeof(SortedReceiver) + sizeof(GatherResult);
-
 // Bytes of a thread beside its part of the caches. A cut larger than a gatherer has room for from
 // the start is foreseen by estimate: some layers of surfaces, seen in pieces of about the max solid
 // angle. With a max solid angle of 0 it is the whole scene.
@@ -40,11 +41,16 @@ std::uint64_t threadBytes(const SceneFile& file, const GatherWork& work) {
   // Rough nodes open to a quarter of the solid angle
   constexpr double kPatches = 4;
   constexpr double kBytes = 2 * (sizeof(Patch) + 2 * sizeof(std::uint64_t));  // vectors double
-  const double cut = kPatches * 4 * double(kPi) / double(work.quality.max_solid_angle) * kLayers;
+  const double cut = kPatches * 4 * double(kPi) / double(maxSolidAngle(work.rules)) * kLayers;
   const double most = std::min(double(file.header().surfel_count), cut);
   const double more = std::max(0.0, most - double(PacketRaster::kReservedPatches));
-  return PacketGatherer::memoryBytes(work.mode, work.quality) + kThreadBytes +
-         PagingController::kMostRun * (sizeof(SortedReceiver) + sizeof(ResultStore::Entry)) +
+  const bool interpolates = work.rules.quality.max_variation > 0;
+  const std::size_t group_size = interpolates ? kGroupReceivers : kClusterReceivers;
+  const std::size_t most_run = std::max<std::size_t>(PagingController::kMostRun, group_size);
+  return (interpolates ? InterpolatingGatherer::memoryBytes(work.rules)
+                       : PacketGatherer::memoryBytes(work.rules)) +
+         kThreadBytes + most_run * (sizeof(SortedReceiver) + sizeof(ResultStore::Entry)) +
+         group_size * (sizeof(Receiver) + sizeof(GatherResult)) +
          static_cast<std::uint64_t>(more * kBytes);
 }
 
@@ -60,28 +66,36 @@ std::uint64_t fixedBytes(const SceneFile& file, const GatherWork& work, int pref
          ReuseDistances::memoryBytes(file.surfelPageCount(), kTrackedPages);
 }
 
-std::uint64_t leastReceiverBytes(std::uint64_t receivers) {
-  return std::min(receivers * kBytesPerReceiver, ReceiverSorter::leastMemoryBytes(receivers) +
-                                                     ResultStore::leastMemoryBytes(receivers));
+std::uint64_t resultBytes(const GatherWork& work) {
+  return resultFloats(work.rules.outputs) * sizeof(float);
+}
+
+std::uint64_t leastReceiverBytes(const GatherWork& work) {
+  const std::uint64_t all = work.receivers * (sizeof(SortedReceiver) + resultBytes(work));
+  return std::min(
+      all, ReceiverSorter::leastMemoryBytes(work.receivers) +
+               ResultStore::leastMemoryBytes(work.receivers, resultFloats(work.rules.outputs)));
 }
 
 std::uint64_t leastBytes(const SceneFile& file, const GatherWork& work, int prefetch_threads) {
-  return fixedBytes(file, work, prefetch_threads) + leastReceiverBytes(work.receivers) +
+  return fixedBytes(file, work, prefetch_threads) + leastReceiverBytes(work) +
          PagedOctree::leastCacheBytes(file, work.threads + prefetch_threads);
 }
 
 // Divides `bytes` among receivers and results; `spare_bytes` are free until the gather begins.
-void planReceivers(std::uint64_t receivers, std::uint64_t bytes, std::uint64_t spare_bytes,
+void planReceivers(const GatherWork& work, std::uint64_t bytes, std::uint64_t spare_bytes,
                    GatherMemory& memory) {
+  const std::uint64_t receivers = work.receivers;
   const std::uint64_t all_receivers = receivers * sizeof(SortedReceiver);
-  const std::uint64_t all_results = receivers * sizeof(GatherResult);
+  const std::uint64_t all_results = receivers * resultBytes(work);
   if (all_receivers + all_results <= bytes) {
     memory.sorter_bytes = memory.sorter_reading_bytes = all_receivers;
     memory.result_bytes = all_results;
     return;
   }
   const std::uint64_t least_sorter = ReceiverSorter::leastMemoryBytes(receivers);
-  const std::uint64_t least_results = ResultStore::leastMemoryBytes(receivers);
+  const std::uint64_t least_results =
+      ResultStore::leastMemoryBytes(receivers, resultFloats(work.rules.outputs));
   memory.sorter_reading_bytes =
       std::clamp(bytes / 4, least_sorter, std::max(least_sorter, kMostReadingBytes));
   memory.result_bytes = std::min(
@@ -93,11 +107,11 @@ void planReceivers(std::uint64_t receivers, std::uint64_t bytes, std::uint64_t s
 }  // namespace
 
 GatherWork gatherWork(const PlyElement& receivers, const GatherOptions& options) {
+  const GatherRules rules(options, nullptr);
   return {.receivers = receivers.count,
           .input_row_bytes = receivers.row_bytes,
-          .result_row_bytes = ResultRows(receivers, options.mode).rowBytes(),
-          .mode = options.mode,
-          .quality = options.quality,
+          .result_row_bytes = ResultRows(receivers, rules.outputs, rules.mode).rowBytes(),
+          .rules = rules,
           .threads = options.threads,
           .prefetch_threads = options.prefetch ? Prefetcher::kThreads : 0,
           .cache_split = options.cache_split};
@@ -112,7 +126,8 @@ std::uint64_t leastGatherMemory(const SceneFile& file, const GatherWork& work) {
 }
 
 std::uint64_t gatherMemoryBesideCaches(const SceneFile& file, const GatherWork& work) {
-  return fixedBytes(file, work, work.prefetch_threads) + work.receivers * kBytesPerReceiver;
+  return fixedBytes(file, work, work.prefetch_threads) +
+         work.receivers * (sizeof(SortedReceiver) + resultBytes(work));
 }
 
 Result<GatherMemory> planGatherMemory(const SceneFile& file, std::uint64_t memory_bytes,
@@ -134,11 +149,11 @@ Result<GatherMemory> planGatherMemory(const SceneFile& file, std::uint64_t memor
   }
   const int readers = work.threads + memory.prefetch_threads;
   const std::uint64_t fixed = fixedBytes(file, work, memory.prefetch_threads);
-  const std::uint64_t least_receivers = leastReceiverBytes(work.receivers);
+  const std::uint64_t least_receivers = leastReceiverBytes(work);
   const std::uint64_t for_receivers =
       std::min(memory_bytes / kReceiverPart,
                memory_bytes - fixed - PagedOctree::leastCacheBytes(file, readers));
-  planReceivers(work.receivers, std::max(for_receivers, least_receivers),
+  planReceivers(work, std::max(for_receivers, least_receivers),
                 memory_bytes - fixed - least_receivers, memory);
   memory.cache_bytes = memory_bytes - fixed - memory.sorter_reading_bytes - memory.result_bytes;
   SURFEIT_ASSIGN_OR_RETURN(

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "gather/gather_rules.h"
 #include "io/ply_format.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
@@ -22,8 +23,7 @@ inline constexpr std::size_t kQueueReceivers = 16384;
 struct GatherWork {
   std::uint64_t receivers = 0;
   std::size_t input_row_bytes = 0, result_row_bytes = 0;
-  GatherMode mode = GatherMode::kOcclusion;
-  GatherQuality quality;
+  GatherRules rules{GatherMode::kOcclusion, {}};
   int threads = 1;
   int prefetch_threads = 0;  // wanted
   double cache_split = -1;   // as in GatherOptions

@@ -6,19 +6,59 @@
 #include <string>
 
 #include "core/job_limits.h"
+#include "gather/gather_outputs.h"
+#include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
 
 namespace surfeit {
 namespace {
 
 constexpr int kMostThreads = 4096;
+constexpr float kNoDistance = 1e19f;
+
+Status refuse(const char* what, auto found, const std::string& expected) {
+  return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
+}
+
+Status checkWeights(const GatherOptions& options) {
+  const GatherWeights& weights = options.weights;
+  if (!(weights.cone_angle >= 0 && weights.cone_angle <= kHemisphere)) {
+    return refuse("cone angle", weights.cone_angle, "0 to pi / 2 radians");
+  }
+  if (!(weights.roughness > 0 && weights.roughness <= 1)) {
+    return refuse("roughness", weights.roughness, "over 0 to 1");
+  }
+  if (!(weights.falloff >= 0 && std::isfinite(weights.falloff))) {
+    return refuse("falloff", weights.falloff, "0 or more");
+  }
+  if (weights.falloff > 0 && weights.falloff_mode == GatherWeights::FalloffMode::kPolynomial &&
+      !(options.quality.max_distance < kNoDistance)) {
+    return Status::invalidArgument(
+        "polynomial falloff needs a max distance, at which occlusion ends (--max-dist)");
+  }
+  return {};
+}
+
+Status checkOutputs(const GatherOptions& options) {
+  if ((options.outputs & ~kAllOutputs) != 0) {
+    return refuse("set of outputs", options.outputs, "GatherOutput values");
+  }
+  const bool has_environment = !options.environment.path.empty();
+  if ((options.outputs & kOutputEnvironment) != 0 && !has_environment) {
+    return Status::invalidArgument("output environment needs an environment (--environment)");
+  }
+  if (!(options.environment.intensity >= 0 && std::isfinite(options.environment.intensity))) {
+    return refuse("intensity of the environment", options.environment.intensity, "0 or more");
+  }
+  if (!std::isfinite(options.environment.rotation)) {
+    return refuse("rotation of the environment", options.environment.rotation, "radians");
+  }
+  return {};
+}
 
 }  // namespace
 
 Status checkGatherOptions(const GatherOptions& options) {
-  const auto refuse = [](const char* what, auto found, const std::string& expected) {
-    return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
-  };
   // No NaN passes any of these
   const auto isFromZero = [](float value) { return value >= 0 && std::isfinite(value); };
   const GatherQuality& quality = options.quality;
@@ -40,6 +80,11 @@ Status checkGatherOptions(const GatherOptions& options) {
   if (!(quality.max_distance > 0)) {
     return refuse("max distance", quality.max_distance, "more than 0 scene units");
   }
+  if (!isFromZero(quality.max_variation)) {
+    return refuse("max variation", quality.max_variation, "0 or more");
+  }
+  SURFEIT_RETURN_IF_ERROR(checkWeights(options));
+  SURFEIT_RETURN_IF_ERROR(checkOutputs(options));
   if (options.threads < 0 || options.threads > kMostThreads) {
     return refuse("thread count", options.threads, fmt::format("0 to {}", kMostThreads));
   }
@@ -72,6 +117,10 @@ void setQuality(QualityPreset preset, GatherQuality& quality) {
 }
 
 GatherOptions withDefaults(GatherOptions options) {
+  if (options.outputs == 0) {
+    options.outputs = usualOutputs(options.mode);
+    if (!options.environment.path.empty()) options.outputs |= kOutputEnvironment;
+  }
   if (options.threads == 0) options.threads = defaultThreadCount();
   if (options.memory_bytes == 0) options.memory_bytes = memoryLimitBytes() / 4 * 3;
   return options;

@@ -17,13 +17,14 @@ struct DrawCut {
 
 }  // namespace
 
-PointGatherer::PointGatherer(GatherMode mode, const GatherQuality& quality)
-    : raster_(mode, quality), cut_(quality, classifySiblings) {}
+PointGatherer::PointGatherer(const GatherRules& rules)
+    : rules_(rules), raster_(rules), cut_(rules, classifySiblings) {}
 
 Status PointGatherer::gather(const Receiver& receiver, PagedOctree::Reader& octree,
                              GatherResult& result) {
   raster_.begin(receiver);
-  SURFEIT_RETURN_IF_ERROR(cut_.walk(viewPacket({&receiver, 1}), {}, octree, DrawCut{raster_}));
+  SURFEIT_RETURN_IF_ERROR(
+      cut_.walk(viewPacket({&receiver, 1}, rules_), {}, octree, DrawCut{raster_}));
   work_ = {.nodes_visited = cut_.nodesVisited(),
            .surfels_visited = cut_.surfelsVisited(),
            .contributions = raster_.contributionCount(),

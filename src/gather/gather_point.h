@@ -15,9 +15,11 @@ namespace surfeit {
 // One thread at a time; make one per thread. For its memory see ReceiverRaster.
 class PointGatherer {
  public:
-  // `quality` must be valid, as gatherCloud checks it: even resolution within its limits, the rest
+  // `rules` must be valid, as gatherCloud checks them: even resolution within its limits, the rest
   // neither negative nor NaN.
-  PointGatherer(GatherMode mode, const GatherQuality& quality);
+  explicit PointGatherer(const GatherRules& rules);
+  PointGatherer(GatherMode mode, const GatherQuality& quality)
+      : PointGatherer(GatherRules(mode, quality)) {}
 
   // Gathers at `receiver`, whose values must be finite. On an error (a page that cannot be read or
   // decoded) `result` is unchanged. The result depends on the scene, the receiver, mode and quality
@@ -39,6 +41,7 @@ class PointGatherer {
   }
 
  private:
+  const GatherRules rules_;
   ReceiverRaster raster_;
   CutWalk cut_;
   Work work_;

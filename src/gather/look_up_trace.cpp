@@ -76,29 +76,30 @@ class LookUpTrace::Reader {
   std::uint32_t node_page_ = kNoPage, surfel_page_ = kNoPage;  // of the last look-ups
 };
 
-LookUpTrace::LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int threads,
+LookUpTrace::LookUpTrace(PagedOctree& octree, const GatherRules& rules, int threads,
                          Progress& progress)
-    : quality_(quality),
+    : rules_(rules),
       threads_(static_cast<std::size_t>(threads)),
       progress_(progress),
       surfel_group_capacity_(octree.file().header().surfel_group_capacity),
       octree_(octree),
-      cut_(std::make_unique<CutWalk>(quality)),
-      cost_(quality.raster_resolution) {}
+      cut_(std::make_unique<CutWalk>(rules)),
+      cost_(rules) {}
 
 // As PacketGatherer::gather walks.
 Status LookUpTrace::walk(std::span<const Receiver> receivers, Reader& reader) {
-  const PacketCluster cluster(receivers, quality_);
+  const PacketCluster cluster(receivers, rules_);
   cost_.begin(cluster.receivers(0)[0].position);
-  SURFEIT_RETURN_IF_ERROR(cut_->walk(viewPacket(cluster.receivers(0).first(1)), {}, reader, cost_));
+  SURFEIT_RETURN_IF_ERROR(
+      cut_->walk(viewPacket(cluster.receivers(0).first(1), rules_), {}, reader, cost_));
   if (cluster.shares()) {
     SURFEIT_RETURN_IF_ERROR(cut_->walk(cluster.view(), cluster.farRegion(), reader, IgnoreCut{}));
   }
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
     const std::span<const Receiver> packet = cluster.receivers(i);
     SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(packet, [&](std::size_t begin, std::size_t count) {
-      return cut_->walk(viewPacket(packet.subspan(begin, count)), cluster.regionOf(i), reader,
-                        IgnoreCut{});
+      return cut_->walk(viewPacket(packet.subspan(begin, count), rules_), cluster.regionOf(i),
+                        reader, IgnoreCut{});
     }));
   }
   return {};

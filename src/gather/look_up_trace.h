@@ -45,7 +45,7 @@ class LookUpTrace {
   using NextRun = std::function<Status(std::vector<SortedReceiver>& run)>;
 
   // All that is referred to must outlive the trace. `progress` advances by receivers.
-  LookUpTrace(PagedOctree& octree, const GatherQuality& quality, int threads, Progress& progress);
+  LookUpTrace(PagedOctree& octree, const GatherRules& rules, int threads, Progress& progress);
 
   // Adds to `every` the look-ups of all receivers that are to come, and to `second`, unless null,
   // those of every second cluster.
@@ -59,7 +59,7 @@ class LookUpTrace {
   class Reader;
   Status walk(std::span<const Receiver> receivers, Reader& reader);
 
-  const GatherQuality quality_;
+  const GatherRules rules_;
   const std::size_t threads_;
   Progress& progress_;
   const std::uint32_t surfel_group_capacity_;

@@ -7,11 +7,14 @@
 #endif
 
 #include <hwy/highway.h>
+// Needs the instruction set that the former chose
+#include <hwy/contrib/math/math-inl.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <type_traits>
 
 #include "gather/coverage_rules.h"
 #include "gather/packet_kernel.h"
@@ -29,10 +32,19 @@ struct Cover {
   bool is_all_lit;
   float overlap;
   glm::vec3 radiosity;
+  V fade;  // only when something fades
+};
+
+// What a kernel for one kind of raster draws.
+template <bool kHasColor, bool kHasFade, bool kHasFrame>
+struct BrushKind {
+  static constexpr bool kColor = kHasColor, kFade = kHasFade;
+  static constexpr bool kFrame = kHasFrame;  // the raster of a cone, in a frame of each lane
+  static constexpr std::size_t kChannels = (kColor ? 3 : 0) + (kFade ? 1 : 0);
 };
 
 // As RasterCube::coverPixel, where `amount` is positive.
-template <bool kColor>
+template <typename Kind>
 inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
@@ -55,12 +67,19 @@ inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
       hn::MulAdd(middle, hn::MulAdd(Splat(3 * kFill), middle, Splat(-cover.overlap)), one);
   const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
   hn::Store(layer, d, layer_at);
-  if constexpr (kColor) {
+  if constexpr (Kind::kChannels > 0) {
     V added = hn::Mul(room, hn::Sub(layer, before));
-    if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
-    for (std::size_t c = 0; c < PacketCanvas::kColorChannels; ++c) {
-      float* const at = pixel + (PacketCanvas::kCoverageChannels + c) * kPacketReceivers;
-      hn::Store(hn::MulAdd(added, Splat(cover.radiosity[int(c)]), hn::Load(d, at)), d, at);
+    float* at = pixel + PacketCanvas::kCoverageChannels * kPacketReceivers;
+    if constexpr (Kind::kFade) {
+      float* const fade_at = at + (Kind::kChannels - 1) * kPacketReceivers;
+      hn::Store(hn::MulAdd(added, cover.fade, hn::Load(d, fade_at)), d, fade_at);
+    }
+    if constexpr (Kind::kColor) {
+      if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
+      for (int c = 0; c < 3; ++c) {
+        hn::Store(hn::MulAdd(added, Splat(cover.radiosity[c]), hn::Load(d, at)), d, at);
+        at += kPacketReceivers;
+      }
     }
   }
 }
@@ -91,14 +110,16 @@ struct Parallelogram {
   V x, y, half_x, half_y, shear;
 };
 
-template <bool kColor>
+template <typename Kind>
 class Brush {
  public:
   Brush(const PacketCanvas& canvas, std::size_t lane)
       : canvas_(canvas),
         lane_(lane),
         resolution_(canvas.geometry->resolution()),
-        receivers_(*canvas.lanes, lane) {}
+        scale_(canvas.geometry->pixelsPerSlope()),
+        receivers_(*canvas.lanes, lane),
+        frames_(*canvas.lanes, lane) {}
 
   // What follows draws to this face alone.
   void BeginFace(int face) {
@@ -116,7 +137,24 @@ class Brush {
   }
 
  private:
-  static constexpr std::size_t kPixelFloats = PacketCanvas::pixelFloats(kColor);
+  static constexpr std::size_t kPixelFloats =
+      (PacketCanvas::kCoverageChannels + Kind::kChannels) * kPacketReceivers;
+  // Of a patch, in the frame of the raster.
+  using Normal = std::conditional_t<Kind::kFrame, V3, glm::vec3>;
+  Normal InRaster(const glm::vec3& normal) const {
+    if constexpr (Kind::kFrame) {
+      return frames_.ToLocal(normal);
+    } else {
+      return normal;
+    }
+  }
+  V3 InRaster(const V3& v) const {
+    if constexpr (Kind::kFrame) {
+      return frames_.ToLocal(v);
+    } else {
+      return v;
+    }
+  }
 
   // For all lanes.
   void ClearFace() {
@@ -140,12 +178,27 @@ class Brush {
     cover.overlap = patch.overlap;
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
+    if constexpr (Kind::kFade) cover.fade = FadeAt(distance);
     return cover;
+  }
+
+  // As fadeAt.
+  V FadeAt(V distance) const {
+    const D d;
+    const GatherWeights& weights = canvas_.rules->weights;
+    if (weights.falloff_mode == GatherWeights::FalloffMode::kExponential) {
+      return hn::Exp(d, hn::Mul(Splat(-weights.falloff), distance));
+    }
+    const float inverse = 1 / canvas_.rules->quality.max_distance;
+    const V rest = hn::NegMulAdd(distance, Splat(inverse), Splat(1));
+    const V power = hn::Mul(Splat(weights.falloff), hn::Log(d, hn::Max(rest, Splat(1e-30f))));
+    return hn::IfThenElseZero(hn::Gt(rest, Splat(1e-30f)), hn::Exp(d, power));
   }
 
   // As RasterCube::splat, onto face_.
   HWY_INLINE void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
-    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(sight.offset, face_ / 2));
+    const V3 offset = InRaster(sight.offset);
+    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(offset, face_ / 2));
     const V inverse = InverseSqrt(sight.distance_sq);
     const V distance = hn::Mul(sight.distance_sq, inverse);
     seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kLeastAxis), distance)));
@@ -157,20 +210,20 @@ class Brush {
                            hn::Mul(Splat(patch.most_area), distance));
     // Numbers of lanes that see nothing must be numbers, too
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
-    CoverParallelogram(OnFace(patch, sight, hn::IfThenElseZero(seen, area), inverse_w), seen,
+    CoverParallelogram(OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w), seen,
                        MakeCover(patch, sight, distance));
   }
 
   // As RasterCube::onFace; `area` is the visible area times the distance.
-  HWY_INLINE Parallelogram OnFace(const Patch& patch, const Sight& sight, V area, V inverse) const {
+  HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse) const {
     const V one = Splat(1), least = Splat(kLeastSpread);
     const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-    const V u = hn::Mul(Axis(sight.offset, u_axis), inverse);
-    const V v = hn::Mul(Axis(sight.offset, v_axis), inverse);
-    const float n = face_ % 2 == 0 ? patch.normal[axis] : -patch.normal[axis];
-    const V n_axis = Splat(n);
-    const V g_u = hn::NegMulAdd(u, n_axis, Splat(patch.normal[u_axis]));
-    const V g_v = hn::NegMulAdd(v, n_axis, Splat(patch.normal[v_axis]));
+    const Normal normal = InRaster(patch.normal);
+    const V u = hn::Mul(Axis(offset, u_axis), inverse);
+    const V v = hn::Mul(Axis(offset, v_axis), inverse);
+    const V n_axis = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(normal, axis));
+    const V g_u = hn::NegMulAdd(u, n_axis, Axis(normal, u_axis));
+    const V g_v = hn::NegMulAdd(v, n_axis, Axis(normal, v_axis));
 
     // The spread of a disk, and what is left of a row's when it is sheared
     const V a = hn::Max(least, hn::NegMulAdd(g_u, g_u, hn::MulAdd(u, u, one)));
@@ -185,16 +238,17 @@ class Brush {
     // Area on the face: du dv = area / distance^2 * (distance / w)^3, and more for large ones
     const V inverse_sq = hn::Mul(inverse, inverse);
     const V extent = hn::Min(Splat(kMostExtent), hn::Mul(Splat(patch.area), inverse_sq));
-    const V bulge = hn::MulAdd(extent, Splat(0.5f * (1 - n * n)), one);
+    const V depth = hn::NegMulAdd(n_axis, n_axis, one);
+    const V bulge = hn::MulAdd(extent, hn::Mul(Splat(0.5f), depth), one);
     const V half_area =
         hn::Mul(hn::Mul(Splat(0.25f), area), hn::Mul(hn::Mul(inverse, inverse_sq), bulge));
     const V half_u_sq = hn::Max(hn::Mul(half_area, ratio), Splat(1e-30f));
     const V inverse_half_u = InverseSqrt(half_u_sq);
     const V shift = hn::Mul(extent, Splat(1.f / 3));
-    const V scale = Splat(0.5f * float(resolution_));
+    const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
     const V middle_u = hn::MulAdd(shift, hn::MulAdd(n_axis, g_u, u), u);
     const V middle_v = hn::MulAdd(shift, hn::MulAdd(n_axis, g_v, v), v);
-    return {hn::MulAdd(middle_u, scale, scale), hn::MulAdd(middle_v, scale, scale),
+    return {hn::MulAdd(middle_u, scale, middle), hn::MulAdd(middle_v, scale, middle),
             hn::Mul(hn::Mul(half_u_sq, inverse_half_u), scale),
             hn::Mul(hn::Mul(half_area, inverse_half_u), scale), shear};
   }
@@ -224,7 +278,7 @@ class Brush {
       for (int column = range.column_begin; column < range.column_end; ++column) {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
-        CoverPixel<kColor>(pixel, hn::Mul(width, height), cover);
+        CoverPixel<Kind>(pixel, hn::Mul(width, height), cover);
         pixel += kPixelFloats;
       }
     }
@@ -232,38 +286,46 @@ class Brush {
 
   // As RasterCube::traceDisk and traceSphere.
   void Trace(const Patch& patch, const Sight& sight) {
-    const V3 centre = {hn::NegMulAdd(sight.bias, receivers_.normal.x, sight.offset.x),
-                       hn::NegMulAdd(sight.bias, receivers_.normal.y, sight.offset.y),
-                       hn::NegMulAdd(sight.bias, receivers_.normal.z, sight.offset.z)};
+    const V3 to_centre = {hn::NegMulAdd(sight.bias, receivers_.normal.x, sight.offset.x),
+                          hn::NegMulAdd(sight.bias, receivers_.normal.y, sight.offset.y),
+                          hn::NegMulAdd(sight.bias, receivers_.normal.z, sight.offset.z)};
     Sight from_ray = sight;
-    from_ray.facing = Dot(centre, patch.normal);
-    const Cover cover = MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq));
-    const V centre_sq = Dot(centre, centre);
-    const bool is_sphere = patch.isRound();
-    // Half the sides of the box around the disk
-    const glm::vec3& normal = patch.normal;
-    const glm::vec3 half =
-        patch.radius *
-        (is_sphere ? glm::vec3(1) : glm::sqrt(glm::max(glm::vec3(0), 1.f - normal * normal)));
-    TraceBox(patch, centre, half, sight.traced, from_ray.facing, centre_sq, cover);
+    from_ray.facing = Dot(to_centre, patch.normal);
+    TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
+             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq)));
   }
 
-  void TraceBox(const Patch& patch, const V3& centre, const glm::vec3& half, M traced, V c_n,
-                V centre_sq, const Cover& cover) {
+  // Half of the side along an axis of the box around the disk.
+  static V HalfSide(const Patch& patch, const V3& normal, int axis) {
+    if (patch.isRound()) return Splat(patch.radius);
+    const V n = Axis(normal, axis);
+    return hn::Mul(Splat(patch.radius),
+                   hn::Sqrt(hn::Max(hn::Zero(D()), hn::NegMulAdd(n, n, Splat(1)))));
+  }
+  static V HalfSide(const Patch& patch, const glm::vec3& normal, int axis) {
+    if (patch.isRound()) return Splat(patch.radius);
+    return Splat(patch.radius * std::sqrt(std::max(0.f, 1 - normal[axis] * normal[axis])));
+  }
+
+  void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
+                const Cover& cover) {
     const D d;
-    const int axis = face_ / 2;
+    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    const V centre_sq = Dot(centre, centre);
     const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(centre, axis));
-    const V w_far = hn::Add(w, Splat(half[axis]));
+    const V half_w = HalfSide(patch, normal, axis);
+    const V w_far = hn::Add(w, half_w);
     traced = hn::And(traced, hn::Gt(w_far, hn::Zero(d)));
     if (hn::AllFalse(d, traced)) return;
 
     // Pixels that see the box; what lies behind the face's origin reaches everywhere
     const V inverse_far = Reciprocal(w_far);
-    const V inverse_near =
-        Reciprocal(hn::Max(hn::Sub(w, Splat(half[axis])), hn::Mul(w_far, Splat(1e-3f))));
+    const V inverse_near = Reciprocal(hn::Max(hn::Sub(w, half_w), hn::Mul(w_far, Splat(1e-3f))));
     V x0, x1, y0, y1;
-    Slopes(Axis(centre, (axis + 1) % 3), half[(axis + 1) % 3], inverse_near, inverse_far, x0, x1);
-    Slopes(Axis(centre, (axis + 2) % 3), half[(axis + 2) % 3], inverse_near, inverse_far, y0, y1);
+    Slopes(Axis(centre, u_axis), HalfSide(patch, normal, u_axis), inverse_near, inverse_far, x0,
+           x1);
+    Slopes(Axis(centre, v_axis), HalfSide(patch, normal, v_axis), inverse_near, inverse_far, y0,
+           y1);
     const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_);
     if (range.isEmpty()) return;
 
@@ -274,24 +336,24 @@ class Brush {
         const glm::vec3& ray = canvas_.geometry->pixels()[face_first + in_face].direction;
         const V amount = hn::IfThenElseZero(
             traced, patch.isRound() ? SphereAmount(patch, ray, centre, centre_sq)
-                                    : DiskAmount(patch, ray, centre, c_n, centre_sq));
+                                    : DiskAmount(patch, normal, ray, centre, c_n, centre_sq));
         if (hn::AllFalse(d, hn::Gt(amount, hn::Zero(d)))) continue;
-        CoverPixel<kColor>(pixels_ + in_face * kPixelFloats, amount, cover);
+        CoverPixel<Kind>(pixels_ + in_face * kPixelFloats, amount, cover);
       }
     }
   }
 
   // Pixel coordinates between which directions to [x - half, x + half] lie, one to spare.
-  void Slopes(V x, float half, V inverse_near, V inverse_far, V& begin, V& end) const {
+  void Slopes(V x, V half, V inverse_near, V inverse_far, V& begin, V& end) const {
     const V zero = hn::Zero(D()), size = Splat(float(resolution_));
-    const V scale = Splat(0.5f * float(resolution_));
-    const V low = hn::Sub(x, Splat(half)), high = hn::Add(x, Splat(half));
+    const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
+    const V low = hn::Sub(x, half), high = hn::Add(x, half);
     const V slope_low = hn::Mul(low, hn::IfThenElse(hn::Lt(low, zero), inverse_near, inverse_far));
     const V slope_high =
         hn::Mul(high, hn::IfThenElse(hn::Lt(high, zero), inverse_far, inverse_near));
     const V spare = Splat(0.01f);
-    begin = hn::Min(size, hn::Max(zero, hn::Sub(hn::MulAdd(slope_low, scale, scale), spare)));
-    end = hn::Min(size, hn::Max(zero, hn::Add(hn::MulAdd(slope_high, scale, scale), spare)));
+    begin = hn::Min(size, hn::Max(zero, hn::Sub(hn::MulAdd(slope_low, scale, middle), spare)));
+    end = hn::Min(size, hn::Max(zero, hn::Add(hn::MulAdd(slope_high, scale, middle), spare)));
   }
 
   static V SphereAmount(const Patch& patch, const glm::vec3& ray, const V3& centre, V centre_sq) {
@@ -302,10 +364,16 @@ class Brush {
   }
 
   // How much of the ray's pixel the soft disk covers; zero or less where the ray misses it.
-  static V DiskAmount(const Patch& patch, const glm::vec3& ray, const V3& centre, V c_n,
-                      V centre_sq) {
-    const float d_n = glm::dot(ray, patch.normal);
-    const V t = hn::Mul(c_n, Splat(1 / (d_n != 0 ? d_n : 1e-20f)));
+  static V DiskAmount(const Patch& patch, const Normal& normal, const glm::vec3& ray,
+                      const V3& centre, V c_n, V centre_sq) {
+    V t;
+    if constexpr (Kind::kFrame) {
+      const V d_n = Dot(normal, ray);
+      t = hn::Div(c_n, hn::IfThenElse(hn::Eq(d_n, hn::Zero(D())), Splat(1e-20f), d_n));
+    } else {
+      const float d_n = glm::dot(ray, normal);
+      t = hn::Mul(c_n, Splat(1 / (d_n != 0 ? d_n : 1e-20f)));
+    }
     const V along = Dot(centre, ray);
     const V miss_sq = hn::MulAdd(t, hn::NegMulAdd(Splat(2), along, t), centre_sq);
     const V part_sq = hn::Mul(miss_sq, Splat(1 / (patch.radius * patch.radius)));
@@ -317,7 +385,9 @@ class Brush {
   const PacketCanvas& canvas_;
   const std::size_t lane_;
   const int resolution_;
+  const float scale_;  // pixels for a slope of 1
   const Receivers receivers_;
+  const Frames frames_;
   int face_ = 0;
   float* pixels_ = nullptr;  // of the face, from the first of our lanes
 };

@@ -13,9 +13,6 @@ namespace {
 // it looks by itself.
 constexpr float kMostWidth = 1.5f;
 
-// A difference of normals of 1 counts like this part of the cluster's radius.
-constexpr float kNormalWeight = 0.5f;
-
 // Receivers whose normals lie farther from their mean (cosine) have no horizon in common: nothing
 // of their far field may be dropped for lying below it.
 constexpr float kOneHorizon = 0.99f;
@@ -27,10 +24,11 @@ float coordinate(const Receiver& receiver, int axis, float normal_weight) {
   return axis < 3 ? receiver.position[axis] : normal_weight * receiver.normal[axis - 3];
 }
 
-// Orders places so that each kPacketReceivers of them, but for the last, are a packet, and halves
-// of packets lie together as well.
-void divide(Places places, std::span<const Receiver> receivers, float normal_weight) {
-  if (places.size() <= 1) return;
+}  // namespace
+
+void divideReceivers(Places places, std::span<const Receiver> receivers, float normal_weight,
+                     std::size_t whole) {
+  if (places.size() <= whole) return;
   int widest = 0;
   float width = -1;
   for (int axis = 0; axis < 6; ++axis) {
@@ -53,27 +51,27 @@ void divide(Places places, std::span<const Receiver> receivers, float normal_wei
                      const float y = coordinate(receivers[b], widest, normal_weight);
                      return x != y ? x < y : a < b;
                    });
-  divide(places.first(half), receivers, normal_weight);
-  divide(places.subspan(half), receivers, normal_weight);
+  divideReceivers(places.first(half), receivers, normal_weight, whole);
+  divideReceivers(places.subspan(half), receivers, normal_weight, whole);
 }
 
-}  // namespace
-
-PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherQuality& quality)
+PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherRules& rules)
     : receiver_count_(receivers.size()) {
   SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kClusterReceivers);
   const Places places = std::span(places_).first(receiver_count_);
   std::iota(places.begin(), places.end(), std::uint16_t{0});
-  divide(places, receivers, kNormalWeight * viewPacket(receivers).radius);
+  divideReceivers(places, receivers, kNormalWeight * viewPacket(receivers).radius);
   for (std::size_t i = 0; i < receiver_count_; ++i) receivers_[i] = receivers[places_[i]];
 
   std::array<float, kClusterPackets> widths{};
   for (std::size_t at = 0; at < receiver_count_; at += kPacketReceivers) {
-    packets_[packet_count_] = viewPacket(this->receivers(packet_count_));
+    packets_[packet_count_] = viewPacket(this->receivers(packet_count_), rules);
     widths[packet_count_] = packets_[packet_count_].radius;
     ++packet_count_;
   }
-  if (packet_count_ < 2 || !(quality.far_field_parallax > 0)) return;
+  // Cones that look elsewhere have no raster in common
+  const GatherQuality& quality = rules.quality;
+  if (packet_count_ < 2 || !(quality.far_field_parallax > 0) || rules.hasConeRaster()) return;
 
   const auto middle = widths.begin() + std::ptrdiff_t(packet_count_ / 2);
   std::nth_element(widths.begin(), middle, widths.begin() + std::ptrdiff_t(packet_count_));
@@ -92,7 +90,7 @@ PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherQu
     width = std::max(width, view.radius);
     for (const Receiver& receiver : this->receivers(i)) members[member_count++] = receiver;
   }
-  view_ = viewPacket(std::span(members).first(member_count));
+  view_ = viewPacket(std::span(members).first(member_count), rules);
 
   // Seen from a packet's centre instead of its rim, what is at distance d moves by width / d
   const float pixel = 2 / float(quality.raster_resolution);

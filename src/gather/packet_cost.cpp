@@ -14,12 +14,18 @@ constexpr float kPatchPixels = 25;
 // Pixels along a patch of a packet without width.
 constexpr float kPatchSide = 2.7f;
 
+// Parts are taken where they cost less than this much more: packets draw what lies far from their
+// centre less exactly. (50,000 scattered receivers of the city, over the scalar gather: 1.3 times
+// its rate with 1, 1.7 with .85 and with .7.)
+constexpr float kWorthDividing = 0.85f;
+
 // So many clusters of a cut tell about the whole.
 constexpr std::size_t kSampledClusters = 512;
 
 }  // namespace
 
-PacketCost::PacketCost(int raster_resolution) : pixels_per_slope_(0.5f * float(raster_resolution)) {
+PacketCost::PacketCost(const GatherRules& rules)
+    : pixels_per_slope_(pixelsPerSlope(rules)), most_side_(float(rules.quality.raster_resolution)) {
   clusters_.reserve(kReservedClusters);
 }
 
@@ -35,7 +41,6 @@ void PacketCost::add(const Node& node, float least_patches) {
 
 float PacketCost::cost(float radius) const {
   const std::size_t step = clusters_.size() / kSampledClusters + 1;
-  const float most_side = 2 * pixels_per_slope_;
   float sum = 0;
   for (std::size_t i = 0; i < clusters_.size(); i += step) {
     const auto& [distance, least, most] = clusters_[i];
@@ -43,7 +48,7 @@ float PacketCost::cost(float radius) const {
     const float ratio = distance / std::max(nearest, 1e-30f);
     const float patches = std::min(most, least * ratio * ratio);
     const float shift = 2 * radius * pixels_per_slope_ / std::max(distance, 1e-30f);
-    const float side = std::min(most_side, kPatchSide + shift);
+    const float side = std::min(most_side_, kPatchSide + shift);
     sum += patches * (kPatchPixels + side * side);
   }
   return sum * float(step);
@@ -57,7 +62,7 @@ PacketCost::Division PacketCost::divide(std::span<const Receiver> packet, float 
   const Division first = divide(packet.first(half), least_cost);
   const Division second = divide(packet.subspan(half), least_cost);
   const float apart = first.cost + second.cost;
-  if (together.cost <= apart) return together;
+  if (together.cost <= kWorthDividing * apart) return together;
   return {apart, first.begins | second.begins << half};
 }
 

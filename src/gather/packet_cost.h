@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "gather/gather_rules.h"
 #include "gather/receiver.h"
 #include "octree/node.h"
 #include "surfeit/status.h"
@@ -21,7 +22,7 @@ class PacketCost {
  public:
   // Room for the clusters of a cut; more for larger ones, as PacketRaster.
   static constexpr std::size_t kReservedClusters = 4096;
-  explicit PacketCost(int raster_resolution);
+  explicit PacketCost(const GatherRules& rules);
 
   // Starts over for a receiver here.
   void begin(const glm::vec3& position);
@@ -66,7 +67,7 @@ class PacketCost {
   void add(const Node& node, float least_patches);
   Division divide(std::span<const Receiver> packet, float least_cost) const;
 
-  const float pixels_per_slope_;
+  const float pixels_per_slope_, most_side_;
   glm::vec3 position_{0};
   std::vector<Cluster> clusters_;
 };

@@ -19,13 +19,12 @@ struct DrawCut {
 
 }  // namespace
 
-PacketGatherer::PacketGatherer(GatherMode mode, const GatherQuality& quality,
-                               const PacketKernel& kernel)
-    : quality_(quality),
-      raster_(mode, quality, kernel),
-      far_raster_(mode, quality, kernel),
-      cut_(quality),
-      cost_(quality.raster_resolution) {}
+PacketGatherer::PacketGatherer(const GatherRules& rules, const PacketKernel& kernel)
+    : rules_(rules),
+      raster_(rules, kernel),
+      far_raster_(rules, kernel),
+      cut_(rules),
+      cost_(rules) {}
 
 // Adds the time since the last call.
 void PacketGatherer::endPhase(double& seconds) {
@@ -71,7 +70,7 @@ struct PacketGatherer::Part {
 Status PacketGatherer::gatherPart(const Part& part, PagedOctree::Reader& octree,
                                   std::span<GatherResult> results) {
   SURFEIT_RETURN_IF_ERROR(
-      draw(viewPacket(part.receivers), part.region, part.receivers, octree, raster_));
+      draw(viewPacket(part.receivers, rules_), part.region, part.receivers, octree, raster_));
   work_.patches += raster_.patchCount();
   ++work_.packets;
   const std::size_t count = part.receivers.size();
@@ -87,9 +86,10 @@ Status PacketGatherer::gather(std::span<const Receiver> receivers, PagedOctree::
                               std::span<GatherResult> results) {
   double ignored = 0;
   endPhase(ignored);
-  const PacketCluster cluster(receivers, quality_);
+  const PacketCluster cluster(receivers, rules_);
   cost_.begin(cluster.receivers(0)[0].position);
-  SURFEIT_RETURN_IF_ERROR(cut_.walk(viewPacket(cluster.receivers(0).first(1)), {}, octree, cost_));
+  SURFEIT_RETURN_IF_ERROR(
+      cut_.walk(viewPacket(cluster.receivers(0).first(1), rules_), {}, octree, cost_));
   if (cluster.shares()) {
     SURFEIT_RETURN_IF_ERROR(
         draw(cluster.view(), cluster.farRegion(), cluster.centres(), octree, far_raster_));

@@ -20,13 +20,16 @@ namespace surfeit {
 // One thread at a time; make one per thread. For its memory see PacketRaster.
 class PacketGatherer {
  public:
-  // `quality` must be valid, as for PointGatherer.
+  // `rules` must be valid, as for PointGatherer.
+  explicit PacketGatherer(const GatherRules& rules,
+                          const PacketKernel& kernel = fastestPacketKernel());
   PacketGatherer(GatherMode mode, const GatherQuality& quality,
-                 const PacketKernel& kernel = fastestPacketKernel());
+                 const PacketKernel& kernel = fastestPacketKernel())
+      : PacketGatherer(GatherRules(mode, quality), kernel) {}
 
   // Gathers at 1 to kClusterReceivers receivers, whose values must be finite; results are as many.
   // On an error (a page that cannot be read or decoded) results are incomplete. They depend on the
-  // scene, the receivers given together, mode, quality and instruction set alone, bit for bit.
+  // scene, the receivers given together, rules and instruction set alone, bit for bit.
   Status gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
                 std::span<GatherResult> results);
 
@@ -43,9 +46,9 @@ class PacketGatherer {
   void measurePhases(bool measures) { measures_phases_ = measures; }
 
   // Bytes that a gatherer holds from the start.
-  static std::size_t memoryBytes(GatherMode mode, const GatherQuality& quality) {
+  static std::size_t memoryBytes(const GatherRules& rules) {
     return sizeof(PacketGatherer) + PacketCost::memoryBytes() +
-           2 * PacketRaster::memoryBytes(mode, quality);
+           2 * PacketRaster::memoryBytes(rules);
   }
 
  private:
@@ -55,7 +58,7 @@ class PacketGatherer {
               PagedOctree::Reader& octree, PacketRaster& raster);
   void endPhase(double& seconds);
 
-  const GatherQuality quality_;
+  const GatherRules rules_;
   PacketRaster raster_, far_raster_;
   CutWalk cut_;
   PacketCost cost_;

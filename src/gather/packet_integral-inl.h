@@ -7,6 +7,8 @@
 #endif
 
 #include <hwy/highway.h>
+// Needs the instruction set that the former chose
+#include <hwy/contrib/math/math-inl.h>
 
 #include <array>
 #include <cstddef>
@@ -14,6 +16,7 @@
 
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
+#include "gather/result_sums.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {
@@ -24,15 +27,15 @@ void FinishFarField(const PacketCanvas& canvas) {
   const D d;
   const V one = Splat(1);
   const std::size_t pixel_count = canvas.geometry->pixels().size();
-  const std::size_t pixel_floats = PacketCanvas::pixelFloats(canvas.has_color);
+  const std::size_t face_pixels = pixel_count / std::size_t(canvas.geometry->faceCount());
+  const std::size_t pixel_floats = PacketCanvas::pixelFloats(*canvas.rules);
   for (std::size_t i = 0; i < pixel_count; ++i) {
-    if (!(*canvas.is_face_used)[i * RasterGeometry::kFaces / pixel_count]) continue;
+    if (!(*canvas.is_face_used)[i / face_pixels]) continue;
     for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
       float* const pixel = canvas.pixels + i * pixel_floats + lane;
       const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
       const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
       hn::Store(total, d, pixel);
-      if (!canvas.has_color) continue;
       const V inverse = hn::Div(one, hn::Max(total, Splat(1e-20f)));
       for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats; c += kPacketReceivers) {
         hn::Store(hn::Mul(hn::Load(d, pixel + c), inverse), d, pixel + c);
@@ -41,95 +44,235 @@ void FinishFarField(const PacketCanvas& canvas) {
   }
 }
 
-// Sums over the pixels for some of the receivers.
+// What is in a pixel.
+struct PixelSight {
+  V coverage, occlusion;
+  V3 radiosity;  // times the coverage
+};
+
+// Sums over the pixels for some of the receivers, as ResultSums.
 class Integral {
  public:
   Integral(const PacketCanvas& canvas, const SharedFarField* far, std::size_t lane)
-      : canvas_(canvas), far_(far), lane_(lane), receivers_(*canvas.lanes, lane) {
-    weight_sum_ = covered_ = red_ = green_ = blue_ = hn::Zero(D());
+      : canvas_(canvas),
+        rules_(*canvas.rules),
+        far_(far),
+        lane_(lane),
+        pixel_floats_(PacketCanvas::pixelFloats(rules_)),
+        fade_at_((PacketCanvas::kCoverageChannels + rules_.channels() - 1) * kPacketReceivers),
+        receivers_(*canvas.lanes, lane),
+        frames_(*canvas.lanes, lane) {
+    weight_sum_ = covered_ = radiosity_.x = radiosity_.y = radiosity_.z = hn::Zero(D());
   }
 
-  void Add(std::size_t face, std::size_t first, std::size_t end) {
+  void AddFace(std::size_t face, std::size_t first, std::size_t end) {
     const bool has_near = (*canvas_.is_face_used)[face];
     const bool has_far = far_ != nullptr && (*far_->canvas->is_face_used)[face];
-    const V spherical = hn::IfThenElseZero(receivers_.spherical, Splat(1));
+    const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
     for (std::size_t i = first; i < end; ++i) {
       const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
-      const V cosine = hn::Max(spherical, Dot(receivers_.normal, pixel.direction));
-      const V weight = hn::Mul(cosine, Splat(pixel.solid_angle));
+      const V direction_weight = WeightOf(pixel.direction);
+      const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
       weight_sum_ = hn::Add(weight_sum_, weight);
-      if (has_near || has_far) AddPixel(i, weight, has_near, has_far);
+      if (!has_near && !has_far && !has_more) continue;
+      const PixelSight sight = Look(i, has_near, has_far);
+      covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
+      radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
+      radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
+      radiosity_.z = hn::MulAdd(weight, sight.radiosity.z, radiosity_.z);
+      if (has_more) AddMore(i, direction_weight, weight, sight);
     }
   }
 
-  void Store(std::array<std::array<float, kPacketReceivers>, 4>& out) const {
+  // Sums of the lanes, and of their weights.
+  void Store(std::span<GatherResult> sums, std::span<float> weights) const {
     const D d;
-    const V inverse = hn::Div(Splat(1), weight_sum_);
-    hn::Store(hn::Mul(covered_, inverse), d, out[0].data() + lane_);
-    hn::Store(hn::Mul(red_, inverse), d, out[1].data() + lane_);
-    hn::Store(hn::Mul(green_, inverse), d, out[2].data() + lane_);
-    hn::Store(hn::Mul(blue_, inverse), d, out[3].data() + lane_);
+    alignas(64) float lanes[5][kPacketReceivers];
+    hn::Store(weight_sum_, d, lanes[0]);
+    hn::Store(covered_, d, lanes[1]);
+    hn::Store(radiosity_.x, d, lanes[2]);
+    hn::Store(radiosity_.y, d, lanes[3]);
+    hn::Store(radiosity_.z, d, lanes[4]);
+    for (std::size_t k = 0; k < kStep && lane_ + k < sums.size(); ++k) {
+      GatherResult& sum = sums[lane_ + k];
+      sum = {};
+      weights[lane_ + k] = lanes[0][k];
+      sum.occlusion = lanes[1][k];
+      sum.irradiance = {lanes[2][k], lanes[3][k], lanes[4][k]};
+      const auto more = [&](std::size_t i) {
+        return glm::vec3(more_[i].lanes[k], more_[i + 1].lanes[k], more_[i + 2].lanes[k]);
+      };
+      sum.bent_normal = more(kBentNormal);
+      sum.illumination_direction = more(kIllumination);
+      sum.environment = more(kEnvironment);
+      sum.fluence = more(kFluence);
+      for (std::size_t c = 0; c < kShCount; ++c) sum.radiance_sh[c] = more(kSh + 3 * c);
+    }
   }
 
  private:
-  void AddPixel(std::size_t i, V weight, bool has_near, bool has_far) {
+  // As DirectionWeights; `direction` is of the raster.
+  V WeightOf(const glm::vec3& direction) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
-    const std::size_t pixel_floats = PacketCanvas::pixelFloats(canvas_.has_color);
-    V room = one, layer = zero, end = zero;
+    const DirectionWeights& weights = *canvas_.weights;
+    const bool has_frame = rules_.hasConeRaster();
+    const V cosine = has_frame ? Splat(direction.x) : Dot(frames_.x, direction);
+    V weight = hn::Max(zero, cosine);
+    if (!weights.isPlainCosine()) {
+      const M in_front = hn::Gt(cosine, zero);
+      if (!weights.isCosine()) weight = hn::IfThenElseZero(in_front, one);
+      if (weights.exponent() > 0) {
+        const V log = hn::Log(d, hn::Max(cosine, Splat(1e-20f)));
+        weight = hn::Mul(weight, hn::Exp(d, hn::Mul(Splat(weights.exponent()), log)));
+      }
+      if (weights.edgeSlope() > 0) {
+        const V part = hn::MulAdd(hn::Sub(cosine, Splat(weights.edgeCosine())),
+                                  Splat(weights.edgeSlope()), Splat(0.5f));
+        weight = hn::Mul(weight, hn::Min(one, hn::Max(zero, part)));
+      }
+      const V3 world = InWorld(direction);
+      weight = hn::IfThenElseZero(hn::Gt(Dot(receivers_.normal, world), zero), weight);
+    }
+    return hn::IfThenElse(receivers_.spherical, one, weight);
+  }
+
+  V3 InWorld(const glm::vec3& direction) const {
+    if (!rules_.hasConeRaster()) {
+      return {Splat(direction.x), Splat(direction.y), Splat(direction.z)};
+    }
+    return {frames_.ToWorld(direction, 0), frames_.ToWorld(direction, 1),
+            frames_.ToWorld(direction, 2)};
+  }
+
+  PixelSight Look(std::size_t i, bool has_near, bool has_far) const {
+    const D d;
+    const V zero = hn::Zero(d), one = Splat(1);
+    const bool has_light = rules_.hasLight(), fades = rules_.fades();
+    V room = one, layer = zero, end = zero, faded = zero;
+    V3 radiosity = {zero, zero, zero};
     if (has_near) {
-      const float* const near = canvas_.pixels + i * pixel_floats + lane_;
+      const float* const near = canvas_.pixels + i * pixel_floats_ + lane_;
       room = hn::Load(d, near);
       layer = hn::Load(d, near + kPacketReceivers);
       end = hn::Load(d, near + 2 * kPacketReceivers);
-      if (canvas_.has_color) {
-        red_ = hn::MulAdd(weight, hn::Load(d, near + 3 * kPacketReceivers), red_);
-        green_ = hn::MulAdd(weight, hn::Load(d, near + 4 * kPacketReceivers), green_);
-        blue_ = hn::MulAdd(weight, hn::Load(d, near + 5 * kPacketReceivers), blue_);
+      if (has_light) {
+        radiosity = {hn::Load(d, near + 3 * kPacketReceivers),
+                     hn::Load(d, near + 4 * kPacketReceivers),
+                     hn::Load(d, near + 5 * kPacketReceivers)};
       }
+      if (fades) faded = hn::Load(d, near + fade_at_);
     }
     // The far field comes last, as one contribution: a surface that reaches it goes on there
     const float* far = nullptr;
-    if (has_far) far = far_->canvas->pixels + i * pixel_floats + far_->lane;
+    if (has_far) far = far_->canvas->pixels + i * pixel_floats_ + far_->lane;
     if (has_far && *far > 0) {
       const V amount = Splat(*far);
       const M is_new = hn::Gt(Splat(far_->distance), end);
       room = hn::IfThenElse(is_new, hn::NegMulAdd(room, layer, room), room);
       layer = hn::IfThenZeroElse(is_new, layer);
       const V after = hn::Min(hn::Add(layer, amount), one);
-      if (canvas_.has_color) {
-        const V added = hn::Mul(weight, hn::Mul(room, hn::Sub(after, layer)));
-        red_ = hn::MulAdd(added, Splat(far[3 * kPacketReceivers]), red_);
-        green_ = hn::MulAdd(added, Splat(far[4 * kPacketReceivers]), green_);
-        blue_ = hn::MulAdd(added, Splat(far[5 * kPacketReceivers]), blue_);
+      const V added = hn::Mul(room, hn::Sub(after, layer));
+      if (has_light) {
+        radiosity.x = hn::MulAdd(added, Splat(far[3 * kPacketReceivers]), radiosity.x);
+        radiosity.y = hn::MulAdd(added, Splat(far[4 * kPacketReceivers]), radiosity.y);
+        radiosity.z = hn::MulAdd(added, Splat(far[5 * kPacketReceivers]), radiosity.z);
       }
+      if (fades) faded = hn::MulAdd(added, Splat(far[fade_at_]), faded);
       layer = after;
     }
-    const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
-    covered_ = hn::MulAdd(weight, total, covered_);
+    const V coverage = hn::Sub(one, hn::NegMulAdd(room, layer, room));
+    return {coverage, fades ? faded : coverage, radiosity};
+  }
+
+  // pi times the radiance of the environment in the whole pixel.
+  V3 EnvironmentAt(std::size_t i) const {
+    if (rules_.environment == nullptr) return {hn::Zero(D()), hn::Zero(D()), hn::Zero(D())};
+    if (!rules_.hasConeRaster()) {
+      const glm::vec3& value = rules_.environment_cube->pixels()[i];
+      return {Splat(value.r), Splat(value.g), Splat(value.b)};
+    }
+    // Every lane looks elsewhere
+    const D d;
+    const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
+    const V3 world = InWorld(pixel.direction);
+    alignas(64) float lanes[3][kPacketReceivers];
+    hn::Store(world.x, d, lanes[0]);
+    hn::Store(world.y, d, lanes[1]);
+    hn::Store(world.z, d, lanes[2]);
+    for (std::size_t k = 0; k < kStep; ++k) {
+      const glm::vec3 value =
+          rules_.environment->lookup({lanes[0][k], lanes[1][k], lanes[2][k]}, pixel.solid_angle);
+      for (int c = 0; c < 3; ++c) lanes[c][k] = value[c];
+    }
+    return {hn::Load(d, lanes[0]), hn::Load(d, lanes[1]), hn::Load(d, lanes[2])};
+  }
+
+  void AddMore(std::size_t i, V direction_weight, V weight, const PixelSight& sight) {
+    const D d;
+    const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
+    const V open = hn::Sub(Splat(1), sight.coverage);
+    const V3 all_around = EnvironmentAt(i);
+    const V3 environment = {hn::Mul(open, all_around.x), hn::Mul(open, all_around.y),
+                            hn::Mul(open, all_around.z)};
+    const V3 light = {hn::Add(sight.radiosity.x, environment.x),
+                      hn::Add(sight.radiosity.y, environment.y),
+                      hn::Add(sight.radiosity.z, environment.z)};
+    if (rules_.has(kOutputEnvironment)) AddTo(kEnvironment, weight, environment);
+    if (rules_.has(kOutputBentNormal | kOutputIlluminationDirection)) {
+      const V3 world = InWorld(pixel.direction);
+      AddTo(kBentNormal, hn::Mul(weight, open), world);
+      AddTo(kIllumination, hn::Mul(weight, Dot(light, kLuminance)), world);
+    }
+    if (!rules_.has(kOutputFluence | kOutputRadianceSh)) return;
+    const V seen = hn::IfThenElseZero(hn::Gt(direction_weight, hn::Zero(d)), Splat(1));
+    AddTo(kFluence, hn::Mul(seen, Splat(pixel.solid_angle)), light);
+    const ShCoefficients basis = shBasis(pixel.direction);
+    for (std::size_t c = 0; c < kShCount; ++c) {
+      AddTo(kSh + 3 * c, hn::Mul(seen, Splat(pixel.solid_angle * basis[c])), light);
+    }
+  }
+
+  // Places in more_, three each.
+  static constexpr std::size_t kBentNormal = 0, kIllumination = 3, kEnvironment = 6, kFluence = 9,
+                               kSh = 12, kMore = kSh + 3 * kShCount;
+  struct alignas(64) Sum {
+    float lanes[kPacketReceivers] = {};
+  };
+  void AddTo(std::size_t place, V weight, const V3& value) {
+    const D d;
+    for (int axis = 0; axis < 3; ++axis, ++place) {
+      float* const sum = more_[place].lanes;
+      hn::Store(hn::MulAdd(weight, Axis(value, axis), hn::Load(d, sum)), d, sum);
+    }
   }
 
   const PacketCanvas& canvas_;
+  const GatherRules& rules_;
   const SharedFarField* const far_;
-  const std::size_t lane_;
+  const std::size_t lane_, pixel_floats_, fade_at_;
   const Receivers receivers_;
-  V weight_sum_, covered_, red_, green_, blue_;
+  const Frames frames_;
+  V weight_sum_, covered_;
+  V3 radiosity_;
+  std::array<Sum, kMore> more_;
 };
 
 // As ReceiverRaster::integrate.
 void Integrate(const PacketCanvas& canvas, const SharedFarField* far,
                std::span<GatherResult> results) {
-  const std::size_t face_pixels = canvas.geometry->pixels().size() / RasterGeometry::kFaces;
-  alignas(64) std::array<std::array<float, kPacketReceivers>, 4> out;
+  const auto faces = static_cast<std::size_t>(canvas.geometry->faceCount());
+  const std::size_t face_pixels = canvas.geometry->pixels().size() / faces;
+  std::array<float, kPacketReceivers> weights;
   for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
     Integral integral(canvas, far, lane);
-    for (std::size_t face = 0; face < RasterGeometry::kFaces; ++face) {
-      integral.Add(face, face * face_pixels, (face + 1) * face_pixels);
+    for (std::size_t face = 0; face < faces; ++face) {
+      integral.AddFace(face, face * face_pixels, (face + 1) * face_pixels);
     }
-    integral.Store(out);
+    integral.Store(results, weights);
   }
   for (std::size_t i = 0; i < results.size(); ++i) {
-    results[i] = {out[0][i], {out[1][i], out[2][i], out[3][i]}};
+    results[i] = resultOf(results[i], weights[i], *canvas.rules, canvas.lanes->spherical[i] > 0);
   }
 }
 

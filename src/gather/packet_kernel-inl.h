@@ -67,11 +67,11 @@ void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sigh
   sight.power = {facing_of[powerKind(0)], facing_of[powerKind(1)], facing_of[powerKind(2)]};
 }
 
-template <bool kColor>
+template <typename Kind>
 void DrawAll(const PacketCanvas& canvas, const Patch* patches,
              std::span<const std::uint64_t> order) {
   for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-    Brush<kColor> brush(canvas, lane);
+    Brush<Kind> brush(canvas, lane);
     int face = -1;
     for (const std::uint64_t key : order) {
       if (draw_order::face(key) != face) {
@@ -84,7 +84,18 @@ void DrawAll(const PacketCanvas& canvas, const Patch* patches,
 }
 
 void Draw(const PacketCanvas& canvas, const Patch* patches, std::span<const std::uint64_t> order) {
-  canvas.has_color ? DrawAll<true>(canvas, patches, order) : DrawAll<false>(canvas, patches, order);
+  const GatherRules& rules = *canvas.rules;
+  const auto withFrame = [&]<bool kColor, bool kFade>() {
+    rules.hasConeRaster() ? DrawAll<BrushKind<kColor, kFade, true>>(canvas, patches, order)
+                          : DrawAll<BrushKind<kColor, kFade, false>>(canvas, patches, order);
+  };
+  if (rules.hasLight()) {
+    rules.fades() ? withFrame.template operator()<true, true>()
+                  : withFrame.template operator()<true, false>();
+  } else {
+    rules.fades() ? withFrame.template operator()<false, true>()
+                  : withFrame.template operator()<false, false>();
+  }
 }
 
 }  // namespace

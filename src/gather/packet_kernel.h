@@ -11,6 +11,7 @@
 #include <limits>
 #include <span>
 
+#include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
 #include "gather/receiver.h"
 #include "octree/node.h"
@@ -46,20 +47,25 @@ struct Patch {
 struct alignas(64) PacketLanes {
   std::array<float, kPacketReceivers> x, y, z, normal_x, normal_y, normal_z;
   std::array<float, kPacketReceivers> spherical;  // 1: no normal, sees the whole sphere; else 0
+  // Axes of the frames of cones (ConeFrame), x y z of each; of a cube, the first is the lobe's.
+  std::array<std::array<float, kPacketReceivers>, 9> frame;
 };
 
-// Where a packet is drawn: 16 raster cubes interleaved by pixel. A pixel has 16 lanes each of room,
-// layer and the layer's end (RasterCube::Coverage), and with color of red, green and blue.
+// Where a packet is drawn: 16 rasters interleaved by pixel. A pixel has 16 lanes each of room,
+// layer and the layer's end (RasterCube::Coverage); with color of red, green and blue; and of the
+// faded coverage, when occlusion fades.
 struct PacketCanvas {
   static constexpr std::size_t kCoverageChannels = 3, kColorChannels = 3;
-  static constexpr std::size_t pixelFloats(bool has_color) {
-    return (kCoverageChannels + (has_color ? kColorChannels : 0)) * kPacketReceivers;
+  static std::size_t pixelFloats(const GatherRules& rules) {
+    return (kCoverageChannels + rules.channels()) * kPacketReceivers;
   }
 
   const PacketLanes* lanes;
+  const GatherRules* rules;
   const RasterGeometry* geometry;
-  bool has_color;
+  const DirectionWeights* weights;
   float bias;             // of rays, in radii of the surfel
+  float turned;           // -1 when one-sided surfels were turned to show their backs, else 1
   float max_distance_sq;  // may be infinite
   glm::vec3 centre;       // of the packet
   float packet_radius;

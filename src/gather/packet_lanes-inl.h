@@ -53,6 +53,28 @@ inline V Dot(const V3& a, const glm::vec3& b) {
   return hn::MulAdd(a.x, Splat(b.x), hn::MulAdd(a.y, Splat(b.y), hn::Mul(a.z, Splat(b.z))));
 }
 inline V Axis(const V3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+inline V Axis(const glm::vec3& v, int axis) { return Splat(v[axis]); }
+
+// Frames of the lanes' cones.
+struct Frames {
+  V3 x, y, z;
+  Frames(const PacketLanes& lanes, std::size_t lane)
+      : x{LoadLanes(lanes.frame[0], lane), LoadLanes(lanes.frame[1], lane),
+          LoadLanes(lanes.frame[2], lane)},
+        y{LoadLanes(lanes.frame[3], lane), LoadLanes(lanes.frame[4], lane),
+          LoadLanes(lanes.frame[5], lane)},
+        z{LoadLanes(lanes.frame[6], lane), LoadLanes(lanes.frame[7], lane),
+          LoadLanes(lanes.frame[8], lane)} {}
+  template <typename Vector>
+  V3 ToLocal(const Vector& v) const {
+    return {Dot(x, v), Dot(y, v), Dot(z, v)};
+  }
+  // A component of v = (x, y, z) in the frame, of the world.
+  V ToWorld(const glm::vec3& v, int axis) const {
+    return hn::MulAdd(Axis(x, axis), Splat(v.x),
+                      hn::MulAdd(Axis(y, axis), Splat(v.y), hn::Mul(Axis(z, axis), Splat(v.z))));
+  }
+};
 
 // Some of the receivers.
 struct Receivers {
@@ -104,7 +126,9 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 
   // As ReceiverRaster::addSurfel: the disk must rise above the horizon of the rays
   const V cosine = Dot(receivers.normal, patch.normal);
-  sight.bias = hn::Mul(Splat(canvas.bias * patch.radius), hn::Min(one, hn::Add(one, cosine)));
+  const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
+  sight.bias = hn::Mul(Splat(canvas.bias * patch.radius),
+                       hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
   const V rise =
       hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
   const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));

@@ -45,16 +45,17 @@ void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
 
 }  // namespace
 
-PacketRaster::PacketRaster(GatherMode mode, const GatherQuality& quality,
-                           const PacketKernel& kernel)
+PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
     : kernel_(kernel),
-      quality_(quality),
-      rules_{quality.sides, mode == GatherMode::kBleeding},
-      max_distance_sq_(quality.max_distance < 1e19f ? quality.max_distance * quality.max_distance
-                                                    : std::numeric_limits<float>::infinity()),
-      geometry_(quality.raster_resolution),
+      rules_(rules),
+      near_field_radii_(nearFieldRadii(rules)),
+      max_distance_sq_(rules.quality.max_distance < 1e19f
+                           ? rules.quality.max_distance * rules.quality.max_distance
+                           : std::numeric_limits<float>::infinity()),
+      geometry_(rasterGeometry(rules)),
+      weights_(rules, 1 / geometry_.pixelsPerSlope()),
       pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() *
-                                          PacketCanvas::pixelFloats(rules_.has_color))) {
+                                          PacketCanvas::pixelFloats(rules_))) {
   if (pixels_ == nullptr) throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
   order_.resize(kReservedEntries);
@@ -73,6 +74,12 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
     lanes_.normal_y[i] = receiver.normal.y;
     lanes_.normal_z[i] = receiver.normal.z;
     lanes_.spherical[i] = receiver.isSpherical() ? 1 : 0;
+    const ConeFrame frame(lobeAxis(receiver, rules_));
+    for (int axis = 0; axis < 3; ++axis) {
+      lanes_.frame[std::size_t(axis)][i] = frame.x[axis];
+      lanes_.frame[std::size_t(3 + axis)][i] = frame.y[axis];
+      lanes_.frame[std::size_t(6 + axis)][i] = frame.z[axis];
+    }
   }
   is_face_used_.fill(false);
   patches_.clear();
@@ -86,6 +93,11 @@ void PacketRaster::orderLastPatch() {
   const Patch& patch = patches_.back();
   const glm::vec3 middle = patch.position - view_.centre;
   const float distance_sq = glm::dot(middle, middle);
+  if (rules_.hasConeRaster()) {
+    order_[order_count_++] = draw_order::key(0, distance_sq, index);
+    if (order_count_ == order_.size()) order_.resize(2 * order_.size());
+    return;
+  }
   const glm::vec3 size = glm::abs(middle);
   const float largest = std::max({size.x, size.y, size.z});
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
@@ -109,11 +121,12 @@ void PacketRaster::orderLastPatch() {
 
 void PacketRaster::addNode(const Node& node) {
   RoughSight seen{};
-  const bool shows_backs = rules_.sides == GatherSides::kBoth;
+  const GatherSides sides = rules_.quality.sides;
+  const bool shows_fronts = sides != GatherSides::kBack, shows_backs = sides != GatherSides::kFront;
   float round_area = 0;
   if (!node.isFlat()) {
     kernel_.seeRoughNode(node, glm::normalize(node.position - view_.centre), seen);
-    round_area = shows_backs ? seen.area + seen.opposite_area : seen.area;
+    round_area = (shows_fronts ? seen.area : 0) + (shows_backs ? seen.opposite_area : 0);
     if (!(round_area > kLeastVisiblePart * node.area)) return;
   }
   Patch& patch = patches_.emplace_back();
@@ -125,20 +138,24 @@ void PacketRaster::addNode(const Node& node) {
   if (node.isFlat()) {
     patch.disk_area = node.area;
     patch.radiosity = node.radiosity;
-    patch.facing_limit = shows_backs ? Patch::kDarkBack : Patch::kFrontOnly;
+    patch.facing_limit = sides == GatherSides::kBoth ? Patch::kDarkBack : Patch::kFrontOnly;
+    if (!shows_fronts) patch.normal = -patch.normal;
   } else {
     patch.round_area = round_area;
     patch.radiosity = seen.power / round_area;
-    patch.overlap = shows_backs ? 0 : overlapOf(seen.area, seen.opposite_area);
+    if (sides == GatherSides::kFront) patch.overlap = overlapOf(seen.area, seen.opposite_area);
+    if (sides == GatherSides::kBack) patch.overlap = overlapOf(seen.opposite_area, seen.area);
     patch.facing_limit = Patch::kBothSides;
   }
+  if (!shows_fronts) patch.radiosity = glm::vec3(0);
   orderLastPatch();
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region) {
   const PacketCanvas canvas = this->canvas();
-  for (const Surfel& surfel : surfels) {
-    if (!region.holds(surfel.position)) continue;
+  for (const Surfel& stored : surfels) {
+    if (!region.holds(stored.position)) continue;
+    const Surfel surfel = withSides(stored, rules_.quality.sides);
     Patch& patch = patches_.emplace_back();
     patch.position = surfel.position;
     patch.radius = effectiveRadius(surfel.radius, surfel.area);
@@ -146,13 +163,13 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     patch.area = patch.most_area = surfel.area;
     (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
     patch.radiosity = surfel.radiosity;
-    patch.facing_limit = surfel.isSphere() || surfel.isTwoSided() ? Patch::kBothSides
-                         : rules_.sides == GatherSides::kBoth     ? Patch::kDarkBack
-                                                                  : Patch::kFrontOnly;
+    patch.facing_limit = surfel.isSphere() || surfel.isTwoSided()     ? Patch::kBothSides
+                         : rules_.quality.sides == GatherSides::kBoth ? Patch::kDarkBack
+                                                                      : Patch::kFrontOnly;
     patch.soft_peak = softDiskPeak(patch.radius, surfel.area);
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =
-        std::max(quality_.near_field_radii * patch.radius, std::numeric_limits<float>::min());
+        std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
     if (kernel_.isSeen(canvas, patch)) {
       orderLastPatch();
     } else {
@@ -163,9 +180,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
 
 PacketCanvas PacketRaster::canvas() const {
   return {.lanes = &lanes_,
+          .rules = &rules_,
           .geometry = &geometry_,
-          .has_color = rules_.has_color,
-          .bias = quality_.bias,
+          .weights = &weights_,
+          .bias = rules_.quality.bias,
+          .turned = rules_.quality.sides == GatherSides::kBack ? -1.f : 1.f,
           .max_distance_sq = max_distance_sq_,
           .centre = view_.centre,
           .packet_radius = view_.radius,
@@ -192,12 +211,11 @@ void PacketRaster::integrate(std::span<GatherResult> results, const PacketRaster
   kernel_.integrate(canvas(), &shared, results);
 }
 
-std::size_t PacketRaster::memoryBytes(GatherMode mode, const GatherQuality& quality) {
+std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
   const std::size_t pixel_bytes =
-      sizeof(RasterGeometry::Pixel) +
-      PacketCanvas::pixelFloats(mode == GatherMode::kBleeding) * sizeof(float);
+      sizeof(RasterGeometry::Pixel) + PacketCanvas::pixelFloats(rules) * sizeof(float);
   return sizeof(PacketRaster) +
-         RasterGeometry::pixelCount(quality.raster_resolution) * pixel_bytes +
+         RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
          kReservedPatches * sizeof(Patch) + 2 * kReservedEntries * sizeof(std::uint64_t);
 }
 

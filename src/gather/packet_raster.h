@@ -33,9 +33,9 @@ class PacketRaster {
   static constexpr std::size_t kReservedPatches = 4096;
   static constexpr std::size_t kReservedEntries = 8192;  // of the order
 
-  // `quality` must be valid, as for PointGatherer.
-  PacketRaster(GatherMode mode, const GatherQuality& quality,
-               const PacketKernel& kernel = fastestPacketKernel());
+  // `rules` must be valid, as for PointGatherer.
+  explicit PacketRaster(const GatherRules& rules,
+                        const PacketKernel& kernel = fastestPacketKernel());
   PacketRaster(const PacketRaster&) = delete;
   PacketRaster& operator=(const PacketRaster&) = delete;
 
@@ -60,17 +60,18 @@ class PacketRaster {
   std::size_t patchCount() const { return patches_.size(); }
 
   // Bytes that a raster of this quality holds from the start.
-  static std::size_t memoryBytes(GatherMode mode, const GatherQuality& quality);
+  static std::size_t memoryBytes(const GatherRules& rules);
 
  private:
   void orderLastPatch();
   PacketCanvas canvas() const;
 
   const PacketKernel& kernel_;
-  GatherQuality quality_;
-  ContributionRules rules_;
+  const GatherRules rules_;
+  const float near_field_radii_;
   float max_distance_sq_;
   RasterGeometry geometry_;
+  DirectionWeights weights_;
   hwy::AlignedFreeUniquePtr<float[]> pixels_;
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 

@@ -13,6 +13,10 @@ constexpr float kLeastConeCosine = 0.1f;
 
 // Lengths are rounded; what is a bound must stay one.
 constexpr float kRoundingSlack = 1.00001f;
+constexpr float kAngleSlack = 1e-3f;  // acos of what is nearly 1
+
+// Pixels at the edge of a cone count in part, so somewhat farther out things matter, too.
+constexpr float kSquareReach = 1.15f;
 
 }  // namespace
 
@@ -46,6 +50,30 @@ PacketView viewPacket(std::span<const Receiver> receivers) {
   view.has_horizon = view.has_horizon && cosine > kLeastConeCosine;
   view.cone_cosine = std::min(1.f, cosine);
   view.cone_sine = std::sqrt(std::max(0.f, 1 - cosine * cosine));
+  return view;
+}
+
+PacketView viewPacket(std::span<const Receiver> receivers, const GatherRules& rules) {
+  PacketView view = viewPacket(receivers);
+  if (!rules.hasCone()) return view;
+  glm::vec3 sum(0);
+  for (const Receiver& receiver : receivers) {
+    if (receiver.isSpherical()) return view;
+    sum += lobeAxis(receiver, rules);
+  }
+  const float length = glm::length(sum);
+  if (!(length > 0)) return view;
+  view.lobe_axis = sum / length;
+  float spread = 0;
+  for (const Receiver& receiver : receivers) {
+    const float cosine = glm::dot(view.lobe_axis, lobeAxis(receiver, rules));
+    spread = std::max(spread, std::acos(std::clamp(cosine, -1.f, 1.f)));
+  }
+  const float slope = std::tan(std::min(rules.weights.cone_angle, 1.5f));
+  const float angle = std::atan(kSquareReach * slope) + spread + kAngleSlack;
+  view.has_cone = angle < kPi / 2;
+  view.lobe_cosine = std::cos(angle);
+  view.lobe_sine = std::sin(angle);
   return view;
 }
 

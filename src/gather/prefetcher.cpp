@@ -9,9 +9,8 @@
 
 namespace surfeit {
 Prefetcher::Prefetcher(PagedOctree& octree, ReceiverQueue& queue,
-                       const PagingController& controller, const GatherQuality& quality,
-                       int threads)
-    : octree_(octree), queue_(queue), controller_(controller), quality_(quality) {
+                       const PagingController& controller, const GatherRules& rules, int threads)
+    : octree_(octree), queue_(queue), controller_(controller), rules_(rules) {
   try {
     for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
   } catch (const std::system_error&) {
@@ -41,7 +40,7 @@ void Prefetcher::notify() {
 void Prefetcher::work() {
   try {
     PagedOctree::Reader reader(octree_, CacheFront::Role::kPrefetch);
-    const auto cut = std::make_unique<CutWalk>(quality_);
+    const auto cut = std::make_unique<CutWalk>(rules_);
     std::unique_lock lock(mutex_);
     while (!ends_) {
       const std::uint64_t moves = moves_;
@@ -49,7 +48,8 @@ void Prefetcher::work() {
       const std::optional<Receiver> receiver =
           queue_.lookAhead(controller_.prefetchReceivers(), kStride);
       bool failed = false;
-      if (receiver) failed = !cut->walk(viewPacket({&*receiver, 1}), {}, reader, IgnoreCut{}).ok();
+      if (receiver)
+        failed = !cut->walk(viewPacket({&*receiver, 1}, rules_), {}, reader, IgnoreCut{}).ok();
       if (!receiver) reader.release();
       lock.lock();
       if (failed) return;

@@ -8,6 +8,7 @@
 #include <thread>
 #include <vector>
 
+#include "gather/gather_rules.h"
 #include "gather/paging_controller.h"
 #include "gather/receiver_queue.h"
 #include "octree/paged_octree.h"
@@ -26,7 +27,7 @@ class Prefetcher {
 
   // `threads` of them; where none can be started there are fewer.
   Prefetcher(PagedOctree& octree, ReceiverQueue& queue, const PagingController& controller,
-             const GatherQuality& quality, int threads);
+             const GatherRules& rules, int threads);
   Prefetcher(const Prefetcher&) = delete;
   Prefetcher& operator=(const Prefetcher&) = delete;
   ~Prefetcher();
@@ -40,7 +41,7 @@ class Prefetcher {
   PagedOctree& octree_;
   ReceiverQueue& queue_;
   const PagingController& controller_;
-  const GatherQuality quality_;
+  const GatherRules rules_;
   std::mutex mutex_;
   std::condition_variable changed_;  // with mutex_
   bool ends_ = false;                // guarded by mutex_

@@ -38,15 +38,22 @@ Slopes tangentSlopes(float x, float w, float radius) {
 
 }  // namespace
 
-RasterGeometry::RasterGeometry(int resolution) : resolution_(resolution) {
+RasterGeometry::RasterGeometry(int resolution) : RasterGeometry(resolution, kFaces, 1) {}
+
+RasterGeometry RasterGeometry::cone(int resolution, float angle) {
+  return RasterGeometry(resolution, 1, std::tan(angle));
+}
+
+RasterGeometry::RasterGeometry(int resolution, int face_count, float largest_slope)
+    : resolution_(resolution), face_count_(face_count), largest_slope_(largest_slope) {
   SURFEIT_CHECK(isValidResolution(resolution));
-  pixels_.reserve(pixelCount(resolution));
-  const double step = 2.0 / resolution;
-  for (int face = 0; face < kFaces; ++face) {
+  pixels_.reserve(std::size_t(face_count) * std::size_t(resolution) * std::size_t(resolution));
+  const double slope = largest_slope, step = 2 * slope / resolution;
+  for (int face = 0; face < face_count; ++face) {
     const int axis = face / 2;
     for (int row = 0; row < resolution; ++row) {
       for (int column = 0; column < resolution; ++column) {
-        const double u = -1 + column * step, v = -1 + row * step;
+        const double u = -slope + column * step, v = -slope + row * step;
         glm::vec3 direction;
         direction[axis] = face % 2 == 0 ? 1.f : -1.f;
         direction[(axis + 1) % 3] = float(u + step / 2);
@@ -60,14 +67,24 @@ RasterGeometry::RasterGeometry(int resolution) : resolution_(resolution) {
   }
 }
 
-RasterCube::RasterCube(const RasterGeometry& geometry, bool has_color)
+// Without a branch that would make it jump (Duff and others, "Building an Orthonormal Basis").
+ConeFrame::ConeFrame(const glm::vec3& axis) : x(axis) {
+  const float sign = std::copysign(1.f, axis.z);
+  const float a = -1 / (sign + axis.z), b = axis.x * axis.y * a;
+  y = {1 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x};
+  z = {b, sign + axis.y * axis.y * a, -axis.y};
+}
+
+RasterCube::RasterCube(const RasterGeometry& geometry, bool has_color, bool fades)
     : geometry_(&geometry),
       coverage_(geometry.pixels().size()),
-      radiosity_(has_color ? geometry.pixels().size() : 0) {}
+      radiosity_(has_color ? geometry.pixels().size() : 0),
+      faded_(fades ? geometry.pixels().size() : 0) {}
 
 void RasterCube::clear() {
   std::fill(coverage_.begin(), coverage_.end(), Coverage{});
   std::fill(radiosity_.begin(), radiosity_.end(), glm::vec3(0));
+  std::fill(faded_.begin(), faded_.end(), 0.f);
 }
 
 // A layer with less room than `amount` ends at exactly 1, and the pixel is exactly 1 then.
@@ -96,6 +113,7 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float overla
           ? 1
           : std::clamp(1 - coverage.room + coverage.layer * coverage.room, before, 1.f);
   if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
+  if (!faded_.empty()) faded_[pixel] += (coverage.total - before) * depth.fade;
 }
 
 // Covers pixels by the part of them that lies in the shape, row by row.
@@ -103,8 +121,8 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, float 
                                     const DepthRange& depth, const glm::vec3& radiosity) {
   // From face coordinates to pixels
   const int resolution = geometry_->resolution();
-  const float size = float(resolution), scale = 0.5f * size;
-  const float x_middle = (shape.u + 1) * scale, y_middle = (shape.v + 1) * scale;
+  const float size = float(resolution), middle = 0.5f * size, scale = geometry_->pixelsPerSlope();
+  const float x_middle = shape.u * scale + middle, y_middle = shape.v * scale + middle;
   const float half_x = shape.half_u * scale, half_y = shape.half_v * scale;
   const float y_begin = std::max(0.f, y_middle - half_y);
   const float y_end = std::min(size, y_middle + half_y);
@@ -165,6 +183,7 @@ void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::v
   for (int axis = 0; axis < 3; ++axis) {
     if (!(std::abs(patch.direction[axis]) > kLeastAxis)) continue;
     const int face = 2 * axis + (patch.direction[axis] < 0 ? 1 : 0);
+    if (face >= geometry_->faceCount()) return;
     coverParallelogram(face, onFace(patch, axis), patch.overlap, depth, radiosity);
   }
 }
@@ -174,9 +193,9 @@ template <typename AmountOf>
 void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthRange& depth,
                              const glm::vec3& radiosity, const AmountOf& amountOf) {
   const int resolution = geometry_->resolution();
-  const float size = float(resolution), scale = 0.5f * size;
+  const float size = float(resolution), middle = 0.5f * size, scale = geometry_->pixelsPerSlope();
   const std::span<const RasterGeometry::Pixel> pixels = geometry_->pixels();
-  for (int face = 0; face < RasterGeometry::kFaces; ++face) {
+  for (int face = 0; face < geometry_->faceCount(); ++face) {
     const int axis = face / 2;
     const float w = face % 2 == 0 ? centre[axis] : -centre[axis];
     if (w <= -radius) continue;
@@ -184,10 +203,10 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthR
     // Pixels between the lines that touch the sphere, with one to spare against rounding
     const Slopes u = tangentSlopes(centre[(axis + 1) % 3], w, radius);
     const Slopes v = tangentSlopes(centre[(axis + 2) % 3], w, radius);
-    const int column_begin = int(std::clamp((u.min + 1) * scale - 1, 0.f, size));
-    const int column_end = int(std::clamp((u.max + 1) * scale + 2, 0.f, size));
-    const int row_begin = int(std::clamp((v.min + 1) * scale - 1, 0.f, size));
-    const int row_end = int(std::clamp((v.max + 1) * scale + 2, 0.f, size));
+    const int column_begin = int(std::clamp(u.min * scale + middle - 1, 0.f, size));
+    const int column_end = int(std::clamp(u.max * scale + middle + 2, 0.f, size));
+    const int row_begin = int(std::clamp(v.min * scale + middle - 1, 0.f, size));
+    const int row_end = int(std::clamp(v.max * scale + middle + 2, 0.f, size));
 
     for (int row = row_begin; row < row_end; ++row) {
       const std::size_t row_first = std::size_t((face * resolution + row) * resolution);

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstddef>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -30,6 +31,9 @@ class RasterGeometry {
 
   // `resolution` must be even, so that no pixel straddles an axis, and within the limits above.
   explicit RasterGeometry(int resolution);
+  // The raster of a cone: one face, +x of a frame of its own whose x axis is the cone's, with
+  // slopes to the tangent of `angle`, half of the cone's; radians, below pi / 2.
+  static RasterGeometry cone(int resolution, float angle);
 
   static bool isValidResolution(int resolution) {
     return resolution >= kMinResolution && resolution <= kMaxResolution && resolution % 2 == 0;
@@ -39,16 +43,34 @@ class RasterGeometry {
   }
 
   int resolution() const { return resolution_; }
+  int faceCount() const { return face_count_; }
+  // Pixels along a face for a slope (u or v) of 1.
+  float pixelsPerSlope() const { return 0.5f * float(resolution_) / largest_slope_; }
   std::span<const Pixel> pixels() const { return pixels_; }
 
  private:
-  int resolution_;
+  RasterGeometry(int resolution, int face_count, float largest_slope);
+
+  int resolution_, face_count_;
+  float largest_slope_;
   std::vector<Pixel> pixels_;
 };
 
 // Distances from the receiver between which something lies.
 struct DepthRange {
   float begin, end;
+  float fade = 1;  // what its occlusion counts
+};
+
+// Axes of a cone's frame: local coordinates are dot products with them.
+struct ConeFrame {
+  glm::vec3 x, y, z;
+
+  explicit ConeFrame(const glm::vec3& axis = {1, 0, 0});  // unit
+  glm::vec3 toLocal(const glm::vec3& v) const {
+    return {glm::dot(x, v), glm::dot(y, v), glm::dot(z, v)};
+  }
+  glm::vec3 toWorld(const glm::vec3& v) const { return v.x * x + v.y * y + v.z * z; }
 };
 
 // What the pixels hold for one receiver. Contributions must come front to back, in the order of the
@@ -63,8 +85,9 @@ struct DepthRange {
 // with layers (docs/algorithm.md, "Coverage").
 class RasterCube {
  public:
-  // `geometry` must outlive the cube. Without color, radiosities are neither added nor stored.
-  RasterCube(const RasterGeometry& geometry, bool has_color);
+  // `geometry` must outlive the cube; with that of a cone, all directions are of its frame. Without
+  // color, radiosities are neither added nor stored; what fades neither, unless `fades`.
+  RasterCube(const RasterGeometry& geometry, bool has_color, bool fades = false);
 
   // Uncovers every pixel.
   void clear();
@@ -100,8 +123,11 @@ class RasterCube {
   // Radiosity of a pixel times its coverage. Requires color.
   const glm::vec3& radiosity(std::size_t pixel) const { return radiosity_[pixel]; }
 
-  // Bytes that a cube with color holds for each pixel.
-  static constexpr std::size_t kPixelBytes = 4 * sizeof(float) + sizeof(glm::vec3);
+  // Coverage of a pixel, each part times its fade. Requires that something fades.
+  float fadedCoverage(std::size_t pixel) const { return faded_[pixel]; }
+
+  // Bytes that a cube with color that fades holds for each pixel.
+  static constexpr std::size_t kPixelBytes = 5 * sizeof(float) + sizeof(glm::vec3);
 
  private:
   struct Coverage {
@@ -126,6 +152,7 @@ class RasterCube {
   const RasterGeometry* geometry_;
   std::vector<Coverage> coverage_;
   std::vector<glm::vec3> radiosity_;
+  std::vector<float> faded_;
 };
 
 }  // namespace surfeit

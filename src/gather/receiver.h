@@ -1,10 +1,13 @@
 // The place being lit, and what is found there.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
+
+#include "core/spherical_harmonics.h"
 
 namespace surfeit {
 
@@ -17,6 +20,8 @@ inline constexpr std::size_t kPacketReceivers = 16;
 struct Receiver {
   glm::vec3 position{0};  // finite
   glm::vec3 normal{0};    // unit length or zero
+  // For glossy reflection: unit direction that it is looked along; zero: from GatherRules::eye.
+  glm::vec3 view{0};
 
   bool isSpherical() const { return normal == glm::vec3(0); }
 };
@@ -28,11 +33,18 @@ inline float heightAboveHorizon(const Receiver& receiver, const glm::vec3& offse
                                 : glm::dot(offset, receiver.normal);
 }
 
+// What was gathered at a receiver: GatherOutput has the meanings. What was not asked for is zero.
+// Plain floats, so that results can be stored and mixed as such.
 struct GatherResult {
-  // Covered part of the hemisphere by cosine, or of the sphere; 0..1.
   float occlusion = 0;
-  // With kBleeding, E = pi * mean radiance = mean radiosity, by the same weights; else zero.
   glm::vec3 irradiance{0};
+  glm::vec3 bent_normal{0};
+  glm::vec3 illumination_direction{0};
+  glm::vec3 environment{0};
+  glm::vec3 fluence{0};
+  std::array<glm::vec3, kShCount> radiance_sh{};
 };
+inline constexpr std::size_t kResultFloats = 16 + 3 * kShCount;
+static_assert(sizeof(GatherResult) == kResultFloats * sizeof(float));
 
 }  // namespace surfeit

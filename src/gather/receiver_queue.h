@@ -17,7 +17,7 @@ namespace surfeit {
 // Safe from any thread.
 class ReceiverQueue {
  public:
-  // `sorter` is finished, and not used by anyone else meanwhile. Takes buffer_receivers * 40 bytes;
+  // `sorter` is finished, and not used by anyone else meanwhile. Takes buffer_receivers * 56 bytes;
   // runs are no longer than that.
   ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers);
 

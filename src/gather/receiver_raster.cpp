@@ -9,16 +9,21 @@
 
 #include "core/assert.h"
 #include "gather/coverage_rules.h"
+#include "gather/result_sums.h"
 
 namespace surfeit {
 
-ReceiverRaster::ReceiverRaster(GatherMode mode, const GatherQuality& quality)
-    : quality_(quality),
-      rules_{quality.sides, mode == GatherMode::kBleeding},
-      max_distance_sq_(quality.max_distance < 1e19f ? quality.max_distance * quality.max_distance
-                                                    : std::numeric_limits<float>::infinity()),
-      geometry_(quality.raster_resolution),
-      cube_(geometry_, rules_.has_color) {
+ReceiverRaster::ReceiverRaster(const GatherRules& rules)
+    : rules_(rules),
+      contribution_rules_{rules.quality.sides, rules.hasLight()},
+      near_field_radii_(nearFieldRadii(rules)),
+      max_distance_sq_(rules.quality.max_distance < 1e19f
+                           ? rules.quality.max_distance * rules.quality.max_distance
+                           : std::numeric_limits<float>::infinity()),
+      has_frame_(rules.hasConeRaster()),
+      geometry_(rasterGeometry(rules)),
+      weights_(rules, 1 / geometry_.pixelsPerSlope()),
+      cube_(geometry_, rules.hasLight(), rules.fades()) {
   contributions_.reserve(kReservedContributions);
   order_.reserve(kReservedContributions);
   near_surfels_.reserve(kReservedNearSurfels);
@@ -27,6 +32,7 @@ ReceiverRaster::ReceiverRaster(GatherMode mode, const GatherQuality& quality)
 void ReceiverRaster::begin(const Receiver& receiver) {
   receiver_ = receiver;
   is_spherical_ = receiver.isSpherical();
+  if (has_frame_) frame_ = ConeFrame(lobeAxis(receiver, rules_));
   contributions_.clear();
   near_surfels_.clear();
 }
@@ -35,13 +41,13 @@ void ReceiverRaster::addNode(const Node& node) {
   const glm::vec3 to_node = node.position - receiver_.position;
   if (!(heightAboveHorizon(receiver_, to_node) > 0)) return;
   Entry entry;
-  if (!makeContribution(node, to_node, rules_, entry.contribution)) return;
+  if (!makeContribution(node, to_node, contribution_rules_, entry.contribution)) return;
   if (!(entry.contribution.distance_sq <= max_distance_sq_)) return;
   contributions_.push_back(entry);
 }
 
 void ReceiverRaster::addSurfel(const Surfel& stored) {
-  Surfel surfel = stored;
+  Surfel surfel = withSides(stored, contribution_rules_.sides);
   surfel.radius = effectiveRadius(surfel.radius, surfel.area);
   const glm::vec3 to_surfel = surfel.position - receiver_.position;
   const float distance_sq = glm::dot(to_surfel, to_surfel);
@@ -54,10 +60,11 @@ void ReceiverRaster::addSurfel(const Surfel& stored) {
 
   // Mid field: a patch, when its middle is above the horizon
   const float height = heightAboveHorizon(receiver_, to_surfel);
-  const float near_distance = quality_.near_field_radii * surfel.radius;
+  const float near_distance = near_field_radii_ * surfel.radius;
   if (distance_sq >= near_distance * near_distance) {
     Entry entry;
-    if (height > 0 && makeContribution(surfel, to_surfel, rules_, entry.contribution)) {
+    if (height > 0 &&
+        makeContribution(surfel, to_surfel, contribution_rules_, entry.contribution)) {
       contributions_.push_back(entry);
     }
     return;
@@ -71,13 +78,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored) {
   const float rise = surfel.radius * std::sqrt(std::max(0.f, 1 - cosine * cosine));
   if (!(height + rise > bias)) return;
 
-  // Nothing is seen of the back of a one-sided disk, nor of a sphere from inside
-  const glm::vec3 centre = to_surfel - bias * receiver_.normal;
-  if (surfel.isSphere()) {
-    if (!(glm::dot(centre, centre) > surfel.radius * surfel.radius)) return;
-  } else if (rules_.sides == GatherSides::kFront && !surfel.isTwoSided()) {
-    if (!(glm::dot(centre, surfel.normal) < 0)) return;
-  }
+  if (!showsTracedSide(surfel, to_surfel - bias * receiver_.normal)) return;
   Entry entry;
   entry.contribution = {};
   entry.contribution.distance_sq = distance_sq;
@@ -85,6 +86,14 @@ void ReceiverRaster::addSurfel(const Surfel& stored) {
   entry.near_index = std::int32_t(near_surfels_.size());
   near_surfels_.push_back(surfel);
   contributions_.push_back(entry);
+}
+
+// Nothing is seen of the back of a one-sided disk, nor of a sphere from inside. `centre`: from the
+// origin of the rays.
+bool ReceiverRaster::showsTracedSide(const Surfel& surfel, const glm::vec3& centre) const {
+  if (surfel.isSphere()) return glm::dot(centre, centre) > surfel.radius * surfel.radius;
+  if (surfel.isTwoSided() || contribution_rules_.sides == GatherSides::kBoth) return true;
+  return glm::dot(centre, surfel.normal) < 0;
 }
 
 // A strict order of what two entries draw, whatever order they were added in.
@@ -127,20 +136,24 @@ void ReceiverRaster::sortByDistance() {
 // bias would be looked through otherwise. (A dragon on a plane: AO RMSE .0254 with a constant bias,
 // .0218 with this one.)
 float ReceiverRaster::rayBias(const Surfel& surfel) const {
-  const float cosine = glm::dot(receiver_.normal, surfel.normal);  // zero for spheres
-  return quality_.bias * surfel.radius * std::min(1.f, 1 + cosine);
+  // Zero for spheres. With backs the surfel was turned, and its own surface faces it
+  const bool is_turned = rules_.quality.sides == GatherSides::kBack && !surfel.isTwoSided();
+  const float turned = is_turned ? -1.f : 1.f;
+  const float cosine = turned * glm::dot(receiver_.normal, surfel.normal);
+  return rules_.quality.bias * surfel.radius * std::min(1.f, 1 + cosine);
 }
 
 void ReceiverRaster::trace(const Surfel& surfel, const DepthRange& depth) {
   const glm::vec3 centre =
       surfel.position - receiver_.position - rayBias(surfel) * receiver_.normal;
   if (surfel.isSphere()) {
-    cube_.traceSphere(centre, surfel.radius, depth, surfel.radiosity);
+    cube_.traceSphere(inRaster(centre), surfel.radius, depth, surfel.radiosity);
     return;
   }
   const bool sends_light = surfel.isTwoSided() || glm::dot(centre, surfel.normal) < 0;
-  cube_.traceDisk(centre, surfel.normal, surfel.radius, softDiskPeak(surfel.radius, surfel.area),
-                  depth, sends_light ? surfel.radiosity : glm::vec3(0));
+  cube_.traceDisk(inRaster(centre), inRaster(surfel.normal), surfel.radius,
+                  softDiskPeak(surfel.radius, surfel.area), depth,
+                  sends_light ? surfel.radiosity : glm::vec3(0));
 }
 
 GatherResult ReceiverRaster::finish() {
@@ -151,34 +164,45 @@ GatherResult ReceiverRaster::finish() {
     const Contribution& patch = entry.contribution;
     const float distance = std::sqrt(patch.distance_sq);
     const float reach = kLayerReach * patch.radius;
-    const DepthRange depth = {distance - reach, distance + reach};
+    const DepthRange depth = {distance - reach, distance + reach,
+                              rules_.fades() ? fadeAt(distance, rules_) : 1};
     if (entry.near_index >= 0) {
       trace(near_surfels_[std::size_t(entry.near_index)], depth);
     } else {
-      cube_.splat({patch.direction, patch.normal, patch.solid_angle, patch.spread, patch.overlap},
+      cube_.splat({inRaster(patch.direction), inRaster(patch.normal), patch.solid_angle,
+                   patch.spread, patch.overlap},
                   depth, patch.radiosity);
     }
   }
   return integrate();
 }
 
-// Dividing by the sum of the weights rather than by pi makes a wholly covered hemisphere exactly 1,
-// whatever the resolution.
 GatherResult ReceiverRaster::integrate() const {
   const std::span<const RasterGeometry::Pixel> pixels = geometry_.pixels();
-  float weight_sum = 0;
-  GatherResult result;
+  const glm::vec3 axis = lobeAxis(receiver_, rules_);
+  ResultSums sums;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const float cosine =
-        is_spherical_ ? 1 : std::max(0.f, glm::dot(pixels[i].direction, receiver_.normal));
-    const float weight = cosine * pixels[i].solid_angle;
-    weight_sum += weight;
-    result.occlusion += weight * cube_.coverage(i);
-    if (rules_.has_color) result.irradiance += weight * cube_.radiosity(i);
+    const glm::vec3 direction =
+        has_frame_ ? frame_.toWorld(pixels[i].direction) : pixels[i].direction;
+    float weight = 1;
+    if (!is_spherical_) {
+      weight = glm::dot(direction, receiver_.normal) > 0 ? weights_(glm::dot(direction, axis)) : 0;
+    }
+    glm::vec3 environment(0);
+    if (has_frame_ && rules_.environment != nullptr) {
+      environment = rules_.environment->lookup(direction, pixels[i].solid_angle);
+    } else if (rules_.environment_cube != nullptr) {
+      environment = rules_.environment_cube->pixels()[i];
+    }
+    sums.add({.direction = direction,
+              .solid_angle = pixels[i].solid_angle,
+              .weight = weight,
+              .coverage = cube_.coverage(i),
+              .occlusion = rules_.fades() ? cube_.fadedCoverage(i) : cube_.coverage(i),
+              .radiosity = rules_.hasLight() ? cube_.radiosity(i) : glm::vec3(0),
+              .environment = environment});
   }
-  result.occlusion /= weight_sum;
-  result.irradiance /= weight_sum;
-  return result;
+  return sums.result(rules_, is_spherical_);
 }
 
 std::size_t ReceiverRaster::memoryBytes(const GatherQuality& quality) {

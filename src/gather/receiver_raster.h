@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "gather/contribution.h"
+#include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
 #include "gather/receiver.h"
 #include "octree/node.h"
@@ -27,8 +28,8 @@ class ReceiverRaster {
   static constexpr std::size_t kReservedContributions = 8192;
   static constexpr std::size_t kReservedNearSurfels = 2048;
 
-  // `quality` must be valid, as for PointGatherer.
-  ReceiverRaster(GatherMode mode, const GatherQuality& quality);
+  // `rules` must be valid, as for PointGatherer.
+  explicit ReceiverRaster(const GatherRules& rules);
   ReceiverRaster(const ReceiverRaster&) = delete;
   ReceiverRaster& operator=(const ReceiverRaster&) = delete;
 
@@ -59,13 +60,20 @@ class ReceiverRaster {
   void sortByDistance();
   bool isLessContent(const Entry& a, const Entry& b) const;
   float rayBias(const Surfel& surfel) const;
+  bool showsTracedSide(const Surfel& surfel, const glm::vec3& centre) const;
+  // In the frame of the raster.
+  glm::vec3 inRaster(const glm::vec3& v) const { return has_frame_ ? frame_.toLocal(v) : v; }
   void trace(const Surfel& surfel, const DepthRange& depth);
   GatherResult integrate() const;
 
-  GatherQuality quality_;
-  ContributionRules rules_;
+  const GatherRules rules_;
+  const ContributionRules contribution_rules_;
+  const float near_field_radii_;
   float max_distance_sq_;
+  const bool has_frame_;
   RasterGeometry geometry_;
+  DirectionWeights weights_;
+  ConeFrame frame_;
   RasterCube cube_;
   Receiver receiver_;
   bool is_spherical_ = true;

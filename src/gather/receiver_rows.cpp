@@ -4,23 +4,32 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <span>
 #include <string_view>
 
+#include "gather/gather_outputs.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 namespace {
 
 constexpr std::array<std::string_view, 6> kGeometryNames = {"x", "y", "z", "nx", "ny", "nz"};
-// Numbered as ResultRows::make has the values
-constexpr std::array<std::string_view, 4> kResultNames = {"occlusion", "irradiance_r",
-                                                          "irradiance_g", "irradiance_b"};
 
-// The results of a mode: the first, or all.
-std::span<const std::string_view> resultNames(GatherMode mode) {
-  return std::span(kResultNames).first(mode == GatherMode::kBleeding ? kResultNames.size() : 1);
+constexpr std::array<std::string_view, 3> kViewNames = {"view_x", "view_y", "view_z"};
+
+std::optional<std::array<PlyProperty, 3>> findViews(const PlyElement& element) {
+  std::array<PlyProperty, 3> views;
+  for (std::size_t axis = 0; axis < views.size(); ++axis) {
+    const auto found = std::find_if(element.properties.begin(), element.properties.end(),
+                                    [&](const PlyProperty& property) {
+                                      return property.name == kViewNames[axis] && !property.is_list;
+                                    });
+    if (found == element.properties.end()) return std::nullopt;
+    views[axis] = *found;
+  }
+  return views;
 }
 
 }  // namespace
@@ -33,7 +42,18 @@ Result<ReceiverMapping> ReceiverMapping::create(const PlyElement& element,
            kGeometryNames.end();
   });
   SURFEIT_ASSIGN_OR_RETURN(SurfelMapping surfels, SurfelMapping::create(geometry, path));
-  return ReceiverMapping(std::move(surfels));
+  return ReceiverMapping(std::move(surfels), findViews(element));
+}
+
+// Unit; zero when there is none.
+glm::vec3 ReceiverMapping::viewOf(const std::byte* row) const {
+  glm::vec3 view;
+  for (int axis = 0; axis < 3; ++axis) {
+    const PlyProperty& property = (*views_)[std::size_t(axis)];
+    view[axis] = float(plyValue(row + property.offset, property.type));
+  }
+  const float length = glm::length(view);
+  return std::isfinite(length) && length > 0 ? view / length : glm::vec3(0);
 }
 
 bool ReceiverMapping::decode(const std::byte* row, std::uint64_t record, Receiver& receiver,
@@ -41,12 +61,14 @@ bool ReceiverMapping::decode(const std::byte* row, std::uint64_t record, Receive
   Surfel surfel;
   if (!surfels_.decode(row, record, surfel, defects)) return false;
   receiver = {surfel.position, surfel.normal};
+  if (views_.has_value()) receiver.view = viewOf(row);
   return true;
 }
 
-ResultRows::ResultRows(const PlyElement& input, GatherMode mode) {
-  const std::span<const std::string_view> results = resultNames(mode);
-  std::array<bool, kResultNames.size()> is_placed = {};
+ResultRows::ResultRows(const PlyElement& input, std::uint32_t outputs, GatherMode mode)
+    : outputs_(outputs) {
+  const std::vector<std::string> results = resultNames(outputs, mode);
+  std::vector<bool> is_placed(results.size(), false);
 
   // The properties of the input, results in the place of their namesakes
   for (PlyProperty property : input.properties) {
@@ -75,10 +97,10 @@ ResultRows::ResultRows(const PlyElement& input, GatherMode mode) {
 
 void ResultRows::make(const std::byte* input, const GatherResult& result, std::byte* output) const {
   for (const Copy& copy : copies_) std::memcpy(output + copy.to, input + copy.from, copy.bytes);
-  const std::array<float, kResultNames.size()> values = {result.occlusion, result.irradiance.r,
-                                                         result.irradiance.g, result.irradiance.b};
+  std::array<float, kResultFloats> values;
+  packResult(result, outputs_, values.data());
   for (const Insert& insert : inserts_) {
-    std::memcpy(output + insert.to, &values[insert.result], sizeof(float));
+    std::memcpy(output + insert.to, &values[insert.place], sizeof(float));
   }
 }
 

@@ -2,6 +2,7 @@
 // how a row of the result is made of an input row and what was gathered there.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -27,6 +28,9 @@ class ReceiverMapping {
 
   // Without normals every receiver gathers over the whole sphere.
   bool hasNormals() const { return surfels_.channels().normal; }
+  // Whether receivers say from where they are looked at: view_x view_y view_z, a direction of any
+  // length from the eye to the receiver.
+  bool hasViews() const { return views_.has_value(); }
 
   // Returns false, and counts the defect under `record`, when the row holds no valid receiver.
   bool decode(const std::byte* row, std::uint64_t record, Receiver& receiver,
@@ -36,16 +40,21 @@ class ReceiverMapping {
   std::string describeDefect(const std::byte* row) const { return surfels_.describeDefect(row); }
 
  private:
-  explicit ReceiverMapping(SurfelMapping surfels) : surfels_(std::move(surfels)) {}
+  glm::vec3 viewOf(const std::byte* row) const;
+
+  using Views = std::array<PlyProperty, 3>;
+  ReceiverMapping(SurfelMapping surfels, std::optional<Views> views)
+      : surfels_(std::move(surfels)), views_(std::move(views)) {}
 
   SurfelMapping surfels_;  // made from an element that has nothing but position and normal
+  std::optional<Views> views_;
 };
 
 // Rows of the result: the scalars of the input row, then what was gathered, as floats. A property
 // that the input has under the name of a result is replaced where it stands. Immutable.
 class ResultRows {
  public:
-  ResultRows(const PlyElement& input, GatherMode mode);
+  ResultRows(const PlyElement& input, std::uint32_t outputs, GatherMode mode);
 
   const std::vector<PlyProperty>& properties() const { return properties_; }
   std::size_t rowBytes() const { return row_bytes_; }
@@ -57,13 +66,14 @@ class ResultRows {
   struct Copy {  // bytes of the input row that stay as they are
     std::size_t from, to, bytes;
   };
-  struct Insert {  // number of a result (the .cpp file has their names), offset in the output row
-    std::size_t result, to;
+  struct Insert {  // place in a packed result, offset in the output row
+    std::size_t place, to;
   };
 
   void addProperty(const PlyProperty& property);
   void addCopy(const Copy& copy);
 
+  std::uint32_t outputs_;
   std::vector<PlyProperty> properties_;
   std::vector<Copy> copies_;
   std::vector<Insert> inserts_;

@@ -1,6 +1,6 @@
 // Runs are made of units of 1,023 receivers, the last of fewer:
 //
-//   [ checksum : 8 | zeros : 32 | receivers : 40 each | zeros up to the next page ]
+//   [ checksum : 8 | zeros : 48 | receivers : 56 each | zeros up to the next page ]
 #include "gather/receiver_sorter.h"
 
 #include <fmt/format.h>
@@ -21,8 +21,8 @@ namespace surfeit {
 namespace {
 
 // Units end and begin with pages, as direct I/O wants them.
-constexpr std::size_t kUnitReceivers = 1023;
-constexpr std::size_t kUnitHeaderBytes = 40;
+constexpr std::size_t kUnitReceivers = 511;
+constexpr std::size_t kUnitHeaderBytes = 56;
 constexpr std::size_t kUnitBytes = kUnitHeaderBytes + kUnitReceivers * sizeof(SortedReceiver);
 static_assert(kUnitBytes % kDirectAlignment == 0);
 
@@ -39,7 +39,7 @@ std::uint64_t checksumOf(Bytes receivers, std::uint64_t unit_offset) {
 }
 
 // Blocks, what a merge reads at once, are some units. Larger ones are not read faster.
-constexpr std::uint64_t kMostBlockUnits = 25;
+constexpr std::uint64_t kMostBlockUnits = 36;
 // Space is given back in pieces of about this size: each takes a call.
 constexpr std::uint64_t kReleaseBytes = 1 << 20;
 

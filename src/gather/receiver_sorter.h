@@ -25,17 +25,18 @@ struct SortedReceiver {
   CurveKey key = 0;
   std::uint64_t index = 0;
   Receiver receiver;
+  std::uint32_t reserved = 0;  // no padding: receivers are written as bytes
 
   bool operator<(const SortedReceiver& other) const {
     return key != other.key ? key < other.key : index < other.index;
   }
 };
-static_assert(sizeof(SortedReceiver) == 40);
+static_assert(sizeof(SortedReceiver) == 56);
 
 // One thread at a time; sorts with all threads of the current arena. Throws std::bad_alloc. After a
 // failure or an exception it is of no further use.
 //
-// Memory, all included but for the stack of the thread that writes the file: 40 bytes per receiver
+// Memory, all included but for the stack of the thread that writes the file: 56 bytes per receiver
 // of `count` where these fit. Else 2.125 MiB for the file and the list of runs, and beside them
 // what memory_bytes leaves: one run, or the blocks of a merge. After finish() it is one block per
 // run, within what reading_bytes leaves, and no more than 1 MiB each. Only what is used is ever

@@ -1,19 +1,21 @@
 // A block, of whole pages:
 //
-//   [ checksum : 8 | offset of the block before : 8 | records : 20 each | zeros ]
-//   record = [ index in the bucket : 4 | result : 16 ]
+//   [ checksum : 8 | offset of the block before : 8 | records | zeros ]
+//   record = [ index in the bucket : 4 | packed result : 4 per float ]
 #include "gather/result_store.h"
 
 #include <fmt/format.h>
 #include <xxhash.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include "core/assert.h"
+#include "gather/gather_outputs.h"
 #include "io/block_writer.h"
 
 namespace surfeit {
@@ -31,7 +33,6 @@ constexpr std::uint64_t kMostBlockBytes = 1 << 20;
 
 // What the receivers without a result have.
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr GatherResult kNoResult{.occlusion = kNan, .irradiance = glm::vec3(kNan)};
 
 struct BlockHeader {
   std::uint64_t checksum = 0;
@@ -46,11 +47,6 @@ std::uint64_t checksumOf(Bytes block, std::uint64_t offset) {
 
 }  // namespace
 
-struct ResultStore::Record {
-  std::uint32_t place = 0;  // in the bucket
-  GatherResult result;
-};
-
 struct ResultStore::Plan {
   std::uint64_t bucket_indices = 0;
   std::uint64_t buckets = 0;
@@ -59,7 +55,7 @@ struct ResultStore::Plan {
 
 // Buckets as large as can be read at once, since each has an open block until then.
 ResultStore::Plan ResultStore::planFor(std::uint64_t memory_bytes, std::uint64_t reading_bytes,
-                                       std::uint64_t count) {
+                                       std::uint64_t count, std::size_t result_floats) {
   const auto wholeSteps = [](std::uint64_t bytes) {
     return (bytes - std::min(bytes, kFileBytes)) / kStepBytes * kStepBytes;
   };
@@ -69,7 +65,7 @@ ResultStore::Plan ResultStore::planFor(std::uint64_t memory_bytes, std::uint64_t
   const std::uint64_t most_block = std::clamp(reading / 16 / kDirectAlignment * kDirectAlignment,
                                               kLeastBlockBytes, kMostBlockBytes);
   const std::uint64_t most_indices =
-      std::min<std::uint64_t>((reading - list_bytes - most_block) / sizeof(GatherResult),
+      std::min<std::uint64_t>((reading - list_bytes - most_block) / (result_floats * sizeof(float)),
                               std::numeric_limits<std::uint32_t>::max());
   Plan plan;
   plan.buckets = (count - 1) / most_indices + 1;
@@ -80,10 +76,10 @@ ResultStore::Plan ResultStore::planFor(std::uint64_t memory_bytes, std::uint64_t
   return plan;
 }
 
-std::uint64_t ResultStore::leastMemoryBytes(std::uint64_t count) {
+std::uint64_t ResultStore::leastMemoryBytes(std::uint64_t count, std::size_t result_floats) {
   if (count == 0) return 0;
-  const auto suffices = [count](std::uint64_t bytes) {
-    return planFor(bytes, bytes, count).block_bytes >= kLeastBlockBytes;
+  const auto suffices = [=](std::uint64_t bytes) {
+    return planFor(bytes, bytes, count, result_floats).block_bytes >= kLeastBlockBytes;
   };
   std::uint64_t enough = kFileBytes + kStepBytes;
   while (!suffices(enough)) enough = kFileBytes + 2 * (enough - kFileBytes);
@@ -93,20 +89,22 @@ std::uint64_t ResultStore::leastMemoryBytes(std::uint64_t count) {
     const std::uint64_t middle = too_few + steps / 2 * kStepBytes;
     (suffices(middle) ? enough : too_few) = middle;
   }
-  return count <= enough / sizeof(GatherResult) ? count * sizeof(GatherResult) : enough;
+  const std::uint64_t result_bytes = result_floats * sizeof(float);
+  return count <= enough / result_bytes ? count * result_bytes : enough;
 }
 
-ResultStore::ResultStore(Options options) : options_(std::move(options)) {
+ResultStore::ResultStore(Options options)
+    : options_(std::move(options)), floats_(resultFloats(options_.outputs)) {
   const std::uint64_t reading =
       options_.reading_bytes > 0 ? options_.reading_bytes : options_.memory_bytes;
   const std::uint64_t least = std::min(options_.memory_bytes, reading);
-  SURFEIT_CHECK(least >= leastMemoryBytes(options_.count));
-  if (options_.count <= least / sizeof(GatherResult)) {
+  SURFEIT_CHECK(floats_ > 0 && least >= leastMemoryBytes(options_.count, floats_));
+  if (options_.count <= least / (floats_ * sizeof(float))) {
     bucket_indices_ = options_.count;
-    results_.assign(static_cast<std::size_t>(options_.count), kNoResult);
+    results_.assign(static_cast<std::size_t>(options_.count) * floats_, kNan);
     return;
   }
-  const Plan plan = planFor(options_.memory_bytes, reading, options_.count);
+  const Plan plan = planFor(options_.memory_bytes, reading, options_.count, floats_);
   SURFEIT_CHECK(plan.block_bytes >= kLeastBlockBytes);
   bucket_indices_ = plan.bucket_indices;
   block_bytes_ = plan.block_bytes;
@@ -117,7 +115,7 @@ ResultStore::ResultStore(Options options) : options_(std::move(options)) {
 ResultStore::~ResultStore() = default;
 
 std::size_t ResultStore::blockRecords() const {
-  return (block_bytes_ - sizeof(BlockHeader)) / sizeof(Record);
+  return (block_bytes_ - sizeof(BlockHeader)) / recordBytes();
 }
 
 std::byte* ResultStore::openBlock(std::size_t bucket) const {
@@ -128,8 +126,8 @@ Status ResultStore::put(std::span<const Entry> entries) {
   if (block_bytes_ == 0) {
     // Others write other places
     for (const Entry& entry : entries) {
-      SURFEIT_CHECK(entry.index < results_.size());
-      results_[entry.index] = entry.result;
+      SURFEIT_CHECK(entry.index < options_.count);
+      packResult(entry.result, options_.outputs, &results_[entry.index * floats_]);
     }
     return {};
   }
@@ -139,10 +137,13 @@ Status ResultStore::put(std::span<const Entry> entries) {
   for (const Entry& entry : entries) {
     SURFEIT_CHECK(entry.index < options_.count);
     const std::size_t b = static_cast<std::size_t>(entry.index / bucket_indices_);
-    const Record record{static_cast<std::uint32_t>(entry.index - b * bucket_indices_),
-                        entry.result};
+    const auto in_bucket = static_cast<std::uint32_t>(entry.index - b * bucket_indices_);
+    std::array<float, kResultFloats> row;
+    packResult(entry.result, options_.outputs, row.data());
     const std::size_t place = buckets_[b].entries++ % block_records;
-    std::memcpy(openBlock(b) + sizeof(BlockHeader) + place * sizeof record, &record, sizeof record);
+    std::byte* const record = openBlock(b) + sizeof(BlockHeader) + place * recordBytes();
+    std::memcpy(record, &in_bucket, sizeof in_bucket);
+    std::memcpy(record + sizeof in_bucket, row.data(), floats_ * sizeof(float));
     if (place + 1 == block_records) SURFEIT_RETURN_IF_ERROR(writeBlock(b, block_records));
   }
   return {};
@@ -156,7 +157,7 @@ Status ResultStore::writeBlock(std::size_t bucket, std::size_t records) {
     file_ = std::make_unique<TemporaryFile>(std::move(file));
   }
   std::byte* const block = openBlock(bucket);
-  const std::size_t used = sizeof(BlockHeader) + records * sizeof(Record);
+  const std::size_t used = sizeof(BlockHeader) + records * recordBytes();
   const std::size_t bytes = alignedUp(used);
   std::memset(block + used, 0, bytes - used);
   const std::uint64_t offset = file_->size();
@@ -176,7 +177,7 @@ Status ResultStore::finish() {
     if (open > 0) SURFEIT_RETURN_IF_ERROR(writeBlock(b, open));
   }
   blocks_ = {};
-  results_.reserve(static_cast<std::size_t>(bucket_indices_));
+  results_.reserve(static_cast<std::size_t>(bucket_indices_) * floats_);
   return file_ != nullptr ? file_->flush() : Status();
 }
 
@@ -187,9 +188,10 @@ Status ResultStore::take(std::span<GatherResult> results) {
     if (begin == 0 && block_bytes_ > 0) {
       SURFEIT_RETURN_IF_ERROR(loadBucket(static_cast<std::size_t>(taken_ / bucket_indices_)));
     }
-    const std::span<const GatherResult> ready = std::span(results_).subspan(begin);
-    const std::size_t count = std::min(results.size(), ready.size());
-    std::copy_n(ready.begin(), count, results.begin());
+    const std::size_t count = std::min(results.size(), results_.size() / floats_ - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      results[i] = unpackResult(&results_[(begin + i) * floats_], options_.outputs);
+    }
     results = results.subspan(count);
     taken_ += count;
   }
@@ -199,12 +201,12 @@ Status ResultStore::take(std::span<GatherResult> results) {
 // Reads the blocks of a bucket, from the last, which need not be full, to the first.
 Status ResultStore::loadBucket(std::size_t bucket) {
   const std::uint64_t rest = options_.count - bucket * bucket_indices_;
-  results_.assign(static_cast<std::size_t>(std::min(bucket_indices_, rest)), kNoResult);
+  results_.assign(static_cast<std::size_t>(std::min(bucket_indices_, rest)) * floats_, kNan);
   const std::size_t block_records = blockRecords();
   std::uint64_t offset = buckets_[bucket].last_block;
   for (std::uint64_t left = buckets_[bucket].entries; left > 0;) {
     const std::size_t records = static_cast<std::size_t>((left - 1) % block_records + 1);
-    const std::size_t bytes = alignedUp(sizeof(BlockHeader) + records * sizeof(Record));
+    const std::size_t bytes = alignedUp(sizeof(BlockHeader) + records * recordBytes());
     SURFEIT_ASSIGN_OR_RETURN(const Bytes block, file_->readView(offset, bytes, blocks_));
     BlockHeader header;
     std::memcpy(&header, block.data(), sizeof header);
@@ -214,9 +216,10 @@ Status ResultStore::loadBucket(std::size_t bucket) {
                       options_.temporary_directory, records, offset, found, header.checksum));
     }
     for (std::size_t i = 0; i < records; ++i) {
-      Record record;
-      std::memcpy(&record, block.data() + sizeof header + i * sizeof record, sizeof record);
-      results_[record.place] = record.result;
+      const std::byte* const record = block.data() + sizeof header + i * recordBytes();
+      std::uint32_t place;
+      std::memcpy(&place, record, sizeof place);
+      std::memcpy(&results_[place * floats_], record + sizeof place, floats_ * sizeof(float));
     }
     file_->release(offset, bytes);
     left -= records;

@@ -14,6 +14,7 @@
 
 #include "gather/receiver.h"
 #include "io/file.h"
+#include "surfeit/gather.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -21,14 +22,16 @@ namespace surfeit {
 // Throws std::bad_alloc. After a failure or an exception it is of no further use.
 //
 // Memory, all included but for the stack of the thread that writes the file: a result per index
-// where these fit, at 16 bytes each. Else 2.125 MiB for the file, 16 bytes per bucket, and beside
-// them what memory_bytes leaves: one open block per bucket; after finish(), within what
-// reading_bytes leaves, the results of one bucket and a block.
+// where these fit, at 4 bytes per float of the outputs. Else 2.125 MiB for the file, 16 bytes per
+// bucket, and beside them what memory_bytes leaves: one open block per bucket; after finish(),
+// within what reading_bytes leaves, the results of one bucket and a block.
 class ResultStore {
  public:
   // Neither memory may be below leastMemoryBytes(count).
   struct Options {
-    std::uint64_t count = 0;          // indices are below it
+    std::uint64_t count = 0;  // indices are below it
+    // Of results, what is kept: a set of GatherOutput.
+    std::uint32_t outputs = kOutputOcclusion | kOutputIrradiance;
     std::uint64_t memory_bytes = 0;   // until finish() returns
     std::uint64_t reading_bytes = 0;  // from then on; 0: memory_bytes
     std::string temporary_directory;
@@ -40,7 +43,7 @@ class ResultStore {
 
   // The least memory that brings so many results into order. It grows with the square root of the
   // count: 2.7 MiB for a million, 13.5 MiB for 500 million.
-  static std::uint64_t leastMemoryBytes(std::uint64_t count);
+  static std::uint64_t leastMemoryBytes(std::uint64_t count, std::size_t result_floats = 4);
 
   explicit ResultStore(Options options);
   ResultStore(const ResultStore&) = delete;
@@ -52,7 +55,7 @@ class ResultStore {
   Status put(std::span<const Entry> entries);
   // All are in. From here on one thread at a time.
   Status finish();
-  // The results of the next indices, from 0 on; NaN in all members for those that were never put.
+  // The results of the next indices, from 0 on; NaN in all outputs for those that were never put.
   // No more may be taken than there are. What has been taken gives its space on the disk back.
   Status take(std::span<GatherResult> results);
 
@@ -61,7 +64,6 @@ class ResultStore {
 
  private:
   struct Plan;
-  struct Record;
   // The entries of consecutive indices. Its blocks in the file are a list from the last to the
   // first: memory need not grow with their number.
   struct Bucket {
@@ -69,13 +71,16 @@ class ResultStore {
     std::uint64_t last_block = 0;  // its offset
   };
 
-  static Plan planFor(std::uint64_t memory_bytes, std::uint64_t reading_bytes, std::uint64_t count);
+  static Plan planFor(std::uint64_t memory_bytes, std::uint64_t reading_bytes, std::uint64_t count,
+                      std::size_t result_floats);
   std::byte* openBlock(std::size_t bucket) const;
   std::size_t blockRecords() const;
+  std::size_t recordBytes() const { return sizeof(std::uint32_t) + floats_ * sizeof(float); }
   Status writeBlock(std::size_t bucket, std::size_t records);
   Status loadBucket(std::size_t bucket);
 
   const Options options_;
+  const std::size_t floats_;          // of a packed result
   std::uint64_t bucket_indices_ = 0;  // of every bucket but the last
   std::uint64_t block_bytes_ = 0;     // 0: all are in results_
   std::uint64_t taken_ = 0;
@@ -85,7 +90,7 @@ class ResultStore {
   AlignedBuffer blocks_;  // the open blocks of all buckets; later the one being read
   std::unique_ptr<TemporaryFile> file_;
 
-  std::vector<GatherResult> results_;  // all, or those of the bucket being taken
+  std::vector<float> results_;  // packed; all, or those of the bucket being taken
 };
 
 }  // namespace surfeit

@@ -43,7 +43,7 @@ Result<double> SampledGather::gather(std::span<const SortedReceiver> receivers) 
   GatherCrew crew({.octree = *octree_,
                    .queue = queue,
                    .controller = controller_,
-                   .options = options_,
+                   .rules = GatherRules(options_, nullptr),
                    .threads = threads_,
                    .progress = progress_},
                   [](std::span<const ResultStore::Entry>) { return Status(); });

@@ -22,6 +22,13 @@ void copyFloats(const std::byte* row, std::size_t row_bytes, std::size_t count, 
   }
 }
 
+template <typename T>
+T loadAs(const std::byte* bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+
 bool isAllOnes(const Int4& lanes) {
   std::int64_t halves[2];
   std::memcpy(halves, &lanes, sizeof halves);
@@ -59,6 +66,12 @@ void FloatRowDecoder::addByte(std::size_t offset, std::size_t place,
 void FloatRowDecoder::setTwoSided(std::size_t offset) {
   two_sided_offset_ = offset;
   has_two_sided_ = true;
+}
+
+void FloatRowDecoder::setGroup(std::size_t offset, std::size_t bytes) {
+  SURFEIT_CHECK(bytes == 1 || bytes == 2 || bytes == 4);
+  group_offset_ = offset;
+  group_bytes_ = bytes;
 }
 
 void FloatRowDecoder::copyValues(const std::byte* rows, std::size_t count, Surfel* surfels) const {
@@ -114,6 +127,22 @@ std::uint64_t FloatRowDecoder::decode(const std::byte* rows, std::size_t count,
     for (std::size_t i = 0; i < count; ++i, two_sided += row_bytes_) {
       surfels[i].flags |= *two_sided != std::byte{0} ? kSurfelTwoSided : 0u;
     }
+  }
+  if (group_bytes_ > 0) left_over |= copyGroups(rows, count, surfels);
+  return left_over;
+}
+
+// Bit i of the result is 1 where group i is not valid. As unsigned numbers negative ones are large.
+std::uint64_t FloatRowDecoder::copyGroups(const std::byte* rows, std::size_t count,
+                                          Surfel* surfels) const {
+  std::uint64_t left_over = 0;
+  const std::byte* row = rows + group_offset_;
+  for (std::size_t i = 0; i < count; ++i, row += row_bytes_) {
+    std::uint32_t group = std::to_integer<std::uint32_t>(*row);
+    if (group_bytes_ == 2) group = loadAs<std::uint16_t>(row);
+    if (group_bytes_ == 4) group = loadAs<std::uint32_t>(row);
+    surfels[i].group = group;
+    left_over |= std::uint64_t{group >= kMaxGroups} << i;
   }
   return left_over;
 }

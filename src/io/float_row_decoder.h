@@ -26,6 +26,9 @@ class FloatRowDecoder {
   void addByte(std::size_t offset, std::size_t place, const std::array<float, 256>& floats);
   // The byte at `offset` of a row is not zero when the surfel is two-sided.
   void setTwoSided(std::size_t offset);
+  // The integer of 1, 2 or 4 bytes at `offset` of a row is the group; it is valid below kMaxGroups,
+  // and a negative one never.
+  void setGroup(std::size_t offset, std::size_t bytes);
   // Radii are multiplied by this before they are held against their limits.
   void setRadiusScale(float scale) { radius_scale_ = scale; }
 
@@ -45,6 +48,7 @@ class FloatRowDecoder {
     const std::array<float, 256>* floats = nullptr;
   };
 
+  std::uint64_t copyGroups(const std::byte* rows, std::size_t count, Surfel* surfels) const;
   void copyValues(const std::byte* rows, std::size_t count, Surfel* surfels) const;
 
   std::size_t row_bytes_;
@@ -53,6 +57,7 @@ class FloatRowDecoder {
   float radius_scale_ = 1;
   std::size_t two_sided_offset_ = 0;
   bool has_two_sided_ = false;
+  std::size_t group_offset_ = 0, group_bytes_ = 0;  // no bytes: no groups
   // Of the floats of a surfel before its flags are set; the others are 0
   alignas(16) std::array<float, kFloats> least_{}, most_{};
 };

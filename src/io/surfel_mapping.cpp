@@ -36,6 +36,8 @@ const std::array<float, 256>& linearFromSrgb8() {
   return table;
 }
 
+bool isFloat(PlyType type) { return type == PlyType::kFloat32 || type == PlyType::kFloat64; }
+
 // Whether a float can hold the value; false for NaN too.
 bool fitsFloat(double value) { return std::abs(value) <= std::numeric_limits<float>::max(); }
 
@@ -51,6 +53,7 @@ constexpr KindName kKindNames[] = {
     {&SurfelDefects::short_normal, "a normal too short to point"},
     {&SurfelDefects::negative_color, "a negative radiosity or albedo"},
     {&SurfelDefects::out_of_range, "a value too large to calculate with"},
+    {&SurfelDefects::bad_group, "a group that is not 0 to 63"},
 };
 
 }  // namespace
@@ -170,7 +173,7 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
     SURFEIT_ASSIGN_OR_RETURN(const bool has_color, findTriple(element, kColorNames, path, color));
     for (Field& field : color) {
       field.is_srgb = field.type == PlyType::kUint8 || field.type == PlyType::kUint16;
-      if (!field.is_srgb && field.type != PlyType::kFloat32 && field.type != PlyType::kFloat64) {
+      if (!field.is_srgb && !isFloat(field.type)) {
         return Status::corruption(fmt::format(
             "{}: element {}: property {} is {}, expected uchar, ushort, float or double", path,
             element.name, field.name, plyTypeName(field.type)));
@@ -184,6 +187,18 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
 
   SURFEIT_ASSIGN_OR_RETURN(mapping.two_sided_, findField(element, "two_sided", path));
   channels.two_sided = mapping.two_sided_.isPresent();
+
+  // Group by the first of its names
+  for (const char* name : kGroupNames) {
+    SURFEIT_ASSIGN_OR_RETURN(mapping.group_, findField(element, name, path));
+    channels.group = mapping.group_.isPresent();
+    if (channels.group) break;
+  }
+  if (channels.group && isFloat(mapping.group_.type)) {
+    return Status::corruption(
+        fmt::format("{}: element {}: property {} is {}, expected an integer type", path,
+                    element.name, mapping.group_.name, plyTypeName(mapping.group_.type)));
+  }
   mapping.row_bytes_ = element.row_bytes;
   mapping.fast_decoder_ = mapping.makeFastDecoder();
   return mapping;
@@ -223,6 +238,9 @@ std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
     is_fast &= plyTypeBytes(two_sided_.type) == 1;
     decoder.setTwoSided(static_cast<std::size_t>(two_sided_.offset));
   }
+  if (group_.isPresent()) {
+    decoder.setGroup(static_cast<std::size_t>(group_.offset), plyTypeBytes(group_.type));
+  }
   if (!is_fast) return std::nullopt;
   return decoder;
 }
@@ -260,6 +278,7 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
   const double radius = radius_scale_ * read(radius_);
   const double area = read(area_);
   const bool is_two_sided = read(two_sided_) != 0;
+  const double group = read(group_);
   if (defect.kind != nullptr) return defect;
 
   // Radius and area as floats: what is too small for a float is zero
@@ -310,6 +329,11 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     surfel.radiosity[i] = static_cast<float>(radiosity[i]);
     surfel.albedo[i] = static_cast<float>(albedo[i]);
   }
+
+  if (!(group >= 0 && group < kMaxGroups)) {
+    return {&SurfelDefects::bad_group, group_.name, group, "0 to 63"};
+  }
+  surfel.group = static_cast<std::uint32_t>(group);
   return {};
 }
 

@@ -33,6 +33,7 @@ struct SurfelDefects {
   Kind short_normal;    // a normal that is not zero (a sphere) but too short (< 1e-6) to point
   Kind negative_color;  // negative radiosity or albedo
   Kind out_of_range;    // beyond kLargestLength, kLargestArea or kLargestColor
+  Kind bad_group;       // group that is not 0 to 63, where the cloud has groups
 
   std::uint64_t total() const;
   // Number of the first record with any defect. Only when total() is not 0.
@@ -58,13 +59,14 @@ Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string
 //                              here, or already linear (float, double): used for whichever of
 //                              radiosity and albedo is absent, whose channel then counts as there
 //   two_sided                  not zero: both sides send and block light
+//   group | light_group        group, an integer from 0 to 63
 // What is absent stays 0: radius and area for the indexer's rules, which need the neighbourhood.
 // A record has one defect, the first in the order of SurfelDefects. Immutable; safe from any
 // thread.
 class SurfelMapping {
  public:
   // kCorruption when x, y or z is missing, a triple is incomplete, a property is a list, or a color
-  // is of another type. `path` only names the file in messages.
+  // or group is of another type. `path` only names the file in messages.
   static Result<SurfelMapping> create(const PlyElement& element, const std::string& path);
 
   CloudChannels channels() const { return channels_; }
@@ -114,7 +116,7 @@ class SurfelMapping {
 
   CloudChannels channels_;
   std::size_t row_bytes_ = 0;
-  Field position_[3], normal_[3], radius_, area_, radiosity_[3], albedo_[3], two_sided_;
+  Field position_[3], normal_[3], radius_, area_, radiosity_[3], albedo_[3], two_sided_, group_;
   double radius_scale_ = 1;
   std::optional<FloatRowDecoder> fast_decoder_;  // when the types of the properties allow it
 };

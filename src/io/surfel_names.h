@@ -1,4 +1,5 @@
-// Names of the properties that come in threes, as clouds have them and as we write them.
+// Names of properties that come in threes or under several names, as clouds have them and as we
+// write them.
 #pragma once
 
 namespace surfeit {
@@ -8,5 +9,8 @@ inline constexpr const char* kNormalNames[3] = {"nx", "ny", "nz"};
 inline constexpr const char* kRadiosityNames[3] = {"radiosity_r", "radiosity_g", "radiosity_b"};
 inline constexpr const char* kAlbedoNames[3] = {"albedo_r", "albedo_g", "albedo_b"};
 inline constexpr const char* kColorNames[3] = {"red", "green", "blue"};
+
+// The group of a surfel: the first of these that a cloud has. We write the first.
+inline constexpr const char* kGroupNames[] = {"group", "light_group"};
 
 }  // namespace surfeit

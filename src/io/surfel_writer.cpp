@@ -41,6 +41,7 @@ Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudCh
   if (channels.radiosity) addTriple(kRadiosityNames);
   if (channels.albedo) addTriple(kAlbedoNames);
   if (channels.two_sided) add("two_sided", PlyType::kUint8);
+  if (channels.group) add(kGroupNames[0], PlyType::kUint8);
 
   SURFEIT_ASSIGN_OR_RETURN(PlyWriter file, PlyWriter::create(path, encoding, std::move(properties),
                                                              std::move(comments)));
@@ -71,6 +72,7 @@ Status SurfelWriter::write(std::span<const Surfel> surfels) {
     if (channels.radiosity) put(surfel.radiosity);
     if (channels.albedo) put(surfel.albedo);
     if (channels.two_sided) put(static_cast<std::uint8_t>(surfel.isTwoSided()));
+    if (channels.group) put(static_cast<std::uint8_t>(surfel.group));
 
     // Hand over a full buffer, and the last
     if (next == end || &surfel == &surfels.back()) {

@@ -12,8 +12,8 @@
 
 namespace surfeit {
 
-// Writes surfels as PLY with the properties above, as floats (two_sided: uchar). One thread at a
-// time. The file appears when finish() succeeds.
+// Writes surfels as PLY with the properties above, as floats (two_sided and group: uchar). One
+// thread at a time. The file appears when finish() succeeds.
 class SurfelWriter {
  public:
   // `channels` says which optional properties the file gets.

@@ -95,6 +95,18 @@ class PayloadReader {
   std::uint32_t record_count_ = 0;
 };
 
+// Appends what `after` has taken since it was as `before`: columns that pass unchanged from one
+// payload to another. Both ok.
+inline void copyTaken(const PayloadReader& before, const PayloadReader& after,
+                      PayloadWriter& writer) {
+  const auto copy = [](ByteReader from, const ByteReader& to, auto&& grow) {
+    const std::size_t count = from.remaining() - to.remaining();
+    if (count > 0) std::memcpy(grow(count), from.take(count).data(), count);
+  };
+  copy(before.packed, after.packed, [&](std::size_t count) { return writer.addPacked(count); });
+  copy(before.plain, after.plain, [&](std::size_t count) { return writer.addPlain(count); });
+}
+
 // Scratch for one column, per thread so that no page allocates. A `Use` keeps apart what is alive
 // at the same time.
 enum class Use { kCodes, kDifferences, kPlanes };

@@ -84,7 +84,8 @@ void InputPass::decode(const RowFetcher::Rows& rows) {
 
 CloudChannels unionOf(const CloudChannels& a, const CloudChannels& b) {
   return {a.normal || b.normal,       a.radius || b.radius, a.area || b.area,
-          a.radiosity || b.radiosity, a.albedo || b.albedo, a.two_sided || b.two_sided};
+          a.radiosity || b.radiosity, a.albedo || b.albedo, a.two_sided || b.two_sided,
+          a.group || b.group};
 }
 
 }  // namespace

@@ -357,7 +357,8 @@ std::uint64_t Indexer::identity(bool full_precision) const {
       full_precision ? 1u : 0u,
       std::uint64_t{channels.normal} | std::uint64_t{channels.radius} << 1 |
           std::uint64_t{channels.area} << 2 | std::uint64_t{channels.radiosity} << 3 |
-          std::uint64_t{channels.albedo} << 4 | std::uint64_t{channels.two_sided} << 5,
+          std::uint64_t{channels.albedo} << 4 | std::uint64_t{channels.two_sided} << 5 |
+          std::uint64_t{channels.group} << 6,
       XXH3_64bits(text.data(), text.size())};
   return XXH3_64bits(parts, sizeof parts);
 }

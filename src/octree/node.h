@@ -40,6 +40,8 @@ struct Node {
   // By coefficient, then by kind: kAreaKind, and a kind per color. Side by side, so that a gather
   // evaluates all kinds at once.
   std::array<std::array<float, kNodeShKinds>, kShCount> sh;
+  std::uint64_t
+      groups;  // set of those of the surfels below; group 0 alone in scenes without groups
 
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
@@ -49,7 +51,7 @@ struct Node {
     return values;
   }
 };
-static_assert(sizeof(Node) == 208);
+static_assert(sizeof(Node) == 216);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

@@ -10,6 +10,7 @@
 #include "core/curve_key.h"
 #include "core/thread_scratch.h"
 #include "octree/column_codec.h"
+#include "surfeit/surfel.h"
 
 namespace surfeit {
 namespace {
@@ -57,6 +58,7 @@ class Columns {
     page = column(integers, 0);
     first = column(integers, 1);
     surfel_count = column(integers, 2);
+    groups = column(integers, 3);
   }
 
   void gather(std::span<const LevelNode> nodes) {
@@ -76,11 +78,12 @@ class Columns {
       page[i] = node.page;
       first[i] = node.first;
       surfel_count[i] = node.surfel_count;
+      groups[i] = node.groups;
     }
   }
 
   // All but the reference: page and first depend on the limits.
-  void scatter(std::span<Node> nodes) const {
+  void scatter(bool has_groups, std::span<Node> nodes) const {
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       Node& node = nodes[i];
       node.position = at(position, i);
@@ -93,16 +96,17 @@ class Columns {
       node.child_count = child_count[i];
       node.flags = flags[i];
       node.surfel_count = surfel_count[i];
+      node.groups = has_groups ? groups[i] : groupBit(0);
     }
   }
 
   MutableAxes position, normal, radiosity;
   std::span<float> radius, area, flatness;
   std::span<std::uint8_t> flags, child_count, child_level;
-  std::span<std::uint64_t> page, first, surfel_count;
+  std::span<std::uint64_t> page, first, surfel_count, groups;
 
  private:
-  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 3, kIntegerColumns = 3;
+  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 3, kIntegerColumns = 4;
 
   static glm::vec3 at(const MutableAxes& axes, std::size_t i) {
     return {axes[0][i], axes[1][i], axes[2][i]};
@@ -164,8 +168,9 @@ Status resolveReference(const NodeLimits& limits, int level, int child_level,
   return {};
 }
 
-// The columns of a page but for the coefficients, checked one by one.
-Status decodeColumns(PayloadReader& reader, bool full_precision, const Columns& columns) {
+// The columns of a page but for the coefficients, checked one by one: those before the radiosity,
+// and those after.
+Status decodeGeometry(PayloadReader& reader, bool full_precision, const Columns& columns) {
   if (!getPositions(reader, columns.position)) return damaged("position");
   if (!getPositive(reader, columns.radius)) return damaged("radius");
   if (!getPositive(reader, columns.area)) return damaged("area");
@@ -174,13 +179,21 @@ Status decodeColumns(PayloadReader& reader, bool full_precision, const Columns& 
                        : getSigned(reader, columns.flatness, 1))) {
     return damaged("flatness");
   }
-  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  return {};
+}
+
+Status decodeReferences(PayloadReader& reader, const PageForm& form, const Columns& columns) {
   if (!getBytes8(reader, columns.flags)) return damaged("flags");
   if (!getBytes8(reader, columns.child_count)) return damaged("child count");
   if (!getBytes8(reader, columns.child_level)) return damaged("child level");
   if (!getCounts(reader, columns.page)) return damaged("page");
   if (!getCounts(reader, columns.first)) return damaged("first");
   if (!getCounts(reader, columns.surfel_count)) return damaged("surfel count");
+  if (!form.has_groups) return {};
+  if (!getCounts(reader, columns.groups)) return damaged("groups");
+  for (const std::uint64_t groups : columns.groups) {
+    if (groups == 0) return damaged("groups");
+  }
   return {};
 }
 
@@ -230,41 +243,53 @@ Status decodeCoefficients(PayloadReader& reader, bool full_precision, std::span<
   return {};
 }
 
-void encodeCoefficients(std::span<const LevelNode> nodes, bool full_precision,
-                        PayloadWriter& writer) {
-  std::size_t rough = 0;
-  for (const LevelNode& n : nodes) rough += n.node.isFlat() ? 0 : 1;
-  const auto floats = coefficientColumns<float>(rough);
-  const auto codes = coefficientColumns<std::int16_t>(rough);
-  std::size_t next = 0;
-  for (const LevelNode& n : nodes) {
-    if (n.node.isFlat()) continue;
-    std::array<std::int16_t, kShCount> before{};
-    for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
-      const ShCoefficients coefficients = n.node.coefficients(static_cast<int>(kind));
-      if (full_precision) {
-        std::copy(coefficients.begin(), coefficients.end(), &floats[kind][next]);
-        continue;
-      }
-      const float scale = coefficientScale(n.node, kind);
-      const float inverse = scale >= std::numeric_limits<float>::min() ? 1 / scale : 0;
-      for (std::size_t i = 0; i < kShCount; ++i) {
-        const std::int16_t code = signedCode(coefficients[i] * inverse, kCoefficientLimit);
-        codes[kind][next + i] = static_cast<std::int16_t>(code - before[i]);
-        before[i] = code;
-      }
+// Appends the coefficients of a kind. Quantized ones are stored as differences from the kind
+// before, whose codes `before` has; it gets those of this kind.
+void encodeKind(std::span<const Node* const> rough, std::size_t kind, bool full_precision,
+                std::span<std::int16_t> before, PayloadWriter& writer) {
+  if (full_precision) {
+    const std::span<float> values = coefficientColumns<float>(rough.size())[kind];
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = rough[i / kShCount]->sh[i % kShCount][kind];
     }
-    next += kShCount;
+    return putFloats(writer, values);
   }
-  for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
-    full_precision ? putFloats(writer, floats[kind]) : putSmallIntegers(writer, codes[kind]);
+  const std::span<std::int16_t> codes = coefficientColumns<std::int16_t>(rough.size())[kind];
+  std::size_t next = 0;
+  for (const Node* const node : rough) {
+    const float scale = coefficientScale(*node, kind);
+    const float inverse = scale >= std::numeric_limits<float>::min() ? 1 / scale : 0;
+    for (std::size_t i = 0; i < kShCount; ++i, ++next) {
+      const std::int16_t code = signedCode(node->sh[i][kind] * inverse, kCoefficientLimit);
+      codes[next] = static_cast<std::int16_t>(code - before[next]);
+      before[next] = code;
+    }
   }
+  putSmallIntegers(writer, codes);
 }
+
+// The nodes of a page that have coefficients, and codes of one kind of these. Every page of a
+// thread uses the same.
+struct RoughNodes {
+  std::vector<const Node*>& nodes = threadScratch<std::vector<const Node*>>([] {});
+  std::vector<std::int16_t>& codes = threadScratch<std::vector<std::int16_t>>([] {});
+
+  RoughNodes() {
+    nodes.clear();
+    codes.clear();
+  }
+  void add(const Node& node) {
+    if (node.isFlat()) return;
+    nodes.push_back(&node);
+    codes.resize(codes.size() + kShCount);
+  }
+};
 
 }  // namespace
 
-std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precision,
+std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& form,
                             std::vector<std::byte>& payload) {
+  const bool full_precision = form.full_precision;
   Columns columns(nodes.size());
   columns.gather(nodes);
   const Axes positions = constAxes(columns.position);
@@ -286,12 +311,18 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precisio
   putCounts(writer, columns.page);
   putCounts(writer, columns.first);
   putCounts(writer, columns.surfel_count);
-  encodeCoefficients(nodes, full_precision, writer);
+  if (form.has_groups) putCounts(writer, columns.groups);
+  RoughNodes rough;
+  for (const LevelNode& node : nodes) rough.add(node.node);
+  for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
+    encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
+  }
   return writer.finish();
 }
 
-Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::uint32_t page,
+Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::uint32_t page,
                                       const NodeLimits& limits, std::span<Node> nodes) {
+  const bool full_precision = form.full_precision;
   PayloadReader reader(payload);
   if (!reader.ok()) return damaged("bytes of the packed part");
   const std::uint32_t count = reader.recordCount();
@@ -301,8 +332,10 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::u
   }
   const Columns columns(count);
   const std::span<Node> out = nodes.first(count);
-  SURFEIT_RETURN_IF_ERROR(decodeColumns(reader, full_precision, columns));
-  columns.scatter(out);
+  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, full_precision, columns));
+  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
+  columns.scatter(form.has_groups, out);
   SURFEIT_RETURN_IF_ERROR(checkNodes(out));
   const int level = levelOfPage(limits.level_first_page, page);
   for (std::size_t i = 0; i < count; ++i) {
@@ -315,6 +348,42 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::u
         fmt::format("node group: {} bytes after the last field", reader.remaining()));
   }
   return count;
+}
+
+Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
+                                         std::span<const Node> nodes,
+                                         std::vector<std::byte>& replaced) {
+  const bool full_precision = form.full_precision;
+  PayloadReader reader(payload);
+  if (!reader.ok() || reader.recordCount() != nodes.size()) return damaged("number of nodes");
+  const Columns columns(nodes.size());
+  PayloadWriter writer(replaced, reader.recordCount());
+
+  const PayloadReader begin = reader;
+  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, full_precision, columns));
+  copyTaken(begin, reader, writer);
+  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      columns.radiosity[c][i] = nodes[i].radiosity[static_cast<int>(c)];
+    }
+  }
+  putColors(writer, constAxes(columns.radiosity), full_precision);
+  const PayloadReader references = reader;
+  SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
+
+  // The projected area stays; power is stored relative to its codes
+  RoughNodes rough;
+  for (const Node& node : nodes) rough.add(node);
+  const bool has_area =
+      full_precision ? getFloats(reader, coefficientColumns<float>(rough.nodes.size())[kAreaKind])
+                     : getSmallIntegers(reader, rough.codes);
+  if (!has_area) return damaged("coefficients");
+  copyTaken(references, reader, writer);
+  for (std::size_t kind = kAreaKind + 1; kind < kCoefficientKinds; ++kind) {
+    encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
+  }
+  return writer.finish();
 }
 
 }  // namespace surfeit

@@ -9,6 +9,7 @@
 
 #include "io/file.h"
 #include "octree/node.h"
+#include "octree/page_form.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -30,13 +31,20 @@ struct NodeLimits {
 
 // The payload of a page with these nodes (at least one), replaced. Returns how many bytes at its
 // front are worth compressing, for compressPage. Safe from any thread.
-std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, bool full_precision,
+std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& form,
                             std::vector<std::byte>& payload);
 
 // Decodes node page number `page` into `nodes` (the file's group capacity) and returns how many
 // there are. Children always lie on a deeper level, so that damaged links cannot form a loop. Safe
 // on arbitrary bytes; kCorruption names the field, but not the file.
-Result<std::uint32_t> decodeNodeGroup(Bytes payload, bool full_precision, std::uint32_t page,
+Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::uint32_t page,
                                       const NodeLimits& limits, std::span<Node> nodes);
+
+// The payload of the same page with the radiosity and, for rough nodes, the power coefficients of
+// `nodes`; of the rest area and flags must be as decoded. All other columns keep their bytes.
+// Returns as encodeNodeGroup; errors as decodeNodeGroup. `replaced` is not `payload`.
+Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
+                                         std::span<const Node> nodes,
+                                         std::vector<std::byte>& replaced);
 
 }  // namespace surfeit

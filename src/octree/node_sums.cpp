@@ -21,6 +21,7 @@ void NodeSums::add(const Surfel& surfel) {
   const double area_and_power[4] = {1, double(surfel.radiosity[0]), double(surfel.radiosity[1]),
                                     double(surfel.radiosity[2])};
   surfel_count += 1;
+  groups |= groupBit(surfel.group);
   area += a;
   for (int axis = 0; axis < 3; ++axis) {
     position[axis] += a * double(surfel.position[axis]);
@@ -45,6 +46,7 @@ void NodeSums::add(const Surfel& surfel) {
 
 void NodeSums::add(const NodeSums& child) {
   surfel_count += child.surfel_count;
+  groups |= child.groups;
   area += child.area;
   for (int axis = 0; axis < 3; ++axis) {
     position[axis] += child.position[axis];
@@ -66,6 +68,7 @@ Node NodeSums::toNode(float flatness_limit) const {
   node.position = centre();
   node.area = float(area);
   node.surfel_count = surfel_count;
+  node.groups = groups;
   const double length =
       std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   node.flatness = float(std::min(length / area, 1.0));

@@ -15,6 +15,7 @@ namespace surfeit {
 // Sums over surfels i with area A, position x, normal n, radiosity B. Plain data.
 struct NodeSums {
   std::uint64_t surfel_count = 0;
+  std::uint64_t groups = 0;     // set of groups
   double area = 0;              // sum A
   double position[3] = {};      // sum A x
   double normal[3] = {};        // sum A n over one-sided disks

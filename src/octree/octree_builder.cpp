@@ -89,7 +89,7 @@ void OctreePipeline::encode(Work& work) {
   work.node_pages.resize(std::max(work.node_pages.size(), work.full_pages.size()));
   for (std::size_t i = 0; i < work.full_pages.size(); ++i) {
     work.node_pages[i].clear();
-    failure_.note(encodeNodePage(work.full_pages[i], header_.full_precision, work.node_pages[i]));
+    failure_.note(encodeNodePage(work.full_pages[i], header_.pageForm(), work.node_pages[i]));
     work.full_pages[i].nodes = {};
   }
 }

@@ -47,8 +47,8 @@ Result<std::uint32_t> SceneFile::decodeNodes(std::uint32_t page, Scratch& scratc
   SURFEIT_RETURN_IF_ERROR(pages_.readPage(page, scratch.stored, scratch.payload));
   const NodeLimits limits{header_.level_first_page, surfelPageCount(), header_.node_group_capacity,
                           header_.surfel_group_capacity};
-  Result<std::uint32_t> count = decodeNodeGroup(scratch.payload, header_.full_precision, page,
-                                                limits, nodes.first(header_.node_group_capacity));
+  Result<std::uint32_t> count = decodeNodeGroup(scratch.payload, header_.pageForm(), page, limits,
+                                                nodes.first(header_.node_group_capacity));
   if (!count.ok()) return pages_.pageError(page, count.status().message());
   return count;
 }
@@ -57,11 +57,18 @@ Result<std::uint32_t> SceneFile::decodeSurfels(std::uint32_t page, Scratch& scra
                                                std::span<Surfel> surfels) const {
   const std::uint32_t file_page = nodePageCount() + page;
   SURFEIT_RETURN_IF_ERROR(pages_.readPage(file_page, scratch.stored, scratch.payload));
-  Result<std::uint32_t> count =
-      decodeSurfelGroup(scratch.payload, {header_.full_precision, header_.channels.albedo},
-                        surfels.first(header_.surfel_group_capacity));
+  Result<std::uint32_t> count = decodeSurfelGroup(scratch.payload, header_.pageForm(),
+                                                  surfels.first(header_.surfel_group_capacity));
   if (!count.ok()) return pages_.pageError(file_page, count.status().message());
   return count;
+}
+
+Result<std::uint64_t> SceneFile::readGroups() const {
+  if (!header_.channels.group) return groupBit(0);
+  Scratch scratch;
+  std::vector<Node> nodes(header_.node_group_capacity);
+  SURFEIT_RETURN_IF_ERROR(decodeNodes(kRootRange.page, scratch, nodes).status());
+  return nodes[kRootRange.first].groups;
 }
 
 }  // namespace surfeit

@@ -13,6 +13,7 @@
 #include "core/curve_key.h"
 #include "io/page_file.h"
 #include "octree/node.h"
+#include "octree/page_form.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
@@ -32,6 +33,8 @@ struct SceneHeader {
   bool full_precision = false;              // pages hold floats instead of quantized values
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
+
+  PageForm pageForm() const { return {full_precision, channels.albedo, channels.group}; }
 };
 
 // Immutable once open; decode calls are safe from any thread.
@@ -61,6 +64,9 @@ class SceneFile {
                                     std::span<Node> nodes) const;
   Result<std::uint32_t> decodeSurfels(std::uint32_t page, Scratch& scratch,
                                       std::span<Surfel> surfels) const;
+  // The groups of all surfels, as a set: those of the root, whose page is read. Group 0 alone in a
+  // scene without groups, without reading. Errors as of decodeNodes.
+  Result<std::uint64_t> readGroups() const;
   // Stored bytes of a page.
   std::uint32_t nodePageBytes(std::uint32_t page) const;
   std::uint32_t surfelPageBytes(std::uint32_t page) const;

@@ -18,7 +18,8 @@ enum ChannelBits : std::uint32_t {
   kHasRadiosity = 8,
   kHasAlbedo = 16,
   kHasTwoSided = 32,
-  kAllChannels = 63,
+  kHasGroup = 64,
+  kAllChannels = 127,
 };
 
 // Bits of the feature field. A reader refuses bits that it does not know.
@@ -31,7 +32,8 @@ constexpr std::uint32_t kMaxSurfelGroup = 16384;
 std::uint32_t channelBits(const CloudChannels& channels) {
   return (channels.normal ? kHasNormal : 0u) | (channels.radius ? kHasRadius : 0u) |
          (channels.area ? kHasArea : 0u) | (channels.radiosity ? kHasRadiosity : 0u) |
-         (channels.albedo ? kHasAlbedo : 0u) | (channels.two_sided ? kHasTwoSided : 0u);
+         (channels.albedo ? kHasAlbedo : 0u) | (channels.two_sided ? kHasTwoSided : 0u) |
+         (channels.group ? kHasGroup : 0u);
 }
 
 CloudChannels channelsFromBits(std::uint32_t bits) {
@@ -42,6 +44,7 @@ CloudChannels channelsFromBits(std::uint32_t bits) {
   channels.radiosity = (bits & kHasRadiosity) != 0;
   channels.albedo = (bits & kHasAlbedo) != 0;
   channels.two_sided = (bits & kHasTwoSided) != 0;
+  channels.group = (bits & kHasGroup) != 0;
   return channels;
 }
 

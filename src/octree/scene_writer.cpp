@@ -85,10 +85,10 @@ Result<SceneFile> SceneWriter::finishUnnamed(const std::string& provenance) {
   return SceneFile::open(std::move(pages));
 }
 
-Status encodeNodePage(const FullNodePage& page, bool full_precision, EncodedPages& encoded) {
+Status encodeNodePage(const FullNodePage& page, const PageForm& form, EncodedPages& encoded) {
   std::vector<std::byte>& payload = threadScratch<std::vector<std::byte>>([] {});
   std::vector<std::byte>& stored = threadScratch<std::vector<std::byte>>([] {});
-  const std::size_t packed_bytes = encodeNodeGroup(page.nodes, full_precision, payload);
+  const std::size_t packed_bytes = encodeNodeGroup(page.nodes, form, payload);
   SURFEIT_RETURN_IF_ERROR(compressPage(payload, packed_bytes, stored));
   encoded.add(stored, payload.size());
   return {};

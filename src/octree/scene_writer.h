@@ -14,6 +14,7 @@
 #include "core/curve_key.h"
 #include "io/page_file.h"
 #include "octree/cell_sweep.h"
+#include "octree/page_form.h"
 #include "octree/scene_file.h"
 #include "octree/slab_builder.h"
 #include "surfeit/status.h"
@@ -81,6 +82,6 @@ class SceneWriter : public SiblingSink {
 };
 
 // Encodes a node page with its last references known. Safe from any thread.
-Status encodeNodePage(const FullNodePage& page, bool full_precision, EncodedPages& encoded);
+Status encodeNodePage(const FullNodePage& page, const PageForm& form, EncodedPages& encoded);
 
 }  // namespace surfeit

@@ -160,7 +160,7 @@ GroupPlace SlabBuilder::placeSurfels(std::size_t begin, std::size_t end) {
 Status SlabBuilder::encodePages() {
   std::vector<std::byte>& payload = threadScratch<std::vector<std::byte>>([] {});
   std::vector<std::byte>& stored = threadScratch<std::vector<std::byte>>([] {});
-  const PageForm form = {header_.full_precision, header_.channels.albedo};
+  const PageForm form = header_.pageForm();
   for (std::size_t p = 0; p + 1 < page_begins_.size(); ++p) {
     const std::size_t begin = page_begins_[p];
     const std::size_t packed_bytes = encodeSurfelGroup(

@@ -27,9 +27,9 @@ class Columns {
   explicit Columns(std::size_t count) {
     std::vector<float>& floats = threadScratch<std::vector<float>>([] {});
     std::vector<std::uint8_t>& bytes = threadScratch<std::vector<std::uint8_t>>([] {});
-    if (bytes.size() < count) {
+    if (bytes.size() < kByteColumns * count) {
       floats.resize(kFloatColumns * count);
-      bytes.resize(count);
+      bytes.resize(kByteColumns * count);
     }
     std::span<float> rest(floats);
     const auto take = [&] {
@@ -43,6 +43,7 @@ class Columns {
     radius = take();
     area = take();
     flags = std::span(bytes).first(count);
+    group = std::span(bytes).subspan(count, count);
   }
 
   void gather(std::span<const Surfel> surfels) {
@@ -55,31 +56,32 @@ class Columns {
       radius[i] = surfels[i].radius;
       area[i] = surfels[i].area;
       flags[i] = static_cast<std::uint8_t>(surfels[i].flags);
+      group[i] = static_cast<std::uint8_t>(surfels[i].group);
     }
   }
 
-  void scatter(bool has_albedo, std::span<Surfel> surfels) const {
+  void scatter(const PageForm& form, std::span<Surfel> surfels) const {
     scatterVectors(position, &Surfel::position, surfels);
     scatterVectors(normal, &Surfel::normal, surfels);
     scatterVectors(radiosity, &Surfel::radiosity, surfels);
-    if (has_albedo) scatterVectors(albedo, &Surfel::albedo, surfels);
+    if (form.has_albedo) scatterVectors(albedo, &Surfel::albedo, surfels);
     for (std::size_t i = 0; i < surfels.size(); ++i) {
       Surfel& surfel = surfels[i];
       surfel.radius = radius[i];
       surfel.area = area[i];
       surfel.flags = flags[i];
-      surfel.reserved = 0;
+      surfel.group = form.has_groups ? group[i] : 0u;
       if (surfel.isSphere()) surfel.normal = glm::vec3(0);
-      if (!has_albedo) surfel.albedo = glm::vec3(0);
+      if (!form.has_albedo) surfel.albedo = glm::vec3(0);
     }
   }
 
   MutableAxes position, normal, radiosity, albedo;
   std::span<float> radius, area;
-  std::span<std::uint8_t> flags;
+  std::span<std::uint8_t> flags, group;
 
  private:
-  static constexpr std::size_t kFloatColumns = 14;
+  static constexpr std::size_t kFloatColumns = 14, kByteColumns = 2;
 
   static void gatherVectors(std::span<const Surfel> surfels, glm::vec3 Surfel::*field,
                             const MutableAxes& axes) {
@@ -99,6 +101,30 @@ class Columns {
   }
 };
 
+// The columns before the radiosity.
+Status decodeGeometry(PayloadReader& reader, const Columns& columns) {
+  if (!getBytes8(reader, columns.flags)) return damaged("flags");
+  for (const std::uint8_t flags : columns.flags) {
+    if ((flags & ~kStoredFlags) != 0) return damaged("flags");
+  }
+  if (!getPositions(reader, columns.position)) return damaged("position");
+  if (!getNormals(reader, columns.normal)) return damaged("normal");
+  if (!getPositive(reader, columns.radius)) return damaged("radius");
+  if (!getPositive(reader, columns.area)) return damaged("area");
+  return {};
+}
+
+// The columns after it.
+Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns& columns) {
+  if (form.has_albedo && !getReflectances(reader, columns.albedo)) return damaged("albedo");
+  if (!form.has_groups) return {};
+  if (!getBytes8(reader, columns.group)) return damaged("group");
+  for (const std::uint8_t group : columns.group) {
+    if (group >= kMaxGroups) return damaged("group");
+  }
+  return {};
+}
+
 }  // namespace
 
 std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
@@ -116,6 +142,7 @@ std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& f
   putPositive(writer, columns.area, Rounding::kNearest, full);
   putColors(writer, constAxes(columns.radiosity), full);
   if (form.has_albedo) putReflectances(writer, constAxes(columns.albedo), full);
+  if (form.has_groups) putBytes8(writer, columns.group);
   return writer.finish();
 }
 
@@ -129,22 +156,38 @@ Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
         fmt::format("surfel group: {} surfels, expected 1 to {}", count, surfels.size()));
   }
   const Columns columns(count);
-  if (!getBytes8(reader, columns.flags)) return damaged("flags");
-  for (const std::uint8_t flags : columns.flags) {
-    if ((flags & ~kStoredFlags) != 0) return damaged("flags");
-  }
-  if (!getPositions(reader, columns.position)) return damaged("position");
-  if (!getNormals(reader, columns.normal)) return damaged("normal");
-  if (!getPositive(reader, columns.radius)) return damaged("radius");
-  if (!getPositive(reader, columns.area)) return damaged("area");
+  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, columns));
   if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
-  if (form.has_albedo && !getReflectances(reader, columns.albedo)) return damaged("albedo");
+  SURFEIT_RETURN_IF_ERROR(decodeOptional(reader, form, columns));
   if (reader.remaining() != 0) {
     return Status::corruption(
         fmt::format("surfel group: {} bytes after the last field", reader.remaining()));
   }
-  columns.scatter(form.has_albedo, surfels.first(count));
+  columns.scatter(form, surfels.first(count));
   return count;
+}
+
+Result<std::size_t> replaceSurfelRadiosity(Bytes payload, const PageForm& form,
+                                           std::span<const glm::vec3> radiosity,
+                                           std::vector<std::byte>& replaced) {
+  PayloadReader reader(payload);
+  if (!reader.ok() || reader.recordCount() != radiosity.size()) return damaged("number of surfels");
+  const Columns columns(radiosity.size());
+  PayloadWriter writer(replaced, reader.recordCount());
+
+  const PayloadReader begin = reader;
+  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, columns));
+  copyTaken(begin, reader, writer);
+  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  for (std::size_t i = 0; i < radiosity.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) columns.radiosity[c][i] = radiosity[i][static_cast<int>(c)];
+  }
+  putColors(writer, constAxes(columns.radiosity), form.full_precision);
+  const PayloadReader optional = reader;
+  SURFEIT_RETURN_IF_ERROR(decodeOptional(reader, form, columns));
+  copyTaken(optional, reader, writer);
+  if (reader.remaining() != 0) return damaged("end");
+  return writer.finish();
 }
 
 }  // namespace surfeit

@@ -8,16 +8,11 @@
 #include <vector>
 
 #include "io/file.h"
+#include "octree/page_form.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
-
-// How surfels and nodes are stored; from the header.
-struct PageForm {
-  bool full_precision = false;
-  bool has_albedo = false;
-};
 
 // The payload of a page with these surfels (at least one), replaced. Returns how many bytes at its
 // front are worth compressing, for compressPage. Safe from any thread.
@@ -28,5 +23,11 @@ std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& f
 // arbitrary bytes; kCorruption names the field, but not the file.
 Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
                                         std::span<Surfel> surfels);
+
+// The payload of the same page with other radiosities, one per surfel: all other columns keep their
+// bytes. Returns as encodeSurfelGroup; errors as decodeSurfelGroup. `replaced` is not `payload`.
+Result<std::size_t> replaceSurfelRadiosity(Bytes payload, const PageForm& form,
+                                           std::span<const glm::vec3> radiosity,
+                                           std::vector<std::byte>& replaced);
 
 }  // namespace surfeit

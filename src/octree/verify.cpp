@@ -105,11 +105,13 @@ class PageChecker {
   struct Below {
     double area = 0;
     std::uint64_t surfels = 0;
+    std::uint64_t groups = 0;
     float reach = 0;
     void add(const Node& node, const glm::vec3& at, float radius, float child_area,
-             std::uint64_t count) {
+             std::uint64_t count, std::uint64_t child_groups) {
       area += double(child_area);
       surfels += count;
+      groups |= child_groups;
       reach = std::max(reach, glm::length(at - node.position) + radius);
     }
   };
@@ -118,6 +120,10 @@ class PageChecker {
     if (below.surfels != node.surfel_count) {
       return Status::corruption(fmt::format("surfel count {}, expected {} from what lies below",
                                             node.surfel_count, below.surfels));
+    }
+    if (below.groups != node.groups) {
+      return Status::corruption(fmt::format("groups {:#x}, expected {:#x} from what lies below",
+                                            node.groups, below.groups));
     }
     if (std::abs(below.area - double(node.area)) > double(kAreaTolerance * node.area)) {
       return Status::corruption(
@@ -133,7 +139,7 @@ class PageChecker {
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> children, reader_.nodes(childrenOf(node)));
     Below below;
     for (const Node& child : children) {
-      below.add(node, child.position, 0, child.area, child.surfel_count);
+      below.add(node, child.position, 0, child.area, child.surfel_count, child.groups);
       // A child's sphere may stick out of its parent's; its centre, a mean of surfels, may not
       const float distance = glm::length(child.position - node.position);
       if (distance > node.radius + (node.radius + child.radius) * kReachTolerance) {
@@ -151,7 +157,7 @@ class PageChecker {
     std::uint32_t page = node.page, place = node.first;
     SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
       for (const Surfel& surfel : surfels) {
-        below.add(node, surfel.position, surfel.radius, surfel.area, 1);
+        below.add(node, surfel.position, surfel.radius, surfel.area, 1, groupBit(surfel.group));
         surfel_balance_ -= placeHash(page, place++);
       }
       ++page;
@@ -203,6 +209,7 @@ Result<SceneInfo> readSceneInfo(const std::string& path) {
     info.level_pages.push_back(header.level_first_page[level + 1] - header.level_first_page[level]);
   }
   info.provenance = file.provenance();
+  SURFEIT_ASSIGN_OR_RETURN(info.groups, file.readGroups());
   return info;
 }
 

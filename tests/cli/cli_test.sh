@@ -210,7 +210,7 @@ impossibleValuesAreUsageErrors() {
   run 2 "${gather[@]}" --threads two
   run 2 "${gather[@]}" --memory 12X
   run 2 "${gather[@]}" --memory -5G
-  run 2 "${gather[@]}" --mode glossy
+  run 2 "${gather[@]}" --mode glosy
   run 2 "${gather[@]}" --max-dist 0
   run 2 tune cornell.sft cornell.ply --sample -1
   run 2 "${index[@]}" --leaf 0
@@ -380,6 +380,54 @@ PLY
   run 3 gather cornell.sft receivers.ply -o result.ply --memory 64M --strict
   says "record 1"
   leavesNothing result
+}
+
+# A floor of group 0 and, above it, a lamp of group 7 behind a screen of group 3: lit.ply, groups.sft.
+makeGroupedScene() {
+  awk 'BEGIN {
+    print "ply\nformat ascii 1.0\nelement vertex 1200"
+    for (split("x y z nx ny nz radius area radiosity_r radiosity_g radiosity_b", name, " "); ++n in name;)
+      print "property float " name[n]
+    print "property uchar group\nend_header"
+    for (layer = 0; layer < 3; ++layer)
+      for (i = 0; i < 400; ++i)
+        print (i % 20) / 10 - .95, int(i / 20) / 10 - .95, layer, 0, 0, layer ? -1 : 1, .08, .01,
+          layer == 2, layer == 2, layer == 2, layer ? layer * 4 - 1 : 0
+  }' > groups.ply
+  run 0 index groups.ply -o groups.sft --quiet
+}
+
+subsetsAreChosenByGroup() {
+  makeGroupedScene
+  run 0 verify groups.sft
+  run 0 info groups.sft
+  says "radiosity, group" "groups         0,3,7"
+  run 0 info groups.sft --json
+  says '"groups": "0,3,7"'
+  # Only the floor, at which to gather
+  awk '/^element/ { print "element vertex 400"; next } { print } /^end_header/ { body = 1; next }
+       body && ++n == 400 { exit }' groups.ply > floor.ply
+  run 0 gather groups.sft floor.ply -o all.ply --mode bleeding --memory 64M
+  run 0 gather groups.sft floor.ply -o every.ply --mode bleeding --memory 64M --subset 0-63
+  sameBytes all.ply every.ply
+  run 0 gather groups.sft floor.ply -o lamp.ply --mode bleeding --memory 64M --subset 7
+  differentBytes all.ply lamp.ply
+  run 0 gather groups.sft floor.ply -o same.ply --mode bleeding --memory 64M --subset 1,5-9
+  sameBytes lamp.ply same.ply
+
+  run 2 gather groups.sft floor.ply -o none.ply --subset 1,4-6
+  says "groups.sft: found groups 0,3,7, expected one of those chosen: 1,4-6"
+  run 2 bounce groups.sft -o none.sft --subset 64
+  says "--subset" "expected groups from 0 to 63"
+  run 2 gather groups.sft floor.ply -o none.ply --subset 3-1
+  says "--subset" "3-1"
+  run 0 generate --surfels 1k -o city.ply
+  run 0 index city.ply -o city.sft
+  run 3 gather city.sft floor.ply -o none.ply --subset 0
+  says "city.sft: found no groups"
+  run 3 bounce city.sft -o none.sft --subset 0
+  says "city.sft: found no groups"
+  leavesNothing none
 }
 
 # Whether a process has a file open that has no name (yet), or a temporary one.

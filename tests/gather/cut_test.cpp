@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -38,6 +39,8 @@ std::vector<Surfel> boxWithSphere(int count) {
     surfel.area = 100.f / float(count);
     surfel.radius = std::sqrt(surfel.area);
     surfel.radiosity = {1, 1, 1};
+    // On one side all of a group, on the other two mixed
+    surfel.group = surfel.position.x < 0 ? 0u : 1u + std::uint32_t(i / 2 % 2);
     cloud.push_back(surfel);
   }
   return cloud;
@@ -51,6 +54,7 @@ Node randomNode(std::mt19937& random) {
   node.radius = .5f * uniform(random) * uniform(random);
   node.flatness = 1 - uniform(random) * uniform(random);
   node.flags = node.flatness > .97f ? kNodeFlat : 0;
+  node.groups = 1 + random() % 7;  // some of three
   return node;
 }
 
@@ -67,12 +71,15 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
           {.05f * randomDirection(random), glm::normalize(axis + .2f * randomDirection(random))});
     }
     const CutRules rules = {trial % 7 == 0 ? 0.f : .1f, trial % 3 == 0 ? 2.f : 1e30f,
-                            trial % 2 == 0};
+                            float(trial % 3 - 1),
+                            trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups};
     CutRegion region;
     region.part = CutRegion::Part(trial % 3);
     region.radius = .2f;
     region.limit = 1;
-    const PacketView view = viewPacket(receivers);
+    GatherRules gather(GatherMode::kBleeding, {});
+    if (trial % 4 == 0) gather.weights.cone_angle = .1f + .001f * float(trial % 1000);
+    const PacketView view = viewPacket(receivers, gather);
     const SiblingClasses expected = classifySiblings(siblings, view, region, rules);
     const SiblingClasses found = fastestSiblingClassifier()(siblings, view, region, rules);
     EXPECT_EQ(found.far & found.open, 0u);
@@ -82,6 +89,8 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
       far += int(bit(expected.far));
       open += int(bit(expected.open));
       dropped += !bit(expected.far) && !bit(expected.open);
+      EXPECT_FALSE(rules.isMixed(siblings[i]) && bit(expected.far | found.far));
+      EXPECT_FALSE(!rules.sees(siblings[i].groups) && bit(expected.open | found.open));
     }
   }
   EXPECT_LE(differing, 3);  // where rounding decides
@@ -101,9 +110,10 @@ struct CountSurfels {
   }
 };
 
-TEST(Cut, NearAndFarWalkTakeEverySurfelOnce) {
-  const std::vector<Surfel> cloud = boxWithSphere(20'000);
-  Scene scene(cloud);
+void expectEverySurfelOnce(Scene& scene, std::uint64_t groups) {
+  const auto seen = std::uint64_t(
+      std::count_if(scene.cloud().begin(), scene.cloud().end(),
+                    [&](const Surfel& surfel) { return (groups & groupBit(surfel.group)) != 0; }));
   GatherQuality quality;
   quality.sides = GatherSides::kBoth;  // and no normals below: nothing is dropped
   std::mt19937 random(9);
@@ -115,9 +125,11 @@ TEST(Cut, NearAndFarWalkTakeEverySurfelOnce) {
       for (Receiver& receiver : receivers) {
         receiver.position = glm::vec3(1, .5f, -1) + extent * randomDirection(random);
       }
-      const PacketCluster cluster(receivers, quality);
+      const PacketCluster cluster(receivers, {GatherMode::kBleeding, quality});
       ASSERT_TRUE(cluster.shares());
-      CutWalk walk(quality);
+      GatherRules rules(GatherMode::kBleeding, quality);
+      rules.groups = groups;
+      CutWalk walk(rules);
       const CutRegion far_region = cluster.farRegion();
       CountSurfels far{far_region};
       ASSERT_TRUE(walk.walk(cluster.view(), far_region, scene.reader(), far).ok());
@@ -126,12 +138,45 @@ TEST(Cut, NearAndFarWalkTakeEverySurfelOnce) {
         const CutRegion region = cluster.regionOf(i);
         CountSurfels near{region};
         ASSERT_TRUE(walk.walk(cluster.packet(i), region, scene.reader(), near).ok());
-        EXPECT_EQ(near.count + (cluster.shares(i) ? far.count : 0), cloud.size())
+        EXPECT_EQ(near.count + (cluster.shares(i) ? far.count : 0), seen)
             << extent << ' ' << parallax << ' ' << i;
       }
     }
   }
   EXPECT_GT(all_far, 0u);
+}
+
+TEST(Cut, NearAndFarWalkTakeEverySurfelOnce) {
+  Scene scene(boxWithSphere(20'000));
+  expectEverySurfelOnce(scene, kAllGroups);
+}
+
+TEST(Cut, NearAndFarWalkTakeEverySurfelOfTheGroupsSeenOnce) {
+  Scene scene(boxWithSphere(20'000));
+  for (const std::uint64_t groups : {0b001ull, 0b010ull, 0b110ull, 0b101ull}) {
+    SCOPED_TRACE(groups);
+    expectEverySurfelOnce(scene, groups);
+  }
+}
+
+// Of a wall that faces away, a few surfels that do not.
+TEST(Cut, NodesOfWhichFewAreSeenAreOpenedWhereverTheyFace) {
+  Node wall{};
+  wall.position = {0, 0, 5};
+  wall.normal = {0, 0, 1};
+  wall.radius = .3f;
+  wall.flatness = .999f;
+  wall.flags = kNodeFlat;
+  wall.groups = 0b11;
+  const Receiver receiver = {{0, 0, 0}, {0, 0, 1}};
+  const PacketView view = viewPacket({&receiver, 1});
+  for (const SiblingClassifier classify : {&classifySiblings, fastestSiblingClassifier()}) {
+    CutRules rules = {.1f, 1e30f, 1};
+    EXPECT_EQ(classify({&wall, 1}, view, {}, rules).open, 0u);
+    EXPECT_EQ(classify({&wall, 1}, view, {}, rules).far, 0u);
+    rules.groups = 0b10;
+    EXPECT_EQ(classify({&wall, 1}, view, {}, rules).open, 1u);
+  }
 }
 
 TEST(PacketCluster, DividesByPlaceAndNormal) {
@@ -143,7 +188,7 @@ TEST(PacketCluster, DividesByPlaceAndNormal) {
                         : i % 3 == 1 ? Receiver{at, {0, 0, -1}}
                                      : Receiver{at + glm::vec3(5, 0, 0), {0, 0, 1}});
   }
-  const PacketCluster cluster(receivers, GatherQuality());
+  const PacketCluster cluster(receivers, {GatherMode::kBleeding, {}});
   ASSERT_EQ(cluster.packetCount(), 13u);
   std::vector<int> seen(receivers.size(), 0);
   int mixed = 0;

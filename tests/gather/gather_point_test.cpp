@@ -99,7 +99,7 @@ double cutError(float max_solid_angle) { return .35 * double(max_solid_angle); }
 
 GatherResult bruteForce(const Cloud& cloud, const Receiver& receiver,
                         GatherMode mode = GatherMode::kBleeding) {
-  return gatherBruteForce(receiver, cloud, mode, {});
+  return gatherBruteForce(receiver, cloud, {mode, {}});
 }
 
 TEST(Gather, InsideUniformShellIrradianceEqualsRadiosity) {
@@ -255,7 +255,7 @@ TEST(Gather, SphereSurfelHasItsFormFactor) {
   for (const float distance : {2.f, 10.f}) {  // near and mid field
     surfel.position = {0, 0, distance};
     const GatherResult result =
-        gatherBruteForce({{0, 0, 0}, {0, 0, 1}}, {&surfel, 1}, GatherMode::kBleeding, quality);
+        gatherBruteForce({{0, 0, 0}, {0, 0, 1}}, {&surfel, 1}, {GatherMode::kBleeding, quality});
     EXPECT_NEAR(result.occlusion * distance * distance, 1, .03);
     EXPECT_NEAR(result.irradiance.x * distance * distance, 2, .06);
   }

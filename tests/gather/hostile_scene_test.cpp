@@ -42,7 +42,7 @@ class HostileScene : public DirectoryTest {
     node.node = sums.toNode(kDefaultFlatnessLimit);
     node.node.radius = 10;  // holds every receiver, so that nothing is far enough
     std::vector<std::byte> payload, stored;
-    encodeSurfelGroup({&surfel, 1}, {header.full_precision, false}, payload);
+    encodeSurfelGroup({&surfel, 1}, header.pageForm(), payload);
     ASSERT_TRUE(compressPage(payload, stored).ok());
     EncodedPages surfel_page;
     surfel_page.add(stored, payload.size());
@@ -58,7 +58,7 @@ class HostileScene : public DirectoryTest {
     }
     for (const FullNodePage& page : (*writer)->takeOpenNodePages()) {
       EncodedPages encoded;
-      ASSERT_TRUE(encodeNodePage(page, header.full_precision, encoded).ok());
+      ASSERT_TRUE(encodeNodePage(page, header.pageForm(), encoded).ok());
       ASSERT_TRUE(
           (*writer)->addNodePage(page.level, encoded.bytes, encoded.pages[0].payload_bytes).ok());
     }

@@ -14,7 +14,7 @@ namespace {
 using Options = ReceiverSorter::Options;
 
 constexpr std::uint64_t kPlenty = std::uint64_t{1} << 30;
-constexpr std::size_t kRunReceivers = 25000;  // no less than a run in the least memory has
+constexpr std::size_t kRunReceivers = 17857;  // no less than a run in the least memory has
 
 // Receivers in random order, `ties` to a key on average.
 std::vector<SortedReceiver> randomReceivers(std::size_t count, std::size_t ties, unsigned seed) {
@@ -95,7 +95,7 @@ class ReceiverSorterTest : public SpillTest {
 };
 
 TEST_F(ReceiverSorterTest, SortsAnyNumberInAnyMemory) {
-  const std::size_t unit = 1023;  // receivers of a checksum
+  const std::size_t unit = 511;  // receivers of a checksum
   for (const std::size_t count :
        {std::size_t{0}, std::size_t{1}, std::size_t{2}, unit - 1, unit, unit + 1,
         3 * kRunReceivers - 1, 3 * kRunReceivers + 5000, 10 * kRunReceivers}) {
@@ -120,9 +120,9 @@ TEST_F(ReceiverSorterTest, SortsWhatIsSortedReversedOrAllEqual) {
   EXPECT_GT(expectSorts(optionsFor(receivers.size()), receivers), 0u);
 }
 
-// 22 runs are the most that the least memory merges at once
+// 30 runs are the most that the least memory merges at once
 TEST_F(ReceiverSorterTest, MergesInSeveralPassesWhatIsTooManyForOne) {
-  const auto receivers = randomReceivers(30 * kRunReceivers, 2, 3);
+  const auto receivers = randomReceivers(40 * kRunReceivers, 2, 3);
   const std::uint64_t bytes = receivers.size() * sizeof(SortedReceiver);
   const std::uint64_t written = expectSorts(optionsFor(receivers.size()), receivers);
   EXPECT_GT(written, bytes + bytes / 5);
@@ -163,7 +163,7 @@ TEST_F(ReceiverSorterTest, ReadsInLessMemoryThanItSortsIn) {
 
 TEST_F(ReceiverSorterTest, LeastMemoryDoesNotGrowWithTheCount) {
   EXPECT_EQ(ReceiverSorter::leastMemoryBytes(0), 0u);
-  EXPECT_EQ(ReceiverSorter::leastMemoryBytes(1000), 40000u);
+  EXPECT_EQ(ReceiverSorter::leastMemoryBytes(1000), 56000u);
   EXPECT_EQ(ReceiverSorter::leastMemoryBytes(1'000'000), std::uint64_t{25} << 17);
   EXPECT_EQ(ReceiverSorter::leastMemoryBytes(~std::uint64_t{0}), std::uint64_t{25} << 17);
 }
@@ -218,8 +218,8 @@ TEST_F(ReceiverSorterTest, FullDiskIsReported) { expectFullDiskError(spillingWor
 
 TEST_F(ReceiverSorterTest, DamageToTheFileIsFound) {
   expectChecksumError(0, spillingWork());           // of the checksum
-  expectChecksumError(40, spillingWork());          // of the first receiver
-  expectChecksumError(40959 - 32, spillingWork());  // between units
+  expectChecksumError(56, spillingWork());          // of the first receiver
+  expectChecksumError(28671 - 48, spillingWork());  // between units
 }
 
 TEST_F(ReceiverSorterTest, RunningOutOfMemoryLeavesNothing) {

@@ -107,7 +107,7 @@ TEST_F(ResultStoreTest, RestoresTheOrderOfAnyNumberInAnyMemory) {
   for (const std::size_t count : {0, 1, 2, 1000, 150'001, 300'000, 700'001}) {
     SCOPED_TRACE(count);
     const std::vector<Entry> entries = randomEntries(count, static_cast<unsigned>(count));
-    const std::uint64_t bytes = count * sizeof(GatherResult);
+    const std::uint64_t bytes = count * (4 * sizeof(float));
     EXPECT_EQ(expectRestores(optionsFor(count), entries) == 0,
               bytes <= ResultStore::leastMemoryBytes(count));
     EXPECT_EQ(expectRestores(optionsFor(count, 3 << 20), entries) == 0, bytes <= 3 << 20);
@@ -196,7 +196,7 @@ TEST_F(ResultStoreTest, KeepsToItsMemory) {
   for (const std::uint64_t memory_bytes :
        {std::uint64_t{0}, std::uint64_t{4} << 20, std::uint64_t{9} << 20, kPlenty}) {
     const Options options = optionsFor(800'000, memory_bytes);
-    const std::uint64_t most = std::min(options.memory_bytes, options.count * sizeof(GatherResult));
+    const std::uint64_t most = std::min(options.memory_bytes, options.count * (4 * sizeof(float)));
     PeakMemory peak;
     const Faults faults({&peak});
     ResultStore store(options);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <utility>
@@ -25,6 +26,8 @@ class Scene {
     CloudChannels channels;
     channels.normal = channels.radius = channels.area = channels.radiosity = true;
     channels.two_sided = true;
+    channels.group = std::any_of(cloud.begin(), cloud.end(),
+                                 [](const Surfel& surfel) { return surfel.group != 0; });
     const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file("c.sft");
     Result<SurfelWriter> writer =
         SurfelWriter::create(cloud_path, channels, PlyEncoding::kBinaryLittleEndian);
@@ -49,7 +52,10 @@ class Scene {
 
   GatherResult gather(const Receiver& receiver, const GatherQuality& quality,
                       GatherMode mode = GatherMode::kBleeding) {
-    PointGatherer gatherer(mode, quality);
+    return gather(receiver, GatherRules(mode, quality));
+  }
+  GatherResult gather(const Receiver& receiver, const GatherRules& rules) {
+    PointGatherer gatherer(rules);
     GatherResult result;
     expectOk(gatherer.gather(receiver, *reader_, result));
     work_ = gatherer.work();

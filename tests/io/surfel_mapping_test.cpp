@@ -83,7 +83,15 @@ const std::vector<std::vector<Declared>> kClouds = {
      {kFloat, "x"},
      {kFloat, "y"},
      {kFloat, "z"}},
+    // Groups of every size
+    {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {kByte, "group"}, {kByte, "light_group"}},
+    {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kInt8, "light_group"}},
+    {{PlyType::kInt16, "group"}, {kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}},
+    {{kFloat, "x"}, {PlyType::kUint16, "group"}, {kFloat, "y"}, {kFloat, "z"}},
+    {{kByte, "two_sided"}, {PlyType::kInt32, "group"}, {kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}},
+    {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kUint32, "group"}},
     // Not fast
+    {{PlyType::kFloat64, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kInt32, "group"}},
     {{PlyType::kFloat64, "x"},
      {PlyType::kFloat64, "y"},
      {PlyType::kFloat64, "z"},
@@ -145,6 +153,10 @@ std::vector<std::byte> randomRows(const PlyElement& element, unsigned hostile_ev
       } else {
         for (std::size_t i = 0; i < plyTypeBytes(property.type); ++i) to[i] = std::byte(random());
         if (property.name == "two_sided" && random() % 2 == 0) *to = std::byte{0};
+        if (property.name == "group" && random() % 8 != 0) {
+          std::memset(to, 0, plyTypeBytes(property.type));
+          *to = std::byte(random() % kMaxGroups);
+        }
       }
     }
   }
@@ -238,6 +250,32 @@ TEST(SurfelMapping, NormalsOfAllLengthsDecodeAsOneByOne) {
   expectEqual(defects, expected_defects);
   EXPECT_GT(defects.short_normal.count, 100u);
   EXPECT_LT(defects.short_normal.count, 3000u);
+}
+
+TEST(SurfelMapping, GroupsAreIntegersFromZeroTo63) {
+  const PlyElement element =
+      elementOf({{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kInt32, "light_group"}}, 6);
+  const SurfelMapping mapping = mappingOf(element);
+  EXPECT_TRUE(mapping.channels().group);
+  std::vector<std::byte> rows(element.count * element.row_bytes);
+  const std::int32_t groups[] = {0, 63, 64, -1, 5, 256};
+  for (std::size_t i = 0; i < 6; ++i) std::memcpy(&rows[i * 16 + 12], &groups[i], 4);
+  std::vector<Surfel> surfels(6);
+  SurfelDefects defects;
+  ASSERT_EQ(mapping.decodeRows(rows, 10, surfels, defects), 3u);
+  EXPECT_EQ(surfels[0].group, 0u);
+  EXPECT_EQ(surfels[1].group, 63u);
+  EXPECT_EQ(surfels[2].group, 5u);
+  EXPECT_EQ(defects.describe(), "3 records with a group that is not 0 to 63 (first: record 12)");
+  EXPECT_EQ(mapping.describeDefect(&rows[3 * 16]), "light_group is -1, expected 0 to 63");
+
+  const Status status =
+      SurfelMapping::create(
+          elementOf({{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {kFloat, "group"}}, 1), "a.ply")
+          .status();
+  EXPECT_EQ(status.code(), StatusCode::kCorruption);
+  EXPECT_EQ(status.message(),
+            "a.ply: element vertex: property group is float, expected an integer type");
 }
 
 TEST(SurfelMapping, DefectsOfPartsAddUpInAnyOrder) {

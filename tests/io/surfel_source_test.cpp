@@ -1,5 +1,4 @@
 #include "io/surfel_source.h"
-#include "io/surfel_writer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "io/surfel_cloud_test.h"
+#include "io/surfel_writer.h"
 
 namespace surfeit {
 namespace {

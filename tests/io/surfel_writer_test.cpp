@@ -15,11 +15,14 @@ namespace {
 using SurfelWriterTest = SurfelCloudTest;
 
 TEST_F(SurfelWriterTest, SurfelsRoundTripInEveryEncoding) {
-  const std::vector<Surfel> surfels = randomSurfels(20001);
+  std::vector<Surfel> surfels = randomSurfels(20001);
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    surfels[i].group = static_cast<std::uint32_t>(i % kMaxGroups);
+  }
   for (const PlyEncoding encoding :
        {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
     Result<SurfelWriter> writer = SurfelWriter::create(
-        path("a.ply"), {true, true, true, true, true, true}, encoding, {"a comment"});
+        path("a.ply"), {true, true, true, true, true, true, true}, encoding, {"a comment"});
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE(writer->write(std::span(surfels).first(1)).ok());
     ASSERT_TRUE(writer->write({}).ok());
@@ -47,7 +50,7 @@ TEST_F(SurfelWriterTest, FileHasOnlyTheChannelsAskedFor) {
   EXPECT_TRUE(source->channels().area);
   EXPECT_FALSE(source->channels().normal || source->channels().radius ||
                source->channels().radiosity || source->channels().albedo ||
-               source->channels().two_sided);
+               source->channels().two_sided || source->channels().group);
   EXPECT_EQ(readAll(*source)[2].area, surfels[2].area);
 }
 

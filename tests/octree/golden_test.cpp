@@ -1,28 +1,40 @@
-// tests/golden/v1.sft stays readable, with the same contents, in every version to come. Set
-// SURFEIT_UPDATE_GOLDEN=1 to write it anew: only while version 1 has never been released.
+// The files in tests/golden stay readable, with the same contents, in every version to come. Set
+// SURFEIT_UPDATE_GOLDEN=1 to write them anew: only while version 1 has never been released.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <xxhash.h>
 #include <zstd.h>
 
 #include <cmath>
+#include <cstddef>
 #include <cstdlib>
+#include <ostream>
 
 #include "octree/test_scenes.h"
 
 namespace surfeit {
 namespace {
 
-// Of what v1.sft decodes to.
-constexpr std::uint64_t kSurfelHash = 12531938469041694647ull;
-constexpr std::uint64_t kNodeHash = 8909698455433171338ull;
-// The zstd that compressed it: another one may store the same payloads in other bytes.
+// A file, and hashes of what it decodes to.
+struct Golden {
+  const char* name;
+  std::uint64_t surfel_hash, node_hash;
+  bool has_groups;
+
+  std::string path() const { return SURFEIT_TEST_SOURCE_DIR "/golden/" + std::string(name); }
+  CloudChannels channels() const { return has_groups ? kAllAndGroups : kAllChannels; }
+  // For the names of the tests
+  friend void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
+};
+constexpr Golden kGoldens[] = {
+    {"v1.sft", 12531938469041694647ull, 8909698455433171338ull, false},
+    {"v1_groups.sft", 12687918996693723113ull, 2413714515543450104ull, true},
+};
+// The zstd that compressed them: another one may store the same payloads in other bytes.
 constexpr unsigned kZstdVersion = 10504;
 
-const std::string kGolden = SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft";
-
 // Surfels of all kinds by operations that IEEE 754 defines to the last bit.
-std::vector<Surfel> goldenCloud() {
+std::vector<Surfel> goldenCloud(bool has_groups) {
   std::vector<Surfel> cloud;
   for (int i = 0; i < 300; ++i) {
     const float t = float(i) / 300;
@@ -39,45 +51,55 @@ std::vector<Surfel> goldenCloud() {
       surfel.flags = kSurfelSphere;
       surfel.normal = glm::vec3(0);
     }
+    if (has_groups) surfel.group = static_cast<std::uint32_t>(i / 50 * 11);
     cloud.push_back(surfel);
   }
   return cloud;
 }
 
-using GoldenTest = SceneTest;
+class GoldenTest : public SceneTest, public testing::WithParamInterface<Golden> {};
 
-TEST_F(GoldenTest, VersionOneDecodesToTheSameContents) {
+TEST_P(GoldenTest, VersionOneDecodesToTheSameContents) {
+  const Golden& golden = GetParam();
   const char* update = std::getenv("SURFEIT_UPDATE_GOLDEN");
   if (update != nullptr && std::string(update) == "1") {
-    writeBytes(kGolden, bytesOf(index(goldenCloud())));
+    writeBytes(golden.path(), bytesOf(index(goldenCloud(golden.has_groups), golden.channels())));
   }
-  EXPECT_THAT(findingsOf(kGolden), testing::IsEmpty());
-  const Result<ReadScene> scene = readScene(kGolden);
+  EXPECT_THAT(findingsOf(golden.path()), testing::IsEmpty());
+  const Result<ReadScene> scene = readScene(golden.path());
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   ASSERT_EQ(scene->surfels.size(), 300u);
+  EXPECT_EQ(scene->header.channels.group, golden.has_groups);
   std::uint64_t node_hash = 0;
   for (const auto& [node, first] : scene->nodes) {
-    // In the order of the file, kind by kind
+    // In the order of the file, kind by kind; groups where it has them
     Node stored = node;
     float* coefficient = &stored.sh[0][0];
     for (int kind = 0; kind < kNodeShKinds; ++kind) {
       for (const float value : node.coefficients(kind)) *coefficient++ = value;
     }
-    node_hash = XXH3_64bits_withSeed(&stored, sizeof stored, node_hash);
+    const std::size_t bytes = golden.has_groups ? sizeof stored : offsetof(Node, groups);
+    node_hash = XXH3_64bits_withSeed(&stored, bytes, node_hash);
+    EXPECT_TRUE(golden.has_groups || node.groups == groupBit(0));
   }
   EXPECT_EQ(XXH3_64bits(scene->surfels.data(), scene->surfels.size() * sizeof(Surfel)),
-            kSurfelHash);
-  EXPECT_EQ(node_hash, kNodeHash);
+            golden.surfel_hash);
+  EXPECT_EQ(node_hash, golden.node_hash);
 }
 
-TEST_F(GoldenTest, IndexingWritesTheSameFile) {
-  const std::string scene = index(goldenCloud());
+TEST_P(GoldenTest, IndexingWritesTheSameFile) {
+  const Golden& golden = GetParam();
+  const std::string scene = index(goldenCloud(golden.has_groups), golden.channels());
   if (ZSTD_versionNumber() != kZstdVersion) {
     GTEST_SKIP() << "zstd " << ZSTD_versionNumber() << " may compress otherwise than "
                  << kZstdVersion;
   }
-  EXPECT_TRUE(bytesOf(scene) == bytesOf(kGolden));
+  EXPECT_TRUE(bytesOf(scene) == bytesOf(golden.path()));
 }
+
+INSTANTIATE_TEST_SUITE_P(Files, GoldenTest, testing::ValuesIn(kGoldens), [](const auto& golden) {
+  return std::string(golden.param.has_groups ? "Groups" : "Plain");
+});
 
 }  // namespace
 }  // namespace surfeit

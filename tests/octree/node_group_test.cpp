@@ -41,9 +41,12 @@ class NodeGroupTest : public testing::Test {
     return nodes;
   }
 
-  Result<std::uint32_t> decode(Bytes payload, bool full_precision, std::uint32_t page = 1) {
-    return decodeNodeGroup(payload, full_precision, page, {first_page_, 10, 128, 512}, found_);
+  Result<std::uint32_t> decode(Bytes payload, const PageForm& form, std::uint32_t page = 1) {
+    return decodeNodeGroup(payload, form, page, {first_page_, 10, 128, 512}, found_);
   }
+
+  static constexpr PageForm kQuantized = {}, kFull = {true};
+  static constexpr PageForm kForms[] = {kQuantized, kFull, {false, true, true}, {true, true, true}};
 
   std::uint32_t first_page_[kCurveLevels + 2];
   std::vector<Node> found_ = std::vector<Node>(128);
@@ -52,8 +55,8 @@ class NodeGroupTest : public testing::Test {
 TEST_F(NodeGroupTest, FullPrecisionIsExact) {
   const std::vector<LevelNode> nodes = someNodes(50);
   std::vector<std::byte> payload;
-  encodeNodeGroup(nodes, true, payload);
-  const Result<std::uint32_t> count = decode(payload, true);
+  encodeNodeGroup(nodes, kFull, payload);
+  const Result<std::uint32_t> count = decode(payload, kFull);
   ASSERT_TRUE(count.ok()) << count.status().message();
   ASSERT_EQ(*count, nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
@@ -78,8 +81,8 @@ TEST_F(NodeGroupTest, FullPrecisionIsExact) {
 TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
   const std::vector<LevelNode> nodes = someNodes(100);
   std::vector<std::byte> payload;
-  encodeNodeGroup(nodes, false, payload);
-  ASSERT_TRUE(decode(payload, false).ok());
+  encodeNodeGroup(nodes, kQuantized, payload);
+  ASSERT_TRUE(decode(payload, kQuantized).ok());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const Node& a = nodes[i].node;
     const Node& b = found_[i];
@@ -99,40 +102,66 @@ TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
   }
 }
 
-TEST_F(NodeGroupTest, DecodeRejectsEveryTruncationAndExtension) {
-  for (const bool full : {false, true}) {
+TEST_F(NodeGroupTest, GroupsAreExactOrTheFirstAlone) {
+  std::vector<LevelNode> nodes = someNodes(40);
+  TestRandom random(23);
+  for (LevelNode& node : nodes) {
+    node.node.groups = std::uint64_t{random.bits()} << 32 | random.bits() | 1;
+  }
+  for (const PageForm& form : kForms) {
     std::vector<std::byte> payload;
-    encodeNodeGroup(someNodes(20), full, payload);
+    encodeNodeGroup(nodes, form, payload);
+    ASSERT_TRUE(decode(payload, form).ok());
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      EXPECT_EQ(found_[i].groups, form.has_groups ? nodes[i].node.groups : groupBit(0));
+    }
+  }
+}
+
+TEST_F(NodeGroupTest, DecodeRejectsNodesWithoutAnyGroup) {
+  std::vector<LevelNode> nodes = someNodes(5);
+  nodes[3].node.groups = 0;
+  std::vector<std::byte> payload;
+  encodeNodeGroup(nodes, {false, false, true}, payload);
+  const Status status = decode(payload, {false, false, true}).status();
+  EXPECT_EQ(status.code(), StatusCode::kCorruption);
+  EXPECT_NE(status.message().find("field groups"), std::string::npos) << status.message();
+}
+
+TEST_F(NodeGroupTest, DecodeRejectsEveryTruncationAndExtension) {
+  for (const PageForm& form : kForms) {
+    std::vector<std::byte> payload;
+    encodeNodeGroup(someNodes(20), form, payload);
     for (std::size_t size = 0; size < payload.size(); ++size) {
-      ASSERT_EQ(decode(Bytes(payload).first(size), full).status().code(), StatusCode::kCorruption)
+      ASSERT_EQ(decode(Bytes(payload).first(size), form).status().code(), StatusCode::kCorruption)
           << size;
     }
     payload.push_back(std::byte{0});
-    EXPECT_EQ(decode(payload, full).status().code(), StatusCode::kCorruption);
+    EXPECT_EQ(decode(payload, form).status().code(), StatusCode::kCorruption);
   }
 }
 
 TEST_F(NodeGroupTest, ChildrenNeverLieOnTheirParentsLevelOrAbove) {
   std::vector<std::byte> payload;
-  encodeNodeGroup(someNodes(3), false, payload);
-  EXPECT_TRUE(decode(payload, false, 1).ok());    // level 1 points at level 2
-  EXPECT_TRUE(decode(payload, false, 10).ok());   // the last page of level 1
-  EXPECT_FALSE(decode(payload, false, 11).ok());  // level 2 at itself
-  EXPECT_FALSE(decode(payload, false, 35).ok());  // level 4 at one above
+  encodeNodeGroup(someNodes(3), kQuantized, payload);
+  EXPECT_TRUE(decode(payload, kQuantized, 1).ok());    // level 1 points at level 2
+  EXPECT_TRUE(decode(payload, kQuantized, 10).ok());   // the last page of level 1
+  EXPECT_FALSE(decode(payload, kQuantized, 11).ok());  // level 2 at itself
+  EXPECT_FALSE(decode(payload, kQuantized, 35).ok());  // level 4 at one above
 }
 
 TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
   TestRandom random(22);
-  for (const bool full : {false, true}) {
+  for (const PageForm& form : kForms) {
     std::vector<std::byte> payload;
-    encodeNodeGroup(someNodes(6), full, payload);
+    encodeNodeGroup(someNodes(6), form, payload);
     int decoded = 0;
     for (int i = 0; i < 50000; ++i) {
       std::vector<std::byte> damaged = payload;
       for (std::uint32_t k = 1 + random.bits() % 6; k > 0; --k) {
         damaged[random.bits() % damaged.size()] = static_cast<std::byte>(random.bits());
       }
-      const Result<std::uint32_t> count = decode(damaged, full);
+      const Result<std::uint32_t> count = decode(damaged, form);
       if (!count.ok()) {
         ASSERT_EQ(count.status().code(), StatusCode::kCorruption);
         continue;
@@ -141,6 +170,7 @@ TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
       for (const Node& node : std::span(found_).first(*count)) {
         ASSERT_TRUE(node.radius > 0 && node.area > 0 && node.surfel_count <= 5120u * 1000);
         ASSERT_TRUE(node.flatness >= 0 && node.flatness <= 1);
+        ASSERT_NE(node.groups, 0u);
         for (int c = 0; c < 3; ++c) {
           ASSERT_TRUE(std::isfinite(node.position[c]) && node.radiosity[c] >= 0);
           for (const float k : node.coefficients(powerKind(c))) ASSERT_TRUE(std::isfinite(k));

@@ -70,7 +70,7 @@ inline Status editNodes(const std::string& from, const std::string& to, std::uin
   std::vector<LevelNode> edited = levelNodes(file.header(), std::span(nodes).first(count));
   edit(edited);
   return rewriteScene(from, to, [&](std::uint32_t at, std::vector<std::byte>& payload) {
-    if (at == page) encodeNodeGroup(edited, true, payload);
+    if (at == page) encodeNodeGroup(edited, file.header().pageForm(), payload);
   });
 }
 
@@ -84,7 +84,7 @@ inline Status editSurfels(const std::string& from, const std::string& to, std::u
   edit(surfels);
   return rewriteScene(from, to, [&](std::uint32_t at, std::vector<std::byte>& payload) {
     if (at != page + file.nodePageCount()) return;
-    encodeSurfelGroup(surfels, {true, file.header().channels.albedo}, payload);
+    encodeSurfelGroup(surfels, file.header().pageForm(), payload);
   });
 }
 

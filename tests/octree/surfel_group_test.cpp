@@ -10,14 +10,15 @@
 namespace surfeit {
 namespace {
 
-constexpr PageForm kForms[] = {{false, false}, {false, true}, {true, false}, {true, true}};
+constexpr PageForm kForms[] = {{},           {false, true},        {true, false},
+                               {true, true}, {false, false, true}, {true, true, true}};
 
 TEST(SurfelGroup, FullPrecisionIsExact) {
-  const std::vector<Surfel> cloud = randomCloud(300);
+  const std::vector<Surfel> cloud = inGroups(randomCloud(300), kMaxGroups);
   std::vector<std::byte> payload;
-  encodeSurfelGroup(cloud, {true, true}, payload);
+  encodeSurfelGroup(cloud, {true, true, true}, payload);
   std::vector<Surfel> found(512);
-  const Result<std::uint32_t> count = decodeSurfelGroup(payload, {true, true}, found);
+  const Result<std::uint32_t> count = decodeSurfelGroup(payload, {true, true, true}, found);
   ASSERT_TRUE(count.ok()) << count.status().message();
   ASSERT_EQ(*count, cloud.size());
   EXPECT_EQ(std::memcmp(found.data(), cloud.data(), cloud.size() * sizeof(Surfel)), 0);
@@ -36,8 +37,34 @@ TEST(SurfelGroup, QuantizedSurfelsAreCloseToWhatTheyWere) {
     ASSERT_LE(glm::length(found[i].normal - cloud[i].normal), 1e-4f);
     ASSERT_EQ(found[i].flags, cloud[i].flags);
     ASSERT_EQ(found[i].albedo, glm::vec3(0));
+    ASSERT_EQ(found[i].group, 0u);
     ASSERT_EQ(found[i].isSphere(), found[i].normal == glm::vec3(0));
   }
+}
+
+TEST(SurfelGroup, GroupsAreExactInEveryForm) {
+  const std::vector<Surfel> cloud = inGroups(randomCloud(300), kMaxGroups);
+  for (const bool full : {false, true}) {
+    for (const bool has_albedo : {false, true}) {
+      const PageForm form = {full, has_albedo, true};
+      std::vector<std::byte> payload;
+      encodeSurfelGroup(cloud, form, payload);
+      std::vector<Surfel> found(300);
+      ASSERT_TRUE(decodeSurfelGroup(payload, form, found).ok());
+      for (std::size_t i = 0; i < cloud.size(); ++i) ASSERT_EQ(found[i].group, cloud[i].group);
+    }
+  }
+}
+
+TEST(SurfelGroup, DecodeRejectsGroupsThatThereAreNot) {
+  std::vector<Surfel> cloud = randomCloud(20);
+  cloud[7].group = kMaxGroups;
+  std::vector<std::byte> payload;
+  encodeSurfelGroup(cloud, {false, true, true}, payload);
+  std::vector<Surfel> found(64);
+  const Status status = decodeSurfelGroup(payload, {false, true, true}, found).status();
+  EXPECT_EQ(status.code(), StatusCode::kCorruption);
+  EXPECT_NE(status.message().find("field group"), std::string::npos) << status.message();
 }
 
 TEST(SurfelGroup, DecodeRejectsEveryTruncationAndExtension) {
@@ -116,6 +143,7 @@ TEST(SurfelGroup, DamagedPayloadsDecodeToValidSurfelsOrNot) {
           ASSERT_TRUE(std::isfinite(surfel.position[c]) && std::isfinite(surfel.radiosity[c]));
           ASSERT_TRUE(surfel.radiosity[c] >= 0 && surfel.albedo[c] >= 0);
         }
+        ASSERT_LT(surfel.group, kMaxGroups);
       }
     }
   }

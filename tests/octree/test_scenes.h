@@ -34,6 +34,7 @@ constexpr bool isThreadSanitized() {
 }
 
 inline constexpr CloudChannels kAllChannels = {true, true, true, true, true, true};
+inline constexpr CloudChannels kAllAndGroups = {true, true, true, true, true, true, true};
 inline constexpr CloudChannels kPositionsOnly = {};
 
 // A generator whose numbers are the same everywhere, unlike those of the standard distributions.
@@ -83,6 +84,15 @@ inline std::vector<Surfel> randomCloud(std::size_t count, std::uint32_t seed = 1
       surfel.normal = glm::vec3(0);
     }
     cloud.push_back(surfel);
+  }
+  return cloud;
+}
+
+// Gives every surfel a group by its place, so that neighbours often share one; `count` in all.
+inline std::vector<Surfel> inGroups(std::vector<Surfel> cloud, std::uint32_t count) {
+  for (Surfel& surfel : cloud) {
+    surfel.group =
+        std::min(static_cast<std::uint32_t>(surfel.position.x * float(count)), count - 1);
   }
   return cloud;
 }

@@ -182,6 +182,33 @@ TEST_F(VerifyTest, ClaimsThatDoNotHoldAreFound) {
   EXPECT_THAT(findingsAfter(root, [](auto& n) { n.push_back(n[0]); }), Not(IsEmpty()));
 }
 
+TEST_F(VerifyTest, GroupsThatAreNotThoseBelowAreFound) {
+  IndexOptions options;
+  options.leaf_capacity = 4;
+  options.full_precision = true;
+  const std::string scene = index(inGroups(randomCloud(400), 3), kAllAndGroups, options);
+  EXPECT_THAT(findingsOf(scene), IsEmpty());
+  const auto groups = HasSubstr("groups 0x");
+  EXPECT_THAT(findingsAfter(0, [](auto& n) { n[0].node.groups |= groupBit(63); }),
+              Contains(groups));
+  EXPECT_THAT(findingsAfter(0, [](auto& n) { n[0].node.groups &= ~groupBit(1); }),
+              Contains(groups));
+  // A leaf, on the last node page
+  const Result<SceneInfo> info = readSceneInfo(scene);
+  ASSERT_TRUE(info.ok()) << info.status().message();
+  EXPECT_TRUE(info->channels.group);
+  EXPECT_EQ(info->groups, 7u);
+  EXPECT_THAT(findingsAfter(info->node_pages - 1,
+                            [](auto& n) {
+                              ASSERT_TRUE(n[0].node.isLeaf());
+                              n[0].node.groups ^= groupBit(5);
+                            }),
+              Contains(groups));
+  ASSERT_TRUE(
+      editSurfels(scene, path("edited.sft"), 0, [](auto& surfels) { surfels[7].group = 9; }).ok());
+  EXPECT_THAT(findingsOf(path("edited.sft")), Contains(groups));
+}
+
 TEST_F(VerifyTest, ReferencesThatLeadNowhereAreCorruption) {
   smallScene(true, 400);
   const struct {

@@ -1,0 +1,180 @@
+// All that decides what a gather finds at a receiver, but the scene: what it looks for, how well,
+// and by which weights.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+#include "gather/environment_map.h"
+#include "gather/raster_cube.h"
+#include "gather/receiver.h"
+#include "surfeit/gather.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// Cones up to this half angle (radians) get a raster of their own, of one face around their axis;
+// wider ones are parts of the cube. At 60 degrees the outermost pixels are as narrow as a third.
+inline constexpr float kWidestConeRaster = 1.05f;
+
+// Half angle of the cone that is all above a receiver, and where a glossy lobe ends: at directions
+// that weigh this little.
+inline constexpr float kHemisphere = kPi / 2;
+inline constexpr float kLobeEnd = 0.01f;
+
+// Of the cosine, as Blinn-Phong lobes of a Beckmann roughness have it.
+inline float lobeExponent(float roughness) { return 2 / (roughness * roughness) - 2; }
+
+// The weights with the cone angle filled in if it was left open.
+inline GatherWeights withConeAngle(GatherWeights weights, GatherMode mode) {
+  if (weights.cone_angle > 0) return weights;
+  const float exponent = mode == GatherMode::kGlossy ? lobeExponent(weights.roughness) : 0;
+  weights.cone_angle = exponent > 0 ? std::acos(std::pow(kLobeEnd, 1 / exponent)) : kHemisphere;
+  return weights;
+}
+
+// What a mode usually gives.
+constexpr std::uint32_t usualOutputs(GatherMode mode) {
+  return mode == GatherMode::kOcclusion ? kOutputOcclusion : kOutputOcclusion | kOutputIrradiance;
+}
+
+// An environment, ready for a gather.
+struct LoadedEnvironment {
+  EnvironmentMap map;
+  EnvironmentCube cube;
+};
+
+struct GatherRules {
+  GatherRules(GatherMode gather_mode, const GatherQuality& gather_quality)
+      : mode(gather_mode),
+        outputs(usualOutputs(gather_mode)),
+        quality(gather_quality),
+        weights(withConeAngle({}, gather_mode)) {}
+
+  // `options` must be checked (checkGatherOptions). The environment, or null, must outlive all that
+  // uses the rules.
+  GatherRules(const GatherOptions& options, const LoadedEnvironment* loaded);
+
+  GatherMode mode;
+  std::uint32_t outputs;  // set of GatherOutput
+  // Both null, or of one map.
+  const EnvironmentMap* environment = nullptr;
+  const EnvironmentCube* environment_cube = nullptr;  // of the raster's resolution
+  GatherQuality quality;
+  GatherWeights weights;              // with the cone angle filled in
+  std::uint64_t groups = kAllGroups;  // set of the groups of surfels that are seen
+  glm::vec3 eye{0};                   // with kGlossy: what receivers are looked at from
+
+  bool has(std::uint32_t some) const { return (outputs & some) != 0; }
+  // Whether the radiosity of surfels matters, and whether distance does.
+  bool hasLight() const {
+    return has(kOutputIrradiance | kOutputIlluminationDirection | kOutputFluence |
+               kOutputRadianceSh);
+  }
+  bool fades() const { return weights.falloff > 0 && has(kOutputOcclusion); }
+  bool isGlossy() const { return mode == GatherMode::kGlossy; }
+  // Whether only a cone is looked at, and drawn to a raster of its own.
+  bool hasCone() const { return weights.cone_angle < kHemisphere; }
+  bool hasConeRaster() const { return weights.cone_angle <= kWidestConeRaster; }
+  std::uint32_t channels() const { return (hasLight() ? 3u : 0u) + (fades() ? 1u : 0u); }
+};
+
+inline GatherRules::GatherRules(const GatherOptions& options, const LoadedEnvironment* loaded)
+    : mode(options.mode),
+      outputs(options.outputs != 0 ? options.outputs : usualOutputs(options.mode)),
+      environment(loaded != nullptr ? &loaded->map : nullptr),
+      environment_cube(loaded != nullptr ? &loaded->cube : nullptr),
+      quality(options.quality),
+      weights(withConeAngle(options.weights, options.mode)),
+      groups(options.groups),
+      eye(options.eye) {}
+
+// The raster that is drawn to.
+inline RasterGeometry rasterGeometry(const GatherRules& rules) {
+  const int resolution = rules.quality.raster_resolution;
+  return rules.hasConeRaster() ? RasterGeometry::cone(resolution, rules.weights.cone_angle)
+                               : RasterGeometry(resolution);
+}
+
+inline float pixelsPerSlope(const GatherRules& rules) {
+  const float slope = rules.hasConeRaster() ? std::tan(rules.weights.cone_angle) : 1;
+  return 0.5f * float(rules.quality.raster_resolution) / slope;
+}
+
+// The max solid angle of a cone is this many times its share of the hemisphere: clusters are then
+// some 6 pixels large, as on the cube.
+inline constexpr float kConeShare = 4;
+
+// A raster that looks closer needs smaller clusters, and disks where others have patches. Shares of
+// the hemisphere keep their number of clusters.
+inline float maxSolidAngle(const GatherRules& rules) {
+  const float share = std::min(1.f, kConeShare * (1 - std::cos(rules.weights.cone_angle)));
+  return rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1);
+}
+inline float nearFieldRadii(const GatherRules& rules) {
+  const float slope = rules.hasConeRaster() ? std::tan(rules.weights.cone_angle) : 1;
+  return rules.quality.near_field_radii / std::sqrt(std::min(1.f, slope));
+}
+
+// The axis that directions weigh about: the normal, or the view mirrored at it. Unit; without a
+// normal something.
+inline glm::vec3 lobeAxis(const Receiver& receiver, const GatherRules& rules) {
+  if (receiver.isSpherical()) return {1, 0, 0};
+  if (!rules.isGlossy()) return receiver.normal;
+  const glm::vec3 view =
+      receiver.view != glm::vec3(0) ? receiver.view : receiver.position - rules.eye;
+  const float length = glm::length(view);
+  if (!(length > 0)) return receiver.normal;
+  const glm::vec3 mirrored =
+      view / length - 2 * glm::dot(view / length, receiver.normal) * receiver.normal;
+  return mirrored / glm::length(mirrored);
+}
+
+// How occlusion at a distance counts.
+inline float fadeAt(float distance, const GatherRules& rules) {
+  const GatherWeights& weights = rules.weights;
+  if (weights.falloff_mode == GatherWeights::FalloffMode::kExponential) {
+    return std::exp(-weights.falloff * distance);
+  }
+  return std::pow(std::max(0.f, 1 - distance / rules.quality.max_distance), weights.falloff);
+}
+
+// How directions weigh by the cosine of their angle to an axis, the normal or the reflection.
+class DirectionWeights {
+ public:
+  // `pixel`: angle of a pixel of the raster; the edge of a cone fades over as much.
+  DirectionWeights(const GatherRules& rules, float pixel) {
+    exponent_ = rules.isGlossy() ? lobeExponent(rules.weights.roughness) : 0;
+    is_cosine_ =
+        !rules.isGlossy() && rules.weights.distribution == GatherWeights::Distribution::kCosine;
+    if (rules.hasCone()) {
+      edge_cosine_ = std::cos(rules.weights.cone_angle);
+      edge_slope_ = 1 / (pixel * std::sin(rules.weights.cone_angle));
+    }
+  }
+
+  float operator()(float cosine) const {
+    if (!(cosine > 0)) return 0;
+    float weight = is_cosine_ ? cosine : 1;
+    if (exponent_ > 0) weight *= std::pow(cosine, exponent_);
+    if (edge_slope_ > 0) {
+      weight *= std::clamp(0.5f + (cosine - edge_cosine_) * edge_slope_, 0.f, 1.f);
+    }
+    return weight;
+  }
+
+  bool isPlainCosine() const { return is_cosine_ && edge_slope_ == 0; }
+  bool isCosine() const { return is_cosine_; }
+  float exponent() const { return exponent_; }
+  float edgeCosine() const { return edge_cosine_; }
+  float edgeSlope() const { return edge_slope_; }  // 0: no cone
+
+ private:
+  bool is_cosine_ = true;
+  float exponent_ = 0, edge_cosine_ = 0, edge_slope_ = 0;
+};
+
+}  // namespace surfeit

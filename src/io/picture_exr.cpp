@@ -1,0 +1,203 @@
+#include <OpenEXR/Iex.h>
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfCompression.h>
+#include <OpenEXR/ImfEnvmapAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfVersion.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <exception>
+#include <new>
+#include <utility>
+#include <vector>
+
+#include "core/assert.h"
+#include "io/picture_reader.h"
+
+namespace surfeit {
+namespace {
+
+// A file as OpenEXR wants to read it. Keeps the failure that made it throw.
+class ExrStream final : public Imf::IStream {
+ public:
+  explicit ExrStream(InputFile file) : Imf::IStream(file.path().c_str()), file_(std::move(file)) {}
+
+  bool read(char bytes[], int count) override {
+    const std::size_t size = std::size_t(std::max(count, 0));
+    Status status = file_.readAt(position_, std::as_writable_bytes(std::span(bytes, size)));
+    if (!status.ok()) {
+      status_ = std::move(status);
+      throw Iex::InputExc(status_.message());
+    }
+    position_ += size;
+    return position_ < file_.size();
+  }
+  uint64_t tellg() override { return position_; }
+  void seekg(uint64_t position) override { position_ = position; }
+
+  // Of a file that ends where OpenEXR reads on, or that the system does not read.
+  const Status& status() const { return status_; }
+
+ private:
+  InputFile file_;
+  std::uint64_t position_ = 0;
+  Status status_;
+};
+
+// Rows that are compressed together.
+int rowsPerBlock(Imf::Compression compression) {
+  switch (compression) {
+    case Imf::NO_COMPRESSION:
+    case Imf::RLE_COMPRESSION:
+    case Imf::ZIPS_COMPRESSION:
+      return 1;
+    case Imf::ZIP_COMPRESSION:
+    case Imf::PXR24_COMPRESSION:
+      return 16;
+    case Imf::DWAB_COMPRESSION:
+      return 256;
+    default:
+      return 32;  // PIZ, B44, B44A, DWAA
+  }
+}
+
+class ExrPicture final : public PictureReader {
+ public:
+  explicit ExrPicture(InputFile file) : PictureReader(file.path()), stream_(std::move(file)) {}
+
+  Status open() {
+    return guarded("header", [&] {
+      SURFEIT_RETURN_IF_ERROR(checkHeader());
+      stream_.seekg(0);
+      // No threads of OpenEXR's own
+      file_ = std::make_unique<Imf::InputFile>(stream_, 0);
+      const Imath::Box2i window = file_->header().dataWindow();
+      next_row_ = window.min.y;
+
+      // All rows are read to the same place: their stride is 0
+      row_.resize(std::size_t(width()));
+      char* const first = reinterpret_cast<char*>(row_.data());
+      char* const origin = first - std::ptrdiff_t(window.min.x) * std::ptrdiff_t(sizeof(glm::vec3));
+      Imf::FrameBuffer buffer;
+      const auto addChannel = [&](const char* name, std::size_t offset) {
+        buffer.insert(name, Imf::Slice(Imf::FLOAT, origin + offset, sizeof(glm::vec3), 0));
+      };
+      addChannel(is_grey_ ? "Y" : "R", 0);
+      if (!is_grey_) {
+        addChannel("G", sizeof(float));
+        addChannel("B", 2 * sizeof(float));
+      }
+      file_->setFrameBuffer(buffer);
+      return Status();
+    });
+  }
+
+  Status readRow(std::span<glm::vec3> row) override {
+    SURFEIT_CHECK(row.size() == row_.size());
+    const std::string place = fmt::format("row {}", next_row_ - file_->header().dataWindow().min.y);
+    return guarded(place.c_str(), [&] {
+      file_->readPixels(next_row_);
+      ++next_row_;
+      std::copy(row_.begin(), row_.end(), row.begin());
+      if (is_grey_) {
+        for (glm::vec3& pixel : row) pixel = glm::vec3(pixel.x);
+      }
+      return Status();
+    });
+  }
+
+ private:
+  // OpenEXR allocates by what the header says, so the header is looked at first.
+  Status checkHeader() {
+    char start[8];
+    stream_.read(start, sizeof(start));
+    const auto byteAt = [&](int i) { return int(static_cast<unsigned char>(start[i])); };
+    const int version = byteAt(4) | byteAt(5) << 8 | byteAt(6) << 16 | byteAt(7) << 24;
+    if (Imf::isNonImage(version)) {
+      return Status::corruption(fmt::format("{}: deep pixels, expected flat ones", path()));
+    }
+    Imf::Header header;
+    int header_version = version;
+    header.readFrom(stream_, header_version);
+
+    const Imath::Box2i window = header.dataWindow();
+    SURFEIT_RETURN_IF_ERROR(setSize(std::int64_t(window.max.x) - window.min.x + 1,
+                                    std::int64_t(window.max.y) - window.min.y + 1));
+    SURFEIT_RETURN_IF_ERROR(checkChannels(header.channels()));
+    is_cube_map_ = Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE;
+
+    // What is decoded at once: whole rows of tiles for us, and OpenEXR's own blocks
+    std::uint64_t pixel_bytes = 0;
+    for (auto i = header.channels().begin(); i != header.channels().end(); ++i) {
+      pixel_bytes += i.channel().type == Imf::HALF ? 2 : 4;
+    }
+    std::uint64_t rows = std::uint64_t(rowsPerBlock(header.compression()));
+    if (header.hasTileDescription()) {
+      rows = header.tileDescription().ySize;
+      pixel_bytes += sizeof(glm::vec3);
+    }
+    rows = std::min(rows, std::uint64_t(height()));
+    const std::uint64_t decoded = rows * std::uint64_t(width()) * pixel_bytes;
+    if (decoded > kMaxDecodedBytes) {
+      return Status::invalidArgument(fmt::format(
+          "{}: {} rows decode to {} bytes together, expected at most {}: save it in scan lines or "
+          "smaller tiles, without channels other than R, G and B",
+          path(), rows, decoded, kMaxDecodedBytes));
+    }
+    return {};
+  }
+
+  Status checkChannels(const Imf::ChannelList& channels) {
+    const auto has = [&](const char* name) { return channels.findChannel(name) != nullptr; };
+    const bool is_color = has("R") && has("G") && has("B");
+    is_grey_ = !is_color && has("Y") && !has("RY") && !has("BY");
+    if (is_color || is_grey_) return {};
+
+    std::string found;
+    for (auto i = channels.begin(); i != channels.end() && found.size() < 100; ++i) {
+      found += fmt::format("{}{}", found.empty() ? "" : " ", i.name());
+    }
+    return Status::corruption(fmt::format("{}: channels {}, expected R G B, or Y without RY BY",
+                                          path(), found.empty() ? "none" : found));
+  }
+
+  // Runs what may throw.
+  template <typename Work>
+  Status guarded(const char* place, const Work& work) {
+    if (!failure_.ok()) return failure_;
+    try {
+      failure_ = work();
+    } catch (const std::bad_alloc&) {
+      failure_ = Status::failed(fmt::format("{}: out of memory", path()));
+    } catch (const std::exception& error) {
+      failure_ =
+          stream_.status().ok()
+              ? Status::corruption(fmt::format("{}: {}: OpenEXR: {}", path(), place, error.what()))
+              : stream_.status();
+    }
+    return failure_;
+  }
+
+  ExrStream stream_;
+  std::unique_ptr<Imf::InputFile> file_;
+  std::vector<glm::vec3> row_;
+  bool is_grey_ = false;
+  int next_row_ = 0;
+  Status failure_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<PictureReader>> openExrPicture(InputFile file) {
+  auto picture = std::make_unique<ExrPicture>(std::move(file));
+  SURFEIT_RETURN_IF_ERROR(picture->open());
+  return std::unique_ptr<PictureReader>(std::move(picture));
+}
+
+}  // namespace surfeit

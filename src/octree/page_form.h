@@ -1,0 +1,14 @@
+// How surfels and nodes are stored on their pages.
+#pragma once
+
+namespace surfeit {
+
+// From the header of a scene (SceneHeader::pageForm).
+struct PageForm {
+  bool full_precision = false;  // floats instead of quantized values
+  // Columns that only some files have
+  bool has_albedo = false;
+  bool has_groups = false;
+};
+
+}  // namespace surfeit

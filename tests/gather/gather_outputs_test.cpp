@@ -1,0 +1,245 @@
+// What modes, weights and outputs give where the answer is known. Packets of equal receivers; that
+// these are the scalar gather is tested elsewhere.
+#include <glm/gtc/constants.hpp>
+
+#include "gather/packet_clouds.h"
+
+namespace surfeit {
+namespace {
+
+using Distribution = GatherWeights::Distribution;
+using FalloffMode = GatherWeights::FalloffMode;
+
+constexpr float kHalfPi = kPi / 2;
+
+// What a closed shell of disks may leave open at standard quality (docs/benchmarks.md, "Errors and
+// rates").
+constexpr float kShellGap = .05f;
+
+// A sphere of disks that face its middle, or turn their backs on it, of radiosity `radiosity`.
+Cloud shell(float radius, float facing, const glm::vec3& radiosity) {
+  Cloud cloud;
+  addSphere(cloud, 20000, glm::vec3(0), radius);
+  for (Surfel& surfel : cloud) {
+    surfel.normal *= facing;
+    surfel.radiosity = radiosity;
+  }
+  return cloud;
+}
+
+// A sphere around a point, seen from the origin within this angle.
+Cloud distantSphere(const glm::vec3& centre, float angle, const glm::vec3& radiosity) {
+  Cloud cloud;
+  addSphere(cloud, 20000, centre, glm::length(centre) * std::sin(angle));
+  for (Surfel& surfel : cloud) surfel.radiosity = radiosity;
+  return cloud;
+}
+
+// A square of this side with its middle here, in the plane of unit axes u and v; faces u x v.
+Cloud square(const glm::vec3& middle, const glm::vec3& u, const glm::vec3& v, float side,
+             const glm::vec3& radiosity, int count = 300) {
+  Cloud cloud;
+  const float step = side / float(count);
+  for (int i = 0; i < count * count; ++i) {
+    Surfel surfel;
+    surfel.position = middle + ((float(i % count) + .5f) * step - side / 2) * u +
+                      ((float(i / count) + .5f) * step - side / 2) * v;
+    surfel.normal = glm::cross(u, v);
+    surfel.area = step * step;
+    surfel.radius = .75f * step;
+    surfel.radiosity = radiosity;
+    cloud.push_back(surfel);
+  }
+  return cloud;
+}
+
+GatherRules rulesOf(GatherMode mode, std::uint32_t outputs = 0) {
+  GatherRules rules(mode, {});
+  if (outputs != 0) rules.outputs = outputs;
+  return rules;
+}
+
+GatherResult gatherAt(Scene& scene, const Receiver& receiver, const GatherRules& rules) {
+  PacketGatherer gatherer(rules);
+  return gatherPacket(gatherer, scene, std::vector<Receiver>(kPacketReceivers, receiver))[0];
+}
+
+constexpr Receiver kUpwards = {{0, 0, 0}, {0, 0, 1}};
+constexpr Receiver kSpherical = {{0, 0, 0}, {0, 0, 0}};
+
+// Part of the weight of a cone that a sphere in its middle covers.
+TEST(GatherWeightsTest, SphereAboveCoversItsPartOfConeAndDistribution) {
+  for (const float angle : {.2f, .5f}) {
+    Scene scene(distantSphere({0, 0, 5}, angle, glm::vec3(1)));
+    const auto sineSq = [](float x) { return std::sin(x) * std::sin(x); };
+    const auto cap = [](float x) { return 1 - std::cos(x); };
+    for (const float cone : {.3f, .8f, 1.2f, kHalfPi}) {
+      GatherRules rules = rulesOf(GatherMode::kOcclusion);
+      rules.weights.cone_angle = cone;
+      const float covered = std::min(angle, cone);
+      EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, sineSq(covered) / sineSq(cone),
+                  .04f * sineSq(covered) / sineSq(cone) + .002f)
+          << angle << " " << cone;
+      rules.weights.distribution = Distribution::kUniform;
+      EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, cap(covered) / cap(cone),
+                  .04f * cap(covered) / cap(cone) + .002f)
+          << angle << " " << cone;
+    }
+  }
+}
+
+TEST(GatherWeightsTest, OcclusionFadesWithDistance) {
+  Scene scene(shell(2, -1, glm::vec3(1)));
+  GatherRules rules = rulesOf(GatherMode::kOcclusion);
+  const float all = gatherAt(scene, kUpwards, rules).occlusion;
+  EXPECT_NEAR(all, 1, kShellGap);
+  rules.weights.falloff = .4f;
+  EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, all * std::exp(-.8f), .003f);
+  rules.weights.falloff_mode = FalloffMode::kPolynomial;
+  rules.quality.max_distance = 5;
+  rules.weights.falloff = 2;
+  EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, all * .36f, .003f);
+  rules.weights.cone_angle = .4f;
+  EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, .36f, .36f * kShellGap);
+}
+
+TEST(GatherWeightsTest, OnlyTheChosenSidesCover) {
+  for (const float facing : {-1.f, 1.f}) {
+    Scene scene(shell(2, facing, glm::vec3(1)));
+    GatherRules rules = rulesOf(GatherMode::kBleeding);
+    rules.quality.sides = GatherSides::kFront;
+    EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, facing < 0 ? 1 : 0, kShellGap);
+    rules.quality.sides = GatherSides::kBack;
+    EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, facing < 0 ? 0 : 1, kShellGap);
+    EXPECT_EQ(gatherAt(scene, kUpwards, rules).irradiance, glm::vec3(0));
+    rules.quality.sides = GatherSides::kBoth;
+    EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, 1, kShellGap);
+  }
+}
+
+// The quarter of a sphere that a wall leaves open has its mean direction, by cosine, along
+// (-2/3, 0, pi/3).
+TEST(GatherOutputsTest, BentNormalLeansAwayFromAWall) {
+  Scene scene(square({.01f, 0, 0}, {0, 0, 1}, {0, 1, 0}, 40, glm::vec3(1), 600));
+  const GatherRules rules = rulesOf(GatherMode::kOcclusion, kOutputOcclusion | kOutputBentNormal);
+  const GatherResult result = gatherAt(scene, kUpwards, rules);
+  EXPECT_NEAR(result.occlusion, .5f, .01f);
+  const glm::vec3 expected = glm::normalize(glm::vec3(-2.f / 3, 0, kPi / 3));
+  EXPECT_GT(glm::dot(result.bent_normal, expected), .9995f);
+}
+
+TEST(GatherOutputsTest, OpenSkyBendsNothingAndAClosedShellHasNoBentNormal) {
+  Scene far_away(distantSphere({0, 0, -5}, .1f, glm::vec3(1)));
+  const GatherRules rules = rulesOf(GatherMode::kOcclusion, kOutputBentNormal);
+  const glm::vec3 normal = glm::normalize(glm::vec3(1, 2, 3));
+  EXPECT_GT(glm::dot(gatherAt(far_away, {{0, 0, 0}, normal}, rules).bent_normal, normal), .9999f);
+}
+
+TEST(GatherOutputsTest, IlluminationComesFromTheLight) {
+  const glm::vec3 direction = glm::normalize(glm::vec3(2, -1, 3));
+  Scene scene(distantSphere(4.f * direction, .05f, {3, 2, 1}));
+  const GatherRules rules =
+      rulesOf(GatherMode::kBleeding, kOutputIlluminationDirection | kOutputIrradiance);
+  const GatherResult result = gatherAt(scene, kUpwards, rules);
+  EXPECT_GT(glm::dot(result.illumination_direction, direction), .9995f);
+  // The form factor of a sphere: cosine * sine^2
+  const float factor = direction.z * std::sin(.05f) * std::sin(.05f);
+  EXPECT_NEAR(result.irradiance.r, 3 * factor, .05f * 3 * factor);
+}
+
+TEST(GatherOutputsTest, VolumesReceiveFluenceAndHarmonics) {
+  const glm::vec3 radiosity = {1, 2, 4};
+  Scene scene(shell(2, -1, radiosity));
+  const GatherRules rules =
+      rulesOf(GatherMode::kBleeding, kOutputIrradiance | kOutputFluence | kOutputRadianceSh);
+  const GatherResult result = gatherAt(scene, kSpherical, rules);
+  for (int c = 0; c < 3; ++c) {
+    // Radiance B / pi from everywhere
+    EXPECT_NEAR(result.irradiance[c], radiosity[c], kShellGap * radiosity[c]);
+    EXPECT_NEAR(result.fluence[c], 4 * radiosity[c], 4 * kShellGap * radiosity[c]);
+    EXPECT_NEAR(result.radiance_sh[0][c], 4 * kPi * .282095f * radiosity[c],
+                4 * kShellGap * radiosity[c]);
+    for (std::size_t i = 1; i < kShCount; ++i) {
+      EXPECT_NEAR(result.radiance_sh[i][c], 0, .03f * radiosity[c]) << i;
+    }
+  }
+}
+
+TEST(GatherOutputsTest, HarmonicsOfASmallLightAreThoseOfItsDirection) {
+  const glm::vec3 direction = glm::normalize(glm::vec3(-1, 2, -3));
+  Scene scene(distantSphere(4.f * direction, .1f, glm::vec3(5)));
+  const GatherRules rules = rulesOf(GatherMode::kBleeding, kOutputRadianceSh);
+  const GatherResult result = gatherAt(scene, kSpherical, rules);
+  const float power = 5 * 2 * kPi * (1 - std::cos(.1f));
+  const ShCoefficients basis = shBasis(direction);
+  for (std::size_t i = 0; i < kShCount; ++i) {
+    EXPECT_NEAR(result.radiance_sh[i].g, power * basis[i], .04f * power) << i;
+  }
+}
+
+// A floor that mirrors a light: it is seen where the mirrored view meets it.
+TEST(GatherGlossy, ReflectsWhatTheMirroredViewMeets) {
+  Cloud cloud = square({3, 0, 4}, {1, 0, 0}, {0, -1, 0}, 1.7f, {7, 5, 3}, 300);
+  Scene scene(cloud);
+  GatherRules rules = rulesOf(GatherMode::kGlossy);
+  rules.weights.roughness = 1;
+  for (const float cone : {.02f, .05f, .1f}) {
+    rules.weights.cone_angle = cone;
+    rules.eye = {-3, 0, 4};
+    const GatherResult seen = gatherAt(scene, kUpwards, rules);
+    EXPECT_NEAR(seen.occlusion, 1, .01f) << cone;
+    EXPECT_NEAR(seen.irradiance.r, 7, .07f) << cone;
+    EXPECT_NEAR(seen.irradiance.b, 3, .03f) << cone;
+    rules.eye = {-3, 2, 4};
+    const GatherResult missed = gatherAt(scene, kUpwards, rules);
+    EXPECT_EQ(missed.occlusion, 0) << cone;
+    // A view of its own goes before the camera's
+    const Receiver viewed = {{0, 0, 0}, {0, 0, 1}, glm::normalize(glm::vec3(3, 0, -4))};
+    EXPECT_NEAR(gatherAt(scene, viewed, rules).irradiance.r, 7, .07f) << cone;
+  }
+}
+
+// The light covers the half of the cone on one side of its edge.
+TEST(GatherGlossy, NarrowConesResolveEdges) {
+  Scene scene(square({2.5f, 0, 4}, {1, 0, 0}, {0, -1, 0}, 5, glm::vec3(2), 1000));
+  GatherRules rules = rulesOf(GatherMode::kGlossy);
+  rules.weights.roughness = 1;
+  rules.weights.cone_angle = .1f;
+  rules.eye = {0, 0, 4};  // straight up, at the edge x = 0
+  EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, .5f, .02f);
+}
+
+// The lobe's own integral: cos^n over a cap of angle a holds 1 - cos(a)^(n + 1) of it.
+TEST(GatherGlossy, LobesWeighDirectionsByTheirPower) {
+  for (const float angle : {.05f, .1f, .2f}) {
+    Scene scene(distantSphere({0, 0, 5}, angle, glm::vec3(1)));
+    GatherRules rules = rulesOf(GatherMode::kGlossy);
+    rules.eye = {0, 0, 9};
+    rules.weights = withConeAngle({.roughness = .15f}, GatherMode::kGlossy);
+    const float n = lobeExponent(.15f);
+    const float all = 1 - std::pow(std::cos(rules.weights.cone_angle), n + 1);
+    const float part = (1 - std::pow(std::cos(angle), n + 1)) / all;
+    EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, part, .025f) << angle;
+  }
+}
+
+// A wide lobe is drawn to the cube, one a little narrower to a raster of its own.
+TEST(GatherGlossy, RastersAgreeWhereTheyMeet) {
+  Scene scene(mixedCloud());
+  GatherRules rules = rulesOf(GatherMode::kGlossy);
+  rules.eye = {3, -9, 4};
+  rules.weights.roughness = 1;
+  rules.quality.raster_resolution = 32;
+  rules.quality.max_solid_angle = .02f;
+  for (const glm::vec3 at : {glm::vec3(1, 0, 0), glm::vec3(-2, 1.5f, 0), glm::vec3(0, -2, 0)}) {
+    rules.weights.cone_angle = kWidestConeRaster;
+    const GatherResult cone = gatherAt(scene, {at, {0, 0, 1}}, rules);
+    rules.weights.cone_angle = std::nextafter(kWidestConeRaster, 2.f);
+    const GatherResult cube = gatherAt(scene, {at, {0, 0, 1}}, rules);
+    EXPECT_NEAR(cone.occlusion, cube.occlusion, .02f);
+    EXPECT_NEAR(cone.irradiance.g, cube.irradiance.g, .02f);
+  }
+}
+
+}  // namespace
+}  // namespace surfeit

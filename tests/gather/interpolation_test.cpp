@@ -1,0 +1,316 @@
+// Results interpolated between receivers are held to results gathered at every one of them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <glm/geometric.hpp>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "gather/gather_input.h"
+#include "gather/gather_memory.h"
+#include "gather/gather_outputs.h"
+#include "gather/interpolating_gatherer.h"
+#include "gather/local_fit.h"
+#include "gather/test_clouds.h"
+#include "octree/scene_file.h"
+#include "surfeit/gather.h"
+
+namespace surfeit {
+namespace {
+
+constexpr float kVariation = 0.02f;
+
+// Jittered receivers on [0, 1)^2 around the origin's plane z = height(x, y), by their places.
+std::vector<FitPoint> pointsOnSphere(int side, float radius) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> jitter(0, 1);
+  std::vector<FitPoint> points;
+  for (int i = 0; i < side * side; ++i) {
+    const float x = (float(i % side) + jitter(random)) / float(side) - 0.5f;
+    const float y = (float(i / side) + jitter(random)) / float(side) - 0.5f;
+    const glm::vec3 normal = glm::vec3(x, y, std::sqrt(radius * radius - x * x - y * y)) / radius;
+    points.push_back({{.position = normal * radius, .normal = normal}, normal});
+  }
+  return points;
+}
+
+std::vector<std::uint16_t> allBut(std::size_t count, std::uint16_t except) {
+  std::vector<std::uint16_t> places;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i != except) places.push_back(static_cast<std::uint16_t>(i));
+  }
+  return places;
+}
+
+float sumOf(const LocalFit& fit, const std::vector<float>& values) {
+  float sum = 0;
+  for (std::size_t k = 0; k < fit.count; ++k) sum += fit.weights[k] * values[fit.samples[k]];
+  return sum;
+}
+
+TEST(LocalFit, IsExactForWhatIsLinear) {
+  const std::vector<FitPoint> points = pointsOnSphere(12, 1e4f);
+  std::vector<float> values;
+  for (const FitPoint& point : points) {
+    values.push_back(0.3f + 2 * point.receiver.position.x - point.receiver.position.y);
+  }
+  for (std::uint16_t at = 0; at < points.size(); ++at) {
+    const LocalFit fit = fitLocally(points, at, allBut(points.size(), at));
+    ASSERT_EQ(fit.count, LocalFit::kSamples);
+    EXPECT_NEAR(sumOf(fit, std::vector<float>(points.size(), 1)), 1, 1e-5f);
+    EXPECT_NEAR(sumOf(fit, values), values[at], fit.gain < 1.5f ? 2e-3f : 1.5e-2f) << fit.gain;
+    EXPECT_LT(fit.height_error, 1e-3f);
+  }
+}
+
+TEST(LocalFit, LeavesOutWhatFacesElsewhereOrLiesInAnotherLayer) {
+  std::vector<FitPoint> points = pointsOnSphere(12, 1e4f);
+  const std::size_t count = points.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    FitPoint back = points[i], shelf = points[i];
+    back.receiver.normal = back.axis = -back.axis;
+    shelf.receiver.position.z += 0.2f;
+    points.push_back(back);
+    points.push_back(shelf);
+  }
+  for (std::uint16_t at = 0; at < count; ++at) {
+    const LocalFit fit = fitLocally(points, at, allBut(points.size(), at));
+    ASSERT_GT(fit.count, 0u);
+    for (std::size_t k = 0; k < fit.count; ++k) EXPECT_LT(fit.samples[k], count);
+  }
+}
+
+TEST(LocalFit, KnowsWhenItLeavesItsSamplesAndWhenNormalsBend) {
+  std::vector<FitPoint> points = pointsOnSphere(12, 2);
+  const auto count = static_cast<std::uint16_t>(points.size());
+  FitPoint outside = points[77];
+  outside.receiver.position += glm::vec3(0.8f, 0, 0);
+  FitPoint bent = points[77];
+  bent.axis = glm::normalize(bent.axis + glm::vec3(0.2f, 0, 0));
+  FitPoint above = points[77];
+  above.receiver.position *= 1.01f;
+  points.insert(points.end(), {outside, bent, above});
+  const auto samples = allBut(count, 77);
+  const LocalFit inside = fitLocally(points, 77, samples);
+  EXPECT_LT(inside.gain, 1.6f);
+  EXPECT_LT(inside.axis_error, 0.01f);
+  EXPECT_LT(inside.height_error, 0.02f);
+  const LocalFit far = fitLocally(points, count, samples);
+  EXPECT_TRUE(far.count == 0 || far.gain > 3);
+  EXPECT_GT(fitLocally(points, count + 1u, samples).axis_error, 0.15f);
+  EXPECT_GT(fitLocally(points, count + 2u, samples).height_error, inside.height_error + 0.03f);
+}
+
+// A floor, a wall, and a ball that lies on the floor: soft and contact shadows, and a corner.
+Table roomCloud(int side) {
+  Table table = floorAndSphere(side);
+  std::vector<std::vector<double>> wall;
+  for (std::vector<double>& row : table.rows) {
+    if (row[5] == 1 && row[2] == 0) {
+      std::vector<double> turned = row;
+      std::swap(turned[0], turned[2]);
+      turned[0] = -2, turned[2] += 2, turned[3] = 1, turned[5] = 0;
+      wall.push_back(turned);
+    } else {
+      row[2] -= 0.2;  // the ball comes down
+    }
+  }
+  table.rows.insert(table.rows.end(), wall.begin(), wall.end());
+  return table;
+}
+
+// Receivers on floor, ball and wall.
+Table roomReceivers(int count) {
+  Table table = receiversOf(count);
+  std::size_t i = 0;
+  for (std::vector<double>& row : table.rows) {
+    if (row[5] != 1 || row[2] != 0) row[2] -= 0.2;
+    if (row[5] == 1 && ++i % 2 == 0) {
+      row[2] = row[0] + 2, row[0] = -2, row[3] = 1, row[5] = 0;
+    }
+  }
+  return table;
+}
+
+class Interpolation : public testing::Test {
+ protected:
+  struct Gathered {
+    Table table;
+    std::string bytes;
+    GatherStats stats;
+  };
+
+  void make(const Table& cloud, const Table& receivers) {
+    makeScene(cloud, scene_);
+    writeTable(receivers, receivers_);
+    options_.threads = 2;
+    options_.memory_bytes = std::uint64_t{1} << 30;
+    options_.mode = GatherMode::kBleeding;
+  }
+
+  Gathered gather(float max_variation) {
+    options_.quality.max_variation = max_variation;
+    Progress progress;
+    const Result<GatherStats> stats = gatherCloud(scene_, receivers_, result_, options_, progress);
+    EXPECT_TRUE(stats.ok()) << stats.status().message();
+    return {readTable(result_), readBytes(result_), stats.ok() ? *stats : GatherStats{}};
+  }
+
+  static double interpolatedPart(const Gathered& gathered) {
+    return double(gathered.stats.interpolated_receivers) / double(gathered.stats.receivers);
+  }
+
+  TestDirectory directory_;
+  const std::string scene_ = directory_.file("s.sft"), receivers_ = directory_.file("r.ply"),
+                    result_ = directory_.file("result.ply");
+  GatherOptions options_;
+};
+
+struct Errors {
+  double rms = 0, within = 0, most = 0;
+};
+
+Errors errorsOf(std::vector<double> errors, double bound, const char* name) {
+  Errors found;
+  for (const double error : errors) {
+    found.rms += error * error / double(errors.size());
+    found.within += error <= bound ? 1 / double(errors.size()) : 0;
+    found.most = std::max(found.most, error);
+  }
+  found.rms = std::sqrt(found.rms);
+  std::printf("%s: RMS %.4f, within %.4f: %.3f %%, most %.4f\n", name, found.rms, bound,
+              100 * found.within, found.most);
+  return found;
+}
+
+Errors occlusionErrors(const Table& exact, const Table& found) {
+  std::vector<double> a = exact.column("occlusion"), b = found.column("occlusion");
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] = std::abs(a[i] - b[i]);
+  return errorsOf(a, double(kVariation), "occlusion");
+}
+
+// Of the brightest color, relative to the mean.
+Errors lightErrors(const Table& exact, const Table& found, const std::string& name) {
+  std::vector<double> errors, brightest;
+  for (const char* color : {"_r", "_g", "_b"}) {
+    const std::vector<double> a = exact.column(name + color), b = found.column(name + color);
+    errors.resize(a.size());
+    brightest.resize(a.size());
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      errors[i] = std::max(errors[i], std::abs(a[i] - b[i]));
+      brightest[i] = std::max(brightest[i], a[i]);
+    }
+  }
+  const double mean =
+      std::accumulate(brightest.begin(), brightest.end(), 0.0) / double(brightest.size());
+  for (double& error : errors) error /= mean;
+  return errorsOf(errors, double(kVariation), name.c_str());
+}
+
+TEST_F(Interpolation, SmoothLightStaysWithinTheVariation) {
+  make(floorAndSphere(150), receiversOf(40000));
+  const Gathered exact = gather(0), found = gather(kVariation);
+  EXPECT_EQ(exact.stats.interpolated_receivers, 0u);
+  std::printf("interpolated: %.1f %%\n", 100 * interpolatedPart(found));
+  EXPECT_GT(interpolatedPart(found), 0.5);
+  const Errors occlusion = occlusionErrors(exact.table, found.table);
+  EXPECT_GT(occlusion.within, 0.999);
+  EXPECT_LT(occlusion.rms, double(kVariation) / 3);
+  const Errors light = lightErrors(exact.table, found.table, "irradiance");
+  EXPECT_GT(light.within, 0.98);
+  EXPECT_LT(light.rms, double(kVariation) / 2);
+}
+
+TEST_F(Interpolation, ContactShadowsAndCornersAreSubdivided) {
+  make(roomCloud(150), roomReceivers(40000));
+  const Gathered exact = gather(0), found = gather(kVariation);
+  std::printf("interpolated: %.1f %%\n", 100 * interpolatedPart(found));
+  const Errors occlusion = occlusionErrors(exact.table, found.table);
+  EXPECT_GT(occlusion.within, 0.995);
+  EXPECT_LT(occlusion.rms, double(kVariation) / 3);
+
+  // A finer knob gathers more; the error falls
+  const Gathered finer = gather(kVariation / 4);
+  EXPECT_LT(finer.stats.interpolated_receivers, found.stats.interpolated_receivers);
+  EXPECT_LE(occlusionErrors(exact.table, finer.table).rms, occlusion.rms);
+}
+
+TEST_F(Interpolation, WhereNothingAgreesTheBytesAreThoseOfTheGather) {
+  make(floorAndSphere(60), receiversOf(3000));
+  const Gathered exact = gather(0);
+  const Gathered found = gather(1e-6f);
+  EXPECT_EQ(found.stats.interpolated_receivers, 0u);
+  EXPECT_EQ(found.bytes, exact.bytes);
+}
+
+TEST_F(Interpolation, SparseReceiversAreGathered) {
+  make(roomCloud(150), roomReceivers(300));
+  const Gathered exact = gather(0), found = gather(kVariation);
+  EXPECT_LT(interpolatedPart(found), 0.02);
+  EXPECT_GT(occlusionErrors(exact.table, found.table).within, 0.99);
+}
+
+TEST_F(Interpolation, ThreadsAndMemoryDoNotChangeResults) {
+  make(roomCloud(60), roomReceivers(20000));
+  const Gathered found = gather(kVariation);
+  EXPECT_GT(found.stats.interpolated_receivers, 0u);
+  for (const int threads : {1, 3}) {
+    options_.threads = threads;
+    EXPECT_EQ(gather(kVariation).bytes, found.bytes) << threads;
+  }
+  const Result<SceneFile> scene = SceneFile::open(scene_);
+  const Result<GatherInput> input = GatherInput::open(receivers_);
+  ASSERT_TRUE(scene.ok() && input.ok());
+  options_.threads = 1;
+  const std::uint64_t with = leastGatherMemory(*scene, gatherWork(input->receivers(), options_));
+  options_.memory_bytes = with;
+  EXPECT_EQ(gather(kVariation).bytes, found.bytes);
+
+  // What it holds beside is charged
+  options_.quality.max_variation = 0;
+  const std::uint64_t without = leastGatherMemory(*scene, gatherWork(input->receivers(), options_));
+  EXPECT_GE(with - without, kGroupReceivers * (sizeof(Receiver) + sizeof(GatherResult)));
+}
+
+TEST_F(Interpolation, VolumesAndAllOutputsAreInterpolated) {
+  Table receivers;
+  for (const char* name : {"x", "y", "z"}) receivers.addProperty(name);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int i = 0; i < 16000; ++i) {
+    receivers.rows.push_back(
+        {1.8 * uniform(random), 1.8 * uniform(random), 2.6 + 0.4 * uniform(random)});
+  }
+  make(floorAndSphere(60), receivers);
+  options_.outputs = kAllOutputs & ~std::uint32_t{kOutputEnvironment};
+  const Gathered exact = gather(0), found = gather(kVariation);
+  std::printf("interpolated: %.1f %%\n", 100 * interpolatedPart(found));
+  EXPECT_GT(interpolatedPart(found), 0.5);
+  EXPECT_GT(occlusionErrors(exact.table, found.table).within, 0.999);
+  EXPECT_GT(lightErrors(exact.table, found.table, "fluence").within, 0.98);
+  EXPECT_GT(lightErrors(exact.table, found.table, "sh0").within, 0.98);
+  const std::vector<double> x = found.table.column("bent_normal_x"),
+                            y = found.table.column("bent_normal_y"),
+                            z = found.table.column("bent_normal_z");
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    ASSERT_NEAR(std::hypot(x[i], y[i], z[i]), 1, 1e-4) << i;
+  }
+}
+
+TEST_F(Interpolation, ARefusedVariationIsNamed) {
+  make(floorAndSphere(10), receiversOf(10));
+  for (const float wrong : {-0.1f, std::numeric_limits<float>::quiet_NaN()}) {
+    options_.quality.max_variation = wrong;
+    Progress progress;
+    const auto stats = gatherCloud(scene_, receivers_, result_, options_, progress);
+    ASSERT_FALSE(stats.ok());
+    EXPECT_NE(stats.status().message().find("max variation"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace surfeit

@@ -1,0 +1,330 @@
+#include "io/picture_reader.h"
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfEnvmapAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfTiledOutputFile.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "io/test_directory.h"
+
+namespace surfeit {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+struct Pixels {
+  int width = 0, height = 0;
+  std::vector<glm::vec3> values;
+};
+
+Result<Pixels> readPicture(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PictureReader> reader, PictureReader::open(path));
+  Pixels pixels = {reader->width(), reader->height(), {}};
+  std::vector<glm::vec3> row(std::size_t(reader->width()));
+  for (int i = 0; i < pixels.height; ++i) {
+    SURFEIT_RETURN_IF_ERROR(reader->readRow(row));
+    pixels.values.insert(pixels.values.end(), row.begin(), row.end());
+  }
+  return pixels;
+}
+
+class PictureReaderTest : public DirectoryTest {
+ protected:
+  Pixels read(const std::string& name) const {
+    const Result<Pixels> pixels = readPicture(path(name));
+    EXPECT_TRUE(pixels.ok()) << pixels.status().message();
+    return pixels.ok() ? *pixels : Pixels{};
+  }
+  Status failure(const std::string& name) const { return readPicture(path(name)).status(); }
+};
+
+// Whole numbers, which every type of pixel holds exactly.
+float valueAt(int x, int y, int channel) { return float(1 + x + 10 * y + 500 * channel); }
+
+struct ExrKind {
+  std::vector<std::string> channels = {"R", "G", "B"};
+  Imf::PixelType type = Imf::HALF;
+  Imf::Compression compression = Imf::ZIP_COMPRESSION;
+  int tile = 0;  // 0: scan lines
+  Imf::LineOrder order = Imf::INCREASING_Y;
+  Imath::Box2i window{{0, 0}, {5, 3}};
+};
+
+void writeExr(const ExrKind& kind, const std::string& path) {
+  const Imath::Box2i& window = kind.window;
+  const int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
+  Imf::Header header(Imath::Box2i({-3, -4}, {90, 80}), window);
+  header.compression() = kind.compression;
+  header.lineOrder() = kind.order;
+  const std::size_t count = std::size_t(width * height);
+  std::vector<std::vector<float>> floats(kind.channels.size(), std::vector<float>(count));
+  std::vector<std::vector<unsigned>> integers(kind.channels.size(), std::vector<unsigned>(count));
+  Imf::FrameBuffer buffer;
+  for (std::size_t c = 0; c < kind.channels.size(); ++c) {
+    for (std::size_t i = 0; i < count; ++i) {
+      floats[c][i] = valueAt(int(i) % width, int(i) / width, int(c));
+      integers[c][i] = unsigned(floats[c][i]);
+    }
+    const bool is_integer = kind.type == Imf::UINT;
+    const Imf::PixelType type = is_integer ? Imf::UINT : Imf::FLOAT;
+    char* const first = is_integer ? reinterpret_cast<char*>(integers[c].data())
+                                   : reinterpret_cast<char*>(floats[c].data());
+    header.channels().insert(kind.channels[c], Imf::Channel(kind.type));
+    buffer.insert(kind.channels[c],
+                  Imf::Slice(type, first - 4 * (window.min.x + window.min.y * width), 4,
+                             4 * std::size_t(width)));
+  }
+  // Files convert nothing when they are written
+  std::vector<std::vector<Imath::half>> halves(kind.channels.size());
+  if (kind.type == Imf::HALF) {
+    for (std::size_t c = 0; c < kind.channels.size(); ++c) {
+      halves[c].assign(floats[c].begin(), floats[c].end());
+      char* const first = reinterpret_cast<char*>(halves[c].data());
+      buffer.insert(kind.channels[c],
+                    Imf::Slice(Imf::HALF, first - 2 * (window.min.x + window.min.y * width), 2,
+                               2 * std::size_t(width)));
+    }
+  }
+  if (kind.tile > 0) {
+    header.setTileDescription(
+        Imf::TileDescription(unsigned(kind.tile), unsigned(kind.tile), Imf::MIPMAP_LEVELS));
+    Imf::TiledOutputFile file(path.c_str(), header, 0);
+    file.setFrameBuffer(buffer);
+    file.writeTiles(0, file.numXTiles(0) - 1, 0, file.numYTiles(0) - 1, 0);
+    return;
+  }
+  Imf::OutputFile file(path.c_str(), header, 0);
+  file.setFrameBuffer(buffer);
+  file.writePixels(height);
+}
+
+void expectValues(const Pixels& pixels, int width, int height, bool is_grey = false) {
+  ASSERT_EQ(pixels.width, width);
+  ASSERT_EQ(pixels.height, height);
+  for (std::size_t i = 0; i < pixels.values.size(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      ASSERT_EQ(pixels.values[i][c], valueAt(int(i) % width, int(i) / width, is_grey ? 0 : c)) << i;
+    }
+  }
+}
+
+TEST_F(PictureReaderTest, ReadsEveryKindOfOpenExr) {
+  std::vector<ExrKind> kinds(8);
+  kinds[1].type = Imf::FLOAT;
+  kinds[2].type = Imf::UINT;
+  kinds[3].tile = 2;
+  kinds[4].window = {{-7, 11}, {-2, 14}};
+  kinds[5].window = {{100, -50}, {105, -47}};
+  kinds[5].tile = 4;
+  kinds[6].order = Imf::DECREASING_Y;
+  kinds[6].compression = Imf::PIZ_COMPRESSION;
+  kinds[7].channels = {"R", "G", "B", "A", "Z", "diffuse.R"};
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    SCOPED_TRACE(i);
+    writeExr(kinds[i], path("a.exr"));
+    expectValues(read("a.exr"), 6, 4);
+  }
+  ExrKind large;
+  large.window = {{0, 0}, {8, 299}};
+  large.compression = Imf::RLE_COMPRESSION;
+  large.type = Imf::FLOAT;
+  writeExr(large, path("a.hdr"));  // contents count, not names
+  expectValues(read("a.hdr"), 9, 300);
+}
+
+TEST_F(PictureReaderTest, LuminanceAloneIsGrey) {
+  ExrKind kind;
+  kind.channels = {"Y", "A"};
+  writeExr(kind, path("a.exr"));
+  expectValues(read("a.exr"), 6, 4, true);
+}
+
+TEST_F(PictureReaderTest, KnowsCubeMaps) {
+  for (const auto& [envmap, is_cube] :
+       {std::pair(Imf::ENVMAP_CUBE, true), {Imf::ENVMAP_LATLONG, false}}) {
+    Imf::Header header(2, 12);
+    Imf::addEnvmap(header, envmap);
+    std::vector<float> zeros(24);
+    Imf::FrameBuffer buffer;
+    for (const char* const name : {"R", "G", "B"}) {
+      header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+      buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(zeros.data()), 4, 8));
+    }
+    {
+      Imf::OutputFile file(path("a.exr").c_str(), header, 0);
+      file.setFrameBuffer(buffer);
+      file.writePixels(12);
+    }
+    const auto reader = PictureReader::open(path("a.exr"));
+    ASSERT_TRUE(reader.ok());
+    EXPECT_EQ((*reader)->isCubeMap(), is_cube);
+  }
+}
+
+TEST_F(PictureReaderTest, RefusesOtherChannels) {
+  for (const auto& [channels, found] :
+       std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"R", "G"}, "channels G R, expected R G B"},
+           {{"Y", "RY", "BY"}, "channels BY RY Y, expected"},
+           {{"depth"}, "channels depth, expected"}}) {
+    ExrKind kind;
+    kind.channels = channels;
+    writeExr(kind, path("a.exr"));
+    EXPECT_THAT(failure("a.exr").message(), AllOf(HasSubstr("a.exr"), HasSubstr(found)));
+    EXPECT_EQ(failure("a.exr").code(), StatusCode::kCorruption);
+  }
+}
+
+// A header and rows; `rows` as they are in the file.
+std::string hdr(const std::string& size, const std::string& rows,
+                const std::string& variables = "FORMAT=32-bit_rle_rgbe\n") {
+  return "#?RADIANCE\n# made by a test\n" + variables + "\n" + size + "\n" + rows;
+}
+
+TEST_F(PictureReaderTest, ReadsFlatAndRunLengthEncodedRadiance) {
+  // 128 + 8 is an exponent that makes mantissas whole numbers
+  write("flat.hdr", hdr("-Y 1 +X 3", std::string("\x01\x02\x03\x88\x64", 5) +
+                                         std::string("\0\xff\x89\x05\x05\x05\0", 7)));
+  Pixels pixels = read("flat.hdr");
+  ASSERT_EQ(pixels.values.size(), 3u);
+  EXPECT_EQ(pixels.values[0], glm::vec3(1, 2, 3));
+  EXPECT_EQ(pixels.values[1], glm::vec3(200, 0, 510));
+  EXPECT_EQ(pixels.values[2], glm::vec3(0));
+
+  // Red: 10 times 7; green: 3 literals and 7 times 1; blue all 0; exponent
+  write("rle.hdr",
+        hdr("-Y 1 +X 10", std::string("\x02\x02\x00\x0a", 4) + "\x8a\x07" +
+                              "\x03\x01\x02\x03\x87\x01" + std::string("\x8a\0", 2) + "\x8a\x88"));
+  pixels = read("rle.hdr");
+  ASSERT_EQ(pixels.values.size(), 10u);
+  EXPECT_EQ(pixels.values[2], glm::vec3(7, 3, 0));
+  EXPECT_EQ(pixels.values[9], glm::vec3(7, 1, 0));
+
+  // The older encoding: a pixel, 255 + 256 copies of it, and another
+  write("old.hdr", hdr("-Y 1 +X 513", std::string("\x09\x02\x03\x88") + "\x01\x01\x01\xff" +
+                                          "\x01\x01\x01\x01" + "\x04\x05\x06\x88"));
+  pixels = read("old.hdr");
+  ASSERT_EQ(pixels.values.size(), 513u);
+  EXPECT_EQ(pixels.values[511], glm::vec3(9, 2, 3));
+  EXPECT_EQ(pixels.values[512], glm::vec3(4, 5, 6));
+}
+
+TEST_F(PictureReaderTest, ExposureIsUndone) {
+  write("a.hdr", hdr("-Y 1 +X 1", "\x10\x20\x30\x88", "EXPOSURE=2\nEXPOSURE=4.0\r\n"));
+  EXPECT_EQ(read("a.hdr").values[0], glm::vec3(2, 4, 6));
+  write("a.hdr", hdr("-Y 1 +X 1", "\x10\x20\x30\x88", "EXPOSURE=0\n"));
+  EXPECT_THAT(failure("a.hdr").message(), HasSubstr("exposure '0', expected a positive number"));
+}
+
+TEST_F(PictureReaderTest, NamesWhatIsWrongWithRadianceFiles) {
+  const std::string row("\x02\x02\x00\x0a\x8b\x07", 6);  // a run of 11
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {hdr("-Y 2 +X 1", "\x01\x02\x03\x88"), "the file ends at"},
+      {hdr("+Y 1 +X 1", "\x01\x02\x03\x88"), "size '+Y 1 +X 1', expected -Y HEIGHT +X WIDTH"},
+      {hdr("-Y 1 +X 1 +Z 1", "\x01\x02\x03\x88"), "expected -Y HEIGHT +X WIDTH"},
+      {hdr("-Y 0 +X 1", "\x01\x02\x03\x88"), "1 x 0 pixels, expected at least one"},
+      {hdr("-Y -5 +X 1", "\x01\x02\x03\x88"), "1 x -5 pixels"},
+      {hdr("-Y 1 +X 1", "\x01\x02\x03\x88", "FORMAT=32-bit_rle_xyze\n"),
+       "format '32-bit_rle_xyze', expected 32-bit_rle_rgbe"},
+      {hdr("-Y 1 +X 10", row), "row 0 before"},
+      {hdr("-Y 1 +X 10", row), "a run of 11 bytes, expected 1 to 10"},
+      {hdr("-Y 1 +X 12", row), "a row of 10 pixels, expected 12"},
+      {hdr("-Y 1 +X 9", "\x01\x01\x01\x03"), "a run of 3 pixels after 0"},
+      {"#?RADIANCE\n" + std::string(5000, 'x'), "no end of the line"},
+      {"#?RADIANCE\nFORMAT", "the file ends at 17"}};
+  for (const auto& [bytes, message] : files) {
+    write("a.hdr", bytes);
+    EXPECT_THAT(failure("a.hdr").message(), AllOf(HasSubstr("a.hdr: "), HasSubstr(message)));
+    EXPECT_EQ(failure("a.hdr").code(), StatusCode::kCorruption);
+  }
+}
+
+TEST_F(PictureReaderTest, NamesWhatIsNoPicture) {
+  write("empty", "");
+  EXPECT_THAT(failure("empty").message(), HasSubstr("empty: begins with nothing, expected 76 2f"));
+  write("text", "hello");
+  EXPECT_THAT(failure("text").message(), HasSubstr("text: begins with 68 65 6c 6c, expected 76"));
+  EXPECT_EQ(failure("text").code(), StatusCode::kCorruption);
+  EXPECT_EQ(failure("absent").code(), StatusCode::kIoError);
+  EXPECT_EQ(failure(".").code(), StatusCode::kIoError);
+}
+
+TEST_F(PictureReaderTest, RefusesAbsurdSizesBeforeAllocating) {
+  write("a.hdr", hdr("-Y 8193 +X 16384", ""));
+  EXPECT_EQ(failure("a.hdr").code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(failure("a.hdr").message(),
+              HasSubstr("16384 x 8193 pixels, expected at most 134217728"));
+  write("a.hdr", hdr("-Y 1 +X 9999999999", ""));
+  EXPECT_EQ(failure("a.hdr").code(), StatusCode::kInvalidArgument);
+
+  ExrKind kind;
+  writeExr(kind, path("a.exr"));
+  std::string bytes = contents("a.exr");
+  const std::size_t window = bytes.find("dataWindow") + 11 + 6 + 4;
+  bytes.replace(window + 8, 8, "\xff\xff\xff\x7f\xff\xff\xff\x7f");
+  write("a.exr", bytes);
+  EXPECT_EQ(failure("a.exr").code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(failure("a.exr").message(), HasSubstr("2147483648 x 2147483648 pixels"));
+}
+
+TEST_F(PictureReaderTest, RefusesTilesThatTakeTooMuchMemory) {
+  ExrKind kind;
+  kind.window = {{0, 0}, {3999, 1999}};
+  kind.tile = 4000;
+  kind.compression = Imf::RLE_COMPRESSION;
+  writeExr(kind, path("a.exr"));
+  EXPECT_THAT(failure("a.exr").message(), HasSubstr("2000 rows decode to 144000000 bytes"));
+}
+
+TEST_F(PictureReaderTest, RefusesEveryTruncation) {
+  writeExr({}, path("whole.exr"));
+  write("whole.hdr",
+        hdr("-Y 2 +X 8", "\x02\x02" + std::string("\0\x08", 2) +
+                             "\x88\x07\x88\x07\x88\x07\x88\x88" + std::string(32, 'a')));
+  for (const char* const name : {"whole.exr", "whole.hdr"}) {
+    const std::string bytes = contents(name);
+    ASSERT_FALSE(read(name).values.empty());
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+      std::filesystem::remove(path("cut"));  // what is written over is flushed
+      write("cut", bytes.substr(0, size));
+      const Status status = failure("cut");
+      EXPECT_EQ(status.code(), StatusCode::kCorruption) << name << " at " << size;
+      EXPECT_THAT(status.message(), HasSubstr("cut: ")) << size;
+    }
+  }
+}
+
+TEST_F(PictureReaderTest, SurvivesEveryDamagedByte) {
+  ExrKind tiled;
+  tiled.tile = 2;
+  writeExr({}, path("lines.exr"));
+  writeExr(tiled, path("tiles.exr"));
+  for (const char* const name : {"lines.exr", "tiles.exr"}) {
+    const std::string bytes = contents(name);
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      for (const int flip : {0x01, 0x80, 0xff}) {
+        std::string damaged = bytes;
+        damaged[i] = char(damaged[i] ^ flip);
+        std::filesystem::remove(path("damaged"));
+        write("damaged", damaged);
+        const Status status = failure("damaged");  // or none, when only a value changed
+        EXPECT_TRUE(status.ok() || status.message().find("damaged: ") != std::string::npos) << i;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace surfeit

@@ -1,0 +1,140 @@
+#include "tools/light_options.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <string_view>
+
+#include "gather/gather_outputs.h"
+#include "tools/gather_options.h"
+#include "tools/number_list.h"
+
+namespace surfeit {
+namespace {
+
+// Words between commas.
+std::uint32_t parseOutputs(std::string_view text) {
+  std::uint32_t outputs = 0;
+  while (!text.empty()) {
+    const std::string_view word = text.substr(0, text.find(','));
+    text.remove_prefix(std::min(text.size(), word.size() + 1));
+    bool is_known = false;
+    for (const OutputColumns& columns : outputColumns()) {
+      if (columns.word != word) continue;
+      outputs |= columns.output;
+      is_known = true;
+    }
+    if (!is_known) {
+      throw CLI::ValidationError("--outputs", fmt::format("found \"{}\", expected some of {}", word,
+                                                          outputWords(kAllOutputs)));
+    }
+  }
+  return outputs;
+}
+
+void addDirectionOptions(CLI::App& command, GatherOptions& options) {
+  constexpr const char* kGroup = "Directions";
+  using Distribution = GatherWeights::Distribution;
+  using FalloffMode = GatherWeights::FalloffMode;
+  GatherWeights& weights = options.weights;
+  command
+      .add_option("--cone-angle,--coneangle", weights.cone_angle,
+                  "Half the opening angle of the cone that counts, around the normal or the "
+                  "reflection, in radians")
+      ->check(CLI::Range(0.0, 1.5707964))
+      ->default_str("pi / 2; glossy: by roughness")
+      ->group(kGroup);
+  addChoice<Distribution>(command, "--distribution", weights.distribution, "Weights of directions",
+                          {{"cosine", Distribution::kCosine}, {"uniform", Distribution::kUniform}})
+      ->group(kGroup);
+  command
+      .add_option("--falloff", weights.falloff,
+                  "Occlusion fades with distance at this rate; 0: not at all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(kGroup);
+  addChoice<FalloffMode>(command, "--falloff-mode,--falloffmode", weights.falloff_mode,
+                         "exp(-falloff * distance), or (1 - distance / max dist) ^ falloff",
+                         {{"exponential", FalloffMode::kExponential},
+                          {"polynomial", FalloffMode::kPolynomial},
+                          {"0", FalloffMode::kExponential},
+                          {"1", FalloffMode::kPolynomial}})
+      ->group(kGroup);
+  command
+      .add_option("--roughness", weights.roughness,
+                  "Width of the glossy lobe, over 0 to 1; 1: all of the cone alike")
+      ->check(CLI::Range(0.001, 1.0))
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option_function<std::string>(
+          "--camera",
+          [&options](const std::string& text) {
+            const auto at = parseNumberList<3>("--camera", text, "a position X,Y,Z");
+            options.eye = {float(at[0]), float(at[1]), float(at[2])};
+          },
+          "Where glossy surfaces are looked at from, else view_x view_y view_z of the receivers")
+      ->type_name("X,Y,Z")
+      ->group(kGroup);
+  command
+      .add_flag_callback(
+          "--clamp", [] {}, "For scripts of older tools: pixels never count more than once here")
+      ->group(kGroup);
+}
+
+void addEnvironmentOptions(CLI::App& command, GatherEnvironment& environment) {
+  constexpr const char* kGroup = "Environment";
+  command
+      .add_option("--environment", environment.path,
+                  "Picture of what surrounds the scene: lat-long or cube OpenEXR, lat-long .hdr")
+      ->group(kGroup);
+  command
+      .add_option_function<double>(
+          "--environment-rotation",
+          [&environment](double degrees) {
+            environment.rotation = float(degrees * 0.017453292519943295);
+          },
+          "Turns it about the up axis, in degrees, counterclockwise seen from above")
+      ->check(CLI::Range(-360.0, 360.0))
+      ->default_str("0")
+      ->group(kGroup);
+  command.add_option("--environment-intensity", environment.intensity, "Multiplies its light")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(kGroup);
+  addChoice<bool>(command, "--up", environment.y_is_up, "Axis that points up in the scene",
+                  {{"z", false}, {"y", true}})
+      ->group(kGroup);
+}
+
+}  // namespace
+
+void addLightOptions(CLI::App& command, GatherOptions& options) {
+  command
+      .add_option_function<std::string>(
+          "--outputs",
+          [&options](const std::string& text) { options.outputs = parseOutputs(text); },
+          "What receivers get, separated by commas: " + outputWords(kAllOutputs))
+      ->type_name("LIST")
+      ->default_str("what the mode gives");
+  command
+      .add_option("--max-variation,--maxvariation", options.quality.max_variation,
+                  "Interpolate where results vary less than this between neighbours, such as 0.02; "
+                  "0: gather at every receiver")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str()
+      ->group("Quality");
+  addDirectionOptions(command, options);
+  addEnvironmentOptions(command, options.environment);
+}
+
+std::string outputWords(std::uint32_t outputs) {
+  std::string words;
+  for (const OutputColumns& columns : outputColumns()) {
+    if ((outputs & columns.output) == 0) continue;
+    words += (words.empty() ? "" : ",") + std::string(columns.word);
+  }
+  return words;
+}
+
+}  // namespace surfeit

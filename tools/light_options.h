@@ -1,0 +1,18 @@
+// Options that say what a gather looks for: outputs, weights of directions, environment.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+
+#include "surfeit/gather.h"
+
+namespace surfeit {
+
+// Parsing fills `options`, which must outlive `command`.
+void addLightOptions(CLI::App& command, GatherOptions& options);
+
+// "occlusion,irradiance": the words of a set of GatherOutput.
+std::string outputWords(std::uint32_t outputs);
+
+}  // namespace surfeit

@@ -1,0 +1,121 @@
+// surfeit radiance: a photon map to surfels with radiosity.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/job_limits.h"
+#include "surfeit/radiance.h"
+#include "tools/command.h"
+#include "tools/number_list.h"
+
+namespace surfeit {
+namespace {
+
+struct RadianceArguments {
+  std::vector<std::string> photons;
+  std::string output;
+  RadianceOptions options;
+};
+
+nlohmann::json jsonOf(const glm::dvec3& rgb) { return {rgb.r, rgb.g, rgb.b}; }
+
+Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
+  RadianceOptions& options = arguments.options;
+  options.threads = context.common.threads;
+  options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(
+      const RadianceStats stats,
+      radianceCloud(arguments.photons, arguments.output, options, context.progress()));
+  const double seconds = std::max(context.wallSeconds(), 1e-9);
+  std::string phases_text;
+  nlohmann::json phases = nlohmann::json::object();
+  for (const auto& [phase, phase_seconds] : stats.phase_seconds) {
+    phases_text +=
+        fmt::format("{}{} {:.1f} s", phases_text.empty() ? "" : ", ", phase, phase_seconds);
+    phases[phase] = phase_seconds;
+  }
+  context.say(
+      fmt::format("{}: {} surfels, area {:.6g}, mean radius of an estimate {:.4g}\n"
+                  "{:.1f} s ({}), {:.2f} M photons/s, peak memory {}, temporary files {}",
+                  arguments.output, formatCount(stats.surfels), stats.area, stats.mean_radius,
+                  seconds, phases_text, double(stats.photons) / seconds / 1e6,
+                  formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
+  return context.writeStats({{"command", "radiance"},
+                             {"memory_bytes", stats.memory_bytes},
+                             {"photons_per_estimate", options.photons_per_estimate},
+                             {"photons", stats.photons},
+                             {"skipped_photons", stats.skipped_photons},
+                             {"surfels", stats.surfels},
+                             {"sparse_surfels", stats.sparse_surfels},
+                             {"area", stats.area},
+                             {"power", jsonOf(stats.power)},
+                             {"reflected_power", jsonOf(stats.reflected_power)},
+                             {"mean_radius", stats.mean_radius},
+                             {"max_radius", stats.max_radius},
+                             {"temporary_bytes", stats.temporary_bytes},
+                             {"photons_per_second", double(stats.photons) / seconds},
+                             {"phases", phases}});
+}
+
+void addEstimateOptions(CLI::App& command, RadianceOptions& options) {
+  command
+      .add_option("--photons-per-estimate,--nphotons", options.photons_per_estimate,
+                  "Nearest photons that an estimate takes: more make less noise, and blur")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  command
+      .add_option("--max-radius", options.max_radius,
+                  "Photons farther away do not count, in scene units (default: 16 times the median "
+                  "radius)")
+      ->check(CLI::PositiveNumber);
+  command
+      .add_option_function<std::string>(
+          "--albedo",
+          [&options](const std::string& text) {
+            const auto numbers = parseNumberList<3>("--albedo", text, "\"r g b\"");
+            for (int i = 0; i < 3; ++i) options.default_albedo[i] = float(numbers[std::size_t(i)]);
+          },
+          "Reflectance where photons bring none [\"0.5 0.5 0.5\"]")
+      ->type_name("\"r g b\"");
+  command
+      .add_option("--overlap", options.overlap, "Disk area over surfel area of the surfels written")
+      ->check(CLI::Range(1.0, 16.0))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void addRadianceCommand(CLI::App& app, CommandContext& context) {
+  CLI::App* command =
+      app.add_subcommand("radiance", "Turn a photon map into surfels with radiosity");
+  const auto arguments = std::make_shared<RadianceArguments>();
+  RadianceOptions& options = arguments->options;
+  command
+      ->add_option("PHOTONS", arguments->photons,
+                   "Photon clouds (PLY: position, normal, power_r power_g power_b, albedo)")
+      ->required();
+  command->add_option("-o,--output", arguments->output, "The cloud to write (PLY)")
+      ->required()
+      ->type_name("CLOUD");
+  addEstimateOptions(*command, options);
+  command->add_option("--temp", options.temporary_directory,
+                      "Directory of temporary files (default: beside the output)");
+  command->add_flag("--strict", options.strict, "Refuse invalid photons instead of skipping them");
+  context.addCommonOptions(*command);
+  command->footer(
+      "The radiosity is what surfaces reflect: albedo times the power of the nearest photons over "
+      "the\n"
+      "area on which they lie. Final gathering takes it from there.\n"
+      "Examples:\n"
+      "  surfeit sample cornell.obj -o photons.ply --photons 1000000\n"
+      "  surfeit radiance photons.ply -o radiosity.ply --nphotons 100\n"
+      "  surfeit index radiosity.ply -o radiosity.sft\n"
+      "  surfeit gather radiosity.sft receivers.ply -o result.ply --mode bleeding");
+  command->callback(
+      [arguments, &context] { context.run([&] { return runRadiance(*arguments, context); }); });
+}
+
+}  // namespace surfeit
