@@ -177,6 +177,54 @@ TEST(GatherOutputsTest, HarmonicsOfASmallLightAreThoseOfItsDirection) {
   }
 }
 
+// Irradiance below the middle of a rectangle that faces down: four times that of a corner. Its
+// sides are 2 a and 2 b times its height.
+float rectangleFactor(float a, float b) {
+  const auto term = [](float x, float y) {
+    const float root = std::sqrt(1 + x * x);
+    return x / root * std::atan(y / root);
+  };
+  return 2 / kPi * (term(a, b) + term(b, a));
+}
+
+// memo 7.1: a light is surfels that send, of any shape and texture; what blocks it is black.
+TEST(AreaLight, RectangleGivesItsAnalyticIrradianceAndHalfOfItBehindAScreen) {
+  const Cloud light = square({0, 0, 2}, {1, 0, 0}, {0, -1, 0}, 3, {6, 3, 1});
+  const float factor = rectangleFactor(.75f, .75f);
+  const GatherRules rules = rulesOf(GatherMode::kBleeding);
+  Scene open(light);
+  const GatherResult lit = gatherAt(open, kUpwards, rules);
+  EXPECT_NEAR(lit.irradiance.r, 6 * factor, .015f * 6 * factor);
+  EXPECT_NEAR(lit.irradiance.b, 1 * factor, .015f * factor);
+
+  // A screen from x = 0 on, lower and larger
+  Cloud half = light;
+  const Cloud screen = square({2, 0, 1}, {1, 0, 0}, {0, -1, 0}, 4, glm::vec3(0));
+  half.insert(half.end(), screen.begin(), screen.end());
+  Scene shaded(half);
+  EXPECT_NEAR(gatherAt(shaded, kUpwards, rules).irradiance.r, 3 * factor, .04f * 3 * factor);
+  // Far behind its edge the shadow is full
+  EXPECT_LT(gatherAt(shaded, {{2.5f, 0, 0}, {0, 0, 1}}, rules).irradiance.r, .02f * 6 * factor);
+}
+
+// A penumbra on the floor below a blocker's straight edge: the visible part of the light is a
+// rectangle again.
+TEST(AreaLight, PenumbraFollowsTheVisiblePartOfTheLight) {
+  Cloud cloud = square({0, 0, 2}, {1, 0, 0}, {0, -1, 0}, 1, glm::vec3(10));
+  const Cloud screen = square({2, 0, 1}, {1, 0, 0}, {0, -1, 0}, 4, glm::vec3(0));
+  cloud.insert(cloud.end(), screen.begin(), screen.end());
+  Scene scene(cloud);
+  // Corner formula of the part of the light between x0 and x1, seen from x
+  const auto corner = [](float a, float b) { return .25f * rectangleFactor(a, b); };
+  for (const float x : {-.6f, -.3f, -.1f, .1f, .3f}) {
+    // The edge x = 0 at height 1 hides what lies beyond -x at height 2
+    const float end = std::clamp(-x, -.5f, .5f);
+    const float expected = 10 * 2 * (corner((end - x) / 2, .25f) - corner((-.5f - x) / 2, .25f));
+    const GatherRules rules = rulesOf(GatherMode::kBleeding);
+    EXPECT_NEAR(gatherAt(scene, {{x, 0, 0}, {0, 0, 1}}, rules).irradiance.g, expected, .06f) << x;
+  }
+}
+
 // A floor that mirrors a light: it is seen where the mirrored view meets it.
 TEST(GatherGlossy, ReflectsWhatTheMirroredViewMeets) {
   Cloud cloud = square({3, 0, 4}, {1, 0, 0}, {0, -1, 0}, 1.7f, {7, 5, 3}, 300);
