@@ -34,6 +34,9 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
       arguments.result, formatCount(stats.receivers), context.wallSeconds(),
       formatCount(static_cast<std::uint64_t>(rate)), stats.threads, formatBytes(stats.memory_bytes),
       formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes), cacheTable(stats)));
+  if (options.quality.max_variation > 0) {
+    context.say(fmt::format("{} of them interpolated", formatCount(stats.interpolated_receivers)));
+  }
   if (!arguments.series.empty()) {
     SURFEIT_RETURN_IF_ERROR(writeCacheSeries(arguments.series, stats.windows));
   }

@@ -73,7 +73,8 @@ Status GatherCrew::gatherRuns(Gatherer& gatherer, std::size_t group_size) {
   run.reserve(most_run);
   results.reserve(most_run);
   while (!failure_.happened()) {
-    const std::size_t run_size = std::max<std::size_t>(setup_.controller.runReceivers(), group_size);
+    const std::size_t run_size =
+        std::max<std::size_t>(setup_.controller.runReceivers(), group_size);
     SURFEIT_RETURN_IF_ERROR(setup_.queue.take(run, run_size));
     if (run.empty()) return {};
     prefetcher_.notify();

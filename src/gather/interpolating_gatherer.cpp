@@ -16,17 +16,17 @@ namespace surfeit {
 namespace {
 
 // Samples are chosen closer and closer until light is smooth between them: one in a cell of so many
-// receivers. Coarse samples, which could miss more, must agree better: within this part of the
-// variation allowed. Finer ones than these save nothing: samples are drawn apart from each other
-// and each costs as much as 5 to 10 neighbours.
-struct Level {
-  std::size_t cell_size;
-  float tolerance;
-};
-constexpr std::array<Level, 2> kLevels = {{{64, 0.7f}, {16, 1}}};
+// receivers. Finer ones than these save nothing: samples are drawn apart from each other, and each
+// costs as much as 5 to 10 neighbours.
+constexpr std::array<std::size_t, 2> kCellSizes = {64, 16};
 
-// Where more than this part of the cells is left at a level, finer ones save nothing.
-constexpr float kMostOpen = 0.7f;
+// Mean error of the samples of a fit in parts of the variation: some of them are twice as far off.
+constexpr float kTolerance = 0.5f;
+
+// Half as far apart, samples miss about a quarter as much where light bends, and as much as before
+// where it is noise. With more than this part of the samples worse than so many times what is
+// allowed, the next level would be for nothing.
+constexpr float kMostHopeless = 0.5f, kHopeless = 3;
 
 // A cell is left to the next level when more than this part of its receivers is.
 constexpr float kMostLeft = 0.125f;
@@ -58,6 +58,7 @@ constexpr std::uint32_t kDirections = kOutputBentNormal | kOutputIlluminationDir
 InterpolatingGatherer::InterpolatingGatherer(const GatherRules& rules, const PacketKernel& kernel)
     : rules_(rules),
       most_axis_error_(rules.quality.max_variation * std::sin(rules.weights.cone_angle)),
+      most_error_(kTolerance * rules.quality.max_variation),
       packets_(rules, kernel),
       packet_receivers_(kClusterReceivers),
       packet_results_(kClusterReceivers) {
@@ -258,7 +259,7 @@ bool InterpolatingGatherer::isSafe(const LocalFit& fit, std::span<const GatherRe
   for (std::size_t k = 0; k < fit.count; ++k) {
     error += std::abs(fit.weights[k]) * errorAt(fit.samples[k], results);
   }
-  return error <= tolerance_;
+  return error <= most_error_;
 }
 
 // Interpolates at the receivers of a cell where that is safe; whether it is at most of them.
@@ -314,9 +315,9 @@ Status InterpolatingGatherer::gather(std::span<const Receiver> receivers,
                                      PagedOctree::Reader& octree, std::span<GatherResult> results) {
   SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kGroupReceivers);
   begin(receivers);
-  for (const Level& level : kLevels) {
+  for (const std::size_t size : kCellSizes) {
     // More samples, where they are needed
-    divideOpenCells(level.cell_size);
+    divideOpenCells(size);
     chosen_.clear();
     for (const Cell& cell : open_) chooseSample(cell);
     SURFEIT_RETURN_IF_ERROR(gatherChosen(receivers, octree, results));
@@ -324,10 +325,11 @@ Status InterpolatingGatherer::gather(std::span<const Receiver> receivers,
     for (const std::uint16_t sample : samples_) errors_[sample] = kUnknown;
 
     // Between them
-    tolerance_ = level.tolerance * rules_.quality.max_variation;
-    const std::size_t count = open_.size();
     std::erase_if(open_, [&](const Cell& cell) { return interpolateIn(cell, results); });
-    if (float(open_.size()) > kMostOpen * float(count)) break;
+    const auto hopeless = std::count_if(samples_.begin(), samples_.end(), [&](auto sample) {
+      return errorAt(sample, results) > kHopeless * most_error_;
+    });
+    if (float(hopeless) > kMostHopeless * float(samples_.size())) break;
   }
   SURFEIT_RETURN_IF_ERROR(gatherOpen(receivers, octree, results));
   interpolated_count_ +=

@@ -67,7 +67,7 @@ class InterpolatingGatherer {
   FitPoint middleOf(const Cell& cell) const;
 
   const GatherRules rules_;
-  const float most_axis_error_;
+  const float most_axis_error_, most_error_;
   PacketGatherer packets_;
   std::vector<Receiver> packet_receivers_;
   std::vector<GatherResult> packet_results_;
@@ -82,7 +82,6 @@ class InterpolatingGatherer {
   std::vector<std::uint16_t> chosen_, rest_;       // to be gathered at
   std::vector<std::uint16_t> near_, near_sample_;  // samples near a cell or sample
   std::vector<Cell> open_, divided_;
-  float tolerance_ = 0;  // of errors, at this level
   std::uint64_t interpolated_count_ = 0;
 };
 

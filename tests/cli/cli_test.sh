@@ -113,13 +113,53 @@ statisticsHaveTheDocumentedFields() {
   jsonHas view.json "${common[@]}" channel records drawn_surfels coverage
 }
 
+# Photons to surfels to a gather, and a scene with more bounces.
+photonsAndBouncesWork() {
+  makeScene 5000
+  run 0 sample cornell.obj -o photons.ply --photons 20000
+  run 0 radiance photons.ply -o lit.ply --stats radiance.json
+  jsonHas radiance.json photons surfels area reflected_power
+  run 0 index lit.ply -o lit.sft
+  run 0 gather lit.sft cornell.ply -o final.ply --mode bleeding
+  exists final.ply
+  run 3 radiance cornell.ply -o wrong.ply
+  leavesNothing wrong.ply
+
+  run 0 bounce cornell.sft --bounces 2 -o bounced.sft --stats bounce.json
+  jsonHas bounce.json bounces passes mean_radiosity largest_change
+  run 0 verify bounced.sft
+  run 0 gather bounced.sft cornell.ply -o bounced.ply --mode bleeding
+  differentBytes bounced.ply final.ply
+  run 2 bounce cornell.sft --bounces 0 -o none.sft
+  leavesNothing none.sft
+}
+
+# Outputs, cones, falloff, reflections; and what they lack is told before work starts.
+lightsHaveTheirOptions() {
+  makeScene 5000
+  run 0 gather cornell.sft cornell.ply -o a.ply --outputs occlusion,bent_normal \
+    --cone-angle 0.8 --falloff 2 --falloffmode 1 --max-dist 1 --distribution uniform
+  grep -aq "property float bent_normal_z" a.ply || fail "no bent normals"
+  run 0 gather cornell.sft cornell.ply -o b.ply --mode glossy --camera 0.5,0.5,2.4
+  grep -aq "property float reflection_r" b.ply || fail "no reflection"
+  run 3 gather cornell.sft cornell.ply -o c.ply --mode glossy
+  says view_x --camera
+  run 2 gather cornell.sft cornell.ply -o c.ply --outputs occlusion,colour
+  says "found \"colour\"" environment
+  run 2 gather cornell.sft cornell.ply -o c.ply --outputs environment
+  says --environment
+  run 74 gather cornell.sft cornell.ply -o c.ply --environment no_such_map.exr
+  says no_such_map.exr
+  leavesNothing c.ply
+}
+
 helpAndVersionExitWithZero() {
   run 0 --version
   says "surfeit 0."
   run 0 --help
-  says sample generate index info verify gather tune view
+  says sample generate index info verify gather bounce radiance tune view
   local command
-  for command in sample generate index info verify gather tune view; do run 0 "$command" --help; done
+  for command in sample generate index info verify gather bounce radiance tune view; do run 0 "$command" --help; done
 }
 
 generatedScenesAreTheSameByEveryWay() {
