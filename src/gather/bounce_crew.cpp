@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <exception>
 #include <memory>
-#include <new>
-#include <system_error>
-#include <thread>
 
+#include "gather/crew_threads.h"
 #include "io/surfel_mapping.h"
 
 namespace surfeit {
@@ -49,29 +46,7 @@ std::uint64_t BounceCrew::threadBytes(const SceneFile& scene, int surfels_per_re
 }
 
 Status BounceCrew::run() {
-  {
-    // This thread works too
-    std::vector<std::jthread> threads;
-    try {
-      threads.reserve(static_cast<std::size_t>(setup_.threads));
-      for (int i = 1; i < setup_.threads; ++i) threads.emplace_back([this] { work(); });
-    } catch (const std::system_error& error) {
-      failure_.note(Status::failed(fmt::format("cannot start a thread: {}", error.what())));
-    }
-    work();
-  }  // all threads have ended
-  return failure_.status();
-}
-
-// What is thrown ends here: past the border of a thread it would end the process.
-void BounceCrew::work() {
-  try {
-    failure_.note(gatherStretches());
-  } catch (const std::bad_alloc&) {
-    failure_.note(Status::failed("out of memory"));
-  } catch (const std::exception& exception) {
-    failure_.note(Status::failed(fmt::format("cannot gather: {}", exception.what())));
-  }
+  return runOnThreads(setup_.threads, failure_, [this] { return gatherStretches(); });
 }
 
 Status BounceCrew::gatherStretches() {

@@ -49,7 +49,6 @@ class BounceCrew {
  private:
   struct Stretch;
 
-  void work();
   Status gatherStretches();
   Status load(std::uint32_t first_page, PagedOctree::Reader& reader, Stretch& stretch) const;
   Status gather(PacketGatherer& gatherer, PagedOctree::Reader& reader, Stretch& stretch) const;

@@ -1,17 +1,12 @@
 #include "gather/gather_crew.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
-#include <exception>
 #include <memory>
-#include <new>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "gather/crew_threads.h"
 #include "gather/interpolating_gatherer.h"
 #include "gather/packet_gatherer.h"
 
@@ -24,29 +19,7 @@ GatherCrew::GatherCrew(const Setup& setup, Sink sink)
                   setup_.prefetch_threads) {}
 
 Status GatherCrew::run() {
-  {
-    // This thread works too
-    std::vector<std::jthread> threads;
-    try {
-      threads.reserve(static_cast<std::size_t>(setup_.threads));
-      for (int i = 1; i < setup_.threads; ++i) threads.emplace_back([this] { work(); });
-    } catch (const std::system_error& error) {
-      failure_.note(Status::failed(fmt::format("cannot start a thread: {}", error.what())));
-    }
-    work();
-  }  // all threads have ended
-  return failure_.status();
-}
-
-// What is thrown ends here: past the border of a thread it would end the process.
-void GatherCrew::work() {
-  try {
-    failure_.note(gatherRuns());
-  } catch (const std::bad_alloc&) {
-    failure_.note(Status::failed("out of memory"));
-  } catch (const std::exception& exception) {
-    failure_.note(Status::failed(fmt::format("cannot gather: {}", exception.what())));
-  }
+  return runOnThreads(setup_.threads, failure_, [this] { return gatherRuns(); });
 }
 
 Status GatherCrew::gatherRuns() {

@@ -45,7 +45,6 @@ class GatherCrew {
   std::uint64_t interpolatedCount() const { return interpolated_count_; }
 
  private:
-  void work();
   Status gatherRuns();
   template <typename Gatherer>
   Status gatherRuns(Gatherer& gatherer, std::size_t group_size);

@@ -104,9 +104,9 @@ inline float pixelsPerSlope(const GatherRules& rules) {
   return 0.5f * float(rules.quality.raster_resolution) / slope;
 }
 
-// The max solid angle of a cone is this many times its share of the hemisphere: 4 by 4 of its pixels
-// at standard quality. (light_bench, glossy .2: error .030 with 4, .034 with 10, at 1.3 and 0.7 times
-// the time of bleeding.)
+// The max solid angle of a cone is this many times its share of the hemisphere: 4 by 4 of its
+// pixels at standard quality. (light_bench, glossy .2: error .030 with 4, .034 with 10, at 1.3 and
+// 0.7 times the time of bleeding.)
 inline constexpr float kConeShare = 10;
 
 // A raster that looks closer needs smaller clusters, and disks where others have patches. Shares of
