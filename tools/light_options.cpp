@@ -41,7 +41,7 @@ void addDirectionOptions(CLI::App& command, GatherOptions& options) {
       .add_option("--cone-angle,--coneangle", weights.cone_angle,
                   "Half the opening angle of the cone that counts, around the normal or the "
                   "reflection, in radians")
-      ->check(CLI::Range(0.0, 1.5707964))
+      ->check(CLI::Range(0.0, 1.571))
       ->default_str("pi / 2; glossy: by roughness")
       ->group(kGroup);
   addChoice<Distribution>(command, "--distribution", weights.distribution, "Weights of directions",

@@ -98,8 +98,9 @@ void addSurfelOptions(CLI::App& app, ViewOptions& options) {
       ->group(kSurfelGroup);
   app.add_option("--channel", options.channel,
                  "What to show: any property or triple (radiosity, irradiance, albedo, color, "
-                 "normal, position, ...), or lit = radiosity + albedo * irradiance, indirect = "
-                 "albedo * irradiance, ao = 1 - occlusion. Default: the first of lit, ao, "
+                 "environment, reflection, fluence, bent_normal, normal, position, ...), or lit = "
+                 "radiosity + albedo * (irradiance + environment), indirect = albedo * "
+                 "(irradiance + environment), ao = 1 - occlusion. Default: the first of lit, ao, "
                  "radiosity, color, albedo, normal, position that the cloud has. Values that are "
                  "not finite are magenta")
       ->type_name("NAME")

@@ -22,7 +22,7 @@ Status refuse(const char* what, auto found, const std::string& expected) {
 
 Status checkWeights(const GatherOptions& options) {
   const GatherWeights& weights = options.weights;
-  if (!(weights.cone_angle >= 0 && weights.cone_angle <= kHemisphere)) {
+  if (!(weights.cone_angle >= 0 && weights.cone_angle <= kHemisphere + 1e-3f)) {
     return refuse("cone angle", weights.cone_angle, "0 to pi / 2 radians");
   }
   if (!(weights.roughness > 0 && weights.roughness <= 1)) {

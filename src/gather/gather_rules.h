@@ -30,7 +30,10 @@ inline float lobeExponent(float roughness) { return 2 / (roughness * roughness) 
 
 // The weights with the cone angle filled in if it was left open.
 inline GatherWeights withConeAngle(GatherWeights weights, GatherMode mode) {
-  if (weights.cone_angle > 0) return weights;
+  if (weights.cone_angle > 0) {
+    weights.cone_angle = std::min(weights.cone_angle, kHemisphere);
+    return weights;
+  }
   const float exponent = mode == GatherMode::kGlossy ? lobeExponent(weights.roughness) : 0;
   weights.cone_angle = exponent > 0 ? std::acos(std::pow(kLobeEnd, 1 / exponent)) : kHemisphere;
   return weights;

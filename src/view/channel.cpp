@@ -82,14 +82,16 @@ Result<Channel> Channel::find(const PlyElement& element, const std::string& name
   channel.base_.constant = 0;
   channel.factor_.constant = 1;
 
-  // Derived channels: light after bleeding, and the picture of ambient occlusion
+  // Derived channels: light after the gather, and the picture of ambient occlusion
   const Triple irradiance = findTriple(element, "irradiance");
+  const Triple environment = findTriple(element, "environment");
   const RowField occlusion = RowField::find(element, "occlusion");
-  if ((name == "lit" || name == "indirect") && irradiance.exists()) {
+  if ((name == "lit" || name == "indirect") && (irradiance.exists() || environment.exists())) {
     const Triple color = findTriple(element, "color");
     const Triple albedo = findTriple(element, "albedo");
     const Triple radiosity = findTriple(element, "radiosity");
     channel.value_ = irradiance;
+    channel.added_ = environment;
     if (albedo.exists() || color.exists()) channel.factor_ = albedo.exists() ? albedo : color;
     if (name == "lit" && (radiosity.exists() || color.exists())) {
       channel.base_ = radiosity.exists() ? radiosity : color;
@@ -131,7 +133,7 @@ std::vector<std::string> Channel::list(const PlyElement& element) {
   const auto addOnce = [&](const std::string& name) {
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   };
-  if (findTriple(element, "irradiance").exists()) {
+  if (findTriple(element, "irradiance").exists() || findTriple(element, "environment").exists()) {
     addOnce("lit");
     addOnce("indirect");
   }
@@ -157,7 +159,7 @@ std::vector<std::string> Channel::list(const PlyElement& element) {
 
 std::string Channel::choose(const PlyElement& element, const std::optional<CloudChannels>& stated) {
   const auto has = [&](const char* name) { return findTriple(element, name).exists(); };
-  if (has("irradiance")) return "lit";
+  if (has("irradiance") || has("environment")) return "lit";
   if (RowField::find(element, "occlusion").exists()) return "ao";
   if (has("radiosity") && (!stated || stated->radiosity)) return "radiosity";
   if (has("color")) return "color";
@@ -167,7 +169,7 @@ std::string Channel::choose(const PlyElement& element, const std::optional<Cloud
 }
 
 glm::vec3 Channel::value(const std::byte* row) const {
-  return base_.read(row) + sign_ * factor_.read(row) * value_.read(row);
+  return base_.read(row) + sign_ * factor_.read(row) * (value_.read(row) + added_.read(row));
 }
 
 }  // namespace surfeit

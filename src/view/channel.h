@@ -1,8 +1,8 @@
 // Channels: what a picture shows of each surfel. A channel is a scalar property, a triple of
 // properties with one prefix, or light derived from several triples.
 //
-//   lit         radiosity + albedo * irradiance: the surface with its color bleeding
-//   indirect    albedo * irradiance: the color bleeding alone
+//   lit         radiosity + albedo * (irradiance + environment): the surface with what was gathered
+//   indirect    albedo * (irradiance + environment): what was gathered alone
 //   ao          1 - occlusion: the ambient-occlusion picture
 //   color       red green blue; 8- and 16-bit values are sRGB and become scene-linear
 //   normal      nx ny nz
@@ -10,8 +10,9 @@
 //   NAME        NAME_r NAME_g NAME_b (radiosity, irradiance, albedo, ...) or NAME_x NAME_y NAME_z
 //   NAME        any other scalar property: a grey value
 //
-// Where radiosity or albedo is absent, lit and indirect use color in its place, as the indexer
-// does; without color, radiosity is 0 and albedo 1.
+// lit and indirect need one of irradiance and environment, and take both where both are there.
+// Where radiosity or albedo is absent, they use color in its place, as the indexer does; without
+// color, radiosity is 0 and albedo 1.
 #pragma once
 
 #include <array>
@@ -69,8 +70,8 @@ class Channel {
 
   std::string name_;
   ChannelKind kind_ = ChannelKind::kLight;
-  // value = base + sign * factor * value
-  Triple base_, factor_, value_;
+  // value = base + sign * factor * (value + added)
+  Triple base_, factor_, value_, added_;
   float sign_ = 1;
 };
 

@@ -60,6 +60,31 @@ TEST(Channel, LitWithoutAlbedoShowsTheIrradiance) {
   EXPECT_EQ(valueOf(element, "lit", {0, 0, 0, 1, 2, 3}), glm::vec3(1, 2, 3));
 }
 
+TEST(Channel, LitAddsTheLightOfTheEnvironment) {
+  const std::vector<std::string> names = {
+      "x",        "y",        "z",        "environment_r", "environment_g", "environment_b",
+      "albedo_r", "albedo_g", "albedo_b", "irradiance_r",  "irradiance_g",  "irradiance_b"};
+  const std::vector<float> row = {0, 0, 0, 1, 2, 3, 0.5f, 0.25f, 1, 3, 2, 1};
+  EXPECT_EQ(valueOf(floats(names), "lit", row), glm::vec3(2, 1, 4));
+  EXPECT_EQ(valueOf(floats(names), "indirect", row), glm::vec3(2, 1, 4));
+
+  // Without color bleeding there is still the environment
+  const PlyElement alone = floats({names.begin(), names.begin() + 9});
+  EXPECT_EQ(valueOf(alone, "lit", row), glm::vec3(0.5f, 0.5f, 3));
+  EXPECT_EQ(Channel::choose(alone, {}), "lit");
+}
+
+TEST(Channel, TriplesOfAGatherAreChannels) {
+  const PlyElement element =
+      floats({"x", "y", "z", "reflection_r", "reflection_g", "reflection_b", "fluence_r",
+              "fluence_g", "fluence_b", "bent_normal_x", "bent_normal_y", "bent_normal_z"});
+  const std::vector<float> row = {0, 0, 0, 1, 2, 3, 4, 5, 6, 0, -1, 0};
+  EXPECT_EQ(valueOf(element, "reflection", row), glm::vec3(1, 2, 3));
+  EXPECT_EQ(valueOf(element, "fluence", row), glm::vec3(4, 5, 6));
+  EXPECT_EQ(valueOf(element, "bent_normal", row), glm::vec3(0, -1, 0));
+  EXPECT_EQ(Channel::find(element, "bent_normal", "cloud.ply")->kind(), ChannelKind::kNormal);
+}
+
 TEST(Channel, EightBitColorsAreSrgb) {
   PlyElement element = floats({"x", "y", "z"});
   for (const char* name : {"red", "green", "blue"}) {

@@ -1,0 +1,201 @@
+#!/usr/bin/env bash
+# Makes the pictures of docs/gallery.md, in docs/gallery/, from scenes that it makes itself. Clouds
+# and scenes go to out/gallery/. Minutes on two cores. Chapters may be named to make only these:
+#
+#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset ...]
+#
+# SURFEIT_BUILD names a build directory to take the programs from; else build/release is built.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+surfels=600000
+receivers=300000
+box_camera=(--eye "0.5 0.5 2.4" --look-at "0.5 0.5 0" --fov 37)
+box_view=("${box_camera[@]}" --size 400x400)
+speckled_view=("${box_camera[@]}" --size 280x280)  # of what a PNG packs badly
+studio_eye="0 3.4 5.4"
+studio_camera=(--eye "$studio_eye" --look-at "0 0.3 0.1" --fov 37)
+studio_view=("${studio_camera[@]}" --size 560x420)
+middle_view=("${studio_camera[@]}" --size 420x315)
+look_view=("${studio_camera[@]}" --size 280x210)
+lamps_view=(--eye "0 3.0 6.6" --look-at "0 0.75 0" --fov 35 --size 560x420)
+sun=(--light-directional "0.9 -1.6 -1.0  1.25 1.2 1.1")
+
+say() { printf '\n== %s\n' "$*"; }
+
+# Runs a command and tells its seconds of processor time, which docs/gallery.md quotes
+timed() {
+  local seconds TIMEFORMAT="%U"
+  seconds=$({ time "$@" --quiet; } 2>&1) || { echo "$seconds" >&2 && exit 1; }
+  printf '%6.1f s  %s\n' "$seconds" "$*"
+}
+sample() { timed surfeit sample "$@"; }
+index() { timed surfeit index "$@"; }
+gather() { timed surfeit gather "$@"; }
+draw() { # PICTURE CLOUD OPTIONS...
+  timed surfeit view "$2" -o "$pictures/$1.png" "${@:3}"
+}
+clouds() { ../../scripts/gallery_clouds.py "$@"; }
+
+if [[ -z ${SURFEIT_BUILD:-} ]]; then
+  SURFEIT_BUILD=$PWD/build/release
+  say "Building the program (preset release)"
+  scripts/install-deps.sh
+  cmake --preset release > /dev/null
+  cmake --build --preset release --parallel "$(nproc)" \
+    --target surfeit_program cornell_scene studio_scene
+fi
+PATH=$SURFEIT_BUILD/bin:$SURFEIT_BUILD/examples:$PATH
+pictures=$PWD/docs/gallery
+mkdir -p "$pictures" out/gallery
+cd out/gallery
+
+scenes() {
+  say "Scenes: a box with two spheres, a knot, a teapot and a bumpy ball on a floor, and three lamps"
+  cornell_scene .
+  studio_scene .
+  # The box: what lights it, and where it is looked at. With --emission the lamp itself shows
+  sample cornell.obj -o box.ply --count $surfels
+  index box.ply -o box.sft
+  sample cornell.obj -o box_receivers.ply --count $receivers --emission --light-samples 64
+  # The studio: in the sun, and black
+  sample studio.obj -o studio.ply --count $surfels "${sun[@]}"
+  index studio.ply -o studio.sft
+  sample studio.obj -o studio_receivers.ply --count $receivers "${sun[@]}"
+  sample studio.obj -o black.ply --count $surfels
+  index black.ply -o black.sft
+  sample studio.obj -o black_receivers.ply --count $receivers
+}
+
+direct() {
+  say "Direct light, and color bleeding"
+  draw studio_direct studio_receivers.ply --channel radiosity "${studio_view[@]}"
+  draw studio_surfels studio.ply --radius-scale 0.5 --channel radiosity --fov 7 \
+    --eye "$studio_eye" --look-at "1.3 0.8 0.9" --size 320x240
+  gather studio.sft studio_receivers.ply -o studio_bleeding.ply --mode bleeding
+  draw studio_bleeding studio_bleeding.ply --channel lit "${studio_view[@]}"
+  draw studio_indirect studio_bleeding.ply --channel indirect --exposure 2.5 "${studio_view[@]}"
+}
+
+quality() {
+  say "What the solid angle and the raster decide"
+  local sigma pixels
+  for sigma in 1 0.1 0.03; do
+    gather studio.sft studio_receivers.ply -o sigma.ply --mode bleeding --max-solid-angle $sigma
+    draw studio_sigma_$sigma sigma.ply --channel indirect --exposure 2.5 "${middle_view[@]}"
+  done
+  for pixels in 2 4 8; do
+    gather studio.sft studio_receivers.ply -o pixels.ply --mode bleeding --max-solid-angle 0.03 \
+      --raster-resolution $pixels
+    draw studio_raster_$pixels pixels.ply --channel indirect --exposure 2.5 "${middle_view[@]}"
+  done
+}
+
+area() {
+  say "Area lights: lamps are bright surfels, the studio is black surfels"
+  sample lamp_panel.obj -o panel.ply --count 30000 --emission
+  sample lamp_ball.obj -o ball.ply --count 30000 --emission
+  sample lamp_ring.obj -o ring.ply --count 30000 --emission
+  # Every lamp is a group, and dimmer where it is looked at
+  clouds join lamps.ply black.ply panel.ply,group=1 ball.ply,group=2 ring.ply,group=3
+  clouds join lamps_receivers.ply black_receivers.ply panel.ply,dim=0.012 ball.ply,dim=0.012 \
+    ring.ply,dim=0.012
+  index lamps.ply -o lamps.sft
+  gather lamps.sft lamps_receivers.ply -o area.ply --mode bleeding --sides both \
+    --raster-resolution 24
+  draw area_lights area.ply --channel lit --exposure 0.5 "${lamps_view[@]}"
+}
+
+subset() {
+  say "One lamp alone, of the same scene"
+  local lamp
+  for lamp in 1 2 3; do
+    gather lamps.sft lamps_receivers.ply -o lamp.ply --mode bleeding --sides both \
+      --raster-resolution 24 --subset 0,$lamp
+    draw subset_$lamp lamp.ply --channel lit --exposure 0.5 "${lamps_view[@]}"
+  done
+}
+
+photons() {
+  say "Photon maps"
+  sample cornell.obj -o photons.ply --photons 1000000
+  sample cornell.obj -o fewer_photons.ply --photons 40000
+  draw photons_map fewer_photons.ply --channel power --exposure 13.5 --mode points \
+    "${speckled_view[@]}"
+  timed surfeit radiance photons.ply -o photon_radiosity.ply --photons-per-estimate 200
+  draw photons_radiosity photon_radiosity.ply --channel radiosity --exposure -1 "${speckled_view[@]}"
+  index photon_radiosity.ply -o photon_radiosity.sft
+  gather photon_radiosity.sft box_receivers.ply -o photons_gathered.ply --mode bleeding
+  draw photons_gathered photons_gathered.ply --channel lit --exposure -1 "${box_view[@]}"
+}
+
+environment() {
+  say "Environment light"
+  clouds sky sky.hdr sky.ply
+  draw environment_map sky.ply --mode points --point-size 2 --channel radiosity --exposure -4.5 \
+    --eye "256 128 400" --look-at "256 128 0" --fov 35.5 --size 512x256
+  gather black.sft black_receivers.ply -o environment.ply --environment sky.hdr --up y \
+    --raster-resolution 24 --outputs occlusion,bent_normal,environment
+  draw environment environment.ply --channel lit --exposure -2.5 "${studio_view[@]}"
+  draw bent_normal environment.ply --channel bent_normal "${studio_view[@]}"
+}
+
+bounces() {
+  say "No bounce, one and two"
+  draw bounces_0 box_receivers.ply --channel radiosity --exposure -1 "${box_view[@]}"
+  gather box.sft box_receivers.ply -o bounces_1.ply --mode bleeding
+  draw bounces_1 bounces_1.ply --channel lit --exposure -1 "${box_view[@]}"
+  timed surfeit bounce box.sft -o box_1.sft --bounces 1
+  gather box_1.sft box_receivers.ply -o bounces_2.ply --mode bleeding
+  draw bounces_2 bounces_2.ply --channel lit --exposure -1 "${box_view[@]}"
+}
+
+occlusion() {
+  say "Ambient occlusion, and its nine looks: max distance by cone angle"
+  gather black.sft black_receivers.ply -o occlusion.ply
+  draw occlusion occlusion.ply --channel ao "${studio_view[@]}"
+  local distance cone
+  for distance in 0.2 0.6 1e30; do
+    for cone in 0.4 0.8 1.57; do
+      gather black.sft black_receivers.ply -o look.ply --max-dist $distance --cone-angle $cone
+      draw occlusion_${distance}_$cone look.ply --channel ao "${look_view[@]}"
+    done
+  done
+}
+
+glossy() {
+  say "Glossy reflection, and reflection occlusion"
+  local cone
+  # Narrow cones see single surfels: they need more of them
+  sample studio.obj -o fine.ply --count 1000000 "${sun[@]}"
+  index fine.ply -o fine.sft
+  for cone in 0.05 0.2 0.5; do
+    gather fine.sft studio_receivers.ply -o glossy.ply --mode glossy --cone-angle $cone \
+      --roughness 1 --camera "${studio_eye// /,}" --outputs occlusion,irradiance --sides both
+    draw glossy_$cone glossy.ply --channel reflection "${studio_view[@]}"
+    draw reflection_occlusion_$cone glossy.ply --channel ao "${studio_view[@]}"
+  done
+}
+
+volume() {
+  say "Light in a volume"
+  sample cornell.obj -o box_lamp.ply --count $surfels --emission
+  index box_lamp.ply -o box_lamp.sft
+  # A slab across the box, and haze before its walls, which have their light already
+  clouds slab slab.ply 200 0.5
+  gather box_lamp.sft slab.ply -o slab_lit.ply --mode bleeding --sides both
+  draw volume_slab slab_lit.ply --channel irradiance --exposure -2 "${box_view[@]}"
+  clouds haze haze.ply 12000 1
+  gather box_lamp.sft haze.ply -o haze_lit.ply --mode bleeding --sides both
+  gather box.sft box_receivers.ply -o box_lit.ply --mode bleeding
+  clouds join haze_in_box.ply box_lit.ply haze_lit.ply
+  draw volume_haze haze_in_box.ply --channel lit --exposure -1.5 "${speckled_view[@]}"
+}
+
+chapters=("$@")
+if ((${#chapters[@]} == 0)); then
+  chapters=(direct quality area subset photons environment bounces occlusion glossy volume)
+  scenes
+fi
+for chapter in "${chapters[@]}"; do "$chapter"; done
+say "Done: $pictures"
