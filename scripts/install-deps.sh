@@ -11,6 +11,8 @@ packages=(
   libopenexr-dev
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
   libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev
+  # Pictures of docs/gallery.md
+  python3
   # Tests
   libgtest-dev libgmock-dev
 )
