@@ -11,6 +11,7 @@
 #include "surfeit/tune.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
+#include "tools/light_options.h"
 #include "view/line_plot.h"
 
 namespace surfeit {
@@ -163,8 +164,9 @@ Status runTune(TuneArguments& arguments, CommandContext& context) {
       tuneGather(arguments.scene, arguments.receivers, arguments.options, context.progress()));
   std::string error_line;
   if (report.hitRateError()) {
-    error_line = fmt::format("\nhit rates are off by {:.4f} percentage points in the mean, but for the least budget",
-                             *report.hitRateError());
+    error_line = fmt::format(
+        "\nhit rates are off by {:.4f} percentage points in the mean, but for the least budget",
+        *report.hitRateError());
   }
   context.say(fmt::format(
       "{}: {} of {} receivers sampled in {:.1f} s; {:.1f} us per receiver with {} threads, {:.0f} "
@@ -198,6 +200,8 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
   command->add_option("--plot", arguments->plot, "Plot misses, bytes read and time (SVG)");
   command->add_flag("--json", arguments->json, "Print the report as JSON on stdout");
   addGatherOptions(*command, options.gather);
+  addLightOptions(*command, options.gather);
+  addSubsetOption(*command, options.gather.groups);
   context.addCommonOptions(*command);
   command->footer(
       "Follows the look-ups of a sample of the receivers, and predicts hit rates, bytes read and\n"

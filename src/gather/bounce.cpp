@@ -179,7 +179,7 @@ Status Bouncer::checkScene() const {
 }
 
 GatherWork Bouncer::gatherWork() const {
-  return {.rules = {GatherMode::kBleeding, options_.quality},
+  return {.rules = GatherRules(gather_options_, nullptr),
           .threads = gather_options_.threads,
           .cache_split = options_.cache_split};
 }

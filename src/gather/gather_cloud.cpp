@@ -66,7 +66,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
     SURFEIT_ASSIGN_OR_RETURN(environment, loadEnvironment(options, progress));
   }
   const std::uint64_t environment_bytes =
-      environment != nullptr ? environment->map.memoryBytes() : 0;
+      environment != nullptr ? environment->map.memoryBytes() + environment->cube.memoryBytes() : 0;
 
   // Spend the budget before anything large is allocated
   SURFEIT_ASSIGN_OR_RETURN(

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/assert.h"
+#include "core/tangent_frame.h"
 #include "gather/coverage_rules.h"
 
 namespace surfeit {
@@ -67,12 +68,10 @@ RasterGeometry::RasterGeometry(int resolution, int face_count, float largest_slo
   }
 }
 
-// Without a branch that would make it jump (Duff and others, "Building an Orthonormal Basis").
 ConeFrame::ConeFrame(const glm::vec3& axis) : x(axis) {
-  const float sign = std::copysign(1.f, axis.z);
-  const float a = -1 / (sign + axis.z), b = axis.x * axis.y * a;
-  y = {1 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x};
-  z = {b, sign + axis.y * axis.y * a, -axis.y};
+  const TangentFrame frame(axis);
+  y = frame.tangent;
+  z = frame.bitangent;
 }
 
 RasterCube::RasterCube(const RasterGeometry& geometry, bool has_color, bool fades)

@@ -22,6 +22,7 @@
 #include "gather/quiet_progress.h"
 #include "gather/receiver_sorter.h"
 #include "gather/tune_sample.h"
+#include "octree/group_set.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
 
@@ -90,6 +91,11 @@ class Tuning {
 
 Result<TuneReport> Tuning::run() {
   SURFEIT_RETURN_IF_ERROR(checkGatherOptions(gather_));
+  if (gather_.quality.max_variation > 0) {
+    return Status::invalidArgument(
+        "max variation: tuning follows every receiver and cannot tell which ones would be "
+        "interpolated: leave it out (--max-variation); the gather then needs no more memory");
+  }
   gather_ = withDefaults(gather_);
   if (gather_.temporary_directory.empty()) {
     std::error_code error;  // where there is none, who spills says so
@@ -103,6 +109,8 @@ Result<TuneReport> Tuning::run() {
     SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path_));
     input_ = std::make_unique<GatherInput>(std::move(input));
   }
+  SURFEIT_RETURN_IF_ERROR(checkGroups(*scene_, gather_.groups));
+  SURFEIT_RETURN_IF_ERROR(input_->check(GatherRules(gather_, nullptr)));
   work_ = gatherWork(input_->receivers(), gather_);
   sample_receivers_ = options_.sample_receivers == 0
                           ? work_.receivers

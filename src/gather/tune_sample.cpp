@@ -176,8 +176,7 @@ Result<TuneSample> Sampling::run(ReceiverSorter& sorter, std::uint64_t receivers
 // Draws those to be timed on the way.
 Status Sampling::followAll(ReceiverSorter& sorter, Pieces& timed) {
   LookUps look_ups(octree_->file(), kTrackedPages);
-  LookUpTrace trace(*octree_, GatherRules(GatherMode::kOcclusion, options_.quality), threads_,
-                    progress_);
+  LookUpTrace trace(*octree_, GatherRules(options_, nullptr), threads_, progress_);
   SURFEIT_RETURN_IF_ERROR(trace.follow(
       [&](std::vector<SortedReceiver>& run) -> Status {
         run.resize(PagingController::kFirstRun);
@@ -203,8 +202,7 @@ Status Sampling::followPieces(const Pieces& stretches, const Pieces& spread, dou
   std::atomic<std::uint64_t> next_stretch{0};
   FirstFailure failure;
   const auto work = [&](bool takes_spread) -> Status {
-    LookUpTrace trace(*octree_, GatherRules(GatherMode::kOcclusion, options_.quality), threads_,
-                      progress_);
+    LookUpTrace trace(*octree_, GatherRules(options_, nullptr), threads_, progress_);
     if (takes_spread) SURFEIT_RETURN_IF_ERROR(trace.follow(spread.all(), every, &second));
     StretchMisses node_part, surfel_part;
     while (!failure.happened()) {

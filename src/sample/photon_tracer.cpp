@@ -322,9 +322,7 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
   try {
     auto start = std::chrono::steady_clock::now();
     progress.beginPhase("load", 0, "triangles");
-    SURFEIT_ASSIGN_OR_RETURN(Mesh mesh,
-                             loadMeshes(meshes, options.surroundings.default_albedo, progress));
-    addGroundPlane(options.surroundings.ground, mesh);
+    SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh, loadScene(meshes, options.surroundings, progress));
     stats.triangles = mesh.triangle.size();
     stats.degenerate_faces = mesh.degenerate_faces;
     stats.load_seconds = secondsSince(start);

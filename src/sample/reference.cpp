@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/spherical_harmonics.h"
+#include "core/tangent_frame.h"
 
 namespace surfeit {
 namespace {
@@ -17,13 +18,8 @@ namespace {
 class CosineDirections {
  public:
   CosineDirections(const glm::vec3& normal, int count, std::uint64_t seed)
-      : normal_(normal), seed_(seed), count_(count) {
+      : normal_(normal), frame_(normal), seed_(seed), count_(count) {
     rows_ = std::max(1, int(std::sqrt(double(count))));
-    // Any frame will do; this one is continuous but for one direction (Duff et al. 2017)
-    const float sign = std::copysign(1.0f, normal.z);
-    const float a = -1 / (sign + normal.z), b = normal.x * normal.y * a;
-    tangent_ = {1 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x};
-    bitangent_ = {b, sign + normal.y * normal.y * a, -normal.y};
   }
 
   glm::vec3 operator[](int i) const {
@@ -39,12 +35,13 @@ class CosineDirections {
 
     const float r = std::sqrt(u), phi = 2 * kPi * v;
     const float cos_theta = std::sqrt(std::max(0.0f, 1 - u));
-    return glm::normalize(tangent_ * (r * std::cos(phi)) + bitangent_ * (r * std::sin(phi)) +
-                          normal_ * cos_theta);
+    return glm::normalize(frame_.tangent * (r * std::cos(phi)) +
+                          frame_.bitangent * (r * std::sin(phi)) + normal_ * cos_theta);
   }
 
  private:
-  glm::vec3 normal_, tangent_, bitangent_;
+  glm::vec3 normal_;
+  TangentFrame frame_;
   std::uint64_t seed_;
   int count_, rows_;
 };
@@ -71,8 +68,7 @@ Result<ReferenceScene> ReferenceScene::load(const std::vector<std::string>& mesh
                                             Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(checkSurroundings(surroundings));
   auto state = std::make_unique<State>();
-  SURFEIT_ASSIGN_OR_RETURN(state->mesh, loadMeshes(meshes, surroundings.default_albedo, progress));
-  addGroundPlane(surroundings.ground, state->mesh);
+  SURFEIT_ASSIGN_OR_RETURN(state->mesh, loadScene(meshes, surroundings, progress));
   SURFEIT_ASSIGN_OR_RETURN(RayScene rays, RayScene::build(state->mesh, threads));
   state->rays.emplace(std::move(rays));
   state->light.emplace(state->mesh, *state->rays, surroundings.lights);

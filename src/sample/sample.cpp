@@ -273,6 +273,13 @@ Status checkSurroundings(const Surroundings& surroundings) {
   return {};
 }
 
+Result<Mesh> loadScene(const std::vector<std::string>& meshes, const Surroundings& surroundings,
+                       Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(Mesh mesh, loadMeshes(meshes, surroundings.default_albedo, progress));
+  addGroundPlane(surroundings.ground, mesh);
+  return mesh;
+}
+
 Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const std::string& output,
                                  const SampleOptions& options, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(checkOptions(options));
@@ -283,9 +290,7 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
   try {
     auto start = std::chrono::steady_clock::now();
     progress.beginPhase("load", 0, "triangles");
-    SURFEIT_ASSIGN_OR_RETURN(Mesh mesh,
-                             loadMeshes(meshes, options.surroundings.default_albedo, progress));
-    addGroundPlane(options.surroundings.ground, mesh);
+    SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh, loadScene(meshes, options.surroundings, progress));
     stats.triangles = mesh.triangle.size();
     stats.degenerate_faces = mesh.degenerate_faces;
     stats.load_seconds = secondsSince(start);

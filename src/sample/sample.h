@@ -22,6 +22,10 @@ struct Surroundings {
 // kInvalidArgument, saying which value, when lights or ground cannot work.
 Status checkSurroundings(const Surroundings& surroundings);
 
+// The meshes (loadMeshes) on their ground, as the surroundings have it.
+Result<Mesh> loadScene(const std::vector<std::string>& meshes, const Surroundings& surroundings,
+                       Progress& progress);
+
 struct SampleOptions {
   Surroundings surroundings;
   std::uint64_t count = 1'000'000;  // surfels, in proportion to area; slivers add a few

@@ -58,3 +58,11 @@ jsonIs() {
 differentBytes() {
   if cmp -s "$1" "$2"; then fail "$1 and $2 are the same"; fi
 }
+
+# A scene of about that many surfels: cornell.obj, cornell.ply and cornell.sft. `cornell_scene` writes
+# its meshes.
+makeScene() {
+  "$cornell_scene" .
+  run 0 sample cornell.obj -o cornell.ply --count "$1" --light-samples 2 --quiet
+  run 0 index cornell.ply -o cornell.sft --memory 64M --quiet
+}

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "gather/frames_gather.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
@@ -76,36 +77,20 @@ class GatherPaging : public testing::Test {
   Result<std::map<std::uint64_t, float>> gatherInFrames(std::size_t frames, int threads,
                                                         int prefetch_threads,
                                                         FaultInjector* fault = nullptr) {
-    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_));
-    SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_));
-    ReceiverSorter sorter({.count = kReceivers,
-                           .memory_bytes = kReceivers * sizeof(SortedReceiver),
-                           .temporary_directory = directory_.file("")});
-    SURFEIT_RETURN_IF_ERROR(
-        input.sort(ReceiverOrder::kHilbert, scene.header().cube, true, sorter, progress_));
-    GatherMemory memory;
-    memory.caches = {.node_frames = frames,
-                     .surfel_frames = frames,
-                     .least_node_frames = 1,
-                     .least_surfel_frames = 1,
-                     .front_slots = 1,
-                     .tracked_pages = 64};
-    memory.prefetch_threads = prefetch_threads;
     GatherStats stats;
-    stats.threads = threads;
-    stats.receivers = kReceivers;
-    std::mutex mutex;
     std::map<std::uint64_t, float> occlusion;
-    std::optional<Faults> faults;
-    if (fault != nullptr) faults.emplace(std::initializer_list<FaultInjector*>{fault});
-    SURFEIT_RETURN_IF_ERROR(gatherSorted(
-        std::move(scene), sorter, memory, coarse(), stats,
-        [&](std::span<const ResultStore::Entry> entries) {
-          const std::lock_guard lock(mutex);
-          for (const auto& entry : entries) occlusion[entry.index] = entry.result.occlusion;
-          return Status();
-        },
-        progress_));
+    SURFEIT_RETURN_IF_ERROR(surfeit::gatherInFrames({.scene = scene_,
+                                                     .receivers = receivers_,
+                                                     .temporary_directory = directory_.file(""),
+                                                     .options = coarse(),
+                                                     .frames = frames,
+                                                     .threads = threads,
+                                                     .prefetch_threads = prefetch_threads,
+                                                     .fault = fault},
+                                                    stats, [&](const ResultStore::Entry& entry) {
+                                                      occlusion[entry.index] =
+                                                          entry.result.occlusion;
+                                                    }));
     return occlusion;
   }
 

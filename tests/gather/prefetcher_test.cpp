@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "gather/frames_gather.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
@@ -44,8 +45,21 @@ class PrefetchedGather : public testing::Test {
   // not slowed down.
   std::vector<GatherResult> gather(std::size_t frames, int threads, int prefetch_threads,
                                    GatherStats& stats, FaultInjector* reads = nullptr) {
+    GatherOptions options;
+    options.mode = GatherMode::kBleeding;
+    options.quality.max_solid_angle = 0.3f;
+    options.quality.raster_resolution = 4;
     std::vector<GatherResult> results(kReceivers);
-    const Status status = gatherInto(results, frames, threads, prefetch_threads, stats, reads);
+    const Status status = gatherInFrames(
+        {.scene = scene_,
+         .receivers = receivers_,
+         .temporary_directory = directory_.file(""),
+         .options = options,
+         .frames = frames,
+         .threads = threads,
+         .prefetch_threads = prefetch_threads,
+         .fault = reads},
+        stats, [&](const ResultStore::Entry& entry) { results[entry.index] = entry.result; });
     EXPECT_TRUE(status.ok()) << status.message();
     return results;
   }
@@ -53,46 +67,9 @@ class PrefetchedGather : public testing::Test {
   static constexpr std::uint64_t kReceivers = 8192;
 
  private:
-  Status gatherInto(std::vector<GatherResult>& results, std::size_t frames, int threads,
-                    int prefetch_threads, GatherStats& stats, FaultInjector* reads) {
-    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_));
-    SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_));
-    ReceiverSorter sorter({.count = kReceivers,
-                           .memory_bytes = kReceivers * sizeof(SortedReceiver),
-                           .temporary_directory = directory_.file("")});
-    SURFEIT_RETURN_IF_ERROR(
-        input.sort(ReceiverOrder::kHilbert, scene.header().cube, true, sorter, progress_));
-    GatherMemory memory;
-    memory.caches = {.node_frames = frames,
-                     .surfel_frames = frames,
-                     .least_node_frames = 1,
-                     .least_surfel_frames = 1,
-                     .front_slots = 1,
-                     .tracked_pages = 64};
-    memory.prefetch_threads = prefetch_threads;
-    GatherOptions options;
-    options.mode = GatherMode::kBleeding;
-    options.quality.max_solid_angle = 0.3f;
-    options.quality.raster_resolution = 4;
-    stats.threads = threads;
-    stats.receivers = kReceivers;
-    std::mutex mutex;
-    std::optional<Faults> faults;
-    if (reads != nullptr) faults.emplace(std::initializer_list<FaultInjector*>{reads});
-    return gatherSorted(
-        std::move(scene), sorter, memory, options, stats,
-        [&](std::span<const ResultStore::Entry> entries) {
-          const std::lock_guard lock(mutex);
-          for (const auto& entry : entries) results[entry.index] = entry.result;
-          return Status();
-        },
-        progress_);
-  }
-
   TestDirectory directory_;
   const std::string scene_ = directory_.file("scene.sft");
   const std::string receivers_ = directory_.file("receivers.ply");
-  Progress progress_;
 };
 
 TEST_F(PrefetchedGather, HasTheBytesOfAGatherInMemory) {

@@ -1,0 +1,128 @@
+#!/usr/bin/env bash
+# One case of the end-to-end tests of lights: photons, bounces, outputs, interpolation, subsets;
+# CMakeLists.txt lists the cases.
+#
+#   light_test.sh CASE SURFEIT CORNELL_SCENE WORK_DIR
+set -euo pipefail
+
+case_name=$1
+surfeit=$2
+cornell_scene=$3
+work_dir=$4
+
+source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
+
+# Photons to surfels to a gather, and a scene with more bounces.
+photonsAndBouncesWork() {
+  makeScene 5000
+  run 0 sample cornell.obj -o photons.ply --photons 20000
+  run 0 radiance photons.ply -o lit.ply --stats radiance.json
+  jsonHas radiance.json photons surfels area reflected_power
+  run 0 index lit.ply -o lit.sft
+  run 0 gather lit.sft cornell.ply -o final.ply --mode bleeding
+  exists final.ply
+  run 3 radiance cornell.ply -o wrong.ply
+  leavesNothing wrong.ply
+
+  run 0 bounce cornell.sft --bounces 2 -o bounced.sft --stats bounce.json
+  jsonHas bounce.json bounces passes mean_radiosity largest_change
+  run 0 verify bounced.sft
+  run 0 gather bounced.sft cornell.ply -o bounced.ply --mode bleeding
+  differentBytes bounced.ply final.ply
+  run 2 bounce cornell.sft --bounces 0 -o none.sft
+  leavesNothing none.sft
+}
+
+# Outputs, cones, falloff, reflections; and what they lack is told before work starts.
+lightsHaveTheirOptions() {
+  makeScene 5000
+  run 0 gather cornell.sft cornell.ply -o a.ply --outputs occlusion,bent_normal \
+    --cone-angle 0.8 --falloff 2 --falloffmode 1 --max-dist 1 --distribution uniform
+  grep -aq "property float bent_normal_z" a.ply || fail "no bent normals"
+  run 0 gather cornell.sft cornell.ply -o b.ply --mode glossy --camera 0.5,0.5,2.4
+  grep -aq "property float reflection_r" b.ply || fail "no reflection"
+  run 3 gather cornell.sft cornell.ply -o c.ply --mode glossy
+  says view_x --camera
+  run 2 gather cornell.sft cornell.ply -o c.ply --outputs occlusion,colour
+  says "found \"colour\"" environment
+  run 2 gather cornell.sft cornell.ply -o c.ply --outputs environment
+  says --environment
+  run 74 gather cornell.sft cornell.ply -o c.ply --environment no_such_map.exr
+  says no_such_map.exr
+  leavesNothing c.ply
+}
+
+interpolationIsAnOption() {
+  makeScene 20000
+  run 0 gather cornell.sft cornell.ply -o all.ply --stats all.json
+  jsonIs all.json max_variation 0 interpolated_receivers 0
+  run 0 gather cornell.sft cornell.ply -o some.ply --max-variation 0.1 --stats some.json
+  jsonIs some.json max_variation 0.1
+  differentBytes all.ply some.ply
+  run 2 gather cornell.sft cornell.ply -o none.ply --max-variation -1
+  run 2 tune cornell.sft cornell.ply --max-variation 0.1
+  says "leave it out"
+}
+
+tuningKnowsTheLights() {
+  makeScene 5000
+  run 0 tune cornell.sft cornell.ply --mode glossy --camera 0.5,0.5,2.4
+  run 3 tune cornell.sft cornell.ply --mode glossy
+  says --camera
+  run 3 tune cornell.sft cornell.ply --subset 1
+  says group
+}
+
+# A floor of group 0 and, above it, a lamp of group 7 behind a screen of group 3: lit.ply, groups.sft.
+makeGroupedScene() {
+  awk 'BEGIN {
+    print "ply\nformat ascii 1.0\nelement vertex 1200"
+    for (split("x y z nx ny nz radius area radiosity_r radiosity_g radiosity_b", name, " "); ++n in name;)
+      print "property float " name[n]
+    print "property uchar group\nend_header"
+    for (layer = 0; layer < 3; ++layer)
+      for (i = 0; i < 400; ++i)
+        print (i % 20) / 10 - .95, int(i / 20) / 10 - .95, layer, 0, 0, layer ? -1 : 1, .08, .01,
+          layer == 2, layer == 2, layer == 2, layer ? layer * 4 - 1 : 0
+  }' > groups.ply
+  run 0 index groups.ply -o groups.sft --quiet
+}
+
+subsetsAreChosenByGroup() {
+  makeGroupedScene
+  run 0 verify groups.sft
+  run 0 info groups.sft
+  says "radiosity, group" "groups         0,3,7"
+  run 0 info groups.sft --json
+  says '"groups": "0,3,7"'
+  # Only the floor, at which to gather
+  awk '/^element/ { print "element vertex 400"; next } { print } /^end_header/ { body = 1; next }
+       body && ++n == 400 { exit }' groups.ply > floor.ply
+  run 0 gather groups.sft floor.ply -o all.ply --mode bleeding --memory 64M
+  run 0 gather groups.sft floor.ply -o every.ply --mode bleeding --memory 64M --subset 0-63
+  sameBytes all.ply every.ply
+  run 0 gather groups.sft floor.ply -o lamp.ply --mode bleeding --memory 64M --subset 7
+  differentBytes all.ply lamp.ply
+  run 0 gather groups.sft floor.ply -o same.ply --mode bleeding --memory 64M --subset 1,5-9
+  sameBytes lamp.ply same.ply
+
+  run 2 gather groups.sft floor.ply -o none.ply --subset 1,4-6
+  says "groups.sft: found groups 0,3,7, expected one of those chosen: 1,4-6"
+  run 2 bounce groups.sft -o none.sft --subset 64
+  says "--subset" "expected groups from 0 to 63"
+  run 2 gather groups.sft floor.ply -o none.ply --subset 3-1
+  says "--subset" "3-1"
+  run 0 generate --surfels 1k -o city.ply
+  run 0 index city.ply -o city.sft
+  run 3 gather city.sft floor.ply -o none.ply --subset 0
+  says "city.sft: found no groups"
+  run 3 bounce city.sft -o none.sft --subset 0
+  says "city.sft: found no groups"
+  leavesNothing none
+}
+
+rm -rf "$work_dir"
+mkdir -p "$work_dir"
+cd "$work_dir"
+"$case_name"
+echo "passed: $case_name"

@@ -1,0 +1,62 @@
+// Gathers in caches of a few frames, whatever a plan would say, for tests of paging.
+#pragma once
+
+#include <initializer_list>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "gather/gather_crew.h"
+#include "gather/gather_input.h"
+#include "gather/receiver_sorter.h"
+#include "io/fault_injector.h"
+#include "octree/scene_file.h"
+#include "surfeit/gather.h"
+#include "surfeit/progress.h"
+
+namespace surfeit {
+
+struct FramesGather {
+  std::string scene, receivers, temporary_directory;
+  GatherOptions options;
+  std::size_t frames = 1;  // of each cache
+  int threads = 1, prefetch_threads = 0;
+  FaultInjector* fault = nullptr;  // of the gather itself, not of opening and sorting
+};
+
+// Calls take(entry) for every result, one at a time.
+template <typename Take>
+Status gatherInFrames(const FramesGather& gather, GatherStats& stats, Take&& take) {
+  Progress progress;
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(gather.scene));
+  SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(gather.receivers));
+  stats.receivers = input.receiverCount();
+  stats.threads = gather.threads;
+  ReceiverSorter sorter({.count = stats.receivers,
+                         .memory_bytes = stats.receivers * sizeof(SortedReceiver),
+                         .temporary_directory = gather.temporary_directory});
+  SURFEIT_RETURN_IF_ERROR(
+      input.sort(ReceiverOrder::kHilbert, scene.header().cube, true, sorter, progress));
+  GatherMemory memory;
+  memory.caches = {.node_frames = gather.frames,
+                   .surfel_frames = gather.frames,
+                   .least_node_frames = 1,
+                   .least_surfel_frames = 1,
+                   .front_slots = 1,
+                   .tracked_pages = 64};
+  memory.prefetch_threads = gather.prefetch_threads;
+  std::mutex mutex;
+  std::optional<Faults> faults;
+  if (gather.fault != nullptr) faults.emplace(std::initializer_list<FaultInjector*>{gather.fault});
+  return gatherSorted(
+      std::move(scene), sorter, memory, gather.options, stats,
+      [&](std::span<const ResultStore::Entry> entries) {
+        const std::lock_guard lock(mutex);
+        for (const ResultStore::Entry& entry : entries) take(entry);
+        return Status();
+      },
+      progress);
+}
+
+}  // namespace surfeit
