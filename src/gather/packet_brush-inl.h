@@ -63,8 +63,7 @@ inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
   hn::Store(hn::IfThenElse(touched, hn::Max(end, cover.depth_end), end), d, end_at);
 
   const V middle = hn::Min(one, hn::MulAdd(Splat(0.5f), amount, before));
-  const V slope =
-      hn::MulAdd(middle, hn::MulAdd(Splat(3 * kFill), middle, Splat(-cover.overlap)), one);
+  const V slope = hn::NegMulAdd(middle, Splat(cover.overlap), one);
   const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
   hn::Store(layer, d, layer_at);
   if constexpr (Kind::kChannels > 0) {

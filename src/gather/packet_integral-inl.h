@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <span>
 
+#include "gather/packet_fill-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
 #include "gather/result_sums.h"
@@ -69,13 +70,14 @@ class Integral {
     const bool has_near = (*canvas_.is_face_used)[face];
     const bool has_far = far_ != nullptr && (*far_->canvas->is_face_used)[face];
     const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
+    if (has_near || has_far) ResolveFace(first, end, has_near, has_far);
     for (std::size_t i = first; i < end; ++i) {
       const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
       const V direction_weight = WeightOf(pixel.direction);
       const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
       weight_sum_ = hn::Add(weight_sum_, weight);
       if (!has_near && !has_far && !has_more) continue;
-      const PixelSight sight = Look(i, has_near, has_far);
+      const PixelSight sight = has_near || has_far ? Resolved(i) : NothingSeen();
       covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
       radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
       radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
@@ -185,6 +187,50 @@ class Integral {
     return {coverage, fades ? faded : coverage, radiosity};
   }
 
+  // Puts what is seen into the pixels of a face: the coverage in the place of the room, radiosities
+  // and faded coverage in theirs.
+  void ResolveFace(std::size_t first, std::size_t end, bool has_near, bool has_far) {
+    const D d;
+    SurfaceFill fill(canvas_, lane_);
+    for (std::size_t i = first; i < end; ++i) {
+      const PixelSight sight = Look(i, has_near, has_far);
+      float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
+      hn::Store(sight.coverage, d, pixel);
+      fill.SetCoverage(i - first, sight.coverage);
+      if (rules_.hasLight()) {
+        hn::Store(sight.radiosity.x, d, pixel + 3 * kPacketReceivers);
+        hn::Store(sight.radiosity.y, d, pixel + 4 * kPacketReceivers);
+        hn::Store(sight.radiosity.z, d, pixel + 5 * kPacketReceivers);
+      }
+      if (rules_.fades()) hn::Store(sight.occlusion, d, pixel + fade_at_);
+    }
+    fill.Run();
+    fill_first_ = first;
+  }
+
+  static PixelSight NothingSeen() {
+    const V zero = hn::Zero(D());
+    return {zero, zero, {zero, zero, zero}};
+  }
+
+  // What is seen of a pixel of the face that was resolved last, with its gaps filled.
+  PixelSight Resolved(std::size_t i) const {
+    const D d;
+    const float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
+    const V found = hn::Load(d, pixel);
+    const V coverage = SurfaceFill(canvas_, lane_).Coverage(i - fill_first_);
+    const V scale = hn::IfThenElse(hn::Gt(coverage, found), hn::Div(coverage, found), Splat(1));
+    PixelSight sight = NothingSeen();
+    sight.coverage = sight.occlusion = coverage;
+    if (rules_.fades()) sight.occlusion = hn::Mul(scale, hn::Load(d, pixel + fade_at_));
+    if (rules_.hasLight()) {
+      sight.radiosity = {hn::Mul(scale, hn::Load(d, pixel + 3 * kPacketReceivers)),
+                         hn::Mul(scale, hn::Load(d, pixel + 4 * kPacketReceivers)),
+                         hn::Mul(scale, hn::Load(d, pixel + 5 * kPacketReceivers))};
+    }
+    return sight;
+  }
+
   // pi times the radiance of the environment in the whole pixel.
   V3 EnvironmentAt(std::size_t i) const {
     if (rules_.environment == nullptr) return {hn::Zero(D()), hn::Zero(D()), hn::Zero(D())};
@@ -251,6 +297,7 @@ class Integral {
   const GatherRules& rules_;
   const SharedFarField* const far_;
   const std::size_t lane_, pixel_floats_, fade_at_;
+  std::size_t fill_first_ = 0;  // first pixel of the face that was resolved last
   const Receivers receivers_;
   const Frames frames_;
   V weight_sum_, covered_;

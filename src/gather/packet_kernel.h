@@ -70,6 +70,8 @@ struct PacketCanvas {
   glm::vec3 centre;       // of the packet
   float packet_radius;
   float* pixels;  // aligned to 64 bytes
+  // Room for two values per pixel of a face and lane, aligned likewise.
+  float* fill_scratch;
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
 };

@@ -19,6 +19,11 @@ namespace {
 constexpr float kReach = 1.8f;
 constexpr float kDiagonal = 1.415f;
 
+std::size_t fillFloats(const GatherRules& rules) {
+  const auto resolution = static_cast<std::size_t>(rules.quality.raster_resolution);
+  return 2 * resolution * resolution * kPacketReceivers;
+}
+
 // Sorts by the upper 32 bits of keys, stable: a radix sort of 11 bits a pass.
 // The first `count` of `order` are replaced; `scratch` grows to hold as many.
 void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
@@ -55,8 +60,9 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
       geometry_(rasterGeometry(rules)),
       weights_(rules, 1 / geometry_.pixelsPerSlope()),
       pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() *
-                                          PacketCanvas::pixelFloats(rules_))) {
-  if (pixels_ == nullptr) throw std::bad_alloc();
+                                          PacketCanvas::pixelFloats(rules_))),
+      fill_scratch_(hwy::AllocateAligned<float>(fillFloats(rules_))) {
+  if (pixels_ == nullptr || fill_scratch_ == nullptr) throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
   order_.resize(kReservedEntries);
   order_scratch_.resize(kReservedEntries);
@@ -189,6 +195,7 @@ PacketCanvas PacketRaster::canvas() const {
           .centre = view_.centre,
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
+          .fill_scratch = fill_scratch_.get(),
           .is_face_used = &is_face_used_};
 }
 
@@ -216,7 +223,8 @@ std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
       sizeof(RasterGeometry::Pixel) + PacketCanvas::pixelFloats(rules) * sizeof(float);
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
-         kReservedPatches * sizeof(Patch) + 2 * kReservedEntries * sizeof(std::uint64_t);
+         fillFloats(rules) * sizeof(float) + kReservedPatches * sizeof(Patch) +
+         2 * kReservedEntries * sizeof(std::uint64_t);
 }
 
 }  // namespace surfeit

@@ -72,7 +72,7 @@ class PacketRaster {
   float max_distance_sq_;
   RasterGeometry geometry_;
   DirectionWeights weights_;
-  hwy::AlignedFreeUniquePtr<float[]> pixels_;
+  hwy::AlignedFreeUniquePtr<float[]> pixels_, fill_scratch_;
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;

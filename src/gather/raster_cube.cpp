@@ -78,7 +78,8 @@ RasterCube::RasterCube(const RasterGeometry& geometry, bool has_color, bool fade
     : geometry_(&geometry),
       coverage_(geometry.pixels().size()),
       radiosity_(has_color ? geometry.pixels().size() : 0),
-      faded_(fades ? geometry.pixels().size() : 0) {}
+      faded_(fades ? geometry.pixels().size() : 0),
+      fill_scratch_(2 * std::size_t(geometry.resolution()) * std::size_t(geometry.resolution())) {}
 
 void RasterCube::clear() {
   std::fill(coverage_.begin(), coverage_.end(), Coverage{});
@@ -99,12 +100,9 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float overla
   }
   coverage.layer_end = std::max(coverage.layer_end, depth.end);
 
-  // Patches do not tile: where a surface fills a pixel their sum scatters around 1, and the limit
-  // at 1 takes from what is above without giving to what is below. The slope of s + kFill s^3 in
-  // the middle of what is added gives it back, and leaves alone what covers little; that of s - s^2
-  // / 2 leaves out what hides behind the layer
+  // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer
   const float middle = std::min(1.f, coverage.layer + 0.5f * amount);
-  const float slope = 1 + middle * (3 * kFill * middle - overlap);
+  const float slope = 1 - middle * overlap;
   coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
   coverage.total =
@@ -113,6 +111,43 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float overla
           : std::clamp(1 - coverage.room + coverage.layer * coverage.room, before, 1.f);
   if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
   if (!faded_.empty()) faded_[pixel] += (coverage.total - before) * depth.fade;
+}
+
+void RasterCube::fill() {
+  const std::size_t face_pixels =
+      coverage_.size() / static_cast<std::size_t>(geometry_->faceCount());
+  std::vector<float>& filled = fill_scratch_;
+  for (std::size_t first = 0; first < coverage_.size(); first += face_pixels) {
+    for (std::size_t i = 0; i < face_pixels; ++i) filled[i] = coverage_[first + i].total;
+    for (const FillPass& pass : kFillPasses) fillFace(pass);
+    for (std::size_t i = 0; i < face_pixels; ++i) {
+      float& total = coverage_[first + i].total;
+      if (!(filled[i] > total)) continue;
+      const float scale = filled[i] / total;
+      total = filled[i];
+      if (!radiosity_.empty()) radiosity_[first + i] *= scale;
+      if (!faded_.empty()) faded_[first + i] *= scale;
+    }
+  }
+}
+
+// One pass over a face, whose coverages are at the front of fill_scratch_; the sums of three of a
+// row behind them. Neighbours on other faces do not count.
+void RasterCube::fillFace(const FillPass& pass) {
+  const int size = geometry_->resolution();
+  float* const coverage = fill_scratch_.data();
+  float* const rows = coverage + size * size;
+  for (int i = 0; i < size * size; ++i) {
+    const int x = i % size;
+    rows[i] = coverage[i] + (x > 0 ? coverage[i - 1] : 0) + (x + 1 < size ? coverage[i + 1] : 0);
+  }
+  for (int i = 0; i < size * size; ++i) {
+    const int x = i % size, y = i / size;
+    const float box = rows[i] + (y > 0 ? rows[i - size] : 0) + (y + 1 < size ? rows[i + size] : 0);
+    const int columns = 1 + (x > 0) + (x + 1 < size), lines = 1 + (y > 0) + (y + 1 < size);
+    const float around = (box - coverage[i]) / float(columns * lines - 1);
+    coverage[i] = filledCoverage(coverage[i], around, pass);
+  }
 }
 
 // Covers pixels by the part of them that lies in the shape, row by row.

@@ -73,6 +73,8 @@ struct ConeFrame {
   glm::vec3 toWorld(const glm::vec3& v) const { return v.x * x + v.y * y + v.z * z; }
 };
 
+struct FillPass;
+
 // What the pixels hold for one receiver. Contributions must come front to back, in the order of the
 // middles of their depth ranges. One thread at a time.
 //
@@ -117,6 +119,10 @@ class RasterCube {
   void traceSphere(const glm::vec3& centre, float radius, const DepthRange& depth,
                    const glm::vec3& radiosity);
 
+  // Closes the gaps that patches leave within a surface (coverage_rules.h, kFillPasses). Comes
+  // once, after everything has been drawn.
+  void fill();
+
   const RasterGeometry& geometry() const { return *geometry_; }
   // Covered fraction of a pixel, 0..1.
   float coverage(std::size_t pixel) const { return coverage_[pixel].total; }
@@ -126,8 +132,9 @@ class RasterCube {
   // Coverage of a pixel, each part times its fade. Requires that something fades.
   float fadedCoverage(std::size_t pixel) const { return faded_[pixel]; }
 
-  // Bytes that a cube with color that fades holds for each pixel.
-  static constexpr std::size_t kPixelBytes = 5 * sizeof(float) + sizeof(glm::vec3);
+  // Bytes that a cube with color that fades holds for each pixel, with its part of the scratch
+  // space of a face.
+  static constexpr std::size_t kPixelBytes = 6 * sizeof(float) + sizeof(glm::vec3);
 
  private:
   struct Coverage {
@@ -141,6 +148,7 @@ class RasterCube {
     float u, v, half_u, half_v, shear;
   };
   static Parallelogram onFace(const Patch& patch, int axis);
+  void fillFace(const FillPass& pass);
   void coverPixel(std::size_t pixel, float amount, float overlap, const DepthRange& depth,
                   const glm::vec3& radiosity);
   void coverParallelogram(int face, const Parallelogram& shape, float overlap,
@@ -153,6 +161,7 @@ class RasterCube {
   std::vector<Coverage> coverage_;
   std::vector<glm::vec3> radiosity_;
   std::vector<float> faded_;
+  std::vector<float> fill_scratch_;  // of fill(), for one face: coverages, then sums along rows
 };
 
 }  // namespace surfeit

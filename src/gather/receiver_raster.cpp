@@ -174,6 +174,7 @@ GatherResult ReceiverRaster::finish() {
                   depth, patch.radiosity);
     }
   }
+  cube_.fill();
   return integrate();
 }
 

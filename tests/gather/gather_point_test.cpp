@@ -179,7 +179,7 @@ TEST(Gather, PerpendicularRectangleHasItsFormFactor) {
     const Receiver receiver{position, {0, 0, 1}};
     const double expected = polygonFormFactor(corners, receiver);
     for (const float max_solid_angle : kSolidAngles) {
-      EXPECT_NEAR(scene.gather(receiver, qualityOf(max_solid_angle)).occlusion, expected, .015)
+      EXPECT_NEAR(scene.gather(receiver, qualityOf(max_solid_angle)).occlusion, expected, .018)
           << position.x << " " << max_solid_angle;
     }
   }

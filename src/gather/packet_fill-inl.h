@@ -1,0 +1,95 @@
+// Closes gaps within surfaces in the rasters of a packet; for one instruction set (see
+// packet_kernel-inl.h). RasterCube::fill is the definition.
+#if defined(SURFEIT_PACKET_FILL_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_FILL_INL_H_
+#undef SURFEIT_PACKET_FILL_INL_H_
+#else
+#define SURFEIT_PACKET_FILL_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+
+#include "gather/coverage_rules.h"
+#include "gather/packet_kernel.h"
+#include "gather/packet_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+// The coverages of one face for kStep receivers from `lane` on, in the canvas' scratch space.
+class SurfaceFill {
+ public:
+  SurfaceFill(const PacketCanvas& canvas, std::size_t lane)
+      : size_(canvas.geometry->resolution()),
+        coverage_(canvas.fill_scratch + lane),
+        rows_(coverage_ + std::size_t(size_) * std::size_t(size_) * kPacketReceivers) {}
+
+  void SetCoverage(std::size_t pixel, V coverage) const {
+    hn::Store(coverage, D(), coverage_ + pixel * kPacketReceivers);
+  }
+  V Coverage(std::size_t pixel) const {
+    return hn::Load(D(), coverage_ + pixel * kPacketReceivers);
+  }
+
+  void Run() const {
+    for (const FillPass& pass : kFillPasses) {
+      for (int row = 0; row < size_; ++row) SumRow(row);
+      for (int row = 0; row < size_; ++row) FillRow(row, pass);
+    }
+  }
+
+ private:
+  float* At(float* values, int row, int column) const {
+    return values + std::size_t(row * size_ + column) * kPacketReceivers;
+  }
+
+  // Sums of three neighbours along a row.
+  void SumRow(int row) const {
+    const D d;
+    V before = hn::Zero(d), here = hn::Load(d, At(coverage_, row, 0));
+    for (int column = 0; column < size_; ++column) {
+      V after = hn::Zero(d);
+      if (column + 1 < size_) after = hn::Load(d, At(coverage_, row, column + 1));
+      hn::Store(hn::Add(hn::Add(here, before), after), d, At(rows_, row, column));
+      before = here;
+      here = after;
+    }
+  }
+
+  void FillRow(int row, const FillPass& pass) const {
+    const D d;
+    const V zero = hn::Zero(d), one = Splat(1);
+    const bool has_above = row > 0, has_below = row + 1 < size_;
+    const float part_scale = 1 / (pass.end - pass.begin);
+    constexpr float kSeenScale = 1 / (kFilledWhole - kFilledFrom);
+    for (int column = 0; column < size_; ++column) {
+      const V coverage = hn::Load(d, At(coverage_, row, column));
+      V box = hn::Load(d, At(rows_, row, column));
+      if (has_above) box = hn::Add(box, hn::Load(d, At(rows_, row - 1, column)));
+      if (has_below) box = hn::Add(box, hn::Load(d, At(rows_, row + 1, column)));
+      const int columns = 1 + (column > 0) + (column + 1 < size_);
+      const int count = columns * (1 + has_above + has_below) - 1;
+      const V around = hn::Mul(hn::Sub(box, coverage), Splat(1 / float(count)));
+      const V part = hn::Mul(hn::Sub(around, Splat(pass.begin)), Splat(part_scale));
+      const V seen = hn::Mul(hn::Sub(coverage, Splat(kFilledFrom)), Splat(kSeenScale));
+      const V filled =
+          hn::Mul(hn::Min(one, hn::Max(zero, part)), hn::Min(one, hn::Max(zero, seen)));
+      hn::Store(hn::MulAdd(filled, hn::Sub(one, coverage), coverage), d,
+                At(coverage_, row, column));
+    }
+  }
+
+  const int size_;
+  float *const coverage_, *const rows_;
+};
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target guard
