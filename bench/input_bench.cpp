@@ -77,7 +77,9 @@ Status measureFile(const std::string& path, std::span<const Surfel> cloud, PlyEn
   const std::size_t count = cloud.size();
   SURFEIT_RETURN_IF_ERROR(measure(("write " + name + ", sync included").c_str(), count,
                                   [&] { return writeCloud(path, cloud, encoding); }));
-  SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, false, Access::kDirect));
+  RowReaderOptions options;
+  options.access = Access::kDirect;
+  SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, false, options));
   AlignedBuffer buffer;
   const auto fetch = [&]() -> Status {
     SURFEIT_RETURN_IF_ERROR(source->rewind());

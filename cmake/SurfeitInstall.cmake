@@ -2,7 +2,7 @@
 include(CMakePackageConfigHelpers)
 
 install(DIRECTORY include/surfeit DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(TARGETS surfeit surfeit_core surfeit_io surfeit_cache surfeit_octree surfeit_gather
+install(TARGETS surfeit surfeit_core surfeit_io surfeit_cache surfeit_octree surfeit_gather surfeit_brick
   EXPORT surfeitTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 if(SURFEIT_BUILD_TOOLS)
   install(TARGETS surfeit_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
@@ -16,5 +16,6 @@ write_basic_package_version_file(surfeitConfigVersion.cmake COMPATIBILITY SameMi
 install(FILES
   ${CMAKE_CURRENT_BINARY_DIR}/surfeitConfig.cmake
   ${CMAKE_CURRENT_BINARY_DIR}/surfeitConfigVersion.cmake
+  cmake/FindBlosc.cmake
   cmake/FindxxHash.cmake
   DESTINATION ${surfeit_package_dir})

@@ -7,7 +7,7 @@ packages=(
   # Tools
   g++ cmake ninja-build ccache
   # Library
-  libglm-dev libfmt-dev libtbb-dev libzstd-dev libxxhash-dev libhwy-dev nlohmann-json3-dev
+  libglm-dev libfmt-dev libtbb-dev libzstd-dev zlib1g-dev libblosc-dev libxxhash-dev libhwy-dev nlohmann-json3-dev
   libopenexr-dev
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
   libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev
@@ -15,6 +15,8 @@ packages=(
   python3
   # Tests
   libgtest-dev libgmock-dev
+  # OpenVDB itself, against which our reader and writer of .vdb are tested
+  libopenvdb-dev libboost-iostreams-dev
 )
 
 if ! command -v dpkg-query > /dev/null || ! command -v apt-get > /dev/null; then

@@ -67,9 +67,13 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
       "gather", "Gather occlusion, color bleeding, reflection or environment light at receivers");
   const auto arguments = std::make_shared<GatherArguments>();
   command->add_option("SCENE", arguments->scene, "Scene file (.sft)")->required();
-  command->add_option("RECEIVERS", arguments->receivers, "Cloud (PLY) with x y z and nx ny nz")
+  command
+      ->add_option("RECEIVERS", arguments->receivers,
+                   "Cloud with x y z and nx ny nz (docs/files.md)")
       ->required();
-  command->add_option("-o,--output", arguments->result, "Result cloud (PLY)")->required();
+  command
+      ->add_option("-o,--output", arguments->result, "Result cloud; the extension tells its format")
+      ->required();
   addGatherOptions(*command, arguments->options);
   addLightOptions(*command, arguments->options);
   addSubsetOption(*command, arguments->options.groups);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "octree/group_set.h"
+#include "tools/channel_options.h"
 
 namespace surfeit {
 namespace {
@@ -125,6 +126,7 @@ void addGatherOptions(CLI::App& command, GatherOptions& options) {
                         {{"occlusion", GatherMode::kOcclusion},
                          {"bleeding", GatherMode::kBleeding},
                          {"glossy", GatherMode::kGlossy}});
+  addChannelOptions(command, options.channels, options.part);
   command.add_flag("--strict", options.strict,
                    "Refuse invalid receivers instead of writing NaN for them");
   addQualityOptions(command, options.quality);

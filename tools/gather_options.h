@@ -31,9 +31,9 @@ CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& target
       ->default_str(choices.front().first);
 }
 
-// Adds everything that says what is gathered and how pages are read: mode, quality, order of the
-// receivers, caches. Parsing fills `options`, which must outlive `command`; threads and memory are
-// left to the program's own options.
+// Adds everything that says what is gathered and how pages are read: mode, channels of the
+// receivers, quality, their order, caches. Parsing fills `options`, which must outlive `command`;
+// threads and memory are left to the program's own options.
 void addGatherOptions(CLI::App& command, GatherOptions& options);
 
 // Parts of it, for commands that gather at the surfels of a scene: what decides about errors, and

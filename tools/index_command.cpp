@@ -7,6 +7,7 @@
 
 #include "core/job_limits.h"
 #include "surfeit/index.h"
+#include "tools/channel_options.h"
 #include "tools/command.h"
 
 namespace surfeit {
@@ -67,9 +68,10 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   IndexOptions& options = arguments->options;
   command
       ->add_option("CLOUD", arguments->inputs,
-                   "Surfel clouds (PLY, or recipes of generate), in any order")
+                   "Surfel clouds (docs/files.md, or recipes of generate), in any order")
       ->required();
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
+  addChannelOptions(*command, options.channels, options.part);
   command->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
@@ -92,7 +94,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "--memory defaults to 1G; 64M is the least for two threads.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"
-      "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch");
+      "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
+      "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");
   command->callback(
       [arguments, &context] { context.run([&] { return runIndex(*arguments, context); }); });
 }

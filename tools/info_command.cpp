@@ -2,22 +2,27 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/bounds.h"
-#include "io/file.h"
+#include "io/byte_input.h"
+#include "io/channels.h"
+#include "io/cloud_formats.h"
 #include "io/ply_reader.h"
 #include "io/surfel_source.h"
 #include "octree/group_set.h"
 #include "surfeit/scene.h"
+#include "tools/channel_options.h"
 #include "tools/command.h"
 
 namespace surfeit {
 namespace {
 
 struct InfoArguments {
-  std::string path;
+  std::string path, channels, part;
   bool json = false;
 };
 
@@ -81,21 +86,20 @@ std::string sceneText(const std::string& path, const SceneInfo& info) {
       formatBytes(info.surfel_cache_bytes), info.provenance);
 }
 
-// Any PLY: elements and properties; bounds when the records are surfels.
-Result<nlohmann::json> plyJson(const std::string& path, Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(const PlyReader reader, PlyReader::open(path));
-  nlohmann::json json = {{"format", "ply"}, {"elements", nlohmann::json::array()}};
-  for (const PlyElement& element : reader.header().elements) {
-    nlohmann::json properties = nlohmann::json::array();
-    for (const PlyProperty& property : element.properties) {
-      properties.push_back(std::string(property.is_list ? "list " : "") +
-                           std::string(plyTypeName(property.type)) + " " + property.name);
-    }
-    json["elements"].push_back(
-        {{"name", element.name}, {"count", element.count}, {"properties", properties}});
-  }
-  Result<std::unique_ptr<SurfelSource>> source = openSurfelSource(path, /* strict= */ false);
-  if (!source.ok()) return json;  // a PLY without surfels is still a PLY
+Result<RowReaderOptions> readingOf(const InfoArguments& arguments) {
+  RowReaderOptions options;
+  SURFEIT_ASSIGN_OR_RETURN(options.channels, parseChannelRenames(arguments.channels));
+  options.part = arguments.part;
+  return options;
+}
+
+// Of records that are surfels: how many are valid, their channels and bounds. Those of a cloud
+// without surfels are left out.
+Status addSurfels(const InfoArguments& arguments, nlohmann::json& json, Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions options, readingOf(arguments));
+  Result<std::unique_ptr<SurfelSource>> source =
+      openSurfelSource(arguments.path, /* strict= */ false, options);
+  if (!source.ok()) return {};
   Bounds3 bounds;
   std::uint64_t surfels = 0;
   std::vector<Surfel> batch(16384);
@@ -113,6 +117,33 @@ Result<nlohmann::json> plyJson(const std::string& path, Progress& progress) {
   if (!bounds.isEmpty()) json["bounds"] = {vectorJson(bounds.min), vectorJson(bounds.max)};
   const std::string defects = (*source)->defects().describe();
   if (!defects.empty()) json["defects"] = defects;
+  return {};
+}
+
+std::string surfelsText(const nlohmann::json& json) {
+  std::string text;
+  if (json.contains("bounds")) {
+    text += fmt::format("\n  surfels        {}, bounds {}",
+                        formatCount(json["surfels"].get<std::uint64_t>()), json["bounds"].dump());
+  }
+  if (json.contains("defects")) text += "\n  defects        " + json["defects"].get<std::string>();
+  return text;
+}
+
+// Any PLY: elements and properties; bounds when the records are surfels.
+Result<nlohmann::json> plyJson(const InfoArguments& arguments, Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(const PlyReader reader, PlyReader::open(arguments.path));
+  nlohmann::json json = {{"format", "ply"}, {"elements", nlohmann::json::array()}};
+  for (const PlyElement& element : reader.header().elements) {
+    nlohmann::json properties = nlohmann::json::array();
+    for (const PlyProperty& property : element.properties) {
+      properties.push_back(std::string(property.is_list ? "list " : "") +
+                           std::string(plyTypeName(property.type)) + " " + property.name);
+    }
+    json["elements"].push_back(
+        {{"name", element.name}, {"count", element.count}, {"properties", properties}});
+  }
+  SURFEIT_RETURN_IF_ERROR(addSurfels(arguments, json, progress));
   return json;
 }
 
@@ -126,33 +157,74 @@ std::string plyText(const std::string& path, const nlohmann::json& json) {
     text += fmt::format("\n  {:14} {}: {}", element["name"].get<std::string>(),
                         formatCount(element["count"].get<std::uint64_t>()), properties);
   }
-  if (json.contains("bounds")) {
-    text += fmt::format("\n  surfels        {}, bounds {}",
-                        formatCount(json["surfels"].get<std::uint64_t>()), json["bounds"].dump());
-  }
-  if (json.contains("defects")) text += "\n  defects        " + json["defects"].get<std::string>();
-  return text;
+  return text + surfelsText(json);
 }
 
-Result<bool> startsWithPly(const std::string& path) {
-  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
-  std::byte magic[3] = {};
-  SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, file.readSome(0, magic));
-  return got == 3 && magic[0] == std::byte{'p'} && magic[1] == std::byte{'l'} &&
-         magic[2] == std::byte{'y'};
+// Any other cloud: what a row holds, and what of the file it does not.
+Result<nlohmann::json> cloudJson(const InfoArguments& arguments, Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions options, readingOf(arguments));
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader,
+                           openRowReader(arguments.path, options));
+  const PlyElement& element = reader->element();
+  nlohmann::json json = {{"format", reader->formatName()},
+                         {"count", element.count},
+                         {"channels", nlohmann::json::array()},
+                         {"comments", reader->comments()},
+                         {"notes", reader->notes()}};
+  for (const RowChannel& channel : channelsOf(element)) {
+    nlohmann::json properties = nlohmann::json::array();
+    for (const std::size_t i : channel.properties) {
+      properties.push_back(element.properties[i].name);
+    }
+    json["channels"].push_back(
+        {{"name", channel.name}, {"type", plyTypeName(channel.type)}, {"properties", properties}});
+  }
+  SURFEIT_RETURN_IF_ERROR(addSurfels(arguments, json, progress));
+  return json;
+}
+
+std::string cloudText(const std::string& path, const nlohmann::json& json) {
+  std::string text = fmt::format("{}: {}, {} points", path, json["format"].get<std::string>(),
+                                 formatCount(json["count"].get<std::uint64_t>()));
+  for (const nlohmann::json& channel : json["channels"]) {
+    text += fmt::format("\n  {:14} {} {}", channel["name"].get<std::string>(),
+                        channel["type"].get<std::string>(),
+                        fmt::join(channel["properties"].get<std::vector<std::string>>(), " "));
+  }
+  for (const char* kind : {"comments", "notes"}) {
+    for (const nlohmann::json& line : json[kind]) {
+      text += fmt::format("\n  {:14} {}",
+                          std::string_view(kind).substr(0, std::string_view(kind).size() - 1),
+                          line.get<std::string>());
+    }
+  }
+  return text + surfelsText(json);
+}
+
+// The first bytes of a file, decompressed.
+Result<std::string> firstBytes(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput file, ByteInput::open(path));
+  std::string bytes(8, '\0');
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                           file.readSome(0, std::as_writable_bytes(std::span(bytes))));
+  bytes.resize(size);
+  return bytes;
 }
 
 Status runInfo(const InfoArguments& arguments, CommandContext& context) {
-  SURFEIT_ASSIGN_OR_RETURN(const bool is_ply, startsWithPly(arguments.path));
+  SURFEIT_ASSIGN_OR_RETURN(const std::string first_bytes, firstBytes(arguments.path));
   nlohmann::json json;
   std::string text;
-  if (is_ply) {
-    SURFEIT_ASSIGN_OR_RETURN(json, plyJson(arguments.path, context.progress()));
+  if (first_bytes.starts_with("ply")) {
+    SURFEIT_ASSIGN_OR_RETURN(json, plyJson(arguments, context.progress()));
     text = plyText(arguments.path, json);
-  } else {
+  } else if (isSceneFile(first_bytes)) {
     SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.path));
     json = sceneJson(info);
     text = sceneText(arguments.path, info);
+  } else {
+    SURFEIT_ASSIGN_OR_RETURN(json, cloudJson(arguments, context.progress()));
+    text = cloudText(arguments.path, json);
   }
   json["path"] = arguments.path;
   if (arguments.json) {
@@ -168,7 +240,9 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
 void addInfoCommand(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand("info", "Tell what a scene file or a cloud holds");
   const auto arguments = std::make_shared<InfoArguments>();
-  command->add_option("FILE", arguments->path, "Scene file (.sft) or cloud (.ply)")->required();
+  command->add_option("FILE", arguments->path, "Scene file (.sft) or cloud (docs/files.md)")
+      ->required();
+  addChannelOptions(*command, arguments->channels, arguments->part);
   command->add_flag("--json", arguments->json, "JSON on standard output");
   context.addCommonOptions(*command, {.threads = false, .memory = false, .stats = false});
   command->footer(

@@ -16,14 +16,17 @@ namespace {
 void addCommands(CLI::App& app, CommandContext& context) {
   addSampleCommand(app, context);
   addGenerateCommand(app, context);
+  addConvertCommand(app, context);
   addIndexCommand(app, context);
   addInfoCommand(app, context);
   addVerifyCommand(app, context);
   addGatherCommand(app, context);
   addRadianceCommand(app, context);
   addBounceCommand(app, context);
+  addBrickCommand(app, context);
   addTuneCommand(app, context);
   addViewCommand(app, context);
+  addCompositeCommand(app, context);
 }
 
 int parseAndRun(int argc, char** argv) {

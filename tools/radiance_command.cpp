@@ -8,6 +8,7 @@
 
 #include "core/job_limits.h"
 #include "surfeit/radiance.h"
+#include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/number_list.h"
 
@@ -94,13 +95,15 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<RadianceArguments>();
   RadianceOptions& options = arguments->options;
   command
-      ->add_option("PHOTONS", arguments->photons,
-                   "Photon clouds (PLY: position, normal, power_r power_g power_b, albedo)")
+      ->add_option(
+          "PHOTONS", arguments->photons,
+          "Photon clouds (docs/photons.md: position, normal, power_r power_g power_b, albedo)")
       ->required();
   command->add_option("-o,--output", arguments->output, "The cloud to write (PLY)")
       ->required()
       ->type_name("CLOUD");
   addEstimateOptions(*command, options);
+  addChannelOptions(*command, options.channels, options.part);
   command->add_option("--temp", options.temporary_directory,
                       "Directory of temporary files (default: beside the output)");
   command->add_flag("--strict", options.strict, "Refuse invalid photons instead of skipping them");

@@ -188,7 +188,9 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<TuneArguments>();
   TuneOptions& options = arguments->options;
   command->add_option("SCENE", arguments->scene, "Scene file (.sft)")->required();
-  command->add_option("RECEIVERS", arguments->receivers, "Cloud (PLY) with x y z and nx ny nz")
+  command
+      ->add_option("RECEIVERS", arguments->receivers,
+                   "Cloud with x y z and nx ny nz (docs/files.md)")
       ->required();
   command
       ->add_option("--sample", options.sample_receivers,

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/view_options.h"
 #include "view/view.h"
@@ -21,6 +22,8 @@ nlohmann::json statsOf(const ViewArguments& arguments, const ViewStats& stats) {
       {"command", "view"},
       {"input", arguments.input},
       {"picture", arguments.picture},
+      {"passes", arguments.options.passes},
+      {"pass_pixels", stats.pass_pixels},
       {"width", arguments.options.width},
       {"height", arguments.options.height},
       {"samples", arguments.options.samples},
@@ -44,24 +47,36 @@ Status runView(ViewArguments& arguments, CommandContext& context) {
   arguments.options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const ViewStats stats, viewCloud(arguments.input, arguments.picture,
                                                             arguments.options, context.progress()));
-  context.say(fmt::format(
-      "{}: channel {} of {} surfels in {:.1f} s; --eye \"{:.6g} {:.6g} {:.6g}\" "
-      "--look-at \"{:.6g} {:.6g} {:.6g}\"",
-      arguments.picture, stats.channel, formatCount(stats.records), stats.seconds, stats.eye.x,
-      stats.eye.y, stats.eye.z, stats.look_at.x, stats.look_at.y, stats.look_at.z));
+  const std::string camera =
+      fmt::format("--eye \"{:.6g} {:.6g} {:.6g}\" --look-at \"{:.6g} {:.6g} {:.6g}\"", stats.eye.x,
+                  stats.eye.y, stats.eye.z, stats.look_at.x, stats.look_at.y, stats.look_at.z);
+  if (!arguments.options.passes.empty()) {
+    context.say(fmt::format("{}: {} of {}x{} pixels see the cloud; {}", arguments.options.passes,
+                            formatCount(stats.pass_pixels), arguments.options.width,
+                            arguments.options.height, camera));
+  }
+  if (!arguments.picture.empty()) {
+    context.say(fmt::format("{}: channel {} of {} surfels in {:.1f} s; {}", arguments.picture,
+                            stats.channel, formatCount(stats.records), stats.seconds, camera));
+  }
   return context.writeStats(statsOf(arguments, stats));
 }
 
 }  // namespace
 
 void addViewCommand(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("view", "Draw a cloud (.ply) or a scene (.sft)");
+  CLI::App* command =
+      app.add_subcommand("view", "Draw a cloud or a scene (.sft), or write its render passes");
   const auto arguments = std::make_shared<ViewArguments>();
-  command->add_option("FILE", arguments->input, "PLY cloud with x y z, or a .sft file")->required();
+  command->add_option("FILE", arguments->input, "Cloud with x y z, or a .sft file")->required();
+  command->add_option("-o,--output", arguments->picture,
+                      "Picture: .png (8-bit sRGB) or .exr (linear half RGBA, and Z)");
   command
-      ->add_option("-o,--output", arguments->picture,
-                   "Picture: .png (8-bit sRGB) or .exr (linear half RGBA, and Z)")
-      ->required();
+      ->add_option("--passes", arguments->options.passes,
+                   "Write what each pixel sees as OpenEXR, position, normal, depth, albedo and "
+                   "radiosity: receivers for gather. With or without -o")
+      ->type_name("FILE");
+  addChannelOptions(*command, arguments->options.channels, arguments->options.part);
   addViewOptions(*command, arguments->options);
   context.addCommonOptions(*command);
   command->callback(

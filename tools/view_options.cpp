@@ -71,6 +71,36 @@ void parseSize(const std::string& text, ViewOptions& options) {
   options.height = height;
 }
 
+void addRange(CLI::App& app, std::optional<glm::dvec2>& range, const char* group) {
+  app.add_option_function<std::string>(
+         "--range",
+         [&range](const std::string& text) {
+           const auto ends = parseNumberList<2>("--range", text, "two numbers, \"black white\"");
+           range = glm::dvec2(ends[0], ends[1]);
+         },
+         "Value shown black and value shown white. Default: scalars other than occlusion are "
+         "stretched over the values they take, in PNG")
+      ->type_name("\"BLACK WHITE\"")
+      ->group(group);
+}
+
+// How light becomes a PNG.
+void addDisplayOptions(CLI::App& app, float& exposure, glm::vec3& background) {
+  app.add_option("--exposure", exposure,
+                 "Stops of exposure: PNG light is multiplied by 2^EV (default 0)")
+      ->type_name("EV")
+      ->group(kPictureGroup);
+  app.add_option_function<std::string>(
+         "--background",
+         [&background](const std::string& text) {
+           background = glm::vec3(parseVector("--background", text));
+         },
+         "Color behind the cloud in PNG, display values 0..1 (default \"0.13 0.13 0.13\"); EXR "
+         "has alpha instead")
+      ->type_name("\"R G B\"")
+      ->group(kPictureGroup);
+}
+
 void addCameraOptions(CLI::App& app, CameraOptions& camera) {
   addVector(app, "--eye", camera.eye,
             "Where the eye stands. Default: a three-quarter view that frames the cloud; strays "
@@ -105,16 +135,19 @@ void addSurfelOptions(CLI::App& app, ViewOptions& options) {
                  "not finite are magenta")
       ->type_name("NAME")
       ->group(kSurfelGroup);
-  app.add_option_function<std::string>(
-         "--range",
-         [&options](const std::string& text) {
-           const auto range = parseNumberList<2>("--range", text, "two numbers, \"black white\"");
-           options.range = glm::dvec2(range[0], range[1]);
-         },
-         "Value shown black and value shown white. Default: scalars other than occlusion are "
-         "stretched over the values they take, in PNG")
-      ->type_name("\"BLACK WHITE\"")
+  app.add_option(
+         "--brick", options.brick,
+         "Brick map (docs/brick.md) that channels are looked up in, at each surfel; those of "
+         "the same name in the cloud give way")
+      ->type_name("FILE")
       ->group(kSurfelGroup);
+  app.add_option("--filter-width", options.filter_width,
+                 "Width over which --brick averages, scene units; 0: the finest there is (default: "
+                 "the diameter of the surfel)")
+      ->type_name("W")
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->group(kSurfelGroup);
+  addRange(app, options.range, kSurfelGroup);
   app.add_option("--radius", options.radius,
                  "Radius of every surfel, scene units. Default: the cloud's own, else from the "
                  "density of the cloud")
@@ -145,19 +178,7 @@ void addPictureOptions(CLI::App& app, ViewOptions& options) {
       ->type_name("N")
       ->check(CLI::Range(1, 8).description(""))
       ->group(kPictureGroup);
-  app.add_option("--exposure", options.exposure,
-                 "Stops of exposure: PNG light is multiplied by 2^EV (default 0)")
-      ->type_name("EV")
-      ->group(kPictureGroup);
-  app.add_option_function<std::string>(
-         "--background",
-         [&options](const std::string& text) {
-           options.background = glm::vec3(parseVector("--background", text));
-         },
-         "Color behind the cloud in PNG, display values 0..1 (default \"0.13 0.13 0.13\"); EXR "
-         "has alpha instead")
-      ->type_name("\"R G B\"")
-      ->group(kPictureGroup);
+  addDisplayOptions(app, options.exposure, options.background);
 }
 
 }  // namespace
@@ -166,6 +187,23 @@ void addViewOptions(CLI::App& app, ViewOptions& options) {
   addCameraOptions(app, options.camera);
   addSurfelOptions(app, options);
   addPictureOptions(app, options);
+}
+
+void addCompositeOptions(CLI::App& app, CompositeOptions& options) {
+  app.add_option("--channel", options.channel,
+                 "What to show: radiosity (direct light), indirect = albedo * (irradiance + "
+                 "environment), lit = radiosity + indirect, ao = 1 - occlusion, or any other "
+                 "channel of the files. Default: the first of lit, ao, radiosity, color, albedo, "
+                 "normal, position that they have. Values that are not finite are magenta")
+      ->type_name("NAME")
+      ->group(kPictureGroup);
+  app.add_option("--reduce", options.reduce,
+                 "Pixels along each edge of the files that become one, their mean (default 1)")
+      ->type_name("N")
+      ->check(CLI::Range(1, 16).description(""))
+      ->group(kPictureGroup);
+  addRange(app, options.range, kPictureGroup);
+  addDisplayOptions(app, options.exposure, options.background);
 }
 
 }  // namespace surfeit

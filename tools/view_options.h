@@ -1,8 +1,9 @@
-// Options of `surfeit view`.
+// Options of `surfeit view` and `surfeit composite`.
 #pragma once
 
 #include <CLI/CLI.hpp>
 
+#include "view/composite.h"
 #include "view/view.h"
 
 namespace surfeit {
@@ -11,5 +12,8 @@ namespace surfeit {
 // `options`, which must outlive `app`; threads and memory are left to the program's own options.
 // A malformed value is a usage error that names the option and what it expects.
 void addViewOptions(CLI::App& app, ViewOptions& options);
+
+// The same for what `surfeit composite` makes of a picture.
+void addCompositeOptions(CLI::App& app, CompositeOptions& options);
 
 }  // namespace surfeit

@@ -133,6 +133,11 @@ struct GatherOptions {
   bool prefetch = true;    // read ahead along the order of the receivers when reading is slow
   // Where receivers and results go that do not fit the memory; empty: beside the result.
   std::string temporary_directory;
+
+  // Channels of the receivers to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of
+  // files with several parts (grids, layers, elements) the one to read; empty: the first with a
+  // cloud.
+  std::string channels, part;
 };
 
 // What one of the two caches did. Counts, bytes, and seconds summed over threads.
@@ -179,11 +184,11 @@ struct GatherStats {
   std::vector<GatherWindow> windows;  // in order; at most some hundreds, however long it took
 };
 
-// Gathers at every record of the cloud `receivers_path` (PLY) and writes `result_path` (PLY,
-// binary): the receivers in their order, with all their properties, plus `occlusion` and with
-// kBleeding `irradiance_r irradiance_g irradiance_b`. A receiver without a normal gathers over the
-// whole sphere. The result depends on scene, receivers, order, mode, quality and the machine's
-// instruction set alone, bit for bit; instruction sets agree within 1e-4.
+// Gathers at every record of the cloud `receivers_path` and writes `result_path`, of the format
+// that its name tells (docs/files.md): the receivers in their order, with all their properties,
+// plus `occlusion` and with kBleeding `irradiance_r irradiance_g irradiance_b`. A receiver without
+// a normal gathers over the whole sphere. The result depends on scene, receivers, order, mode,
+// quality and the machine's instruction set alone, bit for bit; instruction sets agree within 1e-4.
 // Errors: as indexClouds.
 Result<GatherStats> gatherCloud(const std::string& scene_path, const std::string& receivers_path,
                                 const std::string& result_path, const GatherOptions& options,

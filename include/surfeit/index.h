@@ -19,6 +19,9 @@ struct IndexOptions {
   bool full_precision = false;        // keep floats instead of quantized values
   bool strict = false;                // refuse invalid records instead of skipping them
   std::string temporary_directory{};  // empty: beside the output
+  // Channels of the inputs to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
+  // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
+  std::string channels{}, part{};
 };
 
 struct IndexStats {

@@ -29,6 +29,9 @@ struct RadianceOptions {
   int threads = 0;                    // 0: all that the job may use
   bool strict = false;                // refuse invalid photons instead of skipping them
   std::string temporary_directory{};  // empty: beside the result
+  // Channels of the photons to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
+  // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
+  std::string channels{}, part{};
 };
 
 struct RadianceStats {
@@ -48,7 +51,7 @@ struct RadianceStats {
 };
 
 // Writes a cloud of surfels (PLY, binary) with normal, radius, area, radiosity and albedo from the
-// photons of all inputs (PLY; docs/photons.md has the properties), ordered along the Hilbert curve.
+// photons of all inputs (docs/photons.md has the properties), ordered along the Hilbert curve.
 // The radiosity is what the surface reflects, not what it emits by itself. The result depends on
 // the photons and the options above memory_bytes alone, bit for bit, and not on the order of the
 // photons. Errors: as indexClouds; kCorruption, before work starts, when an input has no photons,

@@ -20,8 +20,8 @@
 #include "gather/gather_options.h"
 #include "gather/receiver_sorter.h"
 #include "gather/result_store.h"
+#include "io/cloud_formats.h"
 #include "io/file.h"
-#include "io/ply_writer.h"
 #include "octree/group_set.h"
 #include "octree/parallel.h"
 #include "octree/scene_file.h"
@@ -56,7 +56,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
-  SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path));
+  SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
+                           GatherInput::open(receivers_path, options.channels, options.part));
   SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
   const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();
@@ -73,12 +74,19 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
       const GatherMemory memory,
       planGatherMemory(scene, stats.memory_bytes - std::min(stats.memory_bytes, environment_bytes),
                        gatherWork(input.receivers(), options)));
-  SURFEIT_ASSIGN_OR_RETURN(PlyWriter writer,
-                           PlyWriter::create(result_path, PlyEncoding::kBinaryLittleEndian,
-                                             result_rows.properties(), input.comments()));
+  RowWriterOptions writing;
+  writing.properties = result_rows.properties();
+  writing.comments = input.reader().comments();
+  writing.count = stats.receivers;
+  writing.like = &input.reader();
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
+                           createRowWriter(result_path, writing));
 
   // Sort
   input.note(progress);
+  for (const std::string& note : writer->notes()) {
+    progress.note(fmt::format("{}: {}", result_path, note));
+  }
   progress.beginPhase("sort", stats.receivers, "receivers");
   auto sorter = std::make_unique<ReceiverSorter>(
       ReceiverSorter::Options{.count = stats.receivers,
@@ -111,7 +119,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   // Write
   SURFEIT_RETURN_IF_ERROR(results.finish());
   progress.beginPhase("write", stats.receivers, "receivers");
-  SURFEIT_RETURN_IF_ERROR(input.write(result_rows, results, writer, progress));
+  SURFEIT_RETURN_IF_ERROR(input.write(result_rows, results, *writer, progress));
   return stats;
 }
 

@@ -9,6 +9,8 @@
 
 #include "core/curve_key.h"
 #include "gather/gather_memory.h"
+#include "io/channels.h"
+#include "io/cloud_formats.h"
 
 namespace surfeit {
 namespace {
@@ -39,101 +41,89 @@ CurveKey keyOf(const glm::vec3& position, std::uint64_t index, ReceiverOrder ord
 
 }  // namespace
 
-Result<GatherInput> GatherInput::open(const std::string& path) {
-  SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
-  SURFEIT_ASSIGN_OR_RETURN(const std::size_t element, findSurfelElement(reader.header(), path));
+Result<GatherInput> GatherInput::open(const std::string& path, const std::string& channels,
+                                      const std::string& part) {
+  RowReaderOptions reading;
+  SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(channels));
+  reading.part = part;
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, reading));
   SURFEIT_ASSIGN_OR_RETURN(ReceiverMapping mapping,
-                           ReceiverMapping::create(reader.header().elements[element], path));
-  return GatherInput(std::move(reader), element, std::move(mapping));
+                           ReceiverMapping::create(reader->element(), path));
+  return GatherInput(std::move(reader), std::move(mapping));
 }
 
-GatherInput::GatherInput(PlyReader reader, std::size_t element, ReceiverMapping mapping)
-    : reader_(std::move(reader)), element_(element), mapping_(std::move(mapping)) {}
+GatherInput::GatherInput(std::unique_ptr<RowReader> reader, ReceiverMapping mapping)
+    : reader_(std::move(reader)), mapping_(std::move(mapping)) {}
 
 Status GatherInput::check(const GatherRules& rules) const {
   if (!rules.isGlossy()) return {};
   if (!mapping_.hasNormals()) {
     return Status::corruption(fmt::format(
-        "{}: no normals (nx ny nz), expected some to reflect the view at", reader_.path()));
+        "{}: no normals (nx ny nz), expected some to reflect the view at", reader_->path()));
   }
   if (mapping_.hasViews() || glm::length(rules.eye) >= 0) return {};
   return Status::corruption(
       fmt::format("{}: no view directions (view_x view_y view_z), expected these, or the position "
                   "of a camera (--camera X,Y,Z)",
-                  reader_.path()));
+                  reader_->path()));
 }
 
 void GatherInput::note(Progress& progress) const {
-  const PlyHeader& header = reader_.header();
   if (!mapping_.hasNormals()) {
-    progress.note(fmt::format("{}: no normals: gathering over the whole sphere", reader_.path()));
+    progress.note(fmt::format("{}: no normals: gathering over the whole sphere", reader_->path()));
   }
-  for (const PlyProperty& property : receivers().properties) {
-    if (!property.is_list) continue;
-    progress.note(fmt::format("{}: list property {} is not kept", reader_.path(), property.name));
-  }
-  for (std::size_t i = 0; i < header.elements.size(); ++i) {
-    if (i == element_) continue;
-    progress.note(
-        fmt::format("{}: element {} is not kept", reader_.path(), header.elements[i].name));
+  for (const std::string& note : reader_->notes()) {
+    progress.note(fmt::format("{}: {}", reader_->path(), note));
   }
 }
 
-Result<std::size_t> GatherInput::readSlice(Progress& progress) {
+Result<Bytes> GatherInput::readSlice(Progress& progress) {
   if (progress.isCancelled()) return Status::interrupted();
-  slice_.resize(kSliceRows * receivers().row_bytes);
-  return reader_.readRows(slice_);
+  return reader_->readRows(kSliceRows, slice_);
 }
 
 Status GatherInput::sort(ReceiverOrder order, const RootCube& cube, bool strict,
                          ReceiverSorter& sorter, Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(reader_.seekElement(element_));
+  SURFEIT_RETURN_IF_ERROR(reader_->rewind());
   defects_ = {};
   for (std::uint64_t record = 0;;) {
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, readSlice(progress));
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, readSlice(progress));
+    const std::size_t count = slice.size() / receivers().row_bytes;
     if (count == 0) return sorter.finish();
     for (std::size_t i = 0; i < count; ++i, ++record) {
-      const std::byte* row = slice_.data() + i * receivers().row_bytes;
+      const std::byte* row = slice.data() + i * receivers().row_bytes;
       SortedReceiver receiver;
       if (mapping_.decode(row, record, receiver.receiver, defects_)) {
         receiver.index = record;
         receiver.key = keyOf(receiver.receiver.position, record, order, cube);
         SURFEIT_RETURN_IF_ERROR(sorter.add(receiver));
       } else if (strict) {
-        return Status::corruption(
-            fmt::format("{}: record {}: {}", reader_.path(), record, mapping_.describeDefect(row)));
+        return Status::corruption(fmt::format("{}: record {}: {}", reader_->path(), record,
+                                              mapping_.describeDefect(row)));
       }
     }
     progress.advance(count);
   }
 }
 
-Status GatherInput::write(const ResultRows& rows, ResultStore& results, PlyWriter& writer,
+Status GatherInput::write(const ResultRows& rows, ResultStore& results, RowWriter& writer,
                           Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(reader_.seekElement(element_));
+  SURFEIT_RETURN_IF_ERROR(reader_->rewind());
   std::vector<GatherResult> slice_results;
   std::vector<std::byte> output(kSliceRows * rows.rowBytes());
   for (;;) {
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, readSlice(progress));
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, readSlice(progress));
+    const std::size_t count = slice.size() / receivers().row_bytes;
     if (count == 0) return writer.finish();
     slice_results.resize(count);
     SURFEIT_RETURN_IF_ERROR(results.take(slice_results));
     for (std::size_t i = 0; i < count; ++i) {
-      rows.make(slice_.data() + i * receivers().row_bytes, slice_results[i],
+      rows.make(slice.data() + i * receivers().row_bytes, slice_results[i],
                 output.data() + i * rows.rowBytes());
     }
     SURFEIT_RETURN_IF_ERROR(writer.writeRows({output.data(), count * rows.rowBytes()}));
     progress.advance(count);
   }
-}
-
-std::vector<std::string> GatherInput::comments() const {
-  std::vector<std::string> comments = reader_.header().comments;
-  // PlyWriter leaves blank ones for a count to grow
-  std::erase_if(comments, [](const std::string& comment) {
-    return comment.find_first_not_of(' ') == std::string::npos;
-  });
-  return comments;
 }
 
 }  // namespace surfeit

@@ -4,16 +4,16 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
-#include <vector>
 
 #include "core/bounds.h"
 #include "gather/gather_rules.h"
 #include "gather/receiver_rows.h"
 #include "gather/receiver_sorter.h"
 #include "gather/result_store.h"
-#include "io/ply_reader.h"
-#include "io/ply_writer.h"
+#include "io/row_reader.h"
+#include "io/row_writer.h"
 #include "surfeit/gather.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -23,11 +23,14 @@ namespace surfeit {
 // One thread at a time.
 class GatherInput {
  public:
-  // Opens the cloud and finds its receivers. Errors as of PlyReader::open and ReceiverMapping.
-  static Result<GatherInput> open(const std::string& path);
+  // Opens the cloud and finds its receivers. `channels` and `part` as in GatherOptions. Errors as
+  // of parseChannelRenames, openRowReader and ReceiverMapping.
+  static Result<GatherInput> open(const std::string& path, const std::string& channels = {},
+                                  const std::string& part = {});
 
   std::uint64_t receiverCount() const { return receivers().count; }
-  const PlyElement& receivers() const { return reader_.header().elements[element_]; }
+  const PlyElement& receivers() const { return reader_->element(); }
+  const RowReader& reader() const { return *reader_; }
 
   // kCorruption when receivers lack what the mode needs.
   Status check(const GatherRules& rules) const;
@@ -43,21 +46,17 @@ class GatherInput {
   const SurfelDefects& defects() const { return defects_; }
 
   // Writes all receivers with their results, in the order of the input.
-  Status write(const ResultRows& rows, ResultStore& results, PlyWriter& writer, Progress& progress);
-
-  // The comments of the input that a result keeps.
-  std::vector<std::string> comments() const;
+  Status write(const ResultRows& rows, ResultStore& results, RowWriter& writer, Progress& progress);
 
  private:
-  GatherInput(PlyReader reader, std::size_t element, ReceiverMapping mapping);
+  GatherInput(std::unique_ptr<RowReader> reader, ReceiverMapping mapping);
 
-  // Reads the next rows, up to kSliceRows; 0 at the end.
-  Result<std::size_t> readSlice(Progress& progress);
+  // Reads the next rows, up to kSliceRows; none at the end.
+  Result<Bytes> readSlice(Progress& progress);
 
-  PlyReader reader_;
-  std::size_t element_;
+  std::unique_ptr<RowReader> reader_;
   ReceiverMapping mapping_;
-  std::vector<std::byte> slice_;
+  AlignedBuffer slice_;
   SurfelDefects defects_;
 };
 

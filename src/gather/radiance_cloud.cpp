@@ -154,7 +154,8 @@ class RadianceJob {
 Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
                                        const std::string& result_path) {
   // Everything that can be refused is, before work starts
-  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons, PhotonCloud::open(inputs));
+  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons,
+                           PhotonCloud::open(inputs, options_.channels, options_.part));
   SURFEIT_RETURN_IF_ERROR(planThreads());
   CloudChannels channels;
   channels.normal = channels.radius = channels.area = channels.radiosity = channels.albedo = true;

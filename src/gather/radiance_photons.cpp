@@ -13,8 +13,8 @@
 #include <string_view>
 #include <utility>
 
+#include "io/cloud_formats.h"
 #include "io/photon_names.h"
-#include "io/ply_reader.h"
 #include "io/surfel_names.h"
 #include "io/temporary_name.h"
 #include "octree/local_density.h"
@@ -99,22 +99,20 @@ std::string headerText(std::uint64_t row_count) {
 
 // Opens a cloud and finds its photons.
 struct PhotonFile {
-  PlyReader reader;
-  std::size_t element;
+  std::unique_ptr<RowReader> reader;
   PhotonMapping mapping;
 
-  static Result<PhotonFile> open(const std::string& path) {
-    SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t index, findSurfelElement(reader.header(), path));
-    const PlyElement& element = reader.header().elements[index];
+  static Result<PhotonFile> open(const std::string& path, const RowReaderOptions& options) {
+    SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, options));
+    const PlyElement& element = reader->element();
     SURFEIT_ASSIGN_OR_RETURN(PhotonMapping mapping, PhotonMapping::create(element, path));
     if (element.count == 0) {
       return Status::corruption(
           fmt::format("{}: element {} has 0 rows, expected photons", path, element.name));
     }
-    return PhotonFile{std::move(reader), index, std::move(mapping)};
+    return PhotonFile{std::move(reader), std::move(mapping)};
   }
-  const PlyElement& photons() const { return reader.header().elements[element]; }
+  const PlyElement& photons() const { return reader->element(); }
 };
 
 }  // namespace
@@ -206,12 +204,15 @@ std::string PhotonMapping::describeDefect(const std::byte* row) const {
   return "nothing";
 }
 
-Result<PhotonCloud> PhotonCloud::open(const std::vector<std::string>& inputs) {
+Result<PhotonCloud> PhotonCloud::open(const std::vector<std::string>& inputs,
+                                      const std::string& channels, const std::string& part) {
   if (inputs.empty()) return Status::invalidArgument("radiance: no photon cloud");
   PhotonCloud cloud;
   cloud.inputs_ = inputs;
+  SURFEIT_ASSIGN_OR_RETURN(cloud.opening_.channels, parseChannelRenames(channels));
+  cloud.opening_.part = part;
   for (const std::string& path : inputs) {
-    SURFEIT_ASSIGN_OR_RETURN(const PhotonFile file, PhotonFile::open(path));
+    SURFEIT_ASSIGN_OR_RETURN(const PhotonFile file, PhotonFile::open(path, cloud.opening_));
     cloud.record_count_ += file.photons().count;
   }
   return cloud;
@@ -243,19 +244,19 @@ Status PhotonCloud::write(const std::string& directory, const std::string& resul
 
 Status PhotonCloud::append(const std::string& input, const PhotonReading& reading,
                            Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(PhotonFile file, PhotonFile::open(input));
+  SURFEIT_ASSIGN_OR_RETURN(PhotonFile file, PhotonFile::open(input, opening_));
   if (!file.mapping.hasAlbedo()) {
     const glm::vec3& albedo = reading.default_albedo;
     progress.note(
         fmt::format("{}: no albedo: {} {} {} is used", input, albedo.x, albedo.y, albedo.z));
   }
-  SURFEIT_RETURN_IF_ERROR(file.reader.seekElement(file.element));
   const std::size_t row_bytes = file.photons().row_bytes;
-  std::vector<std::byte> slice(kSliceRows * row_bytes);
+  AlignedBuffer buffer;
   PhotonDefects defects;
   for (std::uint64_t record = 0;;) {
     if (progress.isCancelled()) return Status::interrupted();
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t rows, file.reader.readRows(slice));
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, file.reader->readRows(kSliceRows, buffer));
+    const std::size_t rows = slice.size() / row_bytes;
     if (rows == 0) break;
     for (std::size_t i = 0; i < rows; ++i, ++record) {
       const std::byte* row = slice.data() + i * row_bytes;

@@ -1,5 +1,5 @@
-// Photons as they come, PLY by name, and as the indexer takes them: surfels whose radiosity is the
-// photon's power.
+// Photons as they come, from clouds of any format by name, and as the indexer takes them: surfels
+// whose radiosity is the photon's power.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "io/cloud_formats.h"
 #include "io/ply_format.h"
 #include "io/positional_file.h"
 #include "io/surfel_mapping.h"
@@ -68,8 +69,9 @@ struct PhotonReading {
 // their positions. One thread at a time.
 class PhotonCloud {
  public:
-  // Opens every input to see that it holds photons.
-  static Result<PhotonCloud> open(const std::vector<std::string>& inputs);
+  // Opens every input to see that it holds photons. `channels` and `part` as in RadianceOptions.
+  static Result<PhotonCloud> open(const std::vector<std::string>& inputs,
+                                  const std::string& channels = {}, const std::string& part = {});
 
   std::uint64_t recordCount() const { return record_count_; }
 
@@ -92,6 +94,7 @@ class PhotonCloud {
   Status flush();
 
   std::vector<std::string> inputs_;
+  RowReaderOptions opening_;
   std::uint64_t record_count_ = 0;
   PositionalFile file_;
   std::vector<std::byte> buffer_;  // rows to be written at the end of the file

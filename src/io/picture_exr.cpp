@@ -1,13 +1,9 @@
-#include <OpenEXR/Iex.h>
 #include <OpenEXR/ImfChannelList.h>
-#include <OpenEXR/ImfCompression.h>
 #include <OpenEXR/ImfEnvmapAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
-#include <OpenEXR/ImfVersion.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,54 +14,12 @@
 #include <vector>
 
 #include "core/assert.h"
+#include "io/formats/exr_header.h"
+#include "io/formats/exr_stream.h"
 #include "io/picture_reader.h"
 
 namespace surfeit {
 namespace {
-
-// A file as OpenEXR wants to read it. Keeps the failure that made it throw.
-class ExrStream final : public Imf::IStream {
- public:
-  explicit ExrStream(InputFile file) : Imf::IStream(file.path().c_str()), file_(std::move(file)) {}
-
-  bool read(char bytes[], int count) override {
-    const std::size_t size = std::size_t(std::max(count, 0));
-    Status status = file_.readAt(position_, std::as_writable_bytes(std::span(bytes, size)));
-    if (!status.ok()) {
-      status_ = std::move(status);
-      throw Iex::InputExc(status_.message());
-    }
-    position_ += size;
-    return position_ < file_.size();
-  }
-  uint64_t tellg() override { return position_; }
-  void seekg(uint64_t position) override { position_ = position; }
-
-  // Of a file that ends where OpenEXR reads on, or that the system does not read.
-  const Status& status() const { return status_; }
-
- private:
-  InputFile file_;
-  std::uint64_t position_ = 0;
-  Status status_;
-};
-
-// Rows that are compressed together.
-int rowsPerBlock(Imf::Compression compression) {
-  switch (compression) {
-    case Imf::NO_COMPRESSION:
-    case Imf::RLE_COMPRESSION:
-    case Imf::ZIPS_COMPRESSION:
-      return 1;
-    case Imf::ZIP_COMPRESSION:
-    case Imf::PXR24_COMPRESSION:
-      return 16;
-    case Imf::DWAB_COMPRESSION:
-      return 256;
-    default:
-      return 32;  // PIZ, B44, B44A, DWAA
-  }
-}
 
 class ExrPicture final : public PictureReader {
  public:
@@ -113,19 +67,14 @@ class ExrPicture final : public PictureReader {
   }
 
  private:
-  // OpenEXR allocates by what the header says, so the header is looked at first.
+  // OpenEXR allocates by what the header says, so the header is looked at first
+  // (io/formats/exr_header.h).
   Status checkHeader() {
-    char start[8];
-    stream_.read(start, sizeof(start));
-    const auto byteAt = [&](int i) { return int(static_cast<unsigned char>(start[i])); };
-    const int version = byteAt(4) | byteAt(5) << 8 | byteAt(6) << 16 | byteAt(7) << 24;
-    if (Imf::isNonImage(version)) {
+    SURFEIT_ASSIGN_OR_RETURN(const std::vector<Imf::Header> headers, readExrHeaders(stream_));
+    const Imf::Header& header = headers.front();
+    if (isDeepExr(header)) {
       return Status::corruption(fmt::format("{}: deep pixels, expected flat ones", path()));
     }
-    Imf::Header header;
-    int header_version = version;
-    header.readFrom(stream_, header_version);
-
     const Imath::Box2i window = header.dataWindow();
     SURFEIT_RETURN_IF_ERROR(setSize(std::int64_t(window.max.x) - window.min.x + 1,
                                     std::int64_t(window.max.y) - window.min.y + 1));
@@ -137,18 +86,22 @@ class ExrPicture final : public PictureReader {
     for (auto i = header.channels().begin(); i != header.channels().end(); ++i) {
       pixel_bytes += i.channel().type == Imf::HALF ? 2 : 4;
     }
-    std::uint64_t rows = std::uint64_t(rowsPerBlock(header.compression()));
-    if (header.hasTileDescription()) {
-      rows = header.tileDescription().ySize;
+    std::uint64_t columns = std::uint64_t(width());
+    std::uint64_t rows = exrBlockRows(header);
+    if (hasExrTiles(header)) {
+      // OpenEXR holds whole tiles, however small the picture is
+      columns = std::max(columns, std::uint64_t(header.tileDescription().xSize));
       pixel_bytes += sizeof(glm::vec3);
+    } else {
+      rows = std::min(rows, std::uint64_t(height()));
     }
-    rows = std::min(rows, std::uint64_t(height()));
-    const std::uint64_t decoded = rows * std::uint64_t(width()) * pixel_bytes;
-    if (decoded > kMaxDecodedBytes) {
-      return Status::invalidArgument(fmt::format(
-          "{}: {} rows decode to {} bytes together, expected at most {}: save it in scan lines or "
-          "smaller tiles, without channels other than R, G and B",
-          path(), rows, decoded, kMaxDecodedBytes));
+    const double decoded = double(rows) * double(columns) * double(pixel_bytes);
+    if (decoded > double(kMaxDecodedBytes)) {
+      return Status::invalidArgument(
+          fmt::format("{}: {} rows decode to {:.0f} bytes together, expected at most {}: save it "
+                      "in scan lines or "
+                      "smaller tiles, without channels other than R, G and B",
+                      path(), rows, decoded, kMaxDecodedBytes));
     }
     return {};
   }
@@ -176,15 +129,15 @@ class ExrPicture final : public PictureReader {
     } catch (const std::bad_alloc&) {
       failure_ = Status::failed(fmt::format("{}: out of memory", path()));
     } catch (const std::exception& error) {
-      failure_ =
-          stream_.status().ok()
-              ? Status::corruption(fmt::format("{}: {}: OpenEXR: {}", path(), place, error.what()))
-              : stream_.status();
+      failure_ = stream_.status().ok()
+                     ? Status::corruption(fmt::format("{}: {}: OpenEXR: {}", path(), place,
+                                                      exrMessage(error.what())))
+                     : stream_.status();
     }
     return failure_;
   }
 
-  ExrStream stream_;
+  ExrInputStream stream_;
   std::unique_ptr<Imf::InputFile> file_;
   std::vector<glm::vec3> row_;
   bool is_grey_ = false;

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/file.h"
+#include "io/byte_input.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -17,9 +17,10 @@ namespace surfeit {
 // One thread at a time; the buffer takes 256 KiB.
 class PlyCursor {
  public:
-  explicit PlyCursor(InputFile file) : file_(std::move(file)) {}
+  explicit PlyCursor(ByteInput file) : file_(std::move(file)) {}
 
-  const InputFile& file() const { return file_; }
+  ByteInput& file() { return file_; }
+  const ByteInput& file() const { return file_; }
   // Of the next byte; may lie behind the end of the file after jumpTo.
   std::uint64_t offset() const { return end_offset_ - (end_ - begin_); }
   void jumpTo(std::uint64_t offset);
@@ -46,7 +47,7 @@ class PlyCursor {
   void refill();
   void skipBlanks();
 
-  InputFile file_;
+  ByteInput file_;
   // buffer_[begin_, end_) are the next bytes; the file goes on at end_offset_
   std::vector<std::byte> buffer_ = std::vector<std::byte>(256 << 10);
   std::size_t begin_ = 0, end_ = 0;

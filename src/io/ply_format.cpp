@@ -247,7 +247,7 @@ Result<PlyHeader> parsePlyHeader(std::string_view text, const std::string& path)
   return HeaderParser(text.substr(0, kMaxPlyHeaderBytes), path).parse();
 }
 
-Result<PlyHeader> readPlyHeader(const InputFile& file) {
+Result<PlyHeader> readPlyHeader(ByteInput& file) {
   // Headers are short; only one that does not parse gets the room that it may have at most
   for (std::size_t most = kUsualHeaderBytes;; most = kMaxPlyHeaderBytes) {
     std::string text(most, '\0');

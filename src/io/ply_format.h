@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "io/file.h"
+#include "io/byte_input.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -104,7 +104,7 @@ inline constexpr std::size_t kMaxPlyHeaderBytes = 1 << 20;
 // has properties. "obj_info" lines are dropped, and so are comments without text.
 Result<PlyHeader> parsePlyHeader(std::string_view text, const std::string& path);
 // The same from the file itself.
-Result<PlyHeader> readPlyHeader(const InputFile& file);
+Result<PlyHeader> readPlyHeader(ByteInput& file);
 
 // The header as it stands in a file, up to and including "end_header\n". Line ends in comments
 // become spaces.

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -14,13 +16,15 @@ namespace surfeit {
 namespace {
 
 constexpr std::size_t kMaxListItems = 1 << 20;
+// Only so few bytes can be a line end rather than data.
+constexpr std::size_t kMaxLineEnd = 2;
 constexpr std::size_t kNoList = std::numeric_limits<std::size_t>::max();
 
 }  // namespace
 
 // Where in the file we are.
 struct PlyReader::State {
-  explicit State(InputFile opened) : cursor(std::move(opened)) {}
+  explicit State(ByteInput opened) : cursor(std::move(opened)) {}
 
   PlyCursor cursor;
   PlyHeader header;
@@ -32,7 +36,8 @@ struct PlyReader::State {
   std::vector<std::byte> skipped_row;
   std::string_view token;
 
-  const InputFile& file() const { return cursor.file(); }
+  ByteInput& file() { return cursor.file(); }
+  const ByteInput& file() const { return cursor.file(); }
   const PlyElement& element() const { return header.elements[element_index]; }
   bool isAscii() const { return header.encoding == PlyEncoding::kAscii; }
   bool hasFixedRows() const { return !isAscii() && !element().hasLists(); }
@@ -42,7 +47,9 @@ struct PlyReader::State {
         fmt::format("{}: element {} row {}: {}", file().path(), element().name, row, what));
   }
   Status endsEarly(std::string_view expected) const {
-    return damaged(fmt::format("file ends early: {} bytes, expected {}", file().size(), expected));
+    const std::optional<std::uint64_t> size = file().size();
+    return damaged(fmt::format("file ends early: {} bytes, expected {}",
+                               size.value_or(cursor.offset()), expected));
   }
   Status invalidCall(std::string_view what) const {
     return Status::invalidArgument(fmt::format("{}: {}", file().path(), what));
@@ -65,10 +72,17 @@ struct PlyReader::State {
 
   Status skipBytes(std::uint64_t size) {
     const std::uint64_t offset = cursor.offset();
-    if (size > file().size() - std::min(file().size(), offset)) {
-      return endsEarly(fmt::format("{} bytes at {}", size, offset));
+    if (const std::optional<std::uint64_t> file_size = file().size()) {
+      if (size > *file_size - std::min(*file_size, offset)) {
+        return endsEarly(fmt::format("{} bytes at {}", size, offset));
+      }
+      cursor.skip(size);
+    } else if (size > 0) {
+      // The last of the bytes must be there
+      cursor.skip(size - 1);
+      std::byte last;
+      SURFEIT_RETURN_IF_ERROR(readBytes({&last, 1}));
     }
-    cursor.skip(size);
     return {};
   }
 
@@ -193,20 +207,41 @@ struct PlyReader::State {
   }
 
   Status checkEnd() {
-    const std::uint64_t size = file().size();
-    if (cursor.offset() >= size) return {};
-    // Only so few bytes can be a line end rather than data
-    if (isAscii() || size - cursor.offset() <= 2) cursor.skipEmptyLines();
+    const std::uint64_t begin = cursor.offset();
+    const std::optional<std::uint64_t> size = file().size();
+    if (size && begin >= *size) return {};
+    if (!size && !isAscii()) return checkCompressedEnd();
+    if (isAscii() || *size - begin <= kMaxLineEnd) cursor.skipEmptyLines();
     SURFEIT_RETURN_IF_ERROR(cursor.failure());
-    if (cursor.offset() >= size) return {};
+    if (size ? cursor.offset() >= *size : cursor.isAtEnd()) return {};
+    return notTheEnd(size ? fmt::format("{} bytes", *size - cursor.offset()) : "bytes",
+                     cursor.offset());
+  }
+
+  // Reads to the end of the file, so that its checksum is seen, too.
+  Status checkCompressedEnd() {
+    const std::uint64_t begin = cursor.offset();
+    std::array<std::byte, kMaxLineEnd + 1> bytes;
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t size, cursor.read(bytes));
+    const bool is_line_end = std::all_of(
+        bytes.begin(), bytes.begin() + std::ptrdiff_t(size),
+        [](std::byte byte) { return byte == std::byte{'\n'} || byte == std::byte{'\r'}; });
+    if (size <= kMaxLineEnd && is_line_end) return {};
+    return notTheEnd("bytes", begin);
+  }
+
+  Status notTheEnd(std::string_view found, std::uint64_t offset) const {
     return Status::corruption(
-        fmt::format("{}: {} bytes at {} after the last element, expected the end of the file",
-                    file().path(), size - cursor.offset(), cursor.offset()));
+        fmt::format("{}: {} at {} after the last element, expected the end of the file",
+                    file().path(), found, offset));
   }
 
   // What the file can hold bounds every count before anyone uses it; sums cannot overflow later.
   Status checkCounts() {
-    std::uint64_t left = file().size() - std::min(file().size(), header.data_offset);
+    // More than any disk holds stands for a size that is not known
+    constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 62;
+    const std::uint64_t size = file().size().value_or(kMostBytes);
+    std::uint64_t left = size - std::min(size, header.data_offset);
     bool is_fixed_size = !isAscii();
     for (element_index = 0; element_index < header.elements.size(); ++element_index) {
       // An ascii value takes a digit and a blank; a list takes its length at least
@@ -231,8 +266,8 @@ struct PlyReader::State {
     element_index = 0;
 
     // With rows of fixed size the end is known at once
-    if (is_fixed_size) {
-      cursor.jumpTo(file().size() - left);
+    if (is_fixed_size && !file().isCompressed()) {
+      cursor.jumpTo(size - left);
       SURFEIT_RETURN_IF_ERROR(checkEnd());
     }
     return {};
@@ -330,7 +365,7 @@ struct PlyReader::State {
 };
 
 Result<PlyReader> PlyReader::open(const std::string& path, Access access) {
-  SURFEIT_ASSIGN_OR_RETURN(InputFile file, InputFile::open(path, access));
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput file, ByteInput::open(path, access));
   auto state = std::make_unique<State>(std::move(file));
   SURFEIT_ASSIGN_OR_RETURN(state->header, readPlyHeader(state->file()));
   SURFEIT_RETURN_IF_ERROR(state->checkCounts());
@@ -379,7 +414,8 @@ Result<Bytes> PlyReader::readRowView(std::size_t max_rows, AlignedBuffer& buffer
 }
 
 bool PlyReader::hasFixedRows() const {
-  return !state_->header.elements.empty() && state_->hasFixedRows();
+  return !state_->header.elements.empty() && state_->hasFixedRows() &&
+         !state_->file().isCompressed();
 }
 
 Status PlyReader::seekRow(std::uint64_t row) {

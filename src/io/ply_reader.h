@@ -1,5 +1,5 @@
-// Streams the rows of a PLY file, ascii or binary of either endianness, without ever holding more
-// than a small buffer. Row counts are 64 bits.
+// Streams the rows of a PLY file, ascii or binary of either endianness, plain or compressed,
+// without ever holding more than a small buffer. Row counts are 64 bits.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +20,10 @@ namespace surfeit {
 // bytes after its last element (a final newline is fine) or holds a token that is no number of its
 // type is kCorruption. open refuses counts that the size of the file cannot hold, before anything
 // is allocated; bytes after the last element are noticed there when all rows have a fixed size,
-// else when the last row has been read. A file that was written to since open is kCorruption when
-// the last row of an element has been read. After a failure every read fails the same way until
-// seekElement or seekRow. In ascii files a row is a line; empty lines are skipped.
+// else when the last row has been read. The size of what is compressed is not known: there both
+// show when the rows are read. A file that was written to since open is kCorruption when the last
+// row of an element has been read. After a failure every read fails the same way until seekElement
+// or seekRow. In ascii files a row is a line; empty lines are skipped.
 class PlyReader {
  public:
   // With kDirect, readRowView of fixed rows goes past the page cache; all else is cached.
@@ -47,7 +48,8 @@ class PlyReader {
   // Rows that the file has packed are not copied.
   Result<Bytes> readRowView(std::size_t max_rows, AlignedBuffer& buffer);
 
-  // Whether the rows of the current element can be found by arithmetic: binary, without lists.
+  // Whether the rows of the current element can be found by arithmetic: binary, without lists, not
+  // compressed.
   bool hasFixedRows() const;
   // Moves to row `row` of the current element, at most its count. kInvalidArgument unless
   // hasFixedRows().

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include "io/file.h"
+#include "io/byte_output.h"
 #include "io/ply_number.h"
 
 namespace surfeit {
@@ -48,10 +48,10 @@ Status checkProperties(const std::string& path, const std::vector<PlyProperty>& 
 }  // namespace
 
 struct PlyWriter::State {
-  State(AtomicFile new_file, PlyHeader new_header)
+  State(ByteOutput new_file, PlyHeader new_header)
       : file(std::move(new_file)), header(std::move(new_header)) {}
 
-  AtomicFile file;
+  ByteOutput file;
   PlyHeader header;
   bool is_finished = false;
   std::vector<std::byte> scratch;  // rows on their way to another byte order or to text
@@ -112,7 +112,7 @@ Result<PlyWriter> PlyWriter::create(const std::string& path, PlyEncoding encodin
     return Status::invalidArgument(fmt::format("{}: header of {} bytes, expected at most {}", path,
                                                text.size(), kMaxPlyHeaderBytes));
   }
-  SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
+  SURFEIT_ASSIGN_OR_RETURN(ByteOutput file, ByteOutput::create(path));
   SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
   return PlyWriter(std::make_unique<State>(std::move(file), std::move(header)));
 }

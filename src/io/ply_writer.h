@@ -1,5 +1,5 @@
 // Streams rows into a PLY file of one element, "vertex". The file appears under its final name
-// only when finish() succeeds (io/file.h, AtomicFile).
+// only when finish() succeeds, compressed when its name asks for it (io/byte_output.h).
 #pragma once
 
 #include <cstddef>

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <limits>
 #include <new>
 #include <system_error>
 #include <utility>
@@ -16,6 +17,8 @@
 
 namespace surfeit {
 namespace {
+
+constexpr std::uint64_t kMaxOffset = std::numeric_limits<off_t>::max();
 
 bool isAligned(std::uint64_t value) { return value % kDirectAlignment == 0; }
 
@@ -69,6 +72,8 @@ void PositionalFile::openDirect(int mode) {
 
 Result<std::size_t> PositionalFile::readSome(std::uint64_t offset,
                                              std::span<std::byte> bytes) const {
+  // No file reaches so far, and the system refuses what is no offset to it
+  if (offset > kMaxOffset || bytes.size() > kMaxOffset - offset) return std::size_t{0};
   std::size_t done = 0;
   while (done < bytes.size()) {
     const std::span<std::byte> rest = bytes.subspan(done);

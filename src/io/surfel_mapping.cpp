@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/assert.h"
+#include "io/srgb_curve.h"
 #include "io/surfel_names.h"
 #include "io/surfel_normal.h"
 
@@ -19,17 +20,12 @@ namespace {
 
 constexpr const char* kElementNames[] = {"vertex", "point", "points", "surfel"};
 
-// The transfer function of IEC 61966-2-1, from 0..1 to 0..1.
-double linearFromSrgb(double value) {
-  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
-}
-
 // Of codes of 8 bits.
 const std::array<float, 256>& linearFromSrgb8() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = static_cast<float>(linearFromSrgb(static_cast<double>(i) / 255));
+      values[i] = static_cast<float>(linearFromSrgbCode(static_cast<double>(i) / 255));
     }
     return values;
   }();
@@ -66,6 +62,15 @@ Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string
   return Status::corruption(fmt::format(
       "{}: found {} elements, first {}, expected one named vertex, point, points or surfel", path,
       elements.size(), elements.empty() ? "none" : elements.front().name));
+}
+
+bool isSurfelProperty(std::string_view name) {
+  const auto holds = [name](const auto& names) {
+    return std::find(std::begin(names), std::end(names), name) != std::end(names);
+  };
+  return holds(kPositionNames) || holds(kNormalNames) || holds(kRadiosityNames) ||
+         holds(kAlbedoNames) || holds(kColorNames) || holds(kRadiusNames) || holds(kGroupNames) ||
+         name == "area" || name == "two_sided";
 }
 
 std::uint64_t SurfelDefects::total() const {
@@ -154,7 +159,7 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
                            findTriple(element, kNormalNames, path, mapping.normal_));
 
   // Radius by the first of its names, area
-  for (const char* name : {"radius", "pscale", "width"}) {
+  for (const char* name : kRadiusNames) {
     SURFEIT_ASSIGN_OR_RETURN(mapping.radius_, findField(element, name, path));
     mapping.radius_scale_ = std::string_view(name) == "width" ? 0.5 : 1.0;
     channels.radius = mapping.radius_.isPresent();
@@ -168,11 +173,15 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
                            findTriple(element, kRadiosityNames, path, mapping.radiosity_));
   SURFEIT_ASSIGN_OR_RETURN(channels.albedo,
                            findTriple(element, kAlbedoNames, path, mapping.albedo_));
+  for (int i = 0; i < 3; ++i) {
+    mapping.radiosity_[i].is_srgb = codesSrgb(mapping.radiosity_[i].type);
+    mapping.albedo_[i].is_srgb = codesSrgb(mapping.albedo_[i].type);
+  }
   if (!channels.radiosity || !channels.albedo) {
     Field color[3];
     SURFEIT_ASSIGN_OR_RETURN(const bool has_color, findTriple(element, kColorNames, path, color));
     for (Field& field : color) {
-      field.is_srgb = field.type == PlyType::kUint8 || field.type == PlyType::kUint16;
+      field.is_srgb = codesSrgb(field.type);
       if (!field.is_srgb && !isFloat(field.type)) {
         return Status::corruption(fmt::format(
             "{}: element {}: property {} is {}, expected uchar, ushort, float or double", path,
@@ -193,11 +202,6 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
     SURFEIT_ASSIGN_OR_RETURN(mapping.group_, findField(element, name, path));
     channels.group = mapping.group_.isPresent();
     if (channels.group) break;
-  }
-  if (channels.group && isFloat(mapping.group_.type)) {
-    return Status::corruption(
-        fmt::format("{}: element {}: property {} is {}, expected an integer type", path,
-                    element.name, mapping.group_.name, plyTypeName(mapping.group_.type)));
   }
   mapping.row_bytes_ = element.row_bytes;
   mapping.fast_decoder_ = mapping.makeFastDecoder();
@@ -238,7 +242,8 @@ std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
     is_fast &= plyTypeBytes(two_sided_.type) == 1;
     decoder.setTwoSided(static_cast<std::size_t>(two_sided_.offset));
   }
-  if (group_.isPresent()) {
+  is_fast &= !group_.isPresent() || !isFloat(group_.type);
+  if (group_.isPresent() && is_fast) {
     decoder.setGroup(static_cast<std::size_t>(group_.offset), plyTypeBytes(group_.type));
   }
   if (!is_fast) return std::nullopt;
@@ -254,7 +259,7 @@ double SurfelMapping::Field::read(const std::byte* row) const {
   }
   if (!is_srgb) return plyValue(row + offset, type);
   if (type == PlyType::kUint8) return linearFromSrgb8()[std::to_integer<std::size_t>(row[offset])];
-  return linearFromSrgb(plyValue(row + offset, type) / 65535);
+  return linearFromSrgbCode(plyValue(row + offset, type) / 65535);
 }
 
 SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& surfel) const {
@@ -330,7 +335,8 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     surfel.albedo[i] = static_cast<float>(albedo[i]);
   }
 
-  if (!(group >= 0 && group < kMaxGroups)) {
+  // Some formats have no type but floats
+  if (!(group >= 0 && group < kMaxGroups && group == std::floor(group))) {
     return {&SurfelDefects::bad_group, group_.name, group, "0 to 63"};
   }
   surfel.group = static_cast<std::uint32_t>(group);

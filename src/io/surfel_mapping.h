@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "io/float_row_decoder.h"
 #include "io/ply_format.h"
@@ -33,7 +34,7 @@ struct SurfelDefects {
   Kind short_normal;    // a normal that is not zero (a sphere) but too short (< 1e-6) to point
   Kind negative_color;  // negative radiosity or albedo
   Kind out_of_range;    // beyond kLargestLength, kLargestArea or kLargestColor
-  Kind bad_group;       // group that is not 0 to 63, where the cloud has groups
+  Kind bad_group;       // group that is no whole number from 0 to 63, where the cloud has groups
 
   std::uint64_t total() const;
   // Number of the first record with any defect. Only when total() is not 0.
@@ -48,6 +49,9 @@ struct SurfelDefects {
 // kCorruption when there is none.
 Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string& path);
 
+// Whether a surfel takes a value from properties of that name.
+bool isSurfelProperty(std::string_view name);
+
 // Turns rows of an element into surfels by property name:
 //   x y z                      position (required)
 //   nx ny nz                   normal, normalised here; zero means sphere; absent: sphere
@@ -59,14 +63,14 @@ Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string
 //                              here, or already linear (float, double): used for whichever of
 //                              radiosity and albedo is absent, whose channel then counts as there
 //   two_sided                  not zero: both sides send and block light
-//   group | light_group        group, an integer from 0 to 63
+//   group | light_group        group, a whole number from 0 to 63 of any type
 // What is absent stays 0: radius and area for the indexer's rules, which need the neighbourhood.
 // A record has one defect, the first in the order of SurfelDefects. Immutable; safe from any
 // thread.
 class SurfelMapping {
  public:
   // kCorruption when x, y or z is missing, a triple is incomplete, a property is a list, or a color
-  // or group is of another type. `path` only names the file in messages.
+  // is of another type. `path` only names the file in messages.
   static Result<SurfelMapping> create(const PlyElement& element, const std::string& path);
 
   CloudChannels channels() const { return channels_; }

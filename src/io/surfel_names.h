@@ -10,6 +10,9 @@ inline constexpr const char* kRadiosityNames[3] = {"radiosity_r", "radiosity_g",
 inline constexpr const char* kAlbedoNames[3] = {"albedo_r", "albedo_g", "albedo_b"};
 inline constexpr const char* kColorNames[3] = {"red", "green", "blue"};
 
+// The radius of a surfel: the first of these that a cloud has; a width is twice the radius.
+inline constexpr const char* kRadiusNames[] = {"radius", "pscale", "width"};
+
 // The group of a surfel: the first of these that a cloud has. We write the first.
 inline constexpr const char* kGroupNames[] = {"group", "light_group"};
 

@@ -7,8 +7,9 @@
 #include <string_view>
 #include <utility>
 
-#include "io/ply_reader.h"
+#include "io/cloud_formats.h"
 #include "io/recipe_surfel_source.h"
+#include "io/row_reader.h"
 #include "io/scene_recipe.h"
 
 namespace surfeit {
@@ -16,23 +17,17 @@ namespace {
 
 constexpr std::size_t kRowBufferBytes = 256 << 10;
 
-class PlySurfelSource : public SurfelSource {
+class RowSurfelSource final : public SurfelSource {
  public:
-  PlySurfelSource(PlyReader reader, SurfelMapping mapping, std::size_t element_index, bool strict)
-      : reader_(std::move(reader)),
-        mapping_(std::move(mapping)),
-        element_index_(element_index),
-        is_strict_(strict),
-        is_seekable_(reader_.hasFixedRows()) {}
+  RowSurfelSource(std::unique_ptr<RowReader> reader, SurfelMapping mapping, bool strict)
+      : reader_(std::move(reader)), mapping_(std::move(mapping)), is_strict_(strict) {}
 
-  const std::string& path() const override { return reader_.path(); }
-  std::uint64_t recordCount() const override {
-    return reader_.header().elements[element_index_].count;
-  }
+  const std::string& path() const override { return reader_->path(); }
+  std::uint64_t recordCount() const override { return reader_->element().count; }
   CloudChannels channels() const override { return mapping_.channels(); }
   const SurfelDefects& defects() const override { return defects_; }
   std::size_t rowBytes() const override { return mapping_.rowBytes(); }
-  bool isSeekable() const override { return is_seekable_; }
+  bool isSeekable() const override { return reader_->isSeekable(); }
 
   Result<std::size_t> read(std::span<Surfel> surfels) override {
     std::size_t size = 0;
@@ -61,11 +56,11 @@ class PlySurfelSource : public SurfelSource {
     rows_ = {};
     record_ = 0;
     defects_ = {};
-    return reader_.seekElement(element_index_);
+    return reader_->rewind();
   }
 
   Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
-    return reader_.readRowView(max_rows, buffer);
+    return reader_->readRows(max_rows, buffer);
   }
 
   Result<std::size_t> decodeRows(Bytes rows, std::uint64_t first_record, std::span<Surfel> surfels,
@@ -83,13 +78,12 @@ class PlySurfelSource : public SurfelSource {
     return size;
   }
 
-  Status seekRow(std::uint64_t record) override { return reader_.seekRow(record); }
+  Status seekRow(std::uint64_t record) override { return reader_->seekRow(record); }
 
  private:
-  PlyReader reader_;
+  std::unique_ptr<RowReader> reader_;
   SurfelMapping mapping_;
-  std::size_t element_index_;
-  bool is_strict_, is_seekable_;
+  bool is_strict_;
 
   // Of read(): rows in the buffer that are still to be decoded, the first of them record_
   SurfelDefects defects_;
@@ -98,30 +92,24 @@ class PlySurfelSource : public SurfelSource {
   std::uint64_t record_ = 0;
 };
 
-Result<std::unique_ptr<SurfelSource>> openPly(const std::string& path, bool strict, Access access) {
-  SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path, access));
-  SURFEIT_ASSIGN_OR_RETURN(const std::size_t index, findSurfelElement(reader.header(), path));
-  SURFEIT_ASSIGN_OR_RETURN(SurfelMapping mapping,
-                           SurfelMapping::create(reader.header().elements[index], path));
-  SURFEIT_RETURN_IF_ERROR(reader.seekElement(index));
-  return std::unique_ptr<SurfelSource>(
-      std::make_unique<PlySurfelSource>(std::move(reader), std::move(mapping), index, strict));
+// Whether the file stands for a generated scene.
+Result<bool> isRecipe(const std::string& path) {
+  std::array<std::byte, kRecipeMagic.size()> magic{};
+  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size, file.readSome(0, magic));
+  return std::string_view(reinterpret_cast<const char*>(magic.data()), size) == kRecipeMagic;
 }
 
 }  // namespace
 
 Result<std::unique_ptr<SurfelSource>> openSurfelSource(const std::string& path, bool strict,
-                                                       Access access) {
-  // Formats announce themselves by their first bytes
-  std::array<std::byte, kRecipeMagic.size()> magic{};
-  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
-  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size, file.readSome(0, magic));
-  const std::string_view text(reinterpret_cast<const char*>(magic.data()), size);
-  if (text.starts_with("ply\n") || text.starts_with("ply\r")) return openPly(path, strict, access);
-  if (text == kRecipeMagic) return openRecipeSource(path);
-  return Status::corruption(
-      fmt::format("{}: found {} at 0, expected 'ply' (PLY is the format that is read)", path,
-                  quotePlyText(text.substr(0, 4))));
+                                                       const RowReaderOptions& options) {
+  SURFEIT_ASSIGN_OR_RETURN(const bool is_recipe, isRecipe(path));
+  if (is_recipe) return openRecipeSource(path);
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, options));
+  SURFEIT_ASSIGN_OR_RETURN(SurfelMapping mapping, SurfelMapping::create(reader->element(), path));
+  return std::unique_ptr<SurfelSource>(
+      std::make_unique<RowSurfelSource>(std::move(reader), std::move(mapping), strict));
 }
 
 }  // namespace surfeit

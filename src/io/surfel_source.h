@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "io/cloud_formats.h"
 #include "io/file.h"
 #include "io/surfel_mapping.h"
 #include "surfeit/status.h"
@@ -59,13 +60,13 @@ class SurfelSource {
   virtual Status seekRow(std::uint64_t record) = 0;
 };
 
-// Opens any cloud format that we read, recognised by content (PLY so far: the element "vertex",
-// "point", "points" or "surfel"; and the text that stands for a generated scene,
-// io/scene_recipe.h). A file with an unknown magic is kCorruption, naming what is read. With
-// kDirect, raw records of fixed size go past the page cache, where the file system allows. A source
-// takes at most 1.5 MiB of memory besides the buffers that readRows is given, and half a MiB as a
-// rule.
+// Opens any cloud format that we read, recognised by content (io/cloud_formats.h, and the text that
+// stands for a generated scene, io/scene_recipe.h). A file with an unknown magic is kCorruption,
+// naming what is read. `options` say how the file is read, which of its parts, and under which
+// names; texts of generated scenes have none of these. A source of a plain file takes at most 1.5
+// MiB of memory besides the buffers that readRows is given, and half a MiB as a rule; decompression
+// takes a MiB more, or what window the file asks for, up to 9 MiB.
 Result<std::unique_ptr<SurfelSource>> openSurfelSource(const std::string& path, bool strict,
-                                                       Access access = Access::kCached);
+                                                       const RowReaderOptions& options = {});
 
 }  // namespace surfeit

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/bounds.h"
+#include "io/cloud_formats.h"
 #include "io/surfel_source.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -38,8 +39,9 @@ struct CloudTotals {
 class CloudReader {
  public:
   // Opens every input to see that it can be read. `read_bytes`: how much is fetched at once.
+  // `reading`: what of the files is read, and under which names; the access is chosen here.
   static Result<CloudReader> open(const std::vector<std::string>& inputs, bool strict,
-                                  std::size_t read_bytes);
+                                  std::size_t read_bytes, const RowReaderOptions& reading = {});
 
   // Records of all inputs, valid or not, and bytes of the files.
   std::uint64_t recordCount() const { return record_count_; }
@@ -70,6 +72,7 @@ class CloudReader {
 
   std::vector<std::string> inputs_;
   std::vector<std::uint64_t> records_;  // by input
+  RowReaderOptions reading_;
   bool strict_ = false;
   std::size_t read_bytes_ = 0;
   std::uint64_t record_count_ = 0;

@@ -14,6 +14,8 @@
 
 #include "core/job_limits.h"
 #include "core/thread_scratch.h"
+#include "io/channels.h"
+#include "io/cloud_formats.h"
 #include "octree/bucket_stream.h"
 #include "octree/cloud_reader.h"
 #include "octree/index_plan.h"
@@ -156,8 +158,12 @@ Status Indexer::checkOptions() const {
 
 // Opens the inputs, takes a sample where that is possible, and plans.
 Status Indexer::openInputs() {
+  RowReaderOptions reading;
+  SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options_.channels));
+  reading.part = options_.part;
   SURFEIT_ASSIGN_OR_RETURN(
-      reader_, CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes)));
+      reader_,
+      CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes), reading));
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) {
     SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(usualBucketCount(records)));

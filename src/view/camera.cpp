@@ -126,4 +126,8 @@ glm::vec3 Camera::worldFromCameraDirection(const glm::vec3& d) const {
                    double(d.z) * axes_.forward);
 }
 
+glm::dvec3 Camera::worldFromCamera(const glm::dvec3& p) const {
+  return eye_ + p.x * axes_.right + p.y * axes_.up + p.z * axes_.forward;
+}
+
 }  // namespace surfeit

@@ -47,6 +47,8 @@ class Camera {
   glm::vec3 cameraFromWorld(const glm::dvec3& position) const;
   glm::vec3 cameraFromWorldDirection(const glm::vec3& direction) const;
   glm::vec3 worldFromCameraDirection(const glm::vec3& direction) const;
+  glm::dvec3 worldFromCamera(const glm::dvec3& position) const;
+  const ViewAxes& axes() const { return axes_; }
 
   // Depth before which nothing is drawn.
   float nearDepth() const { return near_depth_; }

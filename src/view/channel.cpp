@@ -109,9 +109,9 @@ Result<Channel> Channel::find(const PlyElement& element, const std::string& name
   channel.value_ = findTriple(element, name);
   if (channel.value_.exists()) {
     if (name == "normal" || element.find(name + "_x") != nullptr) {
-      channel.kind_ = ChannelKind::kNormal;
+      channel.kind_ = ValueKind::kNormal;
     }
-    if (name == "position") channel.kind_ = ChannelKind::kPosition;
+    if (name == "position") channel.kind_ = ValueKind::kPosition;
     return channel;
   }
   const RowField scalar = RowField::find(element, name);
@@ -120,7 +120,7 @@ Result<Channel> Channel::find(const PlyElement& element, const std::string& name
     if (scalar.type == PlyType::kUint8) {
       channel.value_.display_scale = displayScale(scalar.type);
     } else if (name != "occlusion") {
-      channel.kind_ = ChannelKind::kScalar;
+      channel.kind_ = ValueKind::kScalar;
     }
     return channel;
   }

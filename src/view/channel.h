@@ -30,7 +30,7 @@
 namespace surfeit {
 
 // How values of a channel become a picture.
-enum class ChannelKind : std::uint8_t {
+enum class ValueKind : std::uint8_t {
   kLight,     // scene-linear light or reflectance: exposure and the sRGB curve apply
   kScalar,    // any number: stretched over the range of its values, no curve
   kNormal,    // -1..1: shown as 0.5 n + 0.5, no curve
@@ -51,7 +51,7 @@ class Channel {
   static std::string choose(const PlyElement& element, const std::optional<CloudChannels>& stated);
 
   const std::string& name() const { return name_; }
-  ChannelKind kind() const { return kind_; }
+  ValueKind kind() const { return kind_; }
 
   // The value of a row; a grey value three times. Not finite when the row's value is not.
   glm::vec3 value(const std::byte* row) const;
@@ -69,7 +69,7 @@ class Channel {
   static Triple findTriple(const PlyElement& element, const std::string& name);
 
   std::string name_;
-  ChannelKind kind_ = ChannelKind::kLight;
+  ValueKind kind_ = ValueKind::kLight;
   // value = base + sign * factor * (value + added)
   Triple base_, factor_, value_, added_;
   float sign_ = 1;

@@ -159,6 +159,7 @@ RenderCounts CloudRenderer::accumulate(std::span<const std::byte> rows) {
               sample.weight > 0 ? std::min(sample.depth, fragment.depth) : fragment.depth;
           sample.sum += weight * value;
           sample.weight += weight;
+          sample.depth_sum += weight * fragment.depth;
         });
       }
     }

@@ -17,14 +17,9 @@
 #include "view/disk_raster.h"
 #include "view/framebuffer.h"
 #include "view/radius_estimate.h"
+#include "view/value_map.h"
 
 namespace surfeit {
-
-// From a channel's value to what the picture shows: scale * value + offset.
-struct ValueMap {
-  glm::vec3 scale{1};
-  glm::vec3 offset{0};
-};
 
 // What turns rows into surfels on the screen. Points to things that must outlive the renderer.
 struct RenderStyle {

@@ -10,33 +10,29 @@
 #include <utility>
 #include <vector>
 
+#include "io/cloud_formats.h"
 #include "io/file.h"
-#include "io/ply_reader.h"
+#include "io/row_reader.h"
 #include "octree/scene_file.h"
 
 namespace surfeit {
 namespace {
 
-class PlyRows final : public CloudRows {
+// A cloud of any format.
+class FileRows final : public CloudRows {
  public:
-  PlyRows(PlyReader reader, std::size_t element)
-      : reader_(std::move(reader)),
-        element_(element),
-        buffer_(kBatchRows * reader_.header().elements[element].row_bytes) {}
+  explicit FileRows(std::unique_ptr<RowReader> reader) : reader_(std::move(reader)) {}
 
-  const std::string& path() const override { return reader_.path(); }
-  const PlyElement& element() const override { return reader_.header().elements[element_]; }
-  Status rewind() override { return reader_.seekElement(element_); }
-
+  const std::string& path() const override { return reader_->path(); }
+  const PlyElement& element() const override { return reader_->element(); }
+  Status rewind() override { return reader_->rewind(); }
   Result<std::span<const std::byte>> next() override {
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t rows, reader_.readRows(buffer_));
-    return std::span<const std::byte>(buffer_.data(), rows * element().row_bytes);
+    return reader_->readRows(kBatchRows, buffer_);
   }
 
  private:
-  PlyReader reader_;
-  std::size_t element_;
-  std::vector<std::byte> buffer_;
+  std::unique_ptr<RowReader> reader_;
+  AlignedBuffer buffer_;
 };
 
 // Surfels as rows: their fields under the names that PLY clouds use.
@@ -135,32 +131,25 @@ bool hasPositions(const PlyElement& element) {
 
 }  // namespace
 
-Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path) {
-  // A PLY file says so in its first bytes; the .sft reader judges everything else
-  std::array<std::byte, 4> magic{};
+Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path,
+                                                 const RowReaderOptions& options) {
+  // A scene says so in its first bytes
+  std::array<char, 8> magic{};
   {
     SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
-    SURFEIT_ASSIGN_OR_RETURN([[maybe_unused]] const std::size_t got, file.readSome(0, magic));
+    SURFEIT_ASSIGN_OR_RETURN([[maybe_unused]] const std::size_t got,
+                             file.readSome(0, std::as_writable_bytes(std::span(magic))));
   }
-  if (std::memcmp(magic.data(), "ply", 3) != 0) {
+  if (isSceneFile({magic.data(), magic.size()})) {
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(path));
     return std::unique_ptr<CloudRows>(std::make_unique<SceneRows>(std::move(scene)));
   }
-
-  SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
-  const PlyHeader& header = reader.header();
-  // The vertices where there are any, else the first element that has a place
-  std::size_t chosen = header.elements.size();
-  for (std::size_t i = 0; i < header.elements.size(); ++i) {
-    if (!hasPositions(header.elements[i])) continue;
-    if (chosen == header.elements.size() || header.elements[i].name == "vertex") chosen = i;
-  }
-  if (chosen == header.elements.size()) {
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, options));
+  if (!hasPositions(reader->element())) {
     return Status::corruption(
-        fmt::format("{}: no element with the properties x, y and z, so nothing to draw", path));
+        fmt::format("{}: no properties x, y and z, so nothing to draw", path));
   }
-  SURFEIT_RETURN_IF_ERROR(reader.seekElement(chosen));
-  return std::unique_ptr<CloudRows>(std::make_unique<PlyRows>(std::move(reader), chosen));
+  return std::unique_ptr<CloudRows>(std::make_unique<FileRows>(std::move(reader)));
 }
 
 }  // namespace surfeit

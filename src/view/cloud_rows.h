@@ -1,5 +1,5 @@
-// Any file that `surfeit view` draws, as a stream of rows with named scalar properties: the vertex
-// element of a PLY file, or the surfels of a .sft file page by page. Only one batch is in memory.
+// Any file that `surfeit view` draws, as a stream of rows with named scalar properties: those of a
+// cloud of any format, or the surfels of a .sft file page by page. Only one batch is in memory.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/bounds.h"
+#include "io/cloud_formats.h"
 #include "io/ply_format.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
@@ -38,8 +39,10 @@ class CloudRows {
   virtual std::optional<CloudChannels> statedChannels() const { return std::nullopt; }
 };
 
-// Opens a file by its content: PLY when it starts with "ply", else .sft.
-// kCorruption when it is neither, or when no element has x, y and z.
-Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path);
+// Opens a file by its content: a scene, or any cloud that io/cloud_formats.h reads. kCorruption
+// when it is neither, or has no x, y and z.
+// `options`: what of a cloud is read, and under which names; a scene has none of these.
+Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path,
+                                                 const RowReaderOptions& options = {});
 
 }  // namespace surfeit

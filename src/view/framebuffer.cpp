@@ -18,6 +18,8 @@ std::uint64_t Framebuffer::bytes(int width, int height, int samples) {
   return pixels * (per_pixel * (sizeof(float) + sizeof(Sample)) + sizeof(Picture::Pixel));
 }
 
+void Framebuffer::clearValues() { std::fill(samples_.begin(), samples_.end(), Sample()); }
+
 Picture Framebuffer::resolve() const {
   const int n = samples_per_edge_;
   Picture picture;

@@ -24,9 +24,10 @@ class Framebuffer {
  public:
   // What the second pass gathers in a sample.
   struct Sample {
-    glm::vec3 sum{0};  // of weight * value
-    float weight = 0;  // 0: nothing is seen here
-    float depth = 0;   // of the nearest fragment
+    glm::vec3 sum{0};     // of weight * value
+    float weight = 0;     // 0: nothing is seen here
+    float depth = 0;      // of the nearest fragment
+    float depth_sum = 0;  // of weight * depth
   };
 
   // `samples` along each edge of a pixel.
@@ -41,6 +42,9 @@ class Framebuffer {
 
   std::span<float> limitRow(int y) { return std::span(limit_).subspan(rowOffset(y), rowSize()); }
   std::span<Sample> row(int y) { return std::span(samples_).subspan(rowOffset(y), rowSize()); }
+
+  // Forgets the values, not the limits: for a second pass with other values.
+  void clearValues();
 
   // The picture: each pixel is the mean of its samples (box filter).
   Picture resolve() const;

@@ -6,19 +6,23 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
-#include <limits>
 #include <memory>
 #include <new>
 
 #include "core/job_limits.h"
+#include "io/channels.h"
+#include "io/cloud_formats.h"
+#include "view/brick_rows.h"
 #include "view/channel.h"
 #include "view/cloud_record.h"
 #include "view/cloud_renderer.h"
 #include "view/cloud_rows.h"
 #include "view/framebuffer.h"
+#include "view/pass_file.h"
 #include "view/picture_file.h"
 #include "view/radius_estimate.h"
+#include "view/row_stream.h"
+#include "view/value_map.h"
 
 namespace surfeit {
 namespace {
@@ -52,6 +56,9 @@ Status checkOptions(const ViewOptions& options) {
     return refuse(fmt::format("point size {}: expected at most 1000 pixels", options.point_size));
   }
   if (!std::isfinite(options.exposure)) return refuse("the exposure must be finite");
+  if (!options.passes.empty() && options.mode == ViewMode::kPoints) {
+    return refuse("passes are of disks; points have no surface");
+  }
   if (options.range && !(std::isfinite(options.range->x) && std::isfinite(options.range->y) &&
                          options.range->x != options.range->y)) {
     return refuse("the range needs two different finite numbers");
@@ -59,31 +66,10 @@ Status checkOptions(const ViewOptions& options) {
   return {};
 }
 
-// Reads the whole cloud once as a phase of the progress.
-Status streamRows(CloudRows& rows, const char* phase, Progress& progress,
-                  const std::function<void(std::span<const std::byte>)>& visit) {
-  SURFEIT_RETURN_IF_ERROR(rows.rewind());
-  progress.beginPhase(phase, rows.element().count, "surfels");
-  while (true) {
-    if (progress.isCancelled()) return Status::interrupted();
-    SURFEIT_ASSIGN_OR_RETURN(const std::span<const std::byte> batch, rows.next());
-    if (batch.empty()) return {};
-    visit(batch);
-    progress.advance(batch.size() / rows.element().row_bytes);
-  }
-}
-
-// What the first pass finds out.
-struct CloudExtent {
-  Bounds3 bounds;
-  double lowest = std::numeric_limits<double>::infinity();  // values of the channel
-  double highest = -std::numeric_limits<double>::infinity();
-};
-
-Result<CloudExtent> findExtent(CloudRows& rows, const RecordDecoder& decoder,
+Result<ValueExtent> findExtent(CloudRows& rows, const RecordDecoder& decoder,
                                const Channel& channel, bool needs_range, bool needs_frame,
                                ViewFrame& frame, Progress& progress) {
-  CloudExtent extent;
+  ValueExtent extent;
   if (rows.statedBounds() && !needs_frame && !needs_range) {
     extent.bounds = *rows.statedBounds();
     return extent;
@@ -99,8 +85,7 @@ Result<CloudExtent> findExtent(CloudRows& rows, const RecordDecoder& decoder,
           if (!needs_range) continue;
           const double value = double(channel.value(&batch[at]).x);
           if (!std::isfinite(value)) continue;
-          extent.lowest = std::min(extent.lowest, value);
-          extent.highest = std::max(extent.highest, value);
+          extent.addValue(value);
         }
       }));
   if (extent.bounds.isEmpty()) {
@@ -110,42 +95,16 @@ Result<CloudExtent> findExtent(CloudRows& rows, const RecordDecoder& decoder,
   return extent;
 }
 
-// Maps [low, high] to [0, 1]; a range without width becomes mid-grey.
-ValueMap stretch(double low, double high) {
-  if (low == high) return {glm::vec3(0), glm::vec3(0.5f)};
-  const double scale = 1 / (high - low);
-  return {glm::vec3(float(scale)), glm::vec3(float(-low * scale))};
-}
-
-ValueMap chooseValueMap(const ViewOptions& options, const Channel& channel,
-                        const CloudExtent& extent, PictureFormat format, Progress& progress) {
-  if (options.range) return stretch(options.range->x, options.range->y);
-  if (format == PictureFormat::kExr) return {};  // keeps the channel's own values
-  switch (channel.kind()) {
-    case ChannelKind::kLight:
-      return {};
-    case ChannelKind::kScalar:
-      if (!(extent.lowest <= extent.highest)) return {};
-      progress.note(fmt::format("channel {}: black is {:.6g}, white is {:.6g}", channel.name(),
-                                extent.lowest, extent.highest));
-      return stretch(extent.lowest, extent.highest);
-    case ChannelKind::kNormal:
-      return stretch(-1, 1);
-    case ChannelKind::kPosition: {
-      const glm::vec3 size = extent.bounds.extent();
-      const float scale = 1 / std::max({size.x, size.y, size.z, 1e-30f});
-      return {glm::vec3(scale), -scale * extent.bounds.min};
-    }
-  }
-  return {};
-}
-
 Status checkBudget(const ViewOptions& options, std::uint64_t framebuffer_bytes) {
   const std::uint64_t budget =
       options.memory_bytes > 0 ? options.memory_bytes : memoryLimitBytes() / 4 * 3;
   const std::uint64_t pixels = std::uint64_t(options.width) * std::uint64_t(options.height);
+  // Passes and picture are drawn one after the other
+  const std::uint64_t pass_bytes =
+      options.passes.empty() ? 0 : passBytes(options.width, options.height);
   const std::uint64_t needed =
-      framebuffer_bytes + pixels * kEncodeBytesPerPixel + kStreamBytes + RadiusEstimate::kMaxBytes;
+      std::max(framebuffer_bytes + pixels * kEncodeBytesPerPixel, pass_bytes) + kStreamBytes +
+      RadiusEstimate::kMaxBytes + (options.brick.empty() ? 0 : kBrickRowsBytes);
   if (needed <= budget) return {};
   return Status::budgetTooSmall(
       fmt::format("a picture of {}x{} with {}x{} samples needs {} MiB, the budget is {} MiB; "
@@ -154,18 +113,83 @@ Status checkBudget(const ViewOptions& options, std::uint64_t framebuffer_bytes) 
                   (needed >> 20) + 1, budget >> 20));
 }
 
+// The format of the picture, if there is one; what is written must have a name that fits.
+Result<PictureFormat> checkNames(const std::string& picture, const std::string& passes) {
+  if (!passes.empty()) {
+    SURFEIT_ASSIGN_OR_RETURN(const PictureFormat format, pictureFormat(passes));
+    if (format != PictureFormat::kExr) {
+      return Status::invalidArgument(
+          fmt::format("{}: passes are written as OpenEXR, expected a name in .exr", passes));
+    }
+  }
+  if (!picture.empty()) return pictureFormat(picture);
+  if (!passes.empty()) return PictureFormat::kExr;
+  return Status::invalidArgument("neither a picture nor passes to write");
+}
+
+// Draws the values of the style's channel and writes the picture.
+Status drawPicture(const std::string& picture_path, CloudRows& rows, const RenderStyle& style,
+                   const Camera& camera, const ViewOptions& options, ViewStats& stats,
+                   Progress& progress) {
+  // Front surfaces first, then the values on them
+  Framebuffer framebuffer(options.width, options.height, options.samples);
+  CloudRenderer renderer(style, camera, framebuffer);
+  SURFEIT_RETURN_IF_ERROR(
+      streamRows(rows, "depth", progress,
+                 [&](std::span<const std::byte> batch) { renderer.findFront(batch); }));
+  RenderCounts counts;
+  SURFEIT_RETURN_IF_ERROR(streamRows(
+      rows, "values", progress,
+      [&](std::span<const std::byte> batch) { counts.add(renderer.accumulate(batch)); }));
+  stats.records = counts.records;
+  stats.skipped_records = counts.skipped_records;
+  stats.drawn_surfels = counts.drawn_surfels;
+  stats.non_finite_values = counts.non_finite_values;
+  if (counts.skipped_records > 0) {
+    progress.note(
+        fmt::format("{}: {} of {} records cannot be drawn (not finite, or no positive "
+                    "radius); skipped",
+                    rows.path(), counts.skipped_records, counts.records));
+  }
+  if (counts.non_finite_values > 0) {
+    progress.note(fmt::format("{}: {} values of channel {} are not finite; drawn in magenta",
+                              rows.path(), counts.non_finite_values, style.channel->name()));
+  }
+
+  const Picture picture = framebuffer.resolve();
+  double covered = 0;
+  for (const Picture::Pixel& pixel : picture.pixels) covered += double(pixel.alpha);
+  stats.coverage = covered / double(picture.pixels.size());
+
+  PngOptions png;
+  png.exposure = options.exposure;
+  png.is_data = style.is_normal_map || style.channel->kind() != ValueKind::kLight;
+  png.background = options.background;
+  return writePicture(picture_path, picture, png);
+}
+
 Result<ViewStats> draw(const std::string& input, const std::string& picture_path,
                        const ViewOptions& options, Progress& progress) {
   ViewStats stats;
   SURFEIT_RETURN_IF_ERROR(checkOptions(options));
-  SURFEIT_ASSIGN_OR_RETURN(const PictureFormat format, pictureFormat(picture_path));
-  stats.framebuffer_bytes = Framebuffer::bytes(options.width, options.height, options.samples);
+  SURFEIT_ASSIGN_OR_RETURN(const PictureFormat format, checkNames(picture_path, options.passes));
+  const bool has_picture = !picture_path.empty();
+  if (has_picture) {
+    stats.framebuffer_bytes = Framebuffer::bytes(options.width, options.height, options.samples);
+  }
   SURFEIT_RETURN_IF_ERROR(checkBudget(options, stats.framebuffer_bytes));
 
-  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<CloudRows> rows, openCloudRows(input));
+  RowReaderOptions reading;
+  SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options.channels));
+  reading.part = options.part;
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<CloudRows> rows, openCloudRows(input, reading));
+  if (!options.brick.empty()) {
+    SURFEIT_ASSIGN_OR_RETURN(rows,
+                             addBrickValues(std::move(rows), options.brick, options.filter_width));
+  }
   const PlyElement& element = rows->element();
   SURFEIT_ASSIGN_OR_RETURN(const RecordDecoder decoder, RecordDecoder::create(element, input));
-  const bool is_normal_map = options.mode == ViewMode::kNormals;
+  const bool is_normal_map = options.mode == ViewMode::kNormals || !has_picture;
   stats.channel = is_normal_map             ? "normal"
                   : options.channel.empty() ? Channel::choose(element, rows->statedChannels())
                                             : options.channel;
@@ -175,11 +199,11 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
 
   // Where the cloud is, and the values that a grey channel takes
   const bool needs_range =
-      channel.kind() == ChannelKind::kScalar && !options.range && format == PictureFormat::kPng;
+      channel.kind() == ValueKind::kScalar && !options.range && format == PictureFormat::kPng;
   const int width = options.width * options.samples, height = options.height * options.samples;
   SURFEIT_ASSIGN_OR_RETURN(ViewFrame frame, Camera::createFrame(options.camera, width, height));
   SURFEIT_ASSIGN_OR_RETURN(
-      const CloudExtent extent,
+      const ValueExtent extent,
       findExtent(*rows, decoder, channel, needs_range, !options.camera.eye, frame, progress));
   SURFEIT_ASSIGN_OR_RETURN(const Camera camera,
                            Camera::create(options.camera, extent.bounds, frame, width, height));
@@ -191,7 +215,7 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
   style.row_bytes = element.row_bytes;
   style.decoder = &decoder;
   style.channel = &channel;
-  style.value_map = chooseValueMap(options, channel, extent, format, progress);
+  style.value_map = chooseValueMap(options.range, channel, extent, format, progress);
   style.fixed_radius = options.radius;
   style.radius_scale = options.radius_scale;
   style.is_normal_map = is_normal_map;
@@ -219,41 +243,21 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
                     input, stats.mean_estimated_radius));
   }
 
-  // Front surfaces first, then the values on them
-  Framebuffer framebuffer(options.width, options.height, options.samples);
-  CloudRenderer renderer(style, camera, framebuffer);
-  SURFEIT_RETURN_IF_ERROR(
-      streamRows(*rows, "depth", progress,
-                 [&](std::span<const std::byte> batch) { renderer.findFront(batch); }));
-  RenderCounts counts;
-  SURFEIT_RETURN_IF_ERROR(streamRows(
-      *rows, "values", progress,
-      [&](std::span<const std::byte> batch) { counts.add(renderer.accumulate(batch)); }));
-  stats.records = counts.records;
-  stats.skipped_records = counts.skipped_records;
-  stats.drawn_surfels = counts.drawn_surfels;
-  stats.non_finite_values = counts.non_finite_values;
-  if (counts.skipped_records > 0) {
-    progress.note(
-        fmt::format("{}: {} of {} records cannot be drawn (not finite, or no positive "
-                    "radius); skipped",
-                    input, counts.skipped_records, counts.records));
+  if (!options.passes.empty()) {
+    // The same view, with a pixel for a sample
+    SURFEIT_ASSIGN_OR_RETURN(
+        const Camera pixel_camera,
+        Camera::create(options.camera, extent.bounds, frame, options.width, options.height));
+    SURFEIT_ASSIGN_OR_RETURN(stats.pass_pixels,
+                             writePasses(options.passes, *rows, style, pixel_camera, progress));
+    if (stats.pass_pixels == 0) {
+      progress.note(fmt::format("{}: no pixel sees the cloud", options.passes));
+    }
   }
-  if (counts.non_finite_values > 0) {
-    progress.note(fmt::format("{}: {} values of channel {} are not finite; drawn in magenta", input,
-                              counts.non_finite_values, channel.name()));
+  if (has_picture) {
+    SURFEIT_RETURN_IF_ERROR(
+        drawPicture(picture_path, *rows, style, camera, options, stats, progress));
   }
-
-  const Picture picture = framebuffer.resolve();
-  double covered = 0;
-  for (const Picture::Pixel& pixel : picture.pixels) covered += double(pixel.alpha);
-  stats.coverage = covered / double(picture.pixels.size());
-
-  PngOptions png;
-  png.exposure = options.exposure;
-  png.is_data = is_normal_map || channel.kind() != ChannelKind::kLight;
-  png.background = options.background;
-  SURFEIT_RETURN_IF_ERROR(writePicture(picture_path, picture, png));
   return stats;
 }
 

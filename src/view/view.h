@@ -36,6 +36,15 @@ struct ViewOptions {
   // Value shown black and value shown white, for any channel. Absent: scalars other than occlusion
   // are stretched over the values they take, in PNG; everything else is shown as it is.
   std::optional<glm::dvec2> range;
+  // Where to write what every pixel sees (view/pass_file.h), .exr; empty: nowhere.
+  std::string passes;
+  // Channels of the cloud to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of a file
+  // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
+  std::string channels, part;
+  // A brick map of whose values the cloud takes those of its surfels (view/brick_rows.h), over that
+  // width or over each surfel's diameter; empty: none.
+  std::string brick;
+  std::optional<double> filter_width;
   std::uint64_t memory_bytes =
       0;            // budget of the process; 0: three quarters of what the job may use
   int threads = 0;  // 0: all that the job may use
@@ -48,6 +57,7 @@ struct ViewStats {
   std::uint64_t non_finite_values = 0;  // drawn in magenta
   double coverage = 0;                  // part of the picture that the cloud covers, 0..1
   std::string channel;                  // the one shown
+  std::uint64_t pass_pixels = 0;        // of the passes that see something
   bool radius_estimated = false;
   float mean_estimated_radius = 0;
   glm::dvec3 eye{0}, look_at{0};  // the camera that was used
@@ -56,11 +66,12 @@ struct ViewStats {
   double seconds = 0;
 };
 
-// Draws `input`, a PLY cloud or a .sft file, into `picture`, .png or .exr by its name; it appears
-// only when complete. The picture depends on the cloud and the options alone, not on the threads;
-// reordering the records changes it by rounding only. EXR files hold the channel's own values.
-// Errors: kInvalidArgument (options, or a channel that the cloud lacks: the message lists those it
-// has), kBudgetTooSmall (picture too large), kCorruption, kIoError, kInterrupted.
+// Draws `input`, a cloud or a .sft file, into `picture`, .png or .exr by its name; it appears only
+// when complete. `picture` may be empty where options.passes is not. The picture depends on the
+// cloud and the options alone, not on the threads; reordering the records changes it by rounding
+// only. EXR files hold the channel's own values. Errors: kInvalidArgument (options, or a channel
+// that the cloud lacks: the message lists those it has), kBudgetTooSmall (picture too large),
+// kCorruption, kIoError, kInterrupted.
 Result<ViewStats> viewCloud(const std::string& input, const std::string& picture,
                             const ViewOptions& options, Progress& progress);
 

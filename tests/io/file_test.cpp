@@ -64,6 +64,18 @@ TEST_F(InputFileTest, ReadAtBeyondTheEndIsCorruption) {
   EXPECT_NE(status.message().find("file ends early"), std::string::npos);
 }
 
+TEST_F(InputFileTest, ReadAtBeyondAnyFileIsCorruption) {
+  write("file", "0123456789");
+  const Result<InputFile> file = InputFile::open(path("file"));
+  ASSERT_TRUE(file.ok());
+  std::byte bytes[4];
+  for (const std::uint64_t offset : {~std::uint64_t{0}, std::uint64_t{1} << 63,
+                                     (std::uint64_t{1} << 63) - 2, std::uint64_t{1} << 62}) {
+    const Status status = file->readAt(offset, bytes);
+    EXPECT_EQ(status.code(), StatusCode::kCorruption) << status.message();
+  }
+}
+
 TEST_F(InputFileTest, ReadSomeIsShortOnlyAtTheEnd) {
   write("a", "0123456789");
   const Result<InputFile> file = InputFile::open(path("a"));

@@ -275,8 +275,18 @@ TEST_F(PictureReaderTest, RefusesAbsurdSizesBeforeAllocating) {
   const std::size_t window = bytes.find("dataWindow") + 11 + 6 + 4;
   bytes.replace(window + 8, 8, "\xff\xff\xff\x7f\xff\xff\xff\x7f");
   write("a.exr", bytes);
-  EXPECT_EQ(failure("a.exr").code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(failure("a.exr").code(), StatusCode::kCorruption);
   EXPECT_THAT(failure("a.exr").message(), HasSubstr("2147483648 x 2147483648 pixels"));
+}
+
+TEST_F(PictureReaderTest, RefusesAttributesThatTheFileCannotHold) {
+  writeExr({}, path("a.exr"));
+  std::string bytes = contents("a.exr");
+  const std::size_t size = bytes.find("screenWindowWidth") + 18 + 6;
+  bytes.replace(size, 4, std::string("\xff\xff\xff\x6f", 4));
+  write("a.exr", bytes);
+  EXPECT_EQ(failure("a.exr").code(), StatusCode::kCorruption);
+  EXPECT_THAT(failure("a.exr").message(), HasSubstr("1879048191 bytes, expected at most"));
 }
 
 TEST_F(PictureReaderTest, RefusesTilesThatTakeTooMuchMemory) {
@@ -285,7 +295,7 @@ TEST_F(PictureReaderTest, RefusesTilesThatTakeTooMuchMemory) {
   kind.tile = 4000;
   kind.compression = Imf::RLE_COMPRESSION;
   writeExr(kind, path("a.exr"));
-  EXPECT_THAT(failure("a.exr").message(), HasSubstr("2000 rows decode to 144000000 bytes"));
+  EXPECT_THAT(failure("a.exr").message(), HasSubstr("4000 rows decode to 288000000 bytes"));
 }
 
 TEST_F(PictureReaderTest, RefusesEveryTruncation) {

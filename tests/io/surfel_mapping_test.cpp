@@ -268,14 +268,31 @@ TEST(SurfelMapping, GroupsAreIntegersFromZeroTo63) {
   EXPECT_EQ(surfels[2].group, 5u);
   EXPECT_EQ(defects.describe(), "3 records with a group that is not 0 to 63 (first: record 12)");
   EXPECT_EQ(mapping.describeDefect(&rows[3 * 16]), "light_group is -1, expected 0 to 63");
+}
 
-  const Status status =
-      SurfelMapping::create(
-          elementOf({{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {kFloat, "group"}}, 1), "a.ply")
-          .status();
-  EXPECT_EQ(status.code(), StatusCode::kCorruption);
-  EXPECT_EQ(status.message(),
-            "a.ply: element vertex: property group is float, expected an integer type");
+TEST(SurfelMapping, GroupsMayBeWholeFloats) {
+  for (const PlyType type : {PlyType::kFloat32, PlyType::kFloat64}) {
+    const PlyElement element =
+        elementOf({{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {type, "group"}}, 6);
+    const SurfelMapping mapping = mappingOf(element);
+    std::vector<std::byte> rows(6 * element.row_bytes);
+    const double groups[] = {0, 63, 64, -1, 2.5, 5};
+    for (std::size_t i = 0; i < 6; ++i) {
+      const float single = static_cast<float>(groups[i]);
+      const void* const value =
+          type == PlyType::kFloat32 ? static_cast<const void*>(&single) : &groups[i];
+      std::memcpy(&rows[i * element.row_bytes + 12], value, plyTypeBytes(type));
+    }
+    std::vector<Surfel> surfels(6);
+    SurfelDefects defects;
+    ASSERT_EQ(mapping.decodeRows(rows, 10, surfels, defects), 3u);
+    EXPECT_EQ(surfels[0].group, 0u);
+    EXPECT_EQ(surfels[1].group, 63u);
+    EXPECT_EQ(surfels[2].group, 5u);
+    EXPECT_EQ(defects.describe(), "3 records with a group that is not 0 to 63 (first: record 12)");
+    EXPECT_EQ(mapping.describeDefect(&rows[4 * element.row_bytes]),
+              "group is 2.5, expected 0 to 63");
+  }
 }
 
 TEST(SurfelMapping, DefectsOfPartsAddUpInAnyOrder) {

@@ -76,7 +76,9 @@ TEST_F(SurfelRowsTest, DecodeToWhatReadGives) {
        {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
     const std::string file = write(5000, encoding);
     for (const Access access : {Access::kCached, Access::kDirect}) {
-      const Result<std::unique_ptr<SurfelSource>> opened = openSurfelSource(file, false, access);
+      RowReaderOptions options;
+      options.access = access;
+      const Result<std::unique_ptr<SurfelSource>> opened = openSurfelSource(file, false, options);
       ASSERT_TRUE(opened.ok()) << opened.status().message();
       SurfelSource& source = **opened;
       EXPECT_EQ(source.rowBytes(), 57u);

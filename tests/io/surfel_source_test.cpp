@@ -196,10 +196,10 @@ TEST_F(SurfelSourceTest, ElementHasFourNames) {
 }
 
 TEST_F(SurfelSourceTest, OtherFormatsAreRefusedByTheirFirstBytes) {
-  write("a.las", "LASF0000");
-  EXPECT_THAT(refusal(path("a.las")), HasSubstr("found 'LASF' at 0, expected 'ply'"));
+  write("a.abc", "what\x01is this?");
+  EXPECT_THAT(refusal(path("a.abc")), HasSubstr("found 'what' at 0, expected a cloud (PLY"));
   write("empty", "");
-  EXPECT_THAT(refusal(path("empty")), HasSubstr("found '' at 0, expected 'ply'"));
+  EXPECT_THAT(refusal(path("empty")), HasSubstr("found '' at 0, expected a cloud (PLY"));
   EXPECT_EQ(openSurfelSource(path("missing"), false).status().code(), StatusCode::kIoError);
 }
 

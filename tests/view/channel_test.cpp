@@ -82,7 +82,7 @@ TEST(Channel, TriplesOfAGatherAreChannels) {
   EXPECT_EQ(valueOf(element, "reflection", row), glm::vec3(1, 2, 3));
   EXPECT_EQ(valueOf(element, "fluence", row), glm::vec3(4, 5, 6));
   EXPECT_EQ(valueOf(element, "bent_normal", row), glm::vec3(0, -1, 0));
-  EXPECT_EQ(Channel::find(element, "bent_normal", "cloud.ply")->kind(), ChannelKind::kNormal);
+  EXPECT_EQ(Channel::find(element, "bent_normal", "cloud.ply")->kind(), ValueKind::kNormal);
 }
 
 TEST(Channel, EightBitColorsAreSrgb) {

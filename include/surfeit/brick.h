@@ -1,0 +1,102 @@
+// Brick maps: baked values of clouds (occlusion, irradiance, any channel) in a multiresolution
+// OpenVDB file, and looking them up at any place: the counterpart of brickmake and texture3d.
+// docs/brick.md has the layout of the file and what is computed.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Numbers of a point that a brick map keeps at most, over all its channels.
+inline constexpr std::size_t kMaxBrickValues = 64;
+
+struct BrickOptions {
+  // Channels or properties to keep. Empty: what a gather writes, as far as the first cloud has it;
+  // without any of that all that does not tell of the points' geometry.
+  std::vector<std::string> channels;
+  // A voxel is divided where a number of a channel differs by more than this within it. 0 keeps
+  // every voxel of the finest level.
+  double max_error = 0.01;
+  // Edge of the finest voxels, scene units. 0: twice the spacing of the points, by the median of
+  // their areas, or by their density where they have no sizes.
+  double voxel_size = 0;
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // budget of the process; at least 64 MiB
+  int threads = 0;                                      // 0: all that the job may use
+  bool strict = false;                // refuse invalid records instead of skipping them
+  std::string temporary_directory{};  // empty: beside the output
+};
+
+struct BrickStats {
+  std::uint64_t points = 0;  // records of the inputs
+  std::uint64_t skipped_points = 0;
+  std::vector<std::string> channels;
+  double voxel_size = 0;                    // of level 0, the finest
+  std::vector<std::uint64_t> level_voxels;  // written, directions counted each; level 0 first
+  std::uint64_t file_bytes = 0;
+  std::uint64_t temporary_bytes = 0;  // written to temporary files
+  int threads = 0;
+  std::vector<std::pair<std::string, double>> phase_seconds;
+};
+
+// Writes `output`, an OpenVDB file, from the points of all inputs (clouds of any format, docs/
+// files.md). It depends on the points and the options above memory_bytes alone, bit for bit, not on
+// their order or in which input they are. It appears under its name only when complete. Errors:
+// kInvalidArgument (options; a channel that an input lacks), kCorruption (bad input, or no valid
+// point at all), kBudgetTooSmall, kIoError, kInterrupted.
+Result<BrickStats> brickClouds(const std::vector<std::string>& inputs, const std::string& output,
+                               const BrickOptions& options, Progress& progress);
+
+// A channel of a brick map.
+struct BrickChannel {
+  std::string name;                     // irradiance
+  std::vector<std::string> properties;  // irradiance_r irradiance_g irradiance_b
+};
+
+// An open brick map. Safe from any thread.
+class BrickMap {
+ public:
+  // Reads the file once, to find its pages. `memory_bytes` holds a list of these, 12 bytes and 8
+  // for every grid per leaf of 8^3 voxels, and a cache of those that look-ups need. Errors:
+  // kIoError, kCorruption (no brick map, or a damaged one), kBudgetTooSmall with what would do.
+  static Result<BrickMap> open(const std::string& path,
+                               std::uint64_t memory_bytes = std::uint64_t{64} << 20);
+  BrickMap(BrickMap&&) noexcept;
+  BrickMap& operator=(BrickMap&&) noexcept;
+  ~BrickMap();
+
+  const std::vector<BrickChannel>& channels() const;
+  // Numbers of a look-up: those of all channels, in their order.
+  std::size_t valueCount() const;
+  // Level 0 is the finest.
+  int levelCount() const;
+  double voxelSize(int level) const;
+
+  // The values at a place of a surface with that normal, or of any surface where the normal is
+  // zero, averaged over about `filter_width` scene units; 0 takes the finest there are. Linear
+  // between voxels and between levels. `values` has valueCount() numbers. False, and zeros, where
+  // no point that faces that way is within reach of the coarsest voxels. A first look-up of a page
+  // reads it: kIoError, kCorruption.
+  Result<bool> lookup(const glm::dvec3& position, const glm::vec3& normal, double filter_width,
+                      std::span<float> values) const;
+
+  // Bytes of pages in the cache now, and of the list of pages.
+  std::uint64_t cachedBytes() const;
+  std::uint64_t directoryBytes() const;
+
+ private:
+  struct State;
+  explicit BrickMap(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,69 @@
+// Clouds of one format as clouds of another: merged, moved, cropped and thinned on the way.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Holds a position p when min <= p < max along every axis.
+struct CropBox {
+  glm::dvec3 min{0}, max{0};
+};
+
+// What is done to the records of every input, in this order: channels are named, every n-th record
+// is taken, it is moved, cropped, and given the channels that are kept.
+struct ConvertOptions {
+  std::string channels{};   // channels to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md)
+  std::string part{};       // of files with several: the one to read; empty: the first with a cloud
+  std::uint64_t every = 1;  // takes records 0, every, 2 every, ... of each input; at least 1
+
+  // The rows of an affine 3x4 matrix: x' = t[0] x + t[1] y + t[2] z + t[3]. All in double
+  // precision. Positions are points. Normals are turned by the inverse transpose and keep their
+  // length, as do other directions (view, incident, bent_normal, illumination_direction); velocity
+  // and other triples NAME_x NAME_y NAME_z are vectors, but for texture coordinates. radius, pscale
+  // and width are multiplied by the cube root of |det|, area by its 2/3 power. Types stay, except
+  // that integers become floats.
+  std::array<double, 12> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  std::optional<CropBox> crop{};  // only these positions, as they are written
+
+  // Channels by name (docs/files.md), or single properties. With `keep` only these and the
+  // position; without those of `drop`. Only one of the two may be given.
+  std::vector<std::string> keep{}, drop{};
+
+  // A cloud of the output's format that it takes from what rows do not carry: the windows and
+  // attributes of a picture (.exr), the grid of a volume (.vdb), the camera of a .ptc. Empty: the
+  // input, where there is only one, which is not moved.
+  std::string like{};
+  // Memory that a format may take that must hold what it writes until the end (OpenVDB); others
+  // take some MiB, whatever the clouds' size.
+  std::uint64_t memory_bytes = std::uint64_t{2} << 30;
+};
+
+struct ConvertStats {
+  std::uint64_t records = 0;                        // of all inputs
+  std::uint64_t skipped_records = 0;                // left out by `every`
+  std::uint64_t cropped_records = 0;                // left out by `crop`
+  std::uint64_t written_records = 0;                // handed to the writer
+  std::uint64_t input_bytes = 0, output_bytes = 0;  // of the files
+  std::vector<std::string> properties;              // of a record that is written: "float x"
+};
+
+// Writes `output`, whose format is told by its name, from the records of all inputs, one after the
+// other; their formats are told by what they hold (docs/files.md). The output has all properties of
+// all inputs, of types that hold the values of each; what an input lacks is 0. It appears under its
+// name only when complete. Notes tell of what is absent, and what the formats cannot keep.
+// Errors: kInvalidArgument (options, a name of no format that is written, or rows that it cannot
+// hold), kCorruption naming file and record, kBudgetTooSmall, kIoError, kInterrupted.
+Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
+                                   const std::string& output, const ConvertOptions& options,
+                                   Progress& progress);
+
+}  // namespace surfeit

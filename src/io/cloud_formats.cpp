@@ -1,0 +1,155 @@
+#include "io/cloud_formats.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "io/byte_output.h"
+#include "io/formats/bgeo_ascii_reader.h"
+#include "io/formats/bgeo_json_reader.h"
+#include "io/formats/bgeo_reader.h"
+#include "io/formats/bgeo_writer.h"
+#include "io/formats/exr_reader.h"
+#include "io/formats/exr_writer.h"
+#include "io/formats/las_reader.h"
+#include "io/formats/pcd_reader.h"
+#include "io/formats/pdb_reader.h"
+#include "io/formats/pdb_writer.h"
+#include "io/formats/ply_rows.h"
+#include "io/formats/prt2_reader.h"
+#include "io/formats/prt_reader.h"
+#include "io/formats/prt_writer.h"
+#include "io/formats/ptc_reader.h"
+#include "io/formats/ptc_writer.h"
+#include "io/formats/vdb_reader.h"
+#include "io/formats/vdb_writer.h"
+#include "io/formats/xyz_reader.h"
+#include "io/formats/xyz_writer.h"
+
+namespace surfeit {
+namespace {
+
+// Formats with a magic first; text, which is recognised by looking at more, last.
+constexpr CloudFormat kFormats[] = {
+    {"PLY", ".ply", recognisesPly, openPlyRows, createPlyRows},
+    {"OpenEXR", ".exr", recognisesExr, openExr, createExr},
+    {"PTC", ".ptc", recognisesPtc, openPtc, createPtc},
+    {"OpenVDB", ".vdb", recognisesVdb, openVdb, createVdb},
+    {"LAS", "", recognisesLas, openLas, nullptr},
+    {"PCD", "", recognisesPcd, openPcd, nullptr},
+    {"PRT", ".prt", recognisesPrt, openPrt, createPrt},
+    {"PRT 2", "", recognisesPrt2, openPrt2, nullptr},
+    {"BGEO", ".bgeo", recognisesBgeo, openBgeo, createBgeo},
+    {"BGEO", "", recognisesBgeoJson, openBgeoJson, nullptr},
+    {"GEO", "", recognisesBgeoAscii, openBgeoAscii, nullptr},
+    {"PDB", ".pdb", recognisesPdb, openPdb, createPdb},
+    // Text stands last
+    {"xyz text", ".xyz .txt .asc .csv", recognisesXyz, openXyz, createXyz},
+};
+
+// Known formats that are not read, and what to do instead.
+struct OtherFormat {
+  std::string_view magic, name, advice;
+};
+using namespace std::string_view_literals;
+constexpr std::string_view kSceneMagic = "\x89SFT";
+constexpr OtherFormat kOtherFormats[] = {
+    {kSceneMagic, "a Surfeit scene (.sft)", "give the cloud that it was indexed from"},
+    {"ASTM-E57"sv, "E57", "convert it to PLY or LAS first (e57unpack, CloudCompare)"},
+    {"ICECACHE"sv, "a particle cache of Softimage ICE",
+     "save it as .bgeo, .prt or .pdb (partconv)"},
+    {"scf1"sv, "compressed geometry of Houdini (.bgeo.sc)",
+     "save it as .bgeo or .bgeo.gz (gconvert)"},
+    {"[\"fileversion"sv, "Houdini's geometry as text (.geo)", "save it as .bgeo (gconvert)"},
+    {"[\n\t\"fileversion"sv, "Houdini's geometry as text (.geo)", "save it as .bgeo (gconvert)"},
+    {"NGSP"sv, "SPZ", "convert it to the PLY of Gaussian splats first"},
+    {"Ogawa"sv, "Alembic", "save the points as PLY, .bgeo or .vdb"},
+    {"\x89HDF"sv, "HDF5 (Alembic)", "save the points as PLY, .bgeo or .vdb"},
+    {"PXR-USDC"sv, "USD", "save the points as PLY, .bgeo or .vdb"},
+    {"#usda"sv, "USD", "save the points as PLY, .bgeo or .vdb"},
+    {"HAIR"sv, "HAIR", "convert its strands to points or meshes first"},
+    {"PK\x03\x04"sv, "a ZIP archive", "unpack it first"},
+    {"BZh"sv, "bzip2", "unpack it first; gzip and zstd are read as they are"},
+    {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},
+};
+
+// "PLY, PTC and PRT"
+std::string namesOfRead() {
+  std::vector<std::string_view> names;
+  for (const CloudFormat& format : kFormats) {
+    const bool is_new = std::find(names.begin(), names.end(), format.name) == names.end();
+    if (format.open != nullptr && is_new) names.push_back(format.name);
+  }
+  const std::string_view last = names.back();
+  names.pop_back();
+  return names.empty() ? std::string(last) : fmt::format("{} and {}", fmt::join(names, ", "), last);
+}
+
+std::string extensionsWritten() {
+  std::string text;
+  for (const CloudFormat& format : kFormats) {
+    if (format.create == nullptr) continue;
+    text += (text.empty() ? "" : " ") + std::string(format.extensions);
+  }
+  return text;
+}
+
+Status unknownFormat(const std::string& path, std::string_view first_bytes) {
+  for (const OtherFormat& other : kOtherFormats) {
+    if (first_bytes.starts_with(other.magic)) {
+      return Status::corruption(fmt::format("{}: found {}, which is not read as a cloud: {}", path,
+                                            other.name, other.advice));
+    }
+  }
+  return Status::corruption(fmt::format("{}: found {} at 0, expected a cloud ({})", path,
+                                        quotePlyText(first_bytes.substr(0, 4)), namesOfRead()));
+}
+
+// Whether a list of extensions, separated by blanks, has one that `path` ends with.
+bool hasExtension(std::string_view path, std::string_view extensions) {
+  while (!extensions.empty()) {
+    const std::size_t end = std::min(extensions.find(' '), extensions.size());
+    const std::string_view extension = extensions.substr(0, end);
+    if (!extension.empty() && path.size() > extension.size() && path.ends_with(extension)) {
+      return true;
+    }
+    extensions.remove_prefix(std::min(end + 1, extensions.size()));
+  }
+  return false;
+}
+
+}  // namespace
+
+std::span<const CloudFormat> cloudFormats() { return kFormats; }
+
+bool isSceneFile(std::string_view first_bytes) { return first_bytes.starts_with(kSceneMagic); }
+
+Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
+                                                 const RowReaderOptions& options) {
+  std::string first_bytes(kMagicBytes, '\0');
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                           input.readSome(0, std::as_writable_bytes(std::span(first_bytes))));
+  first_bytes.resize(size);
+  for (const CloudFormat& format : kFormats) {
+    if (format.open != nullptr && format.recognises(first_bytes)) return format.open(path, options);
+  }
+  return unknownFormat(path, first_bytes);
+}
+
+Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
+                                                   const RowWriterOptions& options) {
+  const std::string_view name = withoutCompression(path);
+  for (const CloudFormat& format : kFormats) {
+    if (format.create != nullptr && hasExtension(name, format.extensions)) {
+      return format.create(path, options);
+    }
+  }
+  return Status::invalidArgument(fmt::format(
+      "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it", path,
+      extensionsWritten()));
+}
+
+}  // namespace surfeit

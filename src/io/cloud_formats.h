@@ -1,0 +1,60 @@
+// The formats of clouds: one table of how each is recognised, read and written. docs/files.md has
+// them for users.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/byte_input.h"
+#include "io/channels.h"
+#include "io/file.h"
+#include "io/row_reader.h"
+#include "io/row_writer.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+struct RowReaderOptions {
+  std::vector<ChannelRename> channels;
+  // kDirect: raw records of fixed size go past the page cache, where format and system allow.
+  Access access = Access::kCached;
+  // For formats with several parts (grids of a .vdb, layers of an .exr, elements of a .ply): the
+  // one to read, by name. Empty: the first that holds a cloud.
+  std::string part;
+};
+
+// One row of the table. A format that is only read has no `create`, one that is only written no
+// `open`.
+struct CloudFormat {
+  std::string_view name;        // "PTC"
+  std::string_view extensions;  // of files to write, separated by blanks: ".bgeo .geo"
+  // Whether these, the first bytes of the file (decompressed; up to kMagicBytes), are of this
+  // format. Formats without a magic (text) look at more than a word and stand last in the table.
+  bool (*recognises)(std::string_view first_bytes);
+  Result<std::unique_ptr<RowReader>> (*open)(const std::string& path,
+                                             const RowReaderOptions& options);
+  Result<std::unique_ptr<RowWriter>> (*create)(const std::string& path,
+                                               const RowWriterOptions& options);
+};
+inline constexpr std::size_t kMagicBytes = 4096;
+
+std::span<const CloudFormat> cloudFormats();
+
+// Whether these are the first bytes of a Surfeit scene (docs/format.md), which is no cloud.
+bool isSceneFile(std::string_view first_bytes);
+
+// Opens a cloud by its first bytes. kCorruption when they are of no known format, with those that
+// are read and, for known ones that are not read (LAZ, E57, SPRT, ...), what to do instead.
+Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
+                                                 const RowReaderOptions& options = {});
+
+// Creates a cloud by the extension of its name, .gz and .zst aside. kInvalidArgument for a name
+// whose extension is none that is written, naming those that are.
+Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
+                                                   const RowWriterOptions& options);
+
+}  // namespace surfeit

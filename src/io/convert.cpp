@@ -1,0 +1,317 @@
+// Rows go through in batches of a MiB:
+//
+//   reader --take, widen--> rows of the output --move--> --crop--> writer
+//
+// What nothing is done to goes from reader to writer without a copy.
+#include "surfeit/convert.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "io/channels.h"
+#include "io/cloud_formats.h"
+#include "io/file.h"
+#include "io/row_transform.h"
+#include "io/row_union.h"
+#include "io/surfel_names.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kBatchBytes = 1 << 20;
+constexpr std::size_t kMostNamesTold = 12;
+
+std::string listNames(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kMostNamesTold); ++i) text += " " + names[i];
+  return names.size() > kMostNamesTold ? text + " ..." : text;
+}
+
+bool isPositionName(std::string_view name) {
+  return std::find(std::begin(kPositionNames), std::end(kPositionNames), name) !=
+         std::end(kPositionNames);
+}
+
+// The properties without those that the options drop. kInvalidArgument for names that none has.
+Result<std::vector<PlyProperty>> chooseProperties(const std::vector<PlyProperty>& properties,
+                                                  const ConvertOptions& options) {
+  const bool keeps = !options.keep.empty();
+  const std::vector<std::string>& words = keeps ? options.keep : options.drop;
+  if (words.empty()) return properties;
+  PlyElement element;
+  element.properties = properties;
+  const std::vector<RowChannel> channels = channelsOf(element);
+
+  std::vector<bool> is_named(properties.size(), false);
+  for (const std::string& word : words) {
+    bool is_found = false;
+    for (const RowChannel& channel : channels) {
+      for (const std::size_t i : channel.properties) {
+        if (word != channel.name && word != properties[i].name) continue;
+        is_named[i] = is_found = true;
+      }
+    }
+    if (is_found) continue;
+    std::vector<std::string> names;
+    for (const RowChannel& channel : channels) names.push_back(channel.name);
+    return Status::invalidArgument(fmt::format("{}: found no channel {}, expected one of{}",
+                                               keeps ? "keep" : "drop", quotePlyText(word),
+                                               listNames(names)));
+  }
+  std::vector<PlyProperty> chosen;
+  for (std::size_t i = 0; i < properties.size(); ++i) {
+    const bool stays = keeps ? is_named[i] || isPositionName(properties[i].name) : !is_named[i];
+    if (stays) chosen.push_back(properties[i]);
+  }
+  if (chosen.empty()) return Status::invalidArgument("drop: nothing is left to write");
+  return chosen;
+}
+
+// Tells which packed rows lie in a box.
+class Cropper {
+ public:
+  // kInvalidArgument when the box holds nothing, or rows have no positions.
+  static Result<Cropper> create(const CropBox& box, const PlyElement& element) {
+    Cropper cropper(box, element.row_bytes);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(box.min[axis] < box.max[axis])) {
+        return Status::invalidArgument(
+            fmt::format("crop: found {} to {} along {}, expected a box that is not empty",
+                        box.min[axis], box.max[axis], kPositionNames[axis]));
+      }
+      const PlyProperty* const property = element.find(kPositionNames[axis]);
+      if (property == nullptr) {
+        return Status::invalidArgument(
+            fmt::format("crop: found no property {}, expected positions", kPositionNames[axis]));
+      }
+      cropper.properties_[std::size_t(axis)] = *property;
+    }
+    return cropper;
+  }
+
+  // Moves the rows in the box to the front and returns how many there are.
+  std::size_t crop(std::byte* rows, std::size_t count) const {
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::byte* const row = rows + i * row_bytes_;
+      if (!holds(row)) continue;
+      if (size != i) std::memcpy(rows + size * row_bytes_, row, row_bytes_);
+      ++size;
+    }
+    return size;
+  }
+
+ private:
+  Cropper(const CropBox& box, std::size_t row_bytes) : box_(box), row_bytes_(row_bytes) {}
+
+  bool holds(const std::byte* row) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      const PlyProperty& property = properties_[std::size_t(axis)];
+      const double value = plyValue(row + property.offset, property.type);
+      if (!(value >= box_.min[axis] && value < box_.max[axis])) return false;
+    }
+    return true;
+  }
+
+  CropBox box_;
+  std::size_t row_bytes_;
+  std::array<PlyProperty, 3> properties_;
+};
+
+class Converter {
+ public:
+  Converter(const std::vector<std::string>& inputs, const std::string& output,
+            const ConvertOptions& options, RowTransform transform, Progress& progress)
+      : inputs_(inputs),
+        output_(output),
+        options_(options),
+        transform_(std::move(transform)),
+        progress_(progress) {}
+
+  Result<ConvertStats> run() {
+    SURFEIT_ASSIGN_OR_RETURN(reading_.channels, parseChannelRenames(options_.channels));
+    reading_.part = options_.part;
+    SURFEIT_RETURN_IF_ERROR(openInputs());
+    SURFEIT_RETURN_IF_ERROR(createWriter());
+    progress_.beginPhase("convert", stats_.records, "records");
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      std::unique_ptr<RowReader> reader = std::move(first_);
+      if (i > 0) {
+        SURFEIT_ASSIGN_OR_RETURN(reader, openRowReader(inputs_[i], reading_));
+      }
+      SURFEIT_RETURN_IF_ERROR(convert(*reader));
+    }
+    progress_.beginPhase("finish", 0, "records");
+    SURFEIT_RETURN_IF_ERROR(writer_->finish());
+    noteOfWriter();
+    SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(output_));
+    stats_.output_bytes = file.size();
+    return std::move(stats_);
+  }
+
+ private:
+  // Looks at all inputs, of which only the first stays open.
+  Status openInputs() {
+    for (const std::string& path : inputs_) {
+      if (progress_.isCancelled()) return Status::interrupted();
+      SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, reading_));
+      const PlyElement& element = reader->element();
+      stats_.records += element.count;
+      rows_to_write_ += element.count / options_.every + (element.count % options_.every != 0);
+      union_.add(element);
+      for (const std::string& note : reader->notes()) {
+        progress_.note(fmt::format("{}: {}", path, note));
+      }
+      SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+      stats_.input_bytes += file.size();
+      if (first_ == nullptr) first_ = std::move(reader);
+    }
+    return {};
+  }
+
+  Status createWriter() {
+    RowWriterOptions writing;
+    SURFEIT_ASSIGN_OR_RETURN(writing.properties, chooseProperties(union_.properties(), options_));
+    transform_.widenTypes(writing.properties);
+    writing.comments = first_->comments();
+    if (!options_.crop) writing.count = rows_to_write_;
+    writing.memory_bytes = options_.memory_bytes;
+    std::unique_ptr<RowReader> like;
+    if (!options_.like.empty()) {
+      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like));
+      writing.like = like.get();
+    } else if (transform_.isIdentity() && inputs_.size() == 1) {
+      writing.like = first_.get();
+    }
+    SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing));
+    noteOfWriter();
+
+    const PlyElement& element = writer_->element();
+    transform_.bind(element);
+    for (const std::string& note : transform_.notes()) {
+      progress_.note(fmt::format("{}: {}", output_, note));
+    }
+    if (options_.crop) {
+      SURFEIT_ASSIGN_OR_RETURN(cropper_, Cropper::create(*options_.crop, element));
+    }
+    for (const PlyProperty& property : element.properties) {
+      stats_.properties.push_back(fmt::format("{} {}", plyTypeName(property.type), property.name));
+    }
+    return {};
+  }
+
+  // What the writer has not said yet.
+  void noteOfWriter() {
+    for (const std::string& note : writer_->notes()) {
+      if (told_.insert(note).second) progress_.note(fmt::format("{}: {}", output_, note));
+    }
+  }
+
+  Status convert(RowReader& reader) {
+    const PlyElement& from = reader.element();
+    const PlyElement& to = writer_->element();
+    if (from.count == 0) return {};
+    const RowCopier copier(from, to);
+    if (!copier.absent().empty()) {
+      progress_.note(
+          fmt::format("{}: not there, 0 is written:{}", reader.path(), listNames(copier.absent())));
+    }
+    const bool keeps_rows =
+        copier.keepsRows() && options_.every == 1 && transform_.isIdentity() && !cropper_;
+    const std::size_t batch_rows =
+        std::max<std::size_t>(1, kBatchBytes / std::max(from.row_bytes, to.row_bytes));
+    for (std::uint64_t record = 0;;) {
+      if (progress_.isCancelled()) return Status::interrupted();
+      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, reader.readRows(batch_rows, buffer_));
+      if (rows.empty()) return {};
+      const std::size_t count = rows.size() / from.row_bytes;
+      if (keeps_rows) {
+        SURFEIT_RETURN_IF_ERROR(writer_->writeRows(rows));
+        stats_.written_records += count;
+      } else {
+        SURFEIT_RETURN_IF_ERROR(convertRows(copier, rows.data(), from.row_bytes, record, count));
+      }
+      record += count;
+      progress_.advance(count);
+      progress_.advanceBytes(rows.size());
+    }
+  }
+
+  // Rows of the reader, the first of which is `record`.
+  Status convertRows(const RowCopier& copier, const std::byte* rows, std::size_t row_bytes,
+                     std::uint64_t record, std::size_t count) {
+    // Take
+    const std::uint64_t every = options_.every;
+    const std::uint64_t skipped = (every - record % every) % every;
+    const std::size_t taken =
+        skipped < count ? static_cast<std::size_t>((count - 1 - skipped) / every + 1) : 0;
+    stats_.skipped_records += count - taken;
+    if (taken == 0) return {};
+    const std::size_t to_bytes = writer_->element().row_bytes;
+    rows_.resize(taken * to_bytes);
+    // With one row, how far the next one would be does not matter
+    const std::size_t step = taken > 1 ? static_cast<std::size_t>(every) : 1;
+    copier.copy(rows + static_cast<std::size_t>(skipped) * row_bytes, step, taken, rows_.data());
+
+    // Move and crop
+    transform_.apply(rows_.data(), taken);
+    const std::size_t kept = cropper_ ? cropper_->crop(rows_.data(), taken) : taken;
+    stats_.cropped_records += taken - kept;
+    stats_.written_records += kept;
+    return writer_->writeRows(std::span(rows_).first(kept * to_bytes));
+  }
+
+  const std::vector<std::string>& inputs_;
+  const std::string& output_;
+  const ConvertOptions& options_;
+  RowTransform transform_;
+  Progress& progress_;
+
+  RowReaderOptions reading_;
+  RowUnion union_;
+  std::unique_ptr<RowReader> first_;
+  std::uint64_t rows_to_write_ = 0;  // without cropping
+  std::unique_ptr<RowWriter> writer_;
+  std::set<std::string> told_;
+  std::optional<Cropper> cropper_;
+  AlignedBuffer buffer_;
+  std::vector<std::byte> rows_;
+  ConvertStats stats_;
+};
+
+Status checkOptions(const std::vector<std::string>& inputs, const ConvertOptions& options) {
+  if (inputs.empty()) return Status::invalidArgument("convert: no input cloud");
+  if (options.every == 0) return Status::invalidArgument("every is 0, expected 1 or more");
+  if (!options.keep.empty() && !options.drop.empty()) {
+    return Status::invalidArgument("found channels both to keep and to drop, expected one of them");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
+                                   const std::string& output, const ConvertOptions& options,
+                                   Progress& progress) {
+  try {
+    SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
+    SURFEIT_ASSIGN_OR_RETURN(RowTransform transform, RowTransform::create(options.transform));
+    return Converter(inputs, output, options, std::move(transform), progress).run();
+  } catch (const std::bad_alloc&) {
+    return Status::failed(fmt::format("{}: out of memory", output));
+  } catch (const std::exception& exception) {
+    return Status::failed(fmt::format("{}: {}", output, exception.what()));
+  }
+}
+
+}  // namespace surfeit

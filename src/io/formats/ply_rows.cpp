@@ -1,0 +1,161 @@
+#include "io/formats/ply_rows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "io/formats/splat_reader.h"
+#include "io/ply_reader.h"
+#include "io/ply_writer.h"
+#include "io/surfel_mapping.h"
+
+namespace surfeit {
+namespace {
+
+// The names of a channel's properties after renames: of the channel as a whole, of single
+// properties, or as they are. None: the channel is dropped.
+std::vector<std::string> renamed(const PlyElement& element, const RowChannel& channel,
+                                 std::span<const ChannelRename> renames) {
+  std::vector<std::string> names;
+  for (const std::size_t i : channel.properties) names.push_back(element.properties[i].name);
+  const auto isFrom = [&](std::string_view name) {
+    return std::any_of(renames.begin(), renames.end(),
+                       [&](const ChannelRename& rename) { return rename.from == name; });
+  };
+  if (isFrom(channel.name)) {
+    return propertyNames(channel.name, names.size(), channel.kind, renames);
+  }
+  for (std::string& name : names) {
+    if (!isFrom(name)) continue;
+    const std::vector<std::string> single = propertyNames(name, 1, ChannelKind::kFloat, renames);
+    name = single.empty() ? "" : single.front();
+  }
+  return names;
+}
+
+// The element as rows have it: scalars alone, renamed, without those that are dropped. Their places
+// in a row stay the same. kCorruption when a name is taken twice.
+Result<PlyElement> rowElement(const PlyElement& original, std::span<const ChannelRename> renames,
+                              const std::string& path) {
+  for (const PlyProperty& property : original.properties) {
+    if (!property.is_list || !isSurfelProperty(property.name)) continue;
+    return Status::corruption(
+        fmt::format("{}: element {}: property {} is a list, expected a scalar", path, original.name,
+                    property.name));
+  }
+  std::vector<std::string> names(original.properties.size());
+  for (const RowChannel& channel : channelsOf(original)) {
+    const std::vector<std::string> given = renamed(original, channel, renames);
+    for (std::size_t i = 0; i < given.size(); ++i) names[channel.properties[i]] = given[i];
+  }
+
+  PlyElement element = original;
+  element.properties.clear();
+  std::set<std::string> taken;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i].empty()) continue;
+    if (!taken.insert(names[i]).second) {
+      return Status::corruption(
+          fmt::format("{}: element {}: property {} would be a second {}, expected another name",
+                      path, original.name, original.properties[i].name, names[i]));
+    }
+    element.properties.push_back(original.properties[i]);
+    element.properties.back().name = names[i];
+  }
+  return element;
+}
+
+// The element to read.
+Result<std::size_t> findPart(const PlyHeader& header, const std::string& part,
+                             const std::string& path) {
+  if (part.empty()) return findSurfelElement(header, path);
+  if (const std::optional<std::size_t> index = header.findElement(part)) return *index;
+  std::string names;
+  for (const PlyElement& element : header.elements) names += " " + element.name;
+  return Status::corruption(
+      fmt::format("{}: found no element {}, expected one of{}", path, quotePlyText(part), names));
+}
+
+class PlyRowReader final : public RowReader {
+ public:
+  PlyRowReader(PlyReader reader, std::size_t index, PlyElement element)
+      : reader_(std::move(reader)),
+        index_(index),
+        element_(std::move(element)),
+        is_seekable_(reader_.hasFixedRows()) {}
+
+  const std::string& path() const override { return reader_.path(); }
+  std::string formatName() const override { return "PLY"; }
+  const PlyElement& element() const override { return element_; }
+  std::vector<std::string> comments() const override { return reader_.header().comments; }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes;
+    const std::vector<PlyElement>& elements = reader_.header().elements;
+    for (const PlyProperty& property : elements[index_].properties) {
+      if (!property.is_list) continue;
+      notes.push_back(fmt::format("list property {} is not kept", property.name));
+    }
+    for (std::size_t i = 0; i < elements.size(); ++i) {
+      if (i != index_) notes.push_back(fmt::format("element {} is not kept", elements[i].name));
+    }
+    return notes;
+  }
+
+  Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
+    return reader_.readRowView(max_rows, buffer);
+  }
+  Status rewind() override { return reader_.seekElement(index_); }
+  bool isSeekable() const override { return is_seekable_; }
+  Status seekRow(std::uint64_t row) override { return reader_.seekRow(row); }
+
+ private:
+  PlyReader reader_;
+  std::size_t index_;
+  PlyElement element_;
+  bool is_seekable_;
+};
+
+class PlyRowWriter final : public RowWriter {
+ public:
+  explicit PlyRowWriter(PlyWriter writer) : writer_(std::move(writer)) {}
+
+  const PlyElement& element() const override { return writer_.element(); }
+  Status writeRows(std::span<const std::byte> rows) override { return writer_.writeRows(rows); }
+  Status finish() override { return writer_.finish(); }
+
+ private:
+  PlyWriter writer_;
+};
+
+}  // namespace
+
+bool recognisesPly(std::string_view first_bytes) {
+  return first_bytes.starts_with("ply\n") || first_bytes.starts_with("ply\r");
+}
+
+Result<std::unique_ptr<RowReader>> openPlyRows(const std::string& path,
+                                               const RowReaderOptions& options) {
+  SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path, options.access));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t index, findPart(reader.header(), options.part, path));
+  SURFEIT_ASSIGN_OR_RETURN(PlyElement element,
+                           rowElement(reader.header().elements[index], options.channels, path));
+  SURFEIT_RETURN_IF_ERROR(reader.seekElement(index));
+  std::unique_ptr<RowReader> rows =
+      std::make_unique<PlyRowReader>(std::move(reader), index, std::move(element));
+  if (areSplats(rows->element())) return readSplatsAsDisks(std::move(rows));
+  return rows;
+}
+
+Result<std::unique_ptr<RowWriter>> createPlyRows(const std::string& path,
+                                                 const RowWriterOptions& options) {
+  SURFEIT_ASSIGN_OR_RETURN(PlyWriter writer,
+                           PlyWriter::create(path, PlyEncoding::kBinaryLittleEndian,
+                                             options.properties, options.comments));
+  return std::unique_ptr<RowWriter>(std::make_unique<PlyRowWriter>(std::move(writer)));
+}
+
+}  // namespace surfeit

@@ -1,0 +1,94 @@
+// Rows of numbers as lines of text (xyz, ascii PCD): the lines of a file, a block of them at a
+// time, and lines turned into rows.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "io/byte_input.h"
+#include "io/ply_format.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Between values: blanks, tabs, and at most one comma or semicolon. A carriage return is a blank.
+constexpr bool isTextBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+constexpr bool isTextComma(char c) { return c == ',' || c == ';'; }
+// A line without the blanks around it.
+std::string_view trimmedLine(std::string_view line);
+// Whether a line, trimmed, is a comment: it begins with # or //.
+bool isTextComment(std::string_view line);
+// The words of a line; an empty one between two commas. No more than `most`.
+std::vector<std::string_view> wordsOf(std::string_view line, std::size_t most);
+
+// The lines of a file in order. One thread at a time; takes 256 KiB.
+class LineSource {
+ public:
+  static constexpr std::size_t kMostLineBytes = 256 << 10;
+
+  explicit LineSource(ByteInput input) : input_(std::move(input)) {}
+
+  ByteInput& input() { return input_; }
+  const ByteInput& input() const { return input_; }
+  // Of the first line that has not been consumed, and its number from 1.
+  std::uint64_t offset() const { return offset_; }
+  std::uint64_t lineNumber() const { return line_number_; }
+  // Goes on with the line at `offset`, whose number is `line_number`.
+  void jumpTo(std::uint64_t offset, std::uint64_t line_number);
+
+  // Whole lines from here on, with their ends; the last of the file may lack it. At least one
+  // unless the file ends here. The view lasts until consume has passed all of it, or jumpTo.
+  // kCorruption when a line is longer than kMostLineBytes.
+  Result<std::string_view> lines();
+  // Passes over the first `bytes` of lines(): `line_count` whole lines.
+  void consume(std::size_t bytes, std::uint64_t line_count);
+
+ private:
+  ByteInput input_;
+  std::uint64_t offset_ = 0, line_number_ = 1;
+  // buffer_[begin_, lines_end_) are whole lines, up to end_ follows what has been read of the next
+  std::vector<char> buffer_ = std::vector<char>(kMostLineBytes);
+  std::size_t begin_ = 0, lines_end_ = 0, end_ = 0;
+};
+
+// A value of every line. Words of columns that are not kept are passed over unseen.
+struct TextColumn {
+  std::string name;  // for messages
+  PlyType type = PlyType::kFloat32;
+  std::size_t offset = 0;  // in a row
+  bool is_kept = true;
+};
+
+// Turns a line, without its end, into a row; false when it is not as the columns say. Reals are
+// rounded to nearest, and are infinite or zero where too large or too small; nan and inf are read.
+bool parseTextRow(std::string_view line, std::span<const TextColumn> columns, std::byte* row);
+// Why parseTextRow refused a line: "found 'a', expected y of type float".
+std::string describeTextRow(std::string_view line, std::span<const TextColumn> columns);
+
+// Reads rows from lines. Empty lines are skipped, and comments where there may be some.
+class TextRowParser {
+ public:
+  TextRowParser(std::vector<TextColumn> columns, std::size_t row_bytes, bool has_comments)
+      : columns_(std::move(columns)), row_bytes_(row_bytes), has_comments_(has_comments) {}
+
+  // The next `count` rows; the first is row `first_row` of the file in messages. kCorruption for
+  // lines that are not as the columns say, and when the file ends early.
+  Status readRows(LineSource& source, std::uint64_t first_row, std::size_t count,
+                  std::byte* rows) const;
+  // kCorruption unless nothing but empty lines and comments is left.
+  Status checkEnd(LineSource& source) const;
+
+ private:
+  bool isSkipped(std::string_view line) const;
+
+  std::vector<TextColumn> columns_;
+  std::size_t row_bytes_;
+  bool has_comments_;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,119 @@
+#include "io/formats/xyz_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "io/byte_output.h"
+#include "io/ply_format.h"
+#include "io/ply_number.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kBufferBytes = 256 << 10;
+
+class XyzWriter final : public RowWriter {
+ public:
+  XyzWriter(ByteOutput output, PlyElement element, char separator)
+      : output_(std::move(output)), element_(std::move(element)), separator_(separator) {}
+
+  Status writeHead(std::vector<std::string> comments) {
+    std::string head;
+    for (std::string& comment : comments) {
+      std::replace_if(
+          comment.begin(), comment.end(), [](char c) { return c >= '\0' && c < ' '; }, ' ');
+      head += fmt::format("# {}\n", comment);
+    }
+    if (separator_ == ' ') head += "# ";
+    for (const PlyProperty& property : element_.properties) {
+      head += property.name;
+      head += &property == &element_.properties.back() ? '\n' : separator_;
+    }
+    return output_.append(std::as_bytes(std::span(head)));
+  }
+
+  const PlyElement& element() const override { return element_; }
+
+  Status writeRows(std::span<const std::byte> rows) override {
+    if (is_finished_ || rows.size() % element_.row_bytes != 0) {
+      return Status::invalidArgument(
+          fmt::format("{}: {} bytes to write, expected whole rows of {} bytes before finish",
+                      output_.path(), rows.size(), element_.row_bytes));
+    }
+    text_.resize(kBufferBytes);
+    std::size_t used = 0;
+    for (; !rows.empty(); rows = rows.subspan(element_.row_bytes)) {
+      for (const PlyProperty& property : element_.properties) {
+        if (text_.size() - used <= kLongestPlyNumber) {
+          SURFEIT_RETURN_IF_ERROR(append(used));
+          used = 0;
+        }
+        char* const begin = text_.data() + used;
+        char* const end = formatPlyNumber(&rows[property.offset], property.type, begin);
+        *end = &property == &element_.properties.back() ? '\n' : separator_;
+        used += static_cast<std::size_t>(end - begin) + 1;
+      }
+    }
+    return append(used);
+  }
+
+  Status finish() override {
+    if (is_finished_) {
+      return Status::invalidArgument(fmt::format("{}: finished twice", output_.path()));
+    }
+    SURFEIT_RETURN_IF_ERROR(output_.commit());
+    is_finished_ = true;
+    return {};
+  }
+
+ private:
+  Status append(std::size_t used) {
+    return output_.append(std::as_bytes(std::span(text_).first(used)));
+  }
+
+  ByteOutput output_;
+  PlyElement element_;
+  char separator_;
+  std::vector<char> text_;
+  bool is_finished_ = false;
+};
+
+// Without x, y and z nobody could tell what the columns are; commas would part a name.
+Status checkProperties(const std::string& path, const PlyElement& element) {
+  for (const char* name : {"x", "y", "z"}) {
+    if (element.find(name) == nullptr) {
+      return Status::invalidArgument(
+          fmt::format("{}: no positions to write, expected properties x, y and z", path));
+    }
+  }
+  for (const PlyProperty& property : element.properties) {
+    const std::string& name = property.name;
+    if (!isPlyName(name) || name.find_first_of(",;\"") != name.npos || property.is_list) {
+      return Status::invalidArgument(
+          fmt::format("{}: property {}: expected a scalar with a name of one word without commas",
+                      path, quotePlyText(name)));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RowWriter>> createXyz(const std::string& path,
+                                             const RowWriterOptions& options) {
+  PlyElement element;
+  element.name = "vertex";
+  element.properties = options.properties;
+  packPlyRow(element);
+  SURFEIT_RETURN_IF_ERROR(checkProperties(path, element));
+  const char separator = withoutCompression(path).ends_with(".csv") ? ',' : ' ';
+  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path));
+  auto writer = std::make_unique<XyzWriter>(std::move(output), std::move(element), separator);
+  SURFEIT_RETURN_IF_ERROR(writer->writeHead(options.comments));
+  return std::unique_ptr<RowWriter>(std::move(writer));
+}
+
+}  // namespace surfeit

@@ -1,0 +1,168 @@
+#!/usr/bin/env bash
+# One case of the end-to-end tests of clouds of many formats; CMakeLists.txt lists the cases.
+#
+#   convert_test.sh CASE SURFEIT WORK_DIR
+set -euo pipefail
+
+case_name=$1
+surfeit=$2
+work_dir=$3
+
+source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
+
+generate() { "$surfeit" generate --quiet -o "$1" "${@:2}"; }
+
+# Four points with a radius, as PLY text.
+makePoints() {
+  printf '%s\n' ply "format ascii 1.0" "element vertex 4" "property double x" "property double y" \
+    "property double z" "property float radius" "property uchar group" end_header \
+    "0 0 0 1 0" "1 0 0 2 1" "2 0 5 3 2" "637000.25 0 0 4 3" > points.ply
+}
+
+everyFormatComesBack() {
+  local extension
+  generate city.ply --surfels 3k
+  for extension in ply ply.gz ply.zst ptc ptc.gz vdb prt bgeo pdb xyz csv.zst; do
+    run 0 convert city.ply -o "city.$extension"
+    run 0 info "city.$extension"
+    says radiosity
+    run 0 convert "city.$extension" -o back.ply --stats stats.json
+    jsonIs stats.json records 3000 written_records 3000
+  done
+  jsonHas stats.json inputs output properties input_bytes output_bytes records_per_second \
+    peak_resident_bytes
+  run 0 convert city.csv.zst -o back.ply
+  run 0 convert back.ply -o again.csv
+  run 0 convert city.ply -o first.csv
+  sameBytes first.csv again.csv
+  run 0 index city.ptc -o city.sft
+  run 0 verify city.sft
+}
+
+cloudsMergeMoveAndThin() {
+  makePoints
+  run 0 convert points.ply points.ply -o a.csv --every 3 --drop group --quiet
+  [[ $(cat a.csv) == $'x,y,z,radius\n0,0,0,1\n637000.25,0,0,4\n0,0,0,1\n637000.25,0,0,4' ]] ||
+    fail "$(cat a.csv)"
+  run 0 convert points.ply -o b.csv --units m:cm --up y --keep radius --crop -1,0,-1,150,501,1
+  [[ $(cat b.csv) == $'x,y,z,radius\n0,0,0,100\n100,0,0,200' ]] || fail "$(cat b.csv)"
+  run 0 convert points.ply -o c.csv --transform "1 0 0 -637000 0 1 0 0 0 0 1 0.5 0 0 0 1" --keep x \
+    --crop 0,0,0,1,1,1
+  [[ $(cat c.csv) == $'x,y,z\n0.25,0,0.5' ]] || fail "$(cat c.csv)"
+  printf '1 2 3\n' > one.xyz
+  run 0 convert points.ply one.xyz -o d.ply
+  says "one.xyz: not there, 0 is written: radius group"
+  run 0 convert d.ply -o d.csv --quiet
+  [[ $(tail -n 1 d.csv) == "1,2,3,0,0" ]] || fail "$(cat d.csv)"
+  [[ -z $said ]] || fail "said: $said"
+}
+
+# What one program calls so is read as what another needs, by every command.
+channelsAreNamedOnTheWay() {
+  generate city.ply --surfels 3k
+  run 0 convert city.ply -o odd.ptc --channels radiosity=bake,normal=N2
+  run 0 info odd.ptc
+  says bake N2_x
+  run 0 info odd.ptc --channels bake=radiosity,N2=normal
+  says "radiosity      float radiosity_r" "normal         float nx ny nz"
+  run 0 index odd.ptc -o odd.sft --channels bake=radiosity,N2=normal
+  run 0 info odd.sft
+  says "input had      position, normal, radius, area, radiosity"
+  run 0 gather odd.sft odd.ptc -o lit.ptc --channels N2=normal,bake=- --memory 64M
+  run 0 info lit.ptc
+  says occlusion "normal         float nx ny nz"
+  run 0 view odd.ptc -o picture.png --channels bake=radiosity --channel radiosity --size 32x32
+  exists picture.png
+  run 2 index odd.ptc -o none.sft --channels bake
+  says "channels: found 'bake', expected FROM=TO"
+  run 3 gather odd.sft city.ply -o none.ply --channels x=y
+  says "would be a second y"
+  leavesNothing none
+}
+
+partsAreChosenByName() {
+  printf '%s\n' ply "format ascii 1.0" "element vertex 1" "property float x" "property float y" \
+    "property float z" "element lamps 2" "property float x" "property float y" "property float z" \
+    "property float nx" "property float ny" "property float nz" "property float radius" \
+    "property float power_r" "property float power_g" "property float power_b" \
+    end_header "9 9 9" "1 2 3 0 0 1 1 1 1 1" "4 5 6 0 0 1 1 1 1 1" > two.ply
+  run 0 convert two.ply -o a.csv --part lamps --keep position
+  [[ $(cat a.csv) == $'x,y,z\n1,2,3\n4,5,6' ]] || fail "$(cat a.csv)"
+  run 0 index two.ply -o lamps.sft --part lamps
+  says "2 surfels"
+  run 0 gather lamps.sft two.ply -o lit.ply --part lamps --memory 64M
+  says "2 receivers"
+  run 0 radiance two.ply -o map.ply --part lamps --max-radius 10
+  says "2 surfels"
+  run 0 view two.ply -o picture.png --part lamps --size 16x16
+  says "2 surfels"
+  run 3 convert two.ply -o none.ply --part roofs
+  says roofs lamps
+  leavesNothing none
+}
+
+badOptionsAreUsageErrors() {
+  makePoints
+  run 2 convert points.ply
+  run 2 convert points.ply -o none.jpg
+  says "none.jpg" ".ptc"
+  run 2 convert points.ply -o none.ply --transform "1 2 3"
+  says "--transform" "12 or 16 numbers"
+  run 2 convert points.ply -o none.ply --transform "1 0 0 0 0 1 0 0 0 0 1 0 5 5 5 1"
+  says "last row 5 5 5 1" transpose
+  run 2 convert points.ply -o none.ply --transform "1 0 0 0 1 0 0 0 0 0 1 0"
+  says determinant
+  run 2 convert points.ply -o none.ply --units m:parsec
+  says "--units" "us-ft"
+  run 2 convert points.ply -o none.ply --up x
+  run 2 convert points.ply -o none.ply --crop 0,0,0,1,1
+  says "--crop" "six numbers"
+  run 2 convert points.ply -o none.ply --crop 0,0,0,-1,1,1
+  says "crop: found 0 to -1 along x"
+  run 2 convert points.ply -o none.ply --every 0
+  run 2 convert points.ply -o none.ply --keep x --drop radius
+  run 2 convert points.ply -o none.ply --keep colour
+  says "found no channel 'colour', expected one of position radius group"
+  run 2 convert points.ply -o none.exr
+  run 33 convert points.ply -o none.vdb --memory 10
+  run 74 convert no_such_file.ply -o none.ply
+  printf "no cloud" > notes.txt
+  run 3 convert notes.txt -o none.ply
+  head -c 180 points.ply > cut.ply
+  run 3 convert points.ply cut.ply -o none.ply
+  says cut.ply
+  leavesNothing none
+}
+
+# Whether a process has a file open without a name, or under a temporary one, that is to be `result`.
+resultIsOpen() { ls -l "/proc/$1/fd" 2> /dev/null | grep -qE 'deleted|\.tmp'; }
+
+interruptLeavesNothing() {
+  local signal expected process status name
+  generate city.ply --surfels 1M
+  set -m # jobs of their own take SIGINT
+  for name in result.prt result.ptc.gz; do
+    for signal in INT TERM; do
+      expected=$([[ $signal == INT ]] && echo 130 || echo 143)
+      # Much more than can be done before the signal comes
+      "$surfeit" convert city.ply city.ply city.ply city.ply city.ply city.ply city.ply city.ply \
+        city.ply city.ply city.ply city.ply -o "$name" --quiet &
+      process=$!
+      for ((i = 0; i < 300; ++i)); do
+        resultIsOpen "$process" && break
+        sleep 0.02
+      done
+      kill -"$signal" "$process"
+      status=0
+      wait "$process" || status=$?
+      [[ $status == "$expected" ]] || fail "exit status $status after SIG$signal, expected $expected"
+      leavesNothing result
+    done
+  done
+}
+
+rm -rf "$work_dir"
+mkdir -p "$work_dir"
+cd "$work_dir"
+"$case_name"
+echo "passed: $case_name"

@@ -1,0 +1,111 @@
+// surfeit brick: baked values of clouds to a multiresolution OpenVDB file.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "core/job_limits.h"
+#include "surfeit/brick.h"
+#include "tools/command.h"
+
+namespace surfeit {
+namespace {
+
+struct BrickArguments {
+  std::vector<std::string> clouds;
+  std::string output;
+  BrickOptions options;
+};
+
+Status runBrick(BrickArguments& arguments, CommandContext& context) {
+  BrickOptions& options = arguments.options;
+  options.threads = context.common.threads;
+  if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(const BrickStats stats, brickClouds(arguments.clouds, arguments.output,
+                                                               options, context.progress()));
+  const double seconds = std::max(context.wallSeconds(), 1e-9);
+  const std::uint64_t voxels =
+      std::accumulate(stats.level_voxels.begin(), stats.level_voxels.end(), std::uint64_t{0});
+  nlohmann::json phases = nlohmann::json::object();
+  for (const auto& [phase, phase_seconds] : stats.phase_seconds) phases[phase] = phase_seconds;
+  context.say(fmt::format(
+      "{}: {} voxels in {} levels of {:.4g} to {:.4g}, {}\n"
+      "{:.1f} s, {:.2f} M points/s, peak memory {}, temporary files {}",
+      arguments.output, formatCount(voxels), stats.level_voxels.size(), stats.voxel_size,
+      stats.voxel_size * double(std::uint64_t{1} << (stats.level_voxels.size() - 1)),
+      formatBytes(stats.file_bytes), seconds, double(stats.points) / seconds / 1e6,
+      formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
+  return context.writeStats({{"command", "brick"},
+                             {"memory_bytes", options.memory_bytes},
+                             {"max_error", options.max_error},
+                             {"points", stats.points},
+                             {"skipped_points", stats.skipped_points},
+                             {"channels", stats.channels},
+                             {"voxel_size", stats.voxel_size},
+                             {"voxels", voxels},
+                             {"level_voxels", stats.level_voxels},
+                             {"file_bytes", stats.file_bytes},
+                             {"temporary_bytes", stats.temporary_bytes},
+                             {"points_per_second", double(stats.points) / seconds},
+                             {"phases", phases}});
+}
+
+void addBrickOptions(CLI::App& command, BrickOptions& options) {
+  command
+      .add_option("--channel", options.channels,
+                  "Channels or properties to keep, separated by commas (default: what a gather "
+                  "wrote, else all that is not geometry)")
+      ->delimiter(',')
+      ->type_name("NAME");
+  command
+      .add_option("--max-error", options.max_error,
+                  "Voxels are divided where a value differs by more within them, in the units of "
+                  "the channel; 0 keeps all of the finest level")
+      ->type_name("E")
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->capture_default_str();
+  command
+      .add_option("--voxel-size", options.voxel_size,
+                  "Edge of the finest voxels, scene units (default: twice the spacing of the "
+                  "points)")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber.description(""));
+  command
+      .add_option("--temp", options.temporary_directory,
+                  "Directory of temporary files (default: beside the output)")
+      ->type_name("DIRECTORY");
+  command.add_flag("--strict", options.strict, "Refuse invalid points instead of skipping them");
+}
+
+}  // namespace
+
+void addBrickCommand(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand(
+      "brick", "Keep baked values of clouds in a multiresolution OpenVDB file, to look them up");
+  const auto arguments = std::make_shared<BrickArguments>();
+  command->add_option("CLOUD", arguments->clouds, "Clouds with baked values; several merge")
+      ->required();
+  command->add_option("-o,--output", arguments->output, "Brick map to write (.vdb)")
+      ->required()
+      ->check(
+          [](const std::string& name) {
+            return name.ends_with(".vdb") ? std::string() : "expected a name that ends with .vdb";
+          },
+          "");
+  addBrickOptions(*command, arguments->options);
+  context.addCommonOptions(*command);
+  command->footer(
+      "Values are looked up by position and normal: in programs with surfeit/brick.h, in pictures\n"
+      "with surfeit view --brick (docs/brick.md).\n"
+      "Examples:\n"
+      "  surfeit gather scene.sft receivers.ply -o baked.ply --mode occlusion\n"
+      "  surfeit brick baked.ply -o baked.vdb --max-error 0.02\n"
+      "  surfeit view other.ply --brick baked.vdb -o other.png");
+  command->callback(
+      [arguments, &context] { context.run([&] { return runBrick(*arguments, context); }); });
+}
+
+}  // namespace surfeit

@@ -1,0 +1,18 @@
+#include "tools/channel_options.h"
+
+namespace surfeit {
+
+void addChannelOptions(CLI::App& command, std::string& channels, std::string& part) {
+  command
+      .add_option(
+          "--channels", channels,
+          "Channels of the clouds to be called otherwise: FROM=TO,FROM=TO; FROM=- drops one")
+      ->type_name("FROM=TO,...");
+  command
+      .add_option("--part", part,
+                  "Of files with several: the grid (.vdb), layer (.exr) or element (PLY) to read "
+                  "(default: the first that holds a cloud)")
+      ->type_name("NAME");
+}
+
+}  // namespace surfeit

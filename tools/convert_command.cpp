@@ -1,0 +1,225 @@
+// surfeit convert: clouds of one format as clouds of another.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/job_limits.h"
+#include "surfeit/convert.h"
+#include "tools/channel_options.h"
+#include "tools/command.h"
+#include "tools/number_list.h"
+
+namespace surfeit {
+namespace {
+
+using Matrix = std::array<double, 12>;  // as ConvertOptions::transform
+
+struct ConvertArguments {
+  std::vector<std::string> inputs;
+  std::string output;
+  double scale = 1;                                 // of --units
+  Matrix turn{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // of --up
+  ConvertOptions options;
+};
+
+struct Unit {
+  std::string_view name;
+  double metres;
+};
+constexpr Unit kUnits[] = {{"m", 1},       {"cm", 0.01},   {"mm", 0.001},           {"km", 1000},
+                           {"in", 0.0254}, {"ft", 0.3048}, {"us-ft", 1200.0 / 3937}};
+
+// Metres of a unit, by name or as a number; 0 for what is none.
+double metresOf(std::string_view text) {
+  for (const Unit& unit : kUnits) {
+    if (unit.name == text) return unit.metres;
+  }
+  double number = 0;
+  const char* const text_end = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), text_end, number);
+  const bool ok = error == std::errc() && end == text_end && std::isfinite(number) && number > 0;
+  return ok ? number : 0;
+}
+
+// "ft:m"
+double parseUnits(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  if (colon != std::string::npos) {
+    const double from = metresOf(std::string_view(text).substr(0, colon));
+    const double to = metresOf(std::string_view(text).substr(colon + 1));
+    if (from > 0 && to > 0) return from / to;
+  }
+  throw CLI::ValidationError(
+      "--units", fmt::format("found \"{}\", expected FROM:TO, each m, cm, mm, km, in, ft, us-ft or "
+                             "the metres of a unit, such as ft:m or 0.5:m",
+                             text));
+}
+
+// Turns +z up to +y up, or the other way round.
+Matrix parseUp(const std::string& text) {
+  if (text == "y") return {1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0};
+  if (text == "z") return {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0};
+  throw CLI::ValidationError("--up", fmt::format("found \"{}\", expected y or z", text));
+}
+
+// 12 numbers, or 16 with 0 0 0 1 at the end.
+Matrix parseTransform(const std::string& text) {
+  constexpr const char* kName = "--transform";
+  constexpr const char* kExpected = "12 or 16 numbers, the matrix row by row";
+  const std::string_view separators = " ,\t";
+  std::size_t words = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool begins = i == 0 || separators.find(text[i - 1]) != std::string_view::npos;
+    words += begins && separators.find(text[i]) == std::string_view::npos ? 1 : 0;
+  }
+  if (words <= 12) return parseNumberList<12>(kName, text, kExpected);
+  const auto all = parseNumberList<16>(kName, text, kExpected);
+  if (all[12] != 0 || all[13] != 0 || all[14] != 0 || all[15] != 1) {
+    throw CLI::ValidationError(
+        kName, fmt::format("found a last row {} {} {} {}, expected 0 0 0 1 (what moves stands in "
+                           "the last column; transpose matrices that have it in the last row)",
+                           all[12], all[13], all[14], all[15]));
+  }
+  Matrix matrix;
+  std::copy_n(all.begin(), matrix.size(), matrix.begin());
+  return matrix;
+}
+
+// The map that does `b`, then `a`.
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix ab;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      double sum = column == 3 ? a[4 * row + 3] : 0;
+      for (std::size_t k = 0; k < 3; ++k) sum += a[4 * row + k] * b[4 * k + column];
+      ab[4 * row + column] = sum;
+    }
+  }
+  return ab;
+}
+
+Status runConvert(ConvertArguments& arguments, CommandContext& context) {
+  ConvertOptions options = arguments.options;
+  const double scale = arguments.scale;
+  const Matrix scaling{scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, scale, 0};
+  options.transform = product(options.transform, product(arguments.turn, scaling));
+  if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(
+      const ConvertStats stats,
+      convertClouds(arguments.inputs, arguments.output, options, context.progress()));
+  const double seconds = std::max(context.wallSeconds(), 1e-9);
+  context.say(fmt::format(
+      "{}: {} of {} records, {} properties, {}\n"
+      "{:.1f} s, {:.2f} M records/s, {:.0f} MB/s read, {:.0f} MB/s written, peak memory {}",
+      arguments.output, formatCount(stats.written_records), formatCount(stats.records),
+      stats.properties.size(), formatBytes(stats.output_bytes), seconds,
+      double(stats.records) / seconds / 1e6, double(stats.input_bytes) / seconds / 1e6,
+      double(stats.output_bytes) / seconds / 1e6, formatBytes(peakResidentBytes())));
+  return context.writeStats({{"command", "convert"},
+                             {"inputs", arguments.inputs},
+                             {"output", arguments.output},
+                             {"records", stats.records},
+                             {"skipped_records", stats.skipped_records},
+                             {"cropped_records", stats.cropped_records},
+                             {"written_records", stats.written_records},
+                             {"properties", stats.properties},
+                             {"input_bytes", stats.input_bytes},
+                             {"output_bytes", stats.output_bytes},
+                             {"records_per_second", double(stats.records) / seconds}});
+}
+
+// Options that say where records go.
+void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
+  constexpr const char* kGroup = "Places, in this order";
+  command
+      .add_option_function<std::string>(
+          "--units", [&](const std::string& text) { arguments.scale = parseUnits(text); },
+          "Scales from one unit to another: m, cm, mm, km, in, ft, us-ft or a number of metres")
+      ->type_name("FROM:TO")
+      ->group(kGroup);
+  command
+      .add_option_function<std::string>(
+          "--up", [&](const std::string& text) { arguments.turn = parseUp(text); },
+          "Turns what is up: y for clouds with +z up, z for clouds with +y up")
+      ->type_name("y|z")
+      ->group(kGroup);
+  command
+      .add_option_function<std::string>(
+          "--transform",
+          [&](const std::string& text) { arguments.options.transform = parseTransform(text); },
+          "Affine matrix, row by row; it acts on columns, so translations stand at the end of rows")
+      ->type_name("\"12 or 16 numbers\"")
+      ->group(kGroup);
+  command
+      .add_option_function<std::string>(
+          "--crop",
+          [&](const std::string& text) {
+            const auto n = parseNumberList<6>("--crop", text, "six numbers, x0,y0,z0,x1,y1,z1");
+            arguments.options.crop = CropBox{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+          },
+          "Only positions from x0 y0 z0 to below x1 y1 z1")
+      ->type_name("X0,Y0,Z0,X1,Y1,Z1")
+      ->group(kGroup);
+}
+
+// Options that say what of the records is written.
+void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
+  addChannelOptions(command, options.channels, options.part);
+  command.add_option("--every", options.every, "Only records 0, N, 2N, ... of each input")
+      ->type_name("N")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53).description(""));
+  CLI::Option* const keep =
+      command.add_option("--keep", options.keep, "Only these channels, and the position")
+          ->type_name("NAME,...")
+          ->delimiter(',')
+          ->expected(1);
+  command.add_option("--drop", options.drop, "All channels but these")
+      ->type_name("NAME,...")
+      ->delimiter(',')
+      ->expected(1)
+      ->excludes(keep);
+  command
+      .add_option(
+          "--like", options.like,
+          "A file whose picture windows (.exr), grid (.vdb) or camera (.ptc) the output gets "
+          "(default: a single input that is not moved)")
+      ->type_name("FILE");
+}
+
+}  // namespace
+
+void addConvertCommand(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand(
+      "convert", "Convert clouds from one format to another; merge, move, crop and thin them");
+  const auto arguments = std::make_shared<ConvertArguments>();
+  command->add_option("CLOUD", arguments->inputs, "Clouds of any format (docs/files.md)")
+      ->required();
+  command
+      ->add_option("-o,--output", arguments->output,
+                   "Cloud to write; the extension tells the format: .ply, .ptc, .vdb, .prt, .bgeo, "
+                   ".pdb, .exr, .xyz, .csv, with .gz or .zst behind it")
+      ->required();
+  addChoiceOptions(*command, arguments->options);
+  addPlaceOptions(*command, *arguments);
+  context.addCommonOptions(*command, {.threads = false});
+  command->footer(
+      "Several clouds become one with the properties of all; what one of them lacks is 0 there.\n"
+      "Memory is some MiB, whatever the size of the clouds; only .vdb holds what it writes, up to\n"
+      "--memory (default 2G).\n"
+      "Examples:\n"
+      "  surfeit convert scan.las -o scan.ply --units ft:m --up y\n"
+      "  surfeit convert a.ptc b.ptc -o both.ply.zst\n"
+      "  surfeit convert city.ply -o block.vdb --crop 0,0,0,100,100,50 --drop normal\n"
+      "  surfeit convert baked.bgeo -o thin.csv --every 100 --channels bake=radiosity");
+  command->callback(
+      [arguments, &context] { context.run([&] { return runConvert(*arguments, context); }); });
+}
+
+}  // namespace surfeit
