@@ -13,12 +13,12 @@
 namespace surfeit {
 namespace {
 
-constexpr std::uint32_t kMagic = 670, kSwappedMagic = 0x9E020000;
+constexpr std::uint32_t kSwappedMagic = 0x9E020000;  // 670 in the other byte order
 constexpr std::size_t kHeaderBytes = 60, kAttributeBytes = 42, kDataBytes = 20;
 constexpr std::size_t kMaxNameBytes = 256;
 constexpr std::uint32_t kMaxAttributes = 1024, kMaxValueBytes = 1024;
 constexpr std::size_t kMaxRowBytes = 16 << 10;
-constexpr std::uint32_t kVector = 1, kReal = 2, kInteger = 3;
+constexpr std::uint32_t kVector = 1, kInteger = 3;  // 2 is a real
 
 class PdbReader final : public ColumnRowReader {
  public:

@@ -12,7 +12,7 @@ namespace surfeit {
 namespace {
 
 constexpr std::uint32_t kOldestVersion = 222;
-constexpr std::uint32_t kMaxGrids = 1 << 16, kMaxMetadata = 1 << 16;
+constexpr std::uint32_t kMaxGrids = 1 << 12, kMaxMetadata = 1 << 16;
 constexpr std::size_t kUuidBytes = 36;
 // Longer ones (thumbnails, tables for OpenVDB's delayed loading) are passed over.
 constexpr std::uint32_t kMaxMetadataBytes = 1 << 16;

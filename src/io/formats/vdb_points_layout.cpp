@@ -11,8 +11,11 @@
 namespace surfeit {
 namespace {
 
-constexpr std::uint64_t kMaxAttributes = 4096;
-constexpr std::uint64_t kMaxPageBytes = std::uint64_t{1} << 29;
+// Each has buffers of 128 KiB, and a page
+constexpr std::uint64_t kMaxAttributes = 256;
+// OpenVDB's pages are of 1 MiB, or an array when that is larger: one of 5 million positions in a
+// leaf
+constexpr std::uint64_t kMaxPageBytes = std::uint64_t{1} << 26;
 // lz4, which OpenVDB packs with, makes 255 bytes of one at best
 constexpr std::uint64_t kMostExpansion = 256;
 constexpr std::size_t kVoxelBytes = 4 * kVdbLeafVoxels;

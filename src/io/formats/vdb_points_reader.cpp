@@ -13,6 +13,8 @@
 namespace surfeit {
 namespace {
 
+constexpr std::size_t kMaxRowBytes = 16 << 10;
+
 // An attribute that rows have.
 struct Field {
   std::size_t attribute = 0;
@@ -84,6 +86,11 @@ Status VdbPointsReader::declareAttribute(std::size_t index, const RowReaderOptio
   const PlyType type = field.is_position
                            ? vdbPositionType(grid_.transform, layout_.least, layout_.greatest)
                            : attribute.type->type;
+  if (element_.row_bytes + components * plyTypeBytes(type) > kMaxRowBytes) {
+    return Status::corruption(
+        fmt::format("{}: attribute {} of {} values: points of more than {} bytes, expected fewer",
+                    path(), quotePlyText(attribute.name), components, kMaxRowBytes));
+  }
   const std::size_t before = element_.properties.size();
   SURFEIT_RETURN_IF_ERROR(addChannel(attribute.name, components,
                                      vdbChannelKind(attribute.name, components), type,

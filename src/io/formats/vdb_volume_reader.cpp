@@ -13,6 +13,9 @@
 namespace surfeit {
 namespace {
 
+// Walked side by side, each with up to a MiB of nodes and buffers
+constexpr std::size_t kMaxVolumes = 64;
+
 bool isLevelSet(const VdbGrid& grid) { return grid.text("class") == "level set"; }
 
 // The origin of part `part` of a tile, in the order of the tree.
@@ -152,6 +155,9 @@ Status VdbVolumeReader::declare(const RowReaderOptions& options) {
     } else if (grid.transform != grid_.transform) {
       notes_.push_back(fmt::format("grid {} has another transform: read it by its name",
                                    quotePlyText(grid.name)));
+    } else if (volumes_.size() >= kMaxVolumes) {
+      notes_.push_back(fmt::format("grid {}: after {} others it is not read",
+                                   quotePlyText(grid.name), volumes_.size()));
     } else {
       SURFEIT_RETURN_IF_ERROR(declareVolume(grid, grid.name, options));
     }
