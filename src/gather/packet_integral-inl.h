@@ -70,14 +70,16 @@ class Integral {
     const bool has_near = (*canvas_.is_face_used)[face];
     const bool has_far = far_ != nullptr && (*far_->canvas->is_face_used)[face];
     const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
-    if (has_near || has_far) ResolveFace(first, end, has_near, has_far);
+    const SurfaceFill fill(canvas_, lane_);
+    if (has_near || has_far) ResolveFace(first, end, has_near, has_far, fill);
     for (std::size_t i = first; i < end; ++i) {
       const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
       const V direction_weight = WeightOf(pixel.direction);
       const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
       weight_sum_ = hn::Add(weight_sum_, weight);
       if (!has_near && !has_far && !has_more) continue;
-      const PixelSight sight = has_near || has_far ? Resolved(i) : NothingSeen();
+      const PixelSight sight =
+          has_near || has_far ? Resolved(i, fill.Coverage(i - first)) : NothingSeen();
       covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
       radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
       radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
@@ -189,9 +191,9 @@ class Integral {
 
   // Puts what is seen into the pixels of a face: the coverage in the place of the room, radiosities
   // and faded coverage in theirs.
-  void ResolveFace(std::size_t first, std::size_t end, bool has_near, bool has_far) {
+  void ResolveFace(std::size_t first, std::size_t end, bool has_near, bool has_far,
+                   const SurfaceFill& fill) {
     const D d;
-    SurfaceFill fill(canvas_, lane_);
     for (std::size_t i = first; i < end; ++i) {
       const PixelSight sight = Look(i, has_near, has_far);
       float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
@@ -205,7 +207,6 @@ class Integral {
       if (rules_.fades()) hn::Store(sight.occlusion, d, pixel + fade_at_);
     }
     fill.Run();
-    fill_first_ = first;
   }
 
   static PixelSight NothingSeen() {
@@ -213,12 +214,11 @@ class Integral {
     return {zero, zero, {zero, zero, zero}};
   }
 
-  // What is seen of a pixel of the face that was resolved last, with its gaps filled.
-  PixelSight Resolved(std::size_t i) const {
+  // What is seen of a pixel that was resolved, once its gaps are filled to `coverage`.
+  PixelSight Resolved(std::size_t i, V coverage) const {
     const D d;
     const float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
     const V found = hn::Load(d, pixel);
-    const V coverage = SurfaceFill(canvas_, lane_).Coverage(i - fill_first_);
     const V scale = hn::IfThenElse(hn::Gt(coverage, found), hn::Div(coverage, found), Splat(1));
     PixelSight sight = NothingSeen();
     sight.coverage = sight.occlusion = coverage;
@@ -297,7 +297,6 @@ class Integral {
   const GatherRules& rules_;
   const SharedFarField* const far_;
   const std::size_t lane_, pixel_floats_, fade_at_;
-  std::size_t fill_first_ = 0;  // first pixel of the face that was resolved last
   const Receivers receivers_;
   const Frames frames_;
   V weight_sum_, covered_;

@@ -215,34 +215,9 @@ class ChannelFinder {
 
   void add(std::size_t property, RowChannel& channel) {
     const PlyType type = element_.properties[property].type;
-    channel.type = channel.properties.empty() ? type : widest(channel.type, type);
+    channel.type = channel.properties.empty() ? type : widestPlyType(channel.type, type);
     channel.properties.push_back(property);
     is_taken_[property] = true;
-  }
-
-  static bool isFloat(PlyType type) { return type >= PlyType::kFloat32; }
-  static bool isSigned(PlyType type) {
-    return type == PlyType::kInt8 || type == PlyType::kInt16 || type == PlyType::kInt32;
-  }
-
-  // The smallest type that holds the values of both.
-  static PlyType widest(PlyType a, PlyType b) {
-    if (a == b) return a;
-    if (plyTypeBytes(a) < plyTypeBytes(b) || (plyTypeBytes(a) == plyTypeBytes(b) && isFloat(b))) {
-      std::swap(a, b);
-    }
-    if (isFloat(a) || isFloat(b)) {
-      return a == PlyType::kFloat32 && plyTypeBytes(b) < 4 ? PlyType::kFloat32 : PlyType::kFloat64;
-    }
-    if (isSigned(a) == isSigned(b) || (isSigned(a) && plyTypeBytes(a) > plyTypeBytes(b))) return a;
-    switch (plyTypeBytes(a)) {
-      case 1:
-        return PlyType::kInt16;
-      case 2:
-        return PlyType::kInt32;
-      default:
-        return PlyType::kFloat64;
-    }
   }
 
   const PlyElement& element_;

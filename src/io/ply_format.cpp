@@ -141,7 +141,7 @@ class HeaderParser {
     if (type_name == "list") {
       property.is_list = true;
       const std::optional<PlyType> count_type = plyTypeFromName(takeWord(rest));
-      if (!count_type || *count_type >= PlyType::kFloat32) {
+      if (!count_type || isPlyFloat(*count_type)) {
         return unexpected("an integer type for the length of the list");
       }
       property.count_type = *count_type;
@@ -216,6 +216,29 @@ std::optional<PlyType> plyTypeFromName(std::string_view name) {
     if (name == row.classic || name == row.sized) return row.type;
   }
   return std::nullopt;
+}
+
+PlyType widestPlyType(PlyType a, PlyType b) {
+  const auto isSigned = [](PlyType type) {
+    return type == PlyType::kInt8 || type == PlyType::kInt16 || type == PlyType::kInt32;
+  };
+  if (a == b) return a;
+  if (plyTypeBytes(a) < plyTypeBytes(b)) std::swap(a, b);
+  if (isPlyFloat(a) || isPlyFloat(b)) {
+    // A float holds integers of 16 bits
+    const bool is_small = (isPlyFloat(a) ? plyTypeBytes(b) : plyTypeBytes(a)) <= 2;
+    const PlyType floating = isPlyFloat(a) ? a : b;
+    return floating == PlyType::kFloat32 && is_small ? PlyType::kFloat32 : PlyType::kFloat64;
+  }
+  if (isSigned(a) == isSigned(b) || (isSigned(a) && plyTypeBytes(a) > plyTypeBytes(b))) return a;
+  switch (plyTypeBytes(a)) {
+    case 1:
+      return PlyType::kInt16;
+    case 2:
+      return PlyType::kInt32;
+    default:
+      return PlyType::kFloat64;
+  }
 }
 
 bool isPlyName(std::string_view word) {

@@ -35,6 +35,11 @@ std::size_t plyTypeBytes(PlyType type);
 std::string_view plyTypeName(PlyType type);
 std::optional<PlyType> plyTypeFromName(std::string_view name);
 
+inline bool isPlyFloat(PlyType type) { return type >= PlyType::kFloat32; }
+
+// The smallest type that holds the values of both exactly; float64 where none does.
+PlyType widestPlyType(PlyType a, PlyType b);
+
 // Calls `visit` with std::type_identity<T>, T being the C++ type of values of a PLY type, and
 // returns what it returns.
 template <typename Visit>

@@ -147,7 +147,7 @@ void RowTransform::widenTypes(std::vector<PlyProperty>& properties) const {
     if (roleOf(channel) == Role::kNone) continue;
     for (const std::size_t i : channel.properties) {
       PlyType& type = properties[i].type;
-      if (type >= PlyType::kFloat32) continue;
+      if (isPlyFloat(type)) continue;
       type = plyTypeBytes(type) <= 2 ? PlyType::kFloat32 : PlyType::kFloat64;
     }
   }

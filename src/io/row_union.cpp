@@ -12,11 +12,6 @@
 namespace surfeit {
 namespace {
 
-bool isFloat(PlyType type) { return type >= PlyType::kFloat32; }
-bool isSigned(PlyType type) {
-  return type == PlyType::kInt8 || type == PlyType::kInt16 || type == PlyType::kInt32;
-}
-
 // By property, whether it belongs to a color.
 std::vector<bool> findColors(const PlyElement& element) {
   std::vector<bool> is_color(element.properties.size(), false);
@@ -31,7 +26,7 @@ std::vector<bool> findColors(const PlyElement& element) {
 std::vector<double> convertedCodes(PlyType from, PlyType to) {
   if (!codesSrgb(from)) return {};
   const bool is_widened = from == PlyType::kUint8 && to == PlyType::kUint16;
-  if (!isFloat(to) && !is_widened) return {};
+  if (!isPlyFloat(to) && !is_widened) return {};
   const std::size_t most = from == PlyType::kUint8 ? 255 : 65535;
   std::vector<double> codes(most + 1);
   for (std::size_t code = 0; code <= most; ++code) {
@@ -89,26 +84,6 @@ void convertValues(const std::byte* from, std::size_t from_stride, std::size_t c
 
 }  // namespace
 
-PlyType widestType(PlyType a, PlyType b) {
-  if (a == b) return a;
-  if (plyTypeBytes(a) < plyTypeBytes(b)) std::swap(a, b);
-  if (isFloat(a) || isFloat(b)) {
-    // A float holds integers of 16 bits
-    const bool is_small = (isFloat(a) ? plyTypeBytes(b) : plyTypeBytes(a)) <= 2;
-    const PlyType floating = isFloat(a) ? a : b;
-    return floating == PlyType::kFloat32 && is_small ? PlyType::kFloat32 : PlyType::kFloat64;
-  }
-  if (isSigned(a) == isSigned(b) || (isSigned(a) && plyTypeBytes(a) > plyTypeBytes(b))) return a;
-  switch (plyTypeBytes(a)) {
-    case 1:
-      return PlyType::kInt16;
-    case 2:
-      return PlyType::kInt32;
-    default:
-      return PlyType::kFloat64;
-  }
-}
-
 void RowUnion::add(const PlyElement& element) {
   std::unordered_map<std::string, std::size_t> index;
   for (std::size_t i = 0; i < properties_.size(); ++i) index.emplace(properties_[i].name, i);
@@ -119,7 +94,7 @@ void RowUnion::add(const PlyElement& element) {
       properties_.push_back(property);
     } else {
       PlyType& type = properties_[entry->second].type;
-      type = widestType(type, property.type);
+      type = widestPlyType(type, property.type);
     }
   }
 }

@@ -10,9 +10,6 @@
 
 namespace surfeit {
 
-// The smallest type that holds the values of both exactly; float64 where none does.
-PlyType widestType(PlyType a, PlyType b);
-
 // The properties of all elements that were added: in the order in which they first come, each of
 // the widest of its types. Lists are left out. One thread at a time.
 class RowUnion {

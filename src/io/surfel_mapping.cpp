@@ -32,8 +32,6 @@ const std::array<float, 256>& linearFromSrgb8() {
   return table;
 }
 
-bool isFloat(PlyType type) { return type == PlyType::kFloat32 || type == PlyType::kFloat64; }
-
 // Whether a float can hold the value; false for NaN too.
 bool fitsFloat(double value) { return std::abs(value) <= std::numeric_limits<float>::max(); }
 
@@ -182,7 +180,7 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
     SURFEIT_ASSIGN_OR_RETURN(const bool has_color, findTriple(element, kColorNames, path, color));
     for (Field& field : color) {
       field.is_srgb = codesSrgb(field.type);
-      if (!field.is_srgb && !isFloat(field.type)) {
+      if (!field.is_srgb && !isPlyFloat(field.type)) {
         return Status::corruption(fmt::format(
             "{}: element {}: property {} is {}, expected uchar, ushort, float or double", path,
             element.name, field.name, plyTypeName(field.type)));
@@ -242,7 +240,7 @@ std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
     is_fast &= plyTypeBytes(two_sided_.type) == 1;
     decoder.setTwoSided(static_cast<std::size_t>(two_sided_.offset));
   }
-  is_fast &= !group_.isPresent() || !isFloat(group_.type);
+  is_fast &= !group_.isPresent() || !isPlyFloat(group_.type);
   if (group_.isPresent() && is_fast) {
     decoder.setGroup(static_cast<std::size_t>(group_.offset), plyTypeBytes(group_.type));
   }

@@ -85,8 +85,8 @@ TEST_F(ConvertTest, FormatsMixAndEmptyCloudsAddNothing) {
 TEST(RowUnion, WidestTypeHoldsTheValuesOfBoth) {
   for (int a = 0; a < 8; ++a) {
     for (int b = 0; b < 8; ++b) {
-      const PlyType wide = widestType(PlyType(a), PlyType(b));
-      EXPECT_EQ(wide, widestType(PlyType(b), PlyType(a)));
+      const PlyType wide = widestPlyType(PlyType(a), PlyType(b));
+      EXPECT_EQ(wide, widestPlyType(PlyType(b), PlyType(a)));
       for (const int narrow : {a, b}) {
         visitPlyType(PlyType(narrow), [&]<typename T>(std::type_identity<T>) {
           for (const T value : {std::numeric_limits<T>::lowest(), std::numeric_limits<T>::max()}) {
