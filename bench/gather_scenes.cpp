@@ -135,9 +135,7 @@ Status GatherScene::makeOctree(std::uint64_t count, int threads, Progress& progr
   CloudChannels channels;
   channels.normal = channels.radius = channels.area = channels.radiosity = true;
   channels.two_sided = geometry_.is_two_sided;
-  SURFEIT_ASSIGN_OR_RETURN(
-      SurfelWriter writer,
-      SurfelWriter::create(cloud_path, channels, PlyEncoding::kBinaryLittleEndian));
+  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(cloud_path, channels));
   const SurfelSink sink = [&](std::span<const Surfel> surfels) { return writer.write(surfels); };
   if (isMeshScene(name_)) {
     SURFEIT_RETURN_IF_ERROR(sendMeshSurfels(geometry_, count, directory_.path(), threads, sink));

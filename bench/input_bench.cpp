@@ -66,7 +66,8 @@ std::vector<Surfel> randomCloud(std::size_t count) {
 }
 
 Status writeCloud(const std::string& path, std::span<const Surfel> cloud, PlyEncoding encoding) {
-  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(path, kAllChannels, encoding));
+  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer,
+                           SurfelWriter::create(path, kAllChannels, {.ply_encoding = encoding}));
   SURFEIT_RETURN_IF_ERROR(writer.write(cloud));
   return writer.finish();
 }

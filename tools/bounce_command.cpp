@@ -94,10 +94,7 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
   addQualityOptions(*command, options.quality);
   addSubsetOption(*command, options.groups);
   addCacheOptions(*command, options.cache_split, options.direct_io);
-  command
-      ->add_option("--temp", options.temporary_directory,
-                   "Directory of temporary files (default: beside the output)")
-      ->group("Paging");
+  addTemporaryOption(*command, options.temporary_directory)->group("Paging");
   context.addCommonOptions(*command);
   command->footer(
       "The result holds the same surfels, pages and nodes with new radiosities. A gather from it\n"

@@ -29,8 +29,6 @@ Status runBrick(BrickArguments& arguments, CommandContext& context) {
   const double seconds = std::max(context.wallSeconds(), 1e-9);
   const std::uint64_t voxels =
       std::accumulate(stats.level_voxels.begin(), stats.level_voxels.end(), std::uint64_t{0});
-  nlohmann::json phases = nlohmann::json::object();
-  for (const auto& [phase, phase_seconds] : stats.phase_seconds) phases[phase] = phase_seconds;
   context.say(fmt::format(
       "{}: {} voxels in {} levels of {:.4g} to {:.4g}, {}\n"
       "{:.1f} s, {:.2f} M points/s, peak memory {}, temporary files {}",
@@ -50,7 +48,7 @@ Status runBrick(BrickArguments& arguments, CommandContext& context) {
                              {"file_bytes", stats.file_bytes},
                              {"temporary_bytes", stats.temporary_bytes},
                              {"points_per_second", double(stats.points) / seconds},
-                             {"phases", phases}});
+                             {"phases", jsonOfPhases(stats.phase_seconds)}});
 }
 
 void addBrickOptions(CLI::App& command, BrickOptions& options) {
@@ -59,6 +57,7 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
                   "Channels or properties to keep, separated by commas (default: what a gather "
                   "wrote, else all that is not geometry)")
       ->delimiter(',')
+      ->allow_extra_args(false)  // else it takes the clouds behind it, too
       ->type_name("NAME");
   command
       .add_option("--max-error", options.max_error,
@@ -73,10 +72,7 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
                   "points)")
       ->type_name("S")
       ->check(CLI::PositiveNumber.description(""));
-  command
-      .add_option("--temp", options.temporary_directory,
-                  "Directory of temporary files (default: beside the output)")
-      ->type_name("DIRECTORY");
+  addTemporaryOption(command, options.temporary_directory);
   command.add_flag("--strict", options.strict, "Refuse invalid points instead of skipping them");
 }
 
@@ -103,6 +99,8 @@ void addBrickCommand(CLI::App& app, CommandContext& context) {
       "Examples:\n"
       "  surfeit gather scene.sft receivers.ply -o baked.ply --mode occlusion\n"
       "  surfeit brick baked.ply -o baked.vdb --max-error 0.02\n"
+      "  surfeit brick left.ptc right.ptc -o light.vdb --channel irradiance,albedo \\\n"
+      "      --voxel-size 0.05\n"
       "  surfeit view other.ply --brick baked.vdb -o other.png");
   command->callback(
       [arguments, &context] { context.run([&] { return runBrick(*arguments, context); }); });

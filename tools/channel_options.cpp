@@ -15,4 +15,14 @@ void addChannelOptions(CLI::App& command, std::string& channels, std::string& pa
       ->type_name("NAME");
 }
 
+void addCloudOutputOption(CLI::App& command, std::string& output, const std::string& what) {
+  command
+      .add_option("-o,--output", output,
+                  what +
+                      "; the extension tells the format: .ply, .ptc, .vdb, .prt, .bgeo, .pdb, "
+                      ".exr, .xyz, .csv, with .gz or .zst behind it")
+      ->required()
+      ->type_name("CLOUD");
+}
+
 }  // namespace surfeit

@@ -1,4 +1,5 @@
-// --channels and --part, which say what of a cloud's file is read, and under which names.
+// Options about files of clouds: --channels and --part, which say what of a cloud's file is read,
+// and under which names; -o, the cloud that is written.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,5 +9,8 @@ namespace surfeit {
 
 // The library parses `channels`: a text that is no list of FROM=TO is a usage error of its own.
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part);
+
+// `what` begins the description: "Cloud to write". Any format that is written will do.
+void addCloudOutputOption(CLI::App& command, std::string& output, const std::string& what);
 
 }  // namespace surfeit

@@ -155,6 +155,26 @@ CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std:
   return command.add_option_function<std::string>(names, parse, help)->type_name("SIZE");
 }
 
+CLI::Option* addTemporaryOption(CLI::App& command, std::string& directory) {
+  return command
+      .add_option("--temp", directory, "Directory of temporary files (default: beside the output)")
+      ->type_name("DIRECTORY");
+}
+
+std::string formatPhases(const PhaseSeconds& phases) {
+  std::string text;
+  for (const auto& [phase, seconds] : phases) {
+    text += fmt::format("{}{} {:.1f} s", text.empty() ? "" : ", ", phase, seconds);
+  }
+  return text;
+}
+
+nlohmann::json jsonOfPhases(const PhaseSeconds& phases) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const auto& [phase, seconds] : phases) json[phase] = seconds;
+  return json;
+}
+
 int exitStatus(StatusCode code) {
   switch (code) {
     case StatusCode::kOk:

@@ -9,6 +9,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -77,6 +79,14 @@ std::string formatCount(std::uint64_t count);
 // An option that takes a byte size.
 CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,
                                const std::string& help);
+
+// --temp; without it files lie beside the output.
+CLI::Option* addTemporaryOption(CLI::App& command, std::string& directory);
+
+// Seconds by phase, for people, "read 1.2 s, sort 0.3 s", and for statistics.
+using PhaseSeconds = std::vector<std::pair<std::string, double>>;
+std::string formatPhases(const PhaseSeconds& phases);
+nlohmann::json jsonOfPhases(const PhaseSeconds& phases);
 
 // Writes a whole file, which appears when complete.
 Status writeTextFile(const std::string& path, const std::string& text);

@@ -52,6 +52,12 @@ void addCompositeCommand(CLI::App& app, CommandContext& context) {
       ->required();
   addCompositeOptions(*command, arguments->options);
   context.addCommonOptions(*command, {.threads = false});
+  command->footer(
+      "Pixels are those of the first file; the others add the channels that it lacks.\n"
+      "Examples:\n"
+      "  surfeit composite passes.exr light.exr -o lit.png --channel lit --exposure 1\n"
+      "  surfeit composite passes.exr light.exr -o small.png --channel occlusion \\\n"
+      "      --range \"0 0.8\" --reduce 2 --background \"1 1 1\"");
   command->callback(
       [arguments, &context] { context.run([&] { return runComposite(*arguments, context); }); });
 }

@@ -179,11 +179,11 @@ void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
       command.add_option("--keep", options.keep, "Only these channels, and the position")
           ->type_name("NAME,...")
           ->delimiter(',')
-          ->expected(1);
+          ->allow_extra_args(false);
   command.add_option("--drop", options.drop, "All channels but these")
       ->type_name("NAME,...")
       ->delimiter(',')
-      ->expected(1)
+      ->allow_extra_args(false)
       ->excludes(keep);
   command
       .add_option(

@@ -8,6 +8,7 @@
 #include "gather/gather_options.h"
 #include "surfeit/gather.h"
 #include "tools/cache_report.h"
+#include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
 #include "tools/light_options.h"
@@ -71,9 +72,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
       ->add_option("RECEIVERS", arguments->receivers,
                    "Cloud with x y z and nx ny nz (docs/files.md)")
       ->required();
-  command
-      ->add_option("-o,--output", arguments->result, "Result cloud; the extension tells its format")
-      ->required();
+  addCloudOutputOption(*command, arguments->result, "Result cloud");
   addGatherOptions(*command, arguments->options);
   addLightOptions(*command, arguments->options);
   addSubsetOption(*command, arguments->options.groups);

@@ -6,6 +6,7 @@
 
 #include "octree/group_set.h"
 #include "tools/channel_options.h"
+#include "tools/command.h"
 
 namespace surfeit {
 namespace {
@@ -113,10 +114,7 @@ void addPagingOptions(CLI::App& command, GatherOptions& options) {
       .add_flag("--prefetch,!--no-prefetch", options.prefetch,
                 "Read ahead along the order when reading is slow (default: on)")
       ->group(kPagingGroup);
-  command
-      .add_option("--temp", options.temporary_directory,
-                  "Directory of temporary files, for what does not fit the memory")
-      ->group(kPagingGroup);
+  addTemporaryOption(command, options.temporary_directory)->group(kPagingGroup);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/generate_scene.h"
 
@@ -96,8 +97,7 @@ void addSceneOptions(CLI::App& command, SceneRecipe& recipe) {
 void addGenerateCommand(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand("generate", "Make a test scene of any number of surfels");
   const auto arguments = std::make_shared<GenerateArguments>();
-  command->add_option("-o,--output", arguments->output, "Cloud to write (PLY), or recipe (text)")
-      ->required();
+  addCloudOutputOption(*command, arguments->output, "Cloud to write (or a recipe, of any name)");
   addSceneOptions(*command, arguments->recipe);
   command->add_flag("--recipe", arguments->is_recipe,
                     "Write a recipe: a few lines that index takes in place of the cloud");

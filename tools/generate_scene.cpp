@@ -79,9 +79,9 @@ Result<GenerateStats> generateScene(const SceneRecipe& recipe, const std::string
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   std::size_t(threads));
   progress.beginPhase("generate", generator.recordCount(), "surfels");
-  SURFEIT_ASSIGN_OR_RETURN(
-      SurfelWriter writer,
-      SurfelWriter::create(output, generator.channels(), PlyEncoding::kBinaryLittleEndian));
+  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(output, generator.channels(),
+                                                                     {.progress = &progress}));
+  for (const std::string& note : writer.notes()) progress.note(output + ": " + note);
   SURFEIT_RETURN_IF_ERROR(writeRecords(generator, threads, writer, progress));
   SURFEIT_RETURN_IF_ERROR(writer.finish());
   return GenerateStats{generator.recordCount(), generator.area()};

@@ -29,21 +29,14 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                                                                options, context.progress()));
   const double seconds = context.wallSeconds();
   const double bytes_per_surfel = double(stats.file_bytes) / double(stats.surfels);
-  std::string phases_text;
-  for (const auto& [phase, phase_seconds] : stats.phase_seconds) {
-    phases_text +=
-        fmt::format("{}{} {:.1f} s", phases_text.empty() ? "" : ", ", phase, phase_seconds);
-  }
   context.say(
       fmt::format("{}: {} surfels, {} nodes, {} pages, {} ({:.1f} bytes per surfel)\n"
                   "{:.1f} s ({}), {:.2f} M surfels/s, peak memory {}, temporary files {}",
                   arguments.output, formatCount(stats.surfels), formatCount(stats.nodes),
                   formatCount(std::uint64_t{stats.node_pages} + stats.surfel_pages),
-                  formatBytes(stats.file_bytes), bytes_per_surfel, seconds, phases_text,
-                  double(stats.surfels) / seconds / 1e6, formatBytes(peakResidentBytes()),
-                  formatBytes(stats.temporary_bytes)));
-  nlohmann::json phases = nlohmann::json::object();
-  for (const auto& [phase, phase_seconds] : stats.phase_seconds) phases[phase] = phase_seconds;
+                  formatBytes(stats.file_bytes), bytes_per_surfel, seconds,
+                  formatPhases(stats.phase_seconds), double(stats.surfels) / seconds / 1e6,
+                  formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
   return context.writeStats({{"command", "index"},
                              {"memory_bytes", options.memory_bytes},
                              {"input_bytes", stats.input_bytes},
@@ -56,7 +49,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                              {"bytes_per_surfel", bytes_per_surfel},
                              {"temporary_bytes", stats.temporary_bytes},
                              {"surfels_per_second", double(stats.surfels) / seconds},
-                             {"phases", phases}});
+                             {"phases", jsonOfPhases(stats.phase_seconds)}});
 }
 
 }  // namespace
@@ -83,8 +76,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->add_option("--precision", arguments->precision, "quantized, or full (floats)")
       ->check(CLI::IsMember({"quantized", "full"}))
       ->capture_default_str();
-  command->add_option("--temp", options.temporary_directory,
-                      "Directory of temporary files (default: beside the output)");
+  addTemporaryOption(*command, options.temporary_directory);
   command->add_flag("--strict", options.strict, "Refuse invalid records instead of skipping them");
   context.addCommonOptions(*command);
   command->footer(

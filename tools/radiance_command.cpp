@@ -31,18 +31,11 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
       const RadianceStats stats,
       radianceCloud(arguments.photons, arguments.output, options, context.progress()));
   const double seconds = std::max(context.wallSeconds(), 1e-9);
-  std::string phases_text;
-  nlohmann::json phases = nlohmann::json::object();
-  for (const auto& [phase, phase_seconds] : stats.phase_seconds) {
-    phases_text +=
-        fmt::format("{}{} {:.1f} s", phases_text.empty() ? "" : ", ", phase, phase_seconds);
-    phases[phase] = phase_seconds;
-  }
   context.say(
       fmt::format("{}: {} surfels, area {:.6g}, mean radius of an estimate {:.4g}\n"
                   "{:.1f} s ({}), {:.2f} M photons/s, peak memory {}, temporary files {}",
                   arguments.output, formatCount(stats.surfels), stats.area, stats.mean_radius,
-                  seconds, phases_text, double(stats.photons) / seconds / 1e6,
+                  seconds, formatPhases(stats.phase_seconds), double(stats.photons) / seconds / 1e6,
                   formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
   return context.writeStats({{"command", "radiance"},
                              {"memory_bytes", stats.memory_bytes},
@@ -58,7 +51,7 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
                              {"max_radius", stats.max_radius},
                              {"temporary_bytes", stats.temporary_bytes},
                              {"photons_per_second", double(stats.photons) / seconds},
-                             {"phases", phases}});
+                             {"phases", jsonOfPhases(stats.phase_seconds)}});
 }
 
 void addEstimateOptions(CLI::App& command, RadianceOptions& options) {
@@ -99,22 +92,22 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
           "PHOTONS", arguments->photons,
           "Photon clouds (docs/photons.md: position, normal, power_r power_g power_b, albedo)")
       ->required();
-  command->add_option("-o,--output", arguments->output, "The cloud to write (PLY)")
-      ->required()
-      ->type_name("CLOUD");
+  addCloudOutputOption(*command, arguments->output, "Cloud to write");
   addEstimateOptions(*command, options);
   addChannelOptions(*command, options.channels, options.part);
-  command->add_option("--temp", options.temporary_directory,
-                      "Directory of temporary files (default: beside the output)");
+  addTemporaryOption(*command, options.temporary_directory);
   command->add_flag("--strict", options.strict, "Refuse invalid photons instead of skipping them");
   context.addCommonOptions(*command);
   command->footer(
       "The radiosity is what surfaces reflect: albedo times the power of the nearest photons over "
       "the\n"
-      "area on which they lie. Final gathering takes it from there.\n"
+      "area on which they lie. Final gathering takes it from there. A .vdb is held until it is\n"
+      "written: in up to half of --memory.\n"
       "Examples:\n"
       "  surfeit sample cornell.obj -o photons.ply --photons 1000000\n"
       "  surfeit radiance photons.ply -o radiosity.ply --nphotons 100\n"
+      "  surfeit radiance sun.ptc sky.ptc -o radiosity.bgeo.gz --channels _flux=power \\\n"
+      "      --albedo \"0.3 0.3 0.3\" --max-radius 0.5 --memory 1G --temp /scratch\n"
       "  surfeit index radiosity.ply -o radiosity.sft\n"
       "  surfeit gather radiosity.sft receivers.ply -o result.ply --mode bleeding");
   command->callback(

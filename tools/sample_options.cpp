@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/channel_options.h"
 #include "tools/number_list.h"
 
 namespace surfeit {
@@ -111,9 +112,7 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
 
 void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
   app.add_option("MESH", arguments.meshes, "Triangle meshes: PLY, or OBJ with MTL")->required();
-  app.add_option("-o,--output", arguments.output, "The cloud to write (PLY)")
-      ->required()
-      ->type_name("CLOUD");
+  addCloudOutputOption(app, arguments.output, "Cloud to write");
   CLI::Option* const count =
       app.add_option("--count", arguments.options.count,
                      "Surfels, shared out by area; long thin triangles add some")

@@ -79,6 +79,13 @@ void addViewCommand(CLI::App& app, CommandContext& context) {
   addChannelOptions(*command, arguments->options.channels, arguments->options.part);
   addViewOptions(*command, arguments->options);
   context.addCommonOptions(*command);
+  command->footer(
+      "Examples:\n"
+      "  surfeit view city.sft -o city.png --eye \"40 60 120\" --look-at \"0 10 0\" --size "
+      "1920x1080\n"
+      "  surfeit view baked.ptc -o bake.png --channels _bake=radiosity --exposure -1 --cull-back\n"
+      "  surfeit view other.ply --brick baked.vdb --filter-width 0.1 -o other.png\n"
+      "  surfeit view city.sft --passes passes.exr --size 1280x960");
   command->callback(
       [arguments, &context] { context.run([&] { return runView(*arguments, context); }); });
 }

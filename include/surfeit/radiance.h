@@ -50,12 +50,12 @@ struct RadianceStats {
   std::vector<std::pair<std::string, double>> phase_seconds;
 };
 
-// Writes a cloud of surfels (PLY, binary) with normal, radius, area, radiosity and albedo from the
-// photons of all inputs (docs/photons.md has the properties), ordered along the Hilbert curve.
-// The radiosity is what the surface reflects, not what it emits by itself. The result depends on
-// the photons and the options above memory_bytes alone, bit for bit, and not on the order of the
-// photons. Errors: as indexClouds; kCorruption, before work starts, when an input has no photons,
-// no normals or no powers.
+// Writes a cloud of surfels of the format that the name tells with normal, radius, area, radiosity
+// and albedo from the photons of all inputs (docs/photons.md has the properties), ordered along the
+// Hilbert curve. The radiosity is what the surface reflects, not what it emits by itself. The
+// result depends on the photons and the options above memory_bytes alone, bit for bit, and not on
+// the order of the photons. Errors: as indexClouds; kCorruption, before work starts, when an input
+// has no photons, no normals or no powers.
 Result<RadianceStats> radianceCloud(const std::vector<std::string>& photon_paths,
                                     const std::string& result_path, const RadianceOptions& options,
                                     Progress& progress);

@@ -66,21 +66,23 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   if (!options.environment.path.empty()) {
     SURFEIT_ASSIGN_OR_RETURN(environment, loadEnvironment(options, progress));
   }
-  const std::uint64_t environment_bytes =
-      environment != nullptr ? environment->map.memoryBytes() + environment->cube.memoryBytes() : 0;
-
-  // Spend the budget before anything large is allocated
-  SURFEIT_ASSIGN_OR_RETURN(
-      const GatherMemory memory,
-      planGatherMemory(scene, stats.memory_bytes - std::min(stats.memory_bytes, environment_bytes),
-                       gatherWork(input.receivers(), options)));
   RowWriterOptions writing;
   writing.properties = result_rows.properties();
   writing.comments = input.reader().comments();
   writing.count = stats.receivers;
   writing.like = &input.reader();
+  writing.memory_bytes = stats.memory_bytes / 2;  // of what the caches give back before
+  writing.progress = &progress;
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
                            createRowWriter(result_path, writing));
+
+  // Spend the budget before anything large is allocated
+  GatherWork work = gatherWork(input.receivers(), options);
+  if (environment != nullptr) {
+    work.held_bytes = environment->map.memoryBytes() + environment->cube.memoryBytes();
+  }
+  SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory,
+                           planGatherMemory(scene, stats.memory_bytes, work));
 
   // Sort
   input.note(progress);

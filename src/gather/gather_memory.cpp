@@ -58,7 +58,7 @@ std::uint64_t threadBytes(const SceneFile& file, const GatherWork& work) {
 std::uint64_t fixedBytes(const SceneFile& file, const GatherWork& work, int prefetch_threads) {
   const auto threads = static_cast<std::uint64_t>(work.threads);
   const std::uint64_t rows = kSliceRows * (work.input_row_bytes + work.result_row_bytes);
-  return PagedOctree::fixedBytes(file, work.threads + prefetch_threads) +
+  return work.held_bytes + PagedOctree::fixedBytes(file, work.threads + prefetch_threads) +
          threads * threadBytes(file, work) +
          static_cast<std::uint64_t>(prefetch_threads) * (kThreadBytes + sizeof(CutWalk)) + rows +
          kStreamBytes + kQueueReceivers * sizeof(SortedReceiver) + PagingController::memoryBytes() +

@@ -27,6 +27,8 @@ struct GatherWork {
   int threads = 1;
   int prefetch_threads = 0;  // wanted
   double cache_split = -1;   // as in GatherOptions
+  // What others hold meanwhile: an environment.
+  std::uint64_t held_bytes = 0;
 };
 
 // The work of a gather at an element of receivers; threads as options have them (not 0).

@@ -3,7 +3,7 @@
 // any thread, and written in that order.
 //
 //   photons --by name--> surfel cloud --index--> paged octree --estimate (all threads)--> surfels
-//            (PLY)       (temporary)             (temporary)                               (PLY)
+//                        (temporary)             (temporary)
 
 #include <fmt/format.h>
 
@@ -26,6 +26,7 @@
 #include "gather/nearest_photons.h"
 #include "gather/radiance_estimate.h"
 #include "gather/radiance_photons.h"
+#include "io/cloud_formats.h"
 #include "io/file.h"
 #include "io/surfel_writer.h"
 #include "io/temporary_name.h"
@@ -49,6 +50,7 @@ constexpr std::uint32_t kSamplePages = 64;
 constexpr std::uint64_t kStreamBytes = std::uint64_t{6} << 20;
 // Stack and allocator of a thread, and the pages that it has under way.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{256} << 10;
+constexpr std::size_t kResultRowBytes = 14 * sizeof(float);
 
 Status checkOptions(const RadianceOptions& options) {
   const auto refuse = [](const char* what, auto found, const std::string& expected) {
@@ -131,6 +133,7 @@ class RadianceJob {
   };
 
   Status planThreads();
+  Result<SurfelWriter> createWriter(const std::string& result_path, std::uint64_t most_surfels);
   Result<SceneFile> indexPhotons(PhotonCloud photons, const std::string& result_path);
   Result<std::unique_ptr<PagedOctree>> openOctree(SceneFile scene) const;
   Result<float> medianRadius(PagedOctree& octree) const;
@@ -145,6 +148,7 @@ class RadianceJob {
   NearestPhotonSearch search_;
   Progress& progress_;
   RadianceStats stats_;
+  std::uint64_t held_bytes_ = 0;  // by the writer, at most
   std::chrono::steady_clock::time_point phase_begin_ = std::chrono::steady_clock::now();
 
   std::mutex mutex_;  // guards what follows
@@ -157,11 +161,7 @@ Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
   SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons,
                            PhotonCloud::open(inputs, options_.channels, options_.part));
   SURFEIT_RETURN_IF_ERROR(planThreads());
-  CloudChannels channels;
-  channels.normal = channels.radius = channels.area = channels.radiosity = channels.albedo = true;
-  SURFEIT_ASSIGN_OR_RETURN(
-      SurfelWriter writer,
-      SurfelWriter::create(result_path, channels, PlyEncoding::kBinaryLittleEndian));
+  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, createWriter(result_path, photons.recordCount()));
 
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, indexPhotons(std::move(photons), result_path));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree, openOctree(std::move(scene)));
@@ -201,6 +201,18 @@ Status RadianceJob::planThreads() {
   return {};
 }
 
+Result<SurfelWriter> RadianceJob::createWriter(const std::string& result_path,
+                                               std::uint64_t most_surfels) {
+  CloudChannels channels;
+  channels.normal = channels.radius = channels.area = channels.radiosity = channels.albedo = true;
+  held_bytes_ = heldWriterBytes(result_path, most_surfels, kResultRowBytes);
+  RowWriterOptions writing;
+  if (held_bytes_ > 0) writing.count = most_surfels;  // so that too many are refused at once
+  writing.memory_bytes = stats_.memory_bytes / 2;
+  writing.progress = &progress_;
+  return SurfelWriter::create(result_path, channels, std::move(writing));
+}
+
 // The photons as a scene, open and without a name.
 Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::string& result_path) {
   const std::string directory = options_.temporary_directory.empty() ? directoryOf(result_path)
@@ -234,7 +246,7 @@ Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::stri
 
 Result<std::unique_ptr<PagedOctree>> RadianceJob::openOctree(SceneFile scene) const {
   const std::uint64_t fixed = PagedOctree::fixedBytes(scene, stats_.threads) + kStreamBytes +
-                              std::uint64_t(stats_.threads) * threadBytes(options_);
+                              held_bytes_ + std::uint64_t(stats_.threads) * threadBytes(options_);
   const std::uint64_t least = fixed + PagedOctree::leastCacheBytes(scene, stats_.threads);
   if (stats_.memory_bytes < least) {
     return Status::budgetTooSmall(fmt::format(

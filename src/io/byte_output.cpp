@@ -11,13 +11,16 @@ namespace {
 constexpr std::size_t kReadBytes = 1 << 20;
 
 // Reads a file from front to back into a compressor, and that into another file.
-Status compress(const InputFile& from, Compression compression, AtomicFile& to) {
+Status compress(const InputFile& from, Compression compression, Progress* progress,
+                AtomicFile& to) {
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<Compressor> compressor,
                            Compressor::create(compression));
   AlignedBuffer buffer;
   for (std::uint64_t offset = 0;;) {
+    if (progress != nullptr && progress->isCancelled()) return Status::interrupted();
     SURFEIT_ASSIGN_OR_RETURN(const Bytes bytes, from.readView(offset, kReadBytes, buffer));
     offset += bytes.size();
+    if (progress != nullptr) progress->advanceBytes(bytes.size());
     const bool is_last = bytes.size() < kReadBytes;
     SURFEIT_RETURN_IF_ERROR(
         compressor->encode(bytes, is_last, [&to](Bytes piece) { return to.append(piece); }));
@@ -31,20 +34,25 @@ struct ByteOutput::State {
   AtomicFile file;  // as it will appear, or what is to be compressed
   Compression compression;
   std::string path;
+  Progress* progress;
   Status failure;  // of commit, which is not tried again
+
+  Status pollCancel() const {
+    return progress != nullptr && progress->isCancelled() ? Status::interrupted() : Status();
+  }
 
   Status compressAndCommit() {
     SURFEIT_ASSIGN_OR_RETURN(const InputFile plain, file.finishUnnamed(path));
     SURFEIT_ASSIGN_OR_RETURN(AtomicFile packed, AtomicFile::create(path));
-    SURFEIT_RETURN_IF_ERROR(compress(plain, compression, packed));
+    SURFEIT_RETURN_IF_ERROR(compress(plain, compression, progress, packed));
     return packed.commit();
   }
 };
 
-Result<ByteOutput> ByteOutput::create(const std::string& path) {
+Result<ByteOutput> ByteOutput::create(const std::string& path, Progress* progress) {
   SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
   return ByteOutput(std::make_unique<State>(
-      State{std::move(file), compressionOf(std::string_view(path)), path, {}}));
+      State{std::move(file), compressionOf(std::string_view(path)), path, progress, {}}));
 }
 
 ByteOutput::ByteOutput(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -56,7 +64,10 @@ const std::string& ByteOutput::path() const { return state_->path; }
 
 std::uint64_t ByteOutput::size() const { return state_->file.size(); }
 
-Status ByteOutput::append(Bytes bytes) { return state_->file.append(bytes); }
+Status ByteOutput::append(Bytes bytes) {
+  SURFEIT_RETURN_IF_ERROR(state_->pollCancel());
+  return state_->file.append(bytes);
+}
 
 Status ByteOutput::writeAt(std::uint64_t offset, Bytes bytes) {
   return state_->file.writeAt(offset, bytes);

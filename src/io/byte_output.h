@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "io/file.h"
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -17,7 +18,9 @@ namespace surfeit {
 // that headers can be completed; the disk needs room for both. One thread at a time.
 class ByteOutput {
  public:
-  static Result<ByteOutput> create(const std::string& path);
+  // `progress`, if any, outlives the output. commit() polls it while it compresses,
+  // and counts bytes: kInterrupted.
+  static Result<ByteOutput> create(const std::string& path, Progress* progress = nullptr);
   ByteOutput(ByteOutput&&) noexcept;
   ByteOutput& operator=(ByteOutput&&) noexcept;
   ~ByteOutput();

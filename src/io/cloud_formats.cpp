@@ -23,6 +23,7 @@
 #include "io/formats/prt_writer.h"
 #include "io/formats/ptc_reader.h"
 #include "io/formats/ptc_writer.h"
+#include "io/formats/vdb_output.h"
 #include "io/formats/vdb_reader.h"
 #include "io/formats/vdb_writer.h"
 #include "io/formats/xyz_reader.h"
@@ -55,6 +56,8 @@ struct OtherFormat {
 };
 using namespace std::string_view_literals;
 constexpr std::string_view kSceneMagic = "\x89SFT";
+constexpr std::string_view kPictureAdvice =
+    "pictures are textures of `sample` and environments of `gather`; passes are .exr";
 constexpr OtherFormat kOtherFormats[] = {
     {kSceneMagic, "a Surfeit scene (.sft)", "give the cloud that it was indexed from"},
     {"ASTM-E57"sv, "E57", "convert it to PLY or LAS first (e57unpack, CloudCompare)"},
@@ -70,6 +73,10 @@ constexpr OtherFormat kOtherFormats[] = {
     {"PXR-USDC"sv, "USD", "save the points as PLY, .bgeo or .vdb"},
     {"#usda"sv, "USD", "save the points as PLY, .bgeo or .vdb"},
     {"HAIR"sv, "HAIR", "convert its strands to points or meshes first"},
+    {"#?RADIANCE"sv, "a Radiance picture", kPictureAdvice},
+    {"#?RGBE"sv, "a Radiance picture", kPictureAdvice},
+    {"\xFF\xD8\xFF"sv, "a JPEG picture", kPictureAdvice},
+    {"\x89PNG"sv, "a PNG picture", kPictureAdvice},
     {"PK\x03\x04"sv, "a ZIP archive", "unpack it first"},
     {"BZh"sv, "bzip2", "unpack it first; gzip and zstd are read as they are"},
     {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},
@@ -103,8 +110,9 @@ Status unknownFormat(const std::string& path, std::string_view first_bytes) {
                                             other.name, other.advice));
     }
   }
-  return Status::corruption(fmt::format("{}: found {} at 0, expected a cloud ({})", path,
-                                        quotePlyText(first_bytes.substr(0, 4)), namesOfRead()));
+  return Status::corruption(fmt::format(
+      "{}: found {} at 0, expected a cloud ({}); `surfeit sample` makes one of a mesh (.obj)", path,
+      quotePlyText(first_bytes.substr(0, 4)), namesOfRead()));
 }
 
 // Whether a list of extensions, separated by blanks, has one that `path` ends with.
@@ -134,9 +142,16 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
                            input.readSome(0, std::as_writable_bytes(std::span(first_bytes))));
   first_bytes.resize(size);
   for (const CloudFormat& format : kFormats) {
-    if (format.open != nullptr && format.recognises(first_bytes)) return format.open(path, options);
+    if (format.open == nullptr || !format.recognises(first_bytes)) continue;
+    SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, format.open(path, options));
+    SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element(), path));
+    return reader;
   }
   return unknownFormat(path, first_bytes);
+}
+
+std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes) {
+  return hasExtension(path, ".vdb") ? count * (row_bytes + sizeof(VdbEntry)) : 0;
 }
 
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,

@@ -52,6 +52,10 @@ bool isSceneFile(std::string_view first_bytes);
 Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
                                                  const RowReaderOptions& options = {});
 
+// What the writer of `path` holds of so many rows until its end: 0 but for OpenVDB, whose tree is
+// sorted in memory (RowWriterOptions::memory_bytes).
+std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes);
+
 // Creates a cloud by the extension of its name, .gz and .zst aside. kInvalidArgument for a name
 // whose extension is none that is written, naming those that are.
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,

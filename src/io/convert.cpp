@@ -186,6 +186,7 @@ class Converter {
     writing.comments = first_->comments();
     if (!options_.crop) writing.count = rows_to_write_;
     writing.memory_bytes = options_.memory_bytes;
+    writing.progress = &progress_;
     std::unique_ptr<RowReader> like;
     if (!options_.like.empty()) {
       SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like));

@@ -8,8 +8,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <exception>
-#include <new>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -55,7 +54,7 @@ class ExrPicture final : public PictureReader {
   Status readRow(std::span<glm::vec3> row) override {
     SURFEIT_CHECK(row.size() == row_.size());
     const std::string place = fmt::format("row {}", next_row_ - file_->header().dataWindow().min.y);
-    return guarded(place.c_str(), [&] {
+    return guarded(place, [&] {
       file_->readPixels(next_row_);
       ++next_row_;
       std::copy(row_.begin(), row_.end(), row.begin());
@@ -80,30 +79,7 @@ class ExrPicture final : public PictureReader {
                                     std::int64_t(window.max.y) - window.min.y + 1));
     SURFEIT_RETURN_IF_ERROR(checkChannels(header.channels()));
     is_cube_map_ = Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE;
-
-    // What is decoded at once: whole rows of tiles for us, and OpenEXR's own blocks
-    std::uint64_t pixel_bytes = 0;
-    for (auto i = header.channels().begin(); i != header.channels().end(); ++i) {
-      pixel_bytes += i.channel().type == Imf::HALF ? 2 : 4;
-    }
-    std::uint64_t columns = std::uint64_t(width());
-    std::uint64_t rows = exrBlockRows(header);
-    if (hasExrTiles(header)) {
-      // OpenEXR holds whole tiles, however small the picture is
-      columns = std::max(columns, std::uint64_t(header.tileDescription().xSize));
-      pixel_bytes += sizeof(glm::vec3);
-    } else {
-      rows = std::min(rows, std::uint64_t(height()));
-    }
-    const double decoded = double(rows) * double(columns) * double(pixel_bytes);
-    if (decoded > double(kMaxDecodedBytes)) {
-      return Status::invalidArgument(
-          fmt::format("{}: {} rows decode to {:.0f} bytes together, expected at most {}: save it "
-                      "in scan lines or "
-                      "smaller tiles, without channels other than R, G and B",
-                      path(), rows, decoded, kMaxDecodedBytes));
-    }
-    return {};
+    return checkExrBlocks(header, kMaxDecodedBytes, sizeof(glm::vec3), path());
   }
 
   Status checkChannels(const Imf::ChannelList& channels) {
@@ -120,20 +96,10 @@ class ExrPicture final : public PictureReader {
                                           path(), found.empty() ? "none" : found));
   }
 
-  // Runs what may throw.
+  // Runs what may throw. After a failure it is not run.
   template <typename Work>
-  Status guarded(const char* place, const Work& work) {
-    if (!failure_.ok()) return failure_;
-    try {
-      failure_ = work();
-    } catch (const std::bad_alloc&) {
-      failure_ = Status::failed(fmt::format("{}: out of memory", path()));
-    } catch (const std::exception& error) {
-      failure_ = stream_.status().ok()
-                     ? Status::corruption(fmt::format("{}: {}: OpenEXR: {}", path(), place,
-                                                      exrMessage(error.what())))
-                     : stream_.status();
-    }
+  Status guarded(std::string_view place, const Work& work) {
+    if (failure_.ok()) failure_ = guardExr(stream_, StatusCode::kCorruption, path(), place, work);
     return failure_;
   }
 

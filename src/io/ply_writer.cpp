@@ -93,7 +93,7 @@ struct PlyWriter::State {
 
 Result<PlyWriter> PlyWriter::create(const std::string& path, PlyEncoding encoding,
                                     std::vector<PlyProperty> properties,
-                                    std::vector<std::string> comments) {
+                                    std::vector<std::string> comments, Progress* progress) {
   if (path == "-") {
     return Status::invalidArgument("-: a PLY file cannot be written to the standard output");
   }
@@ -112,7 +112,7 @@ Result<PlyWriter> PlyWriter::create(const std::string& path, PlyEncoding encodin
     return Status::invalidArgument(fmt::format("{}: header of {} bytes, expected at most {}", path,
                                                text.size(), kMaxPlyHeaderBytes));
   }
-  SURFEIT_ASSIGN_OR_RETURN(ByteOutput file, ByteOutput::create(path));
+  SURFEIT_ASSIGN_OR_RETURN(ByteOutput file, ByteOutput::create(path, progress));
   SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
   return PlyWriter(std::make_unique<State>(std::move(file), std::move(header)));
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/ply_format.h"
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -20,9 +21,11 @@ class PlyWriter {
  public:
   // `properties` are scalars; their offsets are set here, packed in order. Writing to "-", no
   // properties, lists, and names that are no single words or not unique are kInvalidArgument.
+  // `progress` as ByteOutput has it.
   static Result<PlyWriter> create(const std::string& path, PlyEncoding encoding,
                                   std::vector<PlyProperty> properties,
-                                  std::vector<std::string> comments = {});
+                                  std::vector<std::string> comments = {},
+                                  Progress* progress = nullptr);
   PlyWriter(PlyWriter&&) noexcept;
   PlyWriter& operator=(PlyWriter&&) noexcept;
   ~PlyWriter();  // removes the temporary file unless finish() succeeded

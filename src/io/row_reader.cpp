@@ -9,4 +9,9 @@ Status RowReader::seekRow(std::uint64_t row) {
       "{}: seek to row {}, but {} can only be read from its start", path(), row, formatName()));
 }
 
+Status checkChannelsLeft(const PlyElement& element, const std::string& path) {
+  if (!element.properties.empty()) return {};
+  return Status::invalidArgument(fmt::format("{}: every channel is dropped", path));
+}
+
 }  // namespace surfeit

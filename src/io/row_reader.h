@@ -50,4 +50,7 @@ class RowReader {
   virtual Status seekRow(std::uint64_t row);
 };
 
+// kInvalidArgument when an element has no properties, since all channels are renamed to nothing.
+Status checkChannelsLeft(const PlyElement& element, const std::string& path);
+
 }  // namespace surfeit

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/ply_format.h"
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -19,15 +20,19 @@ class RowReader;
 // What a writer is to write, known before the first row.
 struct RowWriterOptions {
   // Scalars, named as io/channels.h has it; their offsets are set by the writer.
-  std::vector<PlyProperty> properties;
-  std::vector<std::string> comments;
+  std::vector<PlyProperty> properties = {};
+  std::vector<std::string> comments = {};
+  PlyEncoding ply_encoding = PlyEncoding::kBinaryLittleEndian;  // for PLY only
   // The rows that will come, where that is known. Otherwise formats that state it in front of the
   // data complete their header at the end.
-  std::optional<std::uint64_t> count;
+  std::optional<std::uint64_t> count = {};
   // The cloud that the rows come from, or nullptr: a writer of the same format takes from it what
   // rows do not carry (the windows and attributes of a picture, the transform of a grid). Only used
   // by create functions.
   const RowReader* like = nullptr;
+  // Polled by finish(), whose work may be long (compression, OpenVDB): kInterrupted. Outlives the
+  // writer.
+  Progress* progress = nullptr;
   // Memory that a format may take that must hold what it writes until the end (OpenVDB). Others
   // take a few MiB.
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "io/ply_writer.h"
+#include "io/cloud_formats.h"
 #include "io/surfel_names.h"
 
 namespace surfeit {
@@ -16,20 +16,20 @@ constexpr std::size_t kRowBufferBytes = 256 << 10;
 }  // namespace
 
 struct SurfelWriter::State {
-  PlyWriter file;
+  std::unique_ptr<RowWriter> file;
   CloudChannels channels;
   std::vector<std::byte> rows;
 };
 
 Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudChannels& channels,
-                                          PlyEncoding encoding, std::vector<std::string> comments) {
+                                          RowWriterOptions options) {
   // The order here is the order in which write packs the values
-  std::vector<PlyProperty> properties;
+  options.properties.clear();
   const auto add = [&](const char* name, PlyType type) {
     PlyProperty property;
     property.name = name;
     property.type = type;
-    properties.push_back(std::move(property));
+    options.properties.push_back(std::move(property));
   };
   const auto addTriple = [&](const char* const(&names)[3]) {
     for (const char* name : names) add(name, PlyType::kFloat32);
@@ -43,8 +43,7 @@ Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudCh
   if (channels.two_sided) add("two_sided", PlyType::kUint8);
   if (channels.group) add(kGroupNames[0], PlyType::kUint8);
 
-  SURFEIT_ASSIGN_OR_RETURN(PlyWriter file, PlyWriter::create(path, encoding, std::move(properties),
-                                                             std::move(comments)));
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> file, createRowWriter(path, options));
   return SurfelWriter(std::make_unique<State>(State{std::move(file), channels, {}}));
 }
 
@@ -53,9 +52,11 @@ SurfelWriter::SurfelWriter(SurfelWriter&&) noexcept = default;
 SurfelWriter& SurfelWriter::operator=(SurfelWriter&&) noexcept = default;
 SurfelWriter::~SurfelWriter() = default;
 
+std::vector<std::string> SurfelWriter::notes() const { return state_->file->notes(); }
+
 Status SurfelWriter::write(std::span<const Surfel> surfels) {
   const CloudChannels& channels = state_->channels;
-  const std::size_t row_bytes = state_->file.element().row_bytes;
+  const std::size_t row_bytes = state_->file->element().row_bytes;
   state_->rows.resize(kRowBufferBytes / row_bytes * row_bytes);
   std::byte* const begin = state_->rows.data();
   std::byte* const end = begin + state_->rows.size();
@@ -77,13 +78,13 @@ Status SurfelWriter::write(std::span<const Surfel> surfels) {
     // Hand over a full buffer, and the last
     if (next == end || &surfel == &surfels.back()) {
       const std::size_t size = static_cast<std::size_t>(next - begin);
-      SURFEIT_RETURN_IF_ERROR(state_->file.writeRows(std::span(state_->rows).first(size)));
+      SURFEIT_RETURN_IF_ERROR(state_->file->writeRows(std::span(state_->rows).first(size)));
       next = begin;
     }
   }
   return {};
 }
 
-Status SurfelWriter::finish() { return state_->file.finish(); }
+Status SurfelWriter::finish() { return state_->file->finish(); }
 
 }  // namespace surfeit

@@ -1,4 +1,4 @@
-// Surfels into PLY, under the names that src/io/surfel_mapping.h reads.
+// Surfels into clouds of any format, under the names that src/io/surfel_mapping.h reads.
 #pragma once
 
 #include <memory>
@@ -6,22 +6,25 @@
 #include <string>
 #include <vector>
 
-#include "io/ply_format.h"
+#include "io/row_writer.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 
-// Writes surfels as PLY with the properties above, as floats (two_sided and group: uchar). One
-// thread at a time. The file appears when finish() succeeds.
+// Writes surfels as floats (two_sided and group: uchar) into the format that the extension of the
+// name tells (io/cloud_formats.h). One thread at a time. The file appears when finish() succeeds.
 class SurfelWriter {
  public:
-  // `channels` says which optional properties the file gets.
+  // `channels` says which optional properties the file gets. `options` has the rest; its
+  // properties are set here.
   static Result<SurfelWriter> create(const std::string& path, const CloudChannels& channels,
-                                     PlyEncoding encoding, std::vector<std::string> comments = {});
+                                     RowWriterOptions options = {});
   SurfelWriter(SurfelWriter&&) noexcept;
   SurfelWriter& operator=(SurfelWriter&&) noexcept;
   ~SurfelWriter();
+  // What the format cannot keep, one sentence each.
+  std::vector<std::string> notes() const;
   Status write(std::span<const Surfel> surfels);
   Status finish();
 

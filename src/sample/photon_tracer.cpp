@@ -22,8 +22,9 @@
 #include "core/job_limits.h"
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
+#include "io/cloud_formats.h"
 #include "io/photon_names.h"
-#include "io/ply_writer.h"
+#include "io/row_writer.h"
 #include "io/surfel_names.h"
 #include "sample/ray_scene.h"
 
@@ -265,7 +266,7 @@ class PhotonTracer {
 // Sends, follows and writes in a pipeline: batches are dealt and written in order, followed in
 // parallel.
 Status writePhotons(const PhotonTracer& tracer, const PhotonTracingOptions& options, int threads,
-                    PlyWriter& writer, Progress& progress, PhotonTracingStats& stats) {
+                    RowWriter& writer, Progress& progress, PhotonTracingStats& stats) {
   Status status;
   std::atomic<bool> has_failed = false;
   std::uint64_t next = 0;
@@ -342,16 +343,19 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
 
     start = std::chrono::steady_clock::now();
     progress.beginPhase("trace", options.photons, "photons");
-    SURFEIT_ASSIGN_OR_RETURN(
-        PlyWriter writer,
-        PlyWriter::create(output, PlyEncoding::kBinaryLittleEndian, photonProperties()));
+    RowWriterOptions writing;
+    writing.properties = photonProperties();
+    writing.progress = &progress;
+    SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
+                             createRowWriter(output, writing));
+    for (const std::string& note : writer->notes()) progress.note(output + ": " + note);
     const PhotonTracer tracer(mesh, scene, emitters, options);
-    SURFEIT_RETURN_IF_ERROR(writePhotons(tracer, options, stats.threads, writer, progress, stats));
+    SURFEIT_RETURN_IF_ERROR(writePhotons(tracer, options, stats.threads, *writer, progress, stats));
     if (stats.stored == 0) {
       return Status::invalidArgument(fmt::format(
           "{}: none of {} photons met the front of a surface", meshes.front(), stats.emitted));
     }
-    SURFEIT_RETURN_IF_ERROR(writer.finish());
+    SURFEIT_RETURN_IF_ERROR(writer->finish());
     stats.trace_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

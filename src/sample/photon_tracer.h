@@ -33,13 +33,13 @@ struct PhotonTracingStats {
   int threads = 0;
 };
 
-// Writes a photon cloud (PLY, binary): position, normal of the surface, power before reflection,
-// direction that the photon came from, albedo; floats, by the names of docs/photons.md. Lights get
-// photons in proportion to power; directional ones fill a disk that covers the scene. Russian
-// roulette ends the paths, so that powers stay as large as albedos are alike, and no bounce is left
-// out. The cloud depends on meshes, surroundings, number and seed alone, not on the threads.
-// Memory: the meshes, Embree's hierarchy and a few batches of photons, whatever their number.
-// Errors: as sampleMeshes; kInvalidArgument when nothing emits.
+// Writes a photon cloud of the format that the name of the output tells: position, normal of the
+// surface, power before reflection, direction that the photon came from, albedo; floats, by the
+// names of docs/photons.md. Lights get photons in proportion to power; directional ones fill a disk
+// that covers the scene. Russian roulette ends the paths, so that powers stay as large as albedos
+// are alike, and no bounce is left out. The cloud depends on meshes, surroundings, number and seed
+// alone, not on the threads. Memory: the meshes, Embree's hierarchy and a few batches of photons,
+// whatever their number. Errors: as sampleMeshes; kInvalidArgument when nothing emits.
 Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
                                         const std::string& output,
                                         const PhotonTracingOptions& options, Progress& progress);

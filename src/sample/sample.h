@@ -45,10 +45,11 @@ struct SampleStats {
   int threads = 0;
 };
 
-// Writes a cloud (PLY) with normals, radii, areas, albedo, and when anything emits, radiosity. The
-// cloud depends on meshes and options alone, not on the threads. Memory: the meshes, Embree's
-// hierarchy (less than 100 bytes per triangle) and a few batches of surfels, whatever the count.
-// Errors: kIoError, kCorruption (bad mesh), kInvalidArgument (options), kInterrupted, kFailed.
+// Writes a cloud of the format that its name tells, with normals, radii, areas, albedo, and when
+// anything emits, radiosity. The cloud depends on meshes and options alone, not on the threads.
+// Memory: the meshes, Embree's hierarchy (less than 100 bytes per triangle) and a few batches of
+// surfels, whatever the count. Errors: kIoError, kCorruption (bad mesh), kInvalidArgument
+// (options), kInterrupted, kFailed.
 Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const std::string& output,
                                  const SampleOptions& options, Progress& progress);
 

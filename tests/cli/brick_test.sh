@@ -1,14 +1,5 @@
 #!/usr/bin/env bash
-# One case of the end-to-end tests of brick maps; CMakeLists.txt lists the cases.
-#
-#   brick_test.sh CASE SURFEIT CORNELL_SCENE WORK_DIR
-set -euo pipefail
-
-case_name=$1
-surfeit=$2
-cornell_scene=$3
-work_dir=$4
-
+# One case of the end-to-end tests of brick maps.
 source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 
 bake() {
@@ -29,7 +20,8 @@ bakedValuesAreLookedUp() {
   exists other.png
   jsonIs view.json non_finite_values 0
   run 0 view cornell.sft --brick baked.vdb -o scene.exr --filter-width 0.1 --size 160x120
-  exists scene.exr
+  run 0 view cornell.sft --brick baked.vdb --filter-width 0 -o fine.exr --size 160x120
+  differentBytes scene.exr fine.exr
 }
 
 mapsDoNotDependOnThreadsMemoryOrCloudOrder() {
@@ -41,6 +33,26 @@ mapsDoNotDependOnThreadsMemoryOrCloudOrder() {
   run 0 brick first.ply baked.ply -o c.vdb
   run 0 brick baked.ply first.ply -o d.vdb
   sameBytes c.vdb d.vdb
+}
+
+optionsChooseWhatIsKept() {
+  bake
+  run 0 brick baked.ply -o fine.vdb --max-error 0 --stats fine.json
+  run 0 brick baked.ply -o coarse.vdb --max-error 0.2 --stats coarse.json
+  (($(field coarse.json voxels) < $(field fine.json voxels))) || fail "as many voxels for less"
+  run 0 brick --channel albedo,occlusion baked.ply -o albedo.vdb --voxel-size 0.1 --stats albedo.json
+  jsonIs albedo.json voxel_size 0.1
+  run 0 view cornell.ply --brick albedo.vdb -o albedo.png --channel albedo --size 160x120
+  generate city.ply --surfels 600k
+  run 74 brick city.ply -o out.vdb --memory 64M --temp nowhere
+  says nowhere
+  sed '1,/^end_header/!d' baked.ply | sed 's/^element vertex .*/element vertex 1/' >broken.ply
+  head -c $((4 * $(grep -ac '^property float' baked.ply))) /dev/zero | tr '\0' '\377' >>broken.ply # NaN
+  run 0 brick baked.ply broken.ply -o both.vdb
+  says "skipped 1 record"
+  run 3 brick baked.ply broken.ply -o out.vdb --strict
+  says broken.ply
+  leavesNothing out
 }
 
 whatCannotWorkIsRefused() {
@@ -57,8 +69,4 @@ whatCannotWorkIsRefused() {
   leavesNothing out.
 }
 
-rm -rf "$work_dir"
-mkdir -p "$work_dir"
-cd "$work_dir"
-"$case_name"
-echo "passed: $case_name"
+runCase

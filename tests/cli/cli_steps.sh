@@ -1,4 +1,23 @@
-# What the cases of the end-to-end tests are made of. Sourced; `surfeit` is the program.
+# What the cases of the end-to-end tests are made of. Sourced by a script that has a function per case
+# and ends with runCase; CMakeLists.txt lists the cases.
+#
+#   SCRIPT CASE SURFEIT CORNELL_SCENE WORK_DIR
+set -euo pipefail
+
+case_name=$1
+surfeit=$2
+cornell_scene=$3
+work_dir=$4
+script=$(realpath "$0")
+
+# Runs the case in its own directory.
+runCase() {
+  rm -rf "$work_dir"
+  mkdir -p "$work_dir"
+  cd "$work_dir"
+  "$case_name"
+  echo "passed: $case_name"
+}
 
 fail() {
   echo "FAILED: $*" >&2
@@ -42,12 +61,15 @@ jsonHas() {
   done
 }
 
+# A field of a statistics file that is a number.
+field() { sed -n -E "s/^ *\"$2\": ([-+.0-9e]+),?$/\1/p" "$1"; }
+
 # jsonIs FILE [KEY NUMBER]...: every key has that value, as near as a float comes.
 jsonIs() {
   local file=$1 found
   shift
   while (($# > 0)); do
-    found=$(sed -nE "s/^ *\"$1\": ([-+.0-9e]+),?$/\1/p" "$file")
+    found=$(field "$file" "$1")
     awk -v found="$found" -v expected="$2" \
       'BEGIN { e = found - expected; exit !(found != "" && e * e <= 1e-12 * expected * expected) }' ||
       fail "$file: $1 is \"$found\", expected $2"
@@ -65,4 +87,33 @@ makeScene() {
   "$cornell_scene" .
   run 0 sample cornell.obj -o cornell.ply --count "$1" --light-samples 2 --quiet
   run 0 index cornell.ply -o cornell.sft --memory 64M --quiet
+}
+
+# generate NAME OPTION...: a cloud.
+generate() { "$surfeit" generate --quiet -o "$1" "${@:2}"; }
+
+# Whether a process has a file open that has no name (yet), or a temporary one.
+resultIsOpen() { ls -l "/proc/$1/fd" 2> /dev/null | grep -q -e '(deleted)' -e '\.tmp$'; }
+
+# stoppedLeavesNothing NAME ARGUMENT...: runs surfeit, which is to write NAME and takes long, and
+# stops it by each signal when it has begun.
+stoppedLeavesNothing() {
+  local name=$1 signal expected process status i
+  shift
+  set -m # jobs of their own take SIGINT
+  for signal in INT TERM; do
+    expected=$([[ $signal == INT ]] && echo 130 || echo 143)
+    "$surfeit" "$@" -o "$name" --quiet &
+    process=$!
+    for ((i = 0; i < 1500; ++i)); do
+      resultIsOpen "$process" && break
+      sleep 0.02
+    done
+    resultIsOpen "$process" || fail "did not begin: surfeit $*"
+    kill -"$signal" "$process"
+    status=0
+    wait "$process" || status=$?
+    [[ $status == "$expected" ]] || fail "exit status $status after SIG$signal, expected $expected"
+    leavesNothing "${name%%.*}"
+  done
 }

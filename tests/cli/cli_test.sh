@@ -1,16 +1,7 @@
 #!/usr/bin/env bash
-# One case of the program's end-to-end tests; CMakeLists.txt lists the cases.
-#
-#   cli_test.sh CASE SURFEIT CORNELL_SCENE README WORK_DIR
-set -euo pipefail
-
-case_name=$1
-surfeit=$2
-cornell_scene=$3
-readme=$4
-work_dir=$5
-
+# One case of the program's end-to-end tests.
 source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
+readme=$(dirname "$script")/../../README.md
 
 # Replaces the byte at an offset of a file by its complement.
 flipByte() {
@@ -110,9 +101,13 @@ helpAndVersionExitWithZero() {
   run 0 --version
   says "surfeit 0."
   run 0 --help
-  says sample generate index info verify gather bounce radiance tune view
-  local command
-  for command in sample generate index info verify gather bounce radiance tune view; do run 0 "$command" --help; done
+  local command help=$said
+  for command in sample generate convert index info verify gather bounce radiance brick tune view \
+    composite; do
+    [[ $help == *"  $command "* ]] || fail "no $command in: $help"
+    run 0 "$command" --help
+    says Example "  surfeit $command "
+  done
 }
 
 generatedScenesAreTheSameByEveryWay() {
@@ -375,35 +370,10 @@ PLY
   leavesNothing result
 }
 
-# Whether a process has a file open that has no name (yet), or a temporary one.
-resultIsOpen() {
-  ls -l "/proc/$1/fd" 2> /dev/null | grep -q -e '(deleted)' -e '\.tmp$'
-}
-
 interruptLeavesNoFile() {
   makeScene 60000
-  local signal expected process status
-  set -m # jobs of their own take SIGINT
-  for signal in INT TERM; do
-    expected=$([[ $signal == INT ]] && echo 130 || echo 143)
-    "$surfeit" gather cornell.sft cornell.ply -o result.ply --mode bleeding --memory 1G \
-      --max-solid-angle 0.002 --raster-resolution 32 --threads 1 &
-    process=$!
-    for ((i = 0; i < 300; ++i)); do
-      resultIsOpen "$process" && break
-      sleep 0.1
-    done
-    resultIsOpen "$process" || fail "the gather did not begin"
-    kill -"$signal" "$process"
-    status=0
-    wait "$process" || status=$?
-    [[ $status == "$expected" ]] || fail "exit status $status after SIG$signal, expected $expected"
-    leavesNothing result
-  done
+  stoppedLeavesNothing result.ply gather cornell.sft cornell.ply --mode bleeding --memory 1G \
+    --max-solid-angle 0.002 --raster-resolution 32 --threads 1
 }
 
-rm -rf "$work_dir"
-mkdir -p "$work_dir"
-cd "$work_dir"
-"$case_name"
-echo "passed: $case_name"
+runCase

@@ -1,26 +1,11 @@
 #!/usr/bin/env bash
-# One case of the indexer's reliability tests, on clouds that spill; CMakeLists.txt lists the cases.
-#
-#   index_test.sh CASE SURFEIT WORK_DIR
+# One case of the indexer's reliability tests, on clouds that spill.
 #
 # SURFEIT_KILLS: how many runs are killed (default 20). SURFEIT_SANITIZED: set where peak memory
 # means nothing. Exit status 77: cannot be tested here.
-set -euo pipefail
-
-case_name=$1
-surfeit=$2
-work_dir=$3
-spilling=(--memory 64M --threads 2 --quiet)
-
 source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 
-# generate NAME OPTION...: a cloud.
-generate() {
-  "$surfeit" generate --quiet -o "$1" "${@:2}"
-}
-
-# A field of a statistics file that is a number.
-field() { sed -n -E "s/^ *\"$2\": ([0-9.]+),?$/\1/p" "$1"; }
+spilling=(--memory 64M --threads 2 --quiet)
 
 # Runs that spill hold to the budget and 64 MiB more.
 staysInBudget() {
@@ -110,7 +95,7 @@ inMountNamespace() {
     exit 77
   fi
   SURFEIT_IN_NAMESPACE=1 exec unshare --user --map-root-user --mount \
-    bash "$script" "$case_name" "$surfeit" "$work_dir"
+    bash "$script" "$case_name" "$surfeit" "$cornell_scene" "$work_dir"
 }
 
 # withDisk MEBIBYTES COMMAND...: with disk/ a file system of that size, which must end up empty but
@@ -269,9 +254,4 @@ signalledRunsLeaveNothing() {
   ((stopped > 0)) || fail "no run was stopped"
 }
 
-script=$(realpath "${BASH_SOURCE[0]}")
-rm -rf "$work_dir"
-mkdir -p "$work_dir"
-cd "$work_dir"
-"$case_name"
-echo "passed: $case_name"
+runCase

@@ -1,15 +1,5 @@
 #!/usr/bin/env bash
-# One case of the end-to-end tests of lights: photons, bounces, outputs, interpolation, subsets;
-# CMakeLists.txt lists the cases.
-#
-#   light_test.sh CASE SURFEIT CORNELL_SCENE WORK_DIR
-set -euo pipefail
-
-case_name=$1
-surfeit=$2
-cornell_scene=$3
-work_dir=$4
-
+# One case of the end-to-end tests of lights: photons, bounces, outputs, interpolation, subsets.
 source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 
 # Photons to surfels to a gather, and a scene with more bounces.
@@ -31,6 +21,66 @@ photonsAndBouncesWork() {
   differentBytes bounced.ply final.ply
   run 2 bounce cornell.sft --bounces 0 -o none.sft
   leavesNothing none.sft
+}
+
+# By the name of the result; all of them are read again.
+radianceWritesEveryFormat() {
+  local extension
+  "$cornell_scene" .
+  run 0 sample cornell.obj -o photons.ply --photons 20000
+  for extension in ply ply.gz ply.zst ptc ptc.gz vdb prt bgeo bgeo.gz pdb xyz csv.zst; do
+    run 0 radiance photons.ply -o "lit.$extension" --nphotons 50 --stats radiance.json
+    run 0 info "lit.$extension"
+    case $extension in
+      ptc*) says PTC ;;
+      vdb) says OpenVDB ;;
+      prt | bgeo* | pdb) says "${extension%%.*}" ;;
+      xyz | csv*) says text ;;
+      *) says PLY ;;
+    esac
+    run 0 index "lit.$extension" -o lit.sft --stats index.json
+    jsonIs index.json surfels "$(field radiance.json surfels)" skipped_records 0
+    run 0 info lit.sft
+    says "input had      position, normal, radius, area, radiosity, albedo"
+  done
+  run 0 convert lit.ply.gz -o again.csv
+  run 0 convert lit.csv.zst -o lit.csv
+  sameBytes lit.csv again.csv
+
+  run 2 radiance photons.ply -o none.jpg
+  says none.jpg .ptc
+  run 2 radiance photons.ply -o none.exr
+  says "write .ply instead"
+  run 2 radiance photons.ply -o none.vdb.gz
+  says "end with .vdb"
+  local four=(photons.ply photons.ply photons.ply photons.ply)
+  run 0 convert "${four[@]}" "${four[@]}" "${four[@]}" "${four[@]}" -o many.ply
+  run 33 radiance many.ply -o none.vdb --memory 64M
+  says "OpenVDB files are sorted in memory"
+  leavesNothing none
+}
+
+radianceHasItsOptions() {
+  "$cornell_scene" .
+  run 0 sample cornell.obj -o photons.ply --photons 20000
+  run 0 radiance photons.ply -o all.ply --stats all.json
+  run 0 radiance photons.ply -o near.ply --max-radius 0.02 --stats near.json
+  jsonIs near.json max_radius 0.02 photons_per_estimate 100
+  (($(field near.json sparse_surfels) > $(field all.json sparse_surfels))) ||
+    fail "no more sparse surfels within a smaller radius"
+  run 0 radiance photons.ply -o few.ply --photons-per-estimate 10
+  differentBytes few.ply all.ply
+  run 0 radiance photons.ply -o large.ply --overlap 9
+  differentBytes large.ply all.ply
+  run 0 radiance photons.ply -o grey.ply --channels albedo=- --albedo "0.25 0.25 0.25"
+  says "0.25 0.25 0.25 is used"
+  run 0 radiance photons.ply -o again.ply --memory 64M --threads 1
+  sameBytes again.ply all.ply
+  run 74 radiance photons.ply -o none.ply --temp nowhere
+  says nowhere
+  run 2 radiance photons.ply -o none.ply --albedo "1 2"
+  run 2 radiance photons.ply -o none.ply --overlap 0
+  leavesNothing none
 }
 
 # Outputs, cones, falloff, reflections; and what they lack is told before work starts.
@@ -121,8 +171,4 @@ subsetsAreChosenByGroup() {
   leavesNothing none
 }
 
-rm -rf "$work_dir"
-mkdir -p "$work_dir"
-cd "$work_dir"
-"$case_name"
-echo "passed: $case_name"
+runCase

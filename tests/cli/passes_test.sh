@@ -1,21 +1,11 @@
 #!/usr/bin/env bash
-# One case of the end-to-end tests of render passes and of clouds in other formats than PLY;
-# CMakeLists.txt lists the cases.
-#
-#   passes_test.sh CASE SURFEIT CORNELL_SCENE WORK_DIR
-set -euo pipefail
-
-case_name=$1
-surfeit=$2
-cornell_scene=$3
-work_dir=$4
-
+# One case of the end-to-end tests of render passes and of clouds in other formats than PLY.
 source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 
 # Passes from a camera, light gathered at their pixels, pictures of both.
 twoPassesMakeAPicture() {
   makeScene 20000
-  run 0 view cornell.sft --passes passes.exr --eye "0.5 0.5 2.4" --look-at "0.5 0.5 0" --fov 37 \
+  run 0 view cornell.sft --passes passes.exr --eye "0.5 0.5 2.4" --look-at "0.5 0.5 0" --fov 60 \
     --size 96x96 --stats view.json
   jsonHas view.json pass_pixels passes
   run 0 info passes.exr
@@ -29,6 +19,18 @@ twoPassesMakeAPicture() {
     exists $channel.png
   done
   differentBytes radiosity.png lit.png
+  run 0 composite passes.exr light.exr -o shown.png --channel lit --exposure 1
+  differentBytes shown.png lit.png
+  run 0 composite passes.exr light.exr -o shown.png --channel lit --background "1 1 1"
+  differentBytes shown.png lit.png
+  run 0 composite passes.exr light.exr -o shown.png --channel ao --range "0.5 1"
+  differentBytes shown.png ao.png
+  run 0 composite passes.exr light.exr -o shown.png --channel lit --reduce 2 --stats shown.json
+  jsonIs shown.json width 48 height 48
+  run 0 convert light.exr -o light.ply
+  run 0 convert light.ply -o back.exr --like passes.exr
+  run 0 composite passes.exr back.exr -o shown.png --channel lit
+  sameBytes shown.png lit.png
   run 0 gather cornell.sft passes.exr -o again.exr --mode bleeding --threads 1 --memory 64M
   sameBytes light.exr again.exr
   run 2 gather cornell.sft passes.exr -o light.jpg
@@ -59,8 +61,4 @@ cloudsOfOtherFormatsWork() {
   leavesNothing cut.sft
 }
 
-rm -rf "$work_dir"
-mkdir -p "$work_dir"
-cd "$work_dir"
-"$case_name"
-echo "passed: $case_name"
+runCase

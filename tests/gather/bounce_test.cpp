@@ -103,8 +103,7 @@ class BounceTest : public testing::Test {
   std::string index(const std::vector<Surfel>& cloud, const std::string& name,
                     const CloudChannels& channels = kEverything, bool full_precision = false) {
     const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file(name);
-    Result<SurfelWriter> writer =
-        SurfelWriter::create(cloud_path, channels, PlyEncoding::kBinaryLittleEndian);
+    Result<SurfelWriter> writer = SurfelWriter::create(cloud_path, channels);
     EXPECT_TRUE(writer.ok()) << writer.status().message();
     EXPECT_TRUE(writer->write(cloud).ok());
     EXPECT_TRUE(writer->finish().ok());

@@ -29,8 +29,7 @@ class Scene {
     channels.group = std::any_of(cloud.begin(), cloud.end(),
                                  [](const Surfel& surfel) { return surfel.group != 0; });
     const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file("c.sft");
-    Result<SurfelWriter> writer =
-        SurfelWriter::create(cloud_path, channels, PlyEncoding::kBinaryLittleEndian);
+    Result<SurfelWriter> writer = SurfelWriter::create(cloud_path, channels);
     expectOk(writer.status());
     expectOk(writer->write(cloud));
     expectOk(writer->finish());

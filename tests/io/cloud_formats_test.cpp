@@ -46,10 +46,32 @@ TEST_F(CloudFormatsTest, FormatsThatAreNotReadAreToldWhatToDo) {
   EXPECT_THAT(refusal("ASTM-E57...."), HasSubstr("found E57, which is not read as a cloud: conv"));
   EXPECT_THAT(refusal("PXR-USDC...."), HasSubstr("found USD"));
   EXPECT_THAT(refusal(zstdPacked("NGSP....")), HasSubstr("found SPZ"));
+  EXPECT_THAT(refusal("\xFF\xD8\xFF...."), HasSubstr("found a JPEG picture"));
+  EXPECT_THAT(refusal("# no cloud\no cube\nv 0 0 0\n"), HasSubstr("`surfeit sample`"));
 }
 
 TEST_F(CloudFormatsTest, DamagedCompressionIsToldBeforeTheFormat) {
   EXPECT_THAT(refusal("\x1f\x8b damaged"), HasSubstr("damaged gzip data"));
+}
+
+TEST_F(CloudFormatsTest, ChannelsAreNotAllDropped) {
+  RowWriterOptions options;
+  for (const char* name : {"x", "y", "z"}) {
+    options.properties.emplace_back();
+    options.properties.back().name = name;
+  }
+  const std::vector<std::byte> row(3 * sizeof(float));
+  for (const char* name : {"a.ply", "a.bgeo", "a.pdb", "a.prt", "a.vdb", "a.csv"}) {
+    const auto writer = createRowWriter(path(name), options);
+    ASSERT_TRUE(writer.ok()) << writer.status().message();
+    ASSERT_TRUE((*writer)->writeRows(row).ok());
+    ASSERT_TRUE((*writer)->finish().ok());
+    RowReaderOptions reading;
+    reading.channels = *parseChannelRenames("position=-,P=-,Position=-");
+    const auto reader = openRowReader(path(name), reading);
+    ASSERT_FALSE(reader.ok()) << name;
+    EXPECT_THAT(reader.status().message(), HasSubstr("channel")) << name;
+  }
 }
 
 TEST_F(CloudFormatsTest, NamesThatTellNoFormatAreRefused) {

@@ -309,5 +309,27 @@ TEST_F(ConvertTest, CancellingLeavesNothing) {
   }
 }
 
+TEST_F(ConvertTest, CancellingWhileTheFileIsCompletedLeavesNothing) {
+  class CancelInFinish : public Progress {
+   public:
+    void beginPhase(std::string_view name, std::uint64_t, std::string_view) override {
+      is_finishing_ = name == "finish";
+    }
+    bool isCancelled() const override { return is_finishing_; }
+
+   private:
+    bool is_finishing_ = false;
+  };
+  Table table = pointsOf({});
+  for (int i = 0; i < 30'000; ++i) table.rows.push_back({double(i), 1, 2});
+  writeTable("a.ply", table);
+  for (const char* name : {"b.ply.gz", "b.ptc.zst", "b.xyz.gz", "b.vdb", "b.pdb"}) {
+    CancelInFinish progress;
+    const Status status = convertClouds({path("a.ply")}, path(name), {}, progress).status();
+    EXPECT_EQ(status.code(), StatusCode::kInterrupted) << name;
+    EXPECT_EQ(fileCount(), 1) << name;
+  }
+}
+
 }  // namespace
 }  // namespace surfeit

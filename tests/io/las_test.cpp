@@ -9,8 +9,7 @@
 
 #include "io/byte_output.h"
 #include "io/formats/las_reader.h"
-#include "io/row_stream_test.h"
-#include "io/test_directory.h"
+#include "io/row_damage_test.h"
 
 namespace surfeit {
 namespace {
@@ -57,22 +56,13 @@ std::string makeLas(unsigned minor, unsigned format, std::uint32_t count, std::s
   return text;
 }
 
-class LasTest : public DirectoryTest {
+class LasTest : public RowFileTest {
  protected:
   std::unique_ptr<RowReader> openGood(const std::string& text, RowReaderOptions options = {}) {
     write("a.las", text);
-    Result<std::unique_ptr<RowReader>> reader = openLas(path("a.las"), options);
-    EXPECT_TRUE(reader.ok()) << reader.status().message();
-    return reader.ok() ? std::move(*reader) : nullptr;
+    return openOk(openLas, path("a.las"), options);
   }
-
-  // The message of opening; empty when all is well.
-  std::string failureOf(const std::string& text) {
-    write("a.las", text);
-    const Status status = openLas(path("a.las"), {}).status();
-    EXPECT_TRUE(status.ok() || status.code() == StatusCode::kCorruption);
-    return status.message();
-  }
+  std::string refusalOf(const std::string& text) { return refusal(openLas, text); }
 };
 
 TEST_F(LasTest, EveryPointFormatIsRead) {
@@ -106,7 +96,7 @@ TEST_F(LasTest, EveryVersionIsRead) {
   for (unsigned minor = 0; minor <= 4; ++minor) {
     EXPECT_EQ(openGood(makeLas(minor, 0, 3))->element().count, 3u);
   }
-  EXPECT_THAT(failureOf(makeLas(5, 0, 3)), HasSubstr("found version 1.5, expected 1.0 to 1.4"));
+  EXPECT_THAT(refusalOf(makeLas(5, 0, 3)), HasSubstr("found version 1.5, expected 1.0 to 1.4"));
 }
 
 TEST_F(LasTest, CountOf64BitsGoesFirst) {
@@ -116,9 +106,9 @@ TEST_F(LasTest, CountOf64BitsGoesFirst) {
   put(text, 247, std::uint64_t(0));
   EXPECT_EQ(openGood(text)->element().count, 2u);
   put(text, 247, std::uint64_t(1) << 40);
-  EXPECT_THAT(failureOf(text), HasSubstr("hold 5 records of 34 bytes, expected 1099511627776"));
+  EXPECT_THAT(refusalOf(text), HasSubstr("hold 5 records of 34 bytes, expected 1099511627776"));
   put(text, 247, ~std::uint64_t(0));
-  EXPECT_THAT(failureOf(text), HasSubstr("expected 18446744073709551615"));
+  EXPECT_THAT(refusalOf(text), HasSubstr("expected 18446744073709551615"));
 }
 
 TEST_F(LasTest, CompressedPointsAreRefusedWithAdvice) {
@@ -126,17 +116,16 @@ TEST_F(LasTest, CompressedPointsAreRefusedWithAdvice) {
     std::string text = makeLas(2, 3, 5);
     put(text, 104, char(3 | bit));
     EXPECT_TRUE(recognisesLas(text));
-    EXPECT_THAT(failureOf(text), HasSubstr("decompress it first (laszip"));
+    EXPECT_THAT(refusalOf(text), HasSubstr("decompress it first (laszip"));
   }
 }
 
 TEST_F(LasTest, EveryTruncationIsFound) {
   for (const unsigned minor : {2u, 4u}) {
     const std::string whole = makeLas(minor, 3, 3);
-    EXPECT_EQ(failureOf(whole), "");
-    for (std::size_t size = 0; size < whole.size(); ++size) {
-      EXPECT_THAT(failureOf(whole.substr(0, size)), HasSubstr("a.las: ")) << size;
-    }
+    EXPECT_EQ(readAllRows(*openGood(whole)).size(), 3 * 33u);
+    expectEveryTruncationFails(openLas, whole, whole.size());
+    expectDamageIsHarmless(openLas, whole, 3);
   }
 }
 
@@ -146,16 +135,16 @@ TEST_F(LasTest, DamagedHeadersAreRefused) {
     put(text, at, value);
     return text;
   };
-  EXPECT_THAT(failureOf(patched(0, 'l')), HasSubstr("found 'lASF', expected 'LASF'"));
-  EXPECT_THAT(failureOf(patched(94, std::uint16_t(226))), HasSubstr("expected 227 or more"));
-  EXPECT_THAT(failureOf(patched(96, std::uint32_t(226))), HasSubstr("found points at 226"));
-  EXPECT_THAT(failureOf(patched(96, ~std::uint32_t(0))), HasSubstr("file ends early: 0 bytes"));
-  EXPECT_THAT(failureOf(patched(104, char(11))), HasSubstr("found point format 11"));
-  EXPECT_THAT(failureOf(patched(105, std::uint16_t(33))), HasSubstr("expected 34 or more"));
-  EXPECT_THAT(failureOf(patched(107, std::uint32_t(4))), HasSubstr("hold 3 records"));
-  EXPECT_THAT(failureOf(patched(131, 0.0)), HasSubstr("found scale 0"));
-  EXPECT_THAT(failureOf(patched(139, double(NAN))), HasSubstr("found scale nan"));
-  EXPECT_THAT(failureOf(patched(171, double(INFINITY))), HasSubstr("found offset inf"));
+  EXPECT_THAT(refusalOf(patched(0, 'l')), HasSubstr("found 'lASF', expected 'LASF'"));
+  EXPECT_THAT(refusalOf(patched(94, std::uint16_t(226))), HasSubstr("expected 227 or more"));
+  EXPECT_THAT(refusalOf(patched(96, std::uint32_t(226))), HasSubstr("found points at 226"));
+  EXPECT_THAT(refusalOf(patched(96, ~std::uint32_t(0))), HasSubstr("file ends early: 0 bytes"));
+  EXPECT_THAT(refusalOf(patched(104, char(11))), HasSubstr("found point format 11"));
+  EXPECT_THAT(refusalOf(patched(105, std::uint16_t(33))), HasSubstr("expected 34 or more"));
+  EXPECT_THAT(refusalOf(patched(107, std::uint32_t(4))), HasSubstr("hold 3 records"));
+  EXPECT_THAT(refusalOf(patched(131, 0.0)), HasSubstr("found scale 0"));
+  EXPECT_THAT(refusalOf(patched(139, double(NAN))), HasSubstr("found scale nan"));
+  EXPECT_THAT(refusalOf(patched(171, double(INFINITY))), HasSubstr("found offset inf"));
 }
 
 TEST_F(LasTest, GzippedFilesAreRead) {

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "io/formats/pcd_reader.h"
-#include "io/row_stream_test.h"
-#include "io/test_directory.h"
+#include "io/row_damage_test.h"
 
 namespace surfeit {
 namespace {
@@ -37,25 +36,14 @@ std::string bytesOf(T... values) {
   return bytes;
 }
 
-class PcdTest : public DirectoryTest {
+class PcdTest : public RowFileTest {
  protected:
   std::unique_ptr<RowReader> openGood(const std::string& text, RowReaderOptions options = {}) {
     write("a.pcd", text);
     EXPECT_TRUE(recognisesPcd(text));
-    Result<std::unique_ptr<RowReader>> reader = openPcd(path("a.pcd"), options);
-    EXPECT_TRUE(reader.ok()) << reader.status().message();
-    return reader.ok() ? std::move(*reader) : nullptr;
+    return openOk(openPcd, path("a.pcd"), options);
   }
-
-  // The message of opening or else reading; empty when all is well.
-  std::string failureOf(const std::string& text) {
-    write("a.pcd", text);
-    Result<std::unique_ptr<RowReader>> reader = openPcd(path("a.pcd"), {});
-    Status status = reader.status();
-    if (reader.ok()) readAllRows(**reader, 5, status);
-    EXPECT_TRUE(status.ok() || status.code() == StatusCode::kCorruption);
-    return status.message();
-  }
+  std::string refusalOf(const std::string& text) { return refusal(openPcd, text); }
 };
 
 TEST_F(PcdTest, AsciiAndBinaryGiveTheSameRows) {
@@ -159,7 +147,7 @@ TEST_F(PcdTest, ViewPointIsNoted) {
 TEST_F(PcdTest, CompressedPointsAreRefusedWithAdvice) {
   Head head;
   head.data = "binary_compressed";
-  EXPECT_THAT(failureOf(head.text() + "abc"), HasSubstr("pcl_convert_pcd_ascii_binary IN OUT 1"));
+  EXPECT_THAT(refusalOf(head.text() + "abc"), HasSubstr("pcl_convert_pcd_ascii_binary IN OUT 1"));
 }
 
 TEST_F(PcdTest, CountComesFromPointsOrWidthAndHeight) {
@@ -170,21 +158,20 @@ TEST_F(PcdTest, CountComesFromPointsOrWidthAndHeight) {
   head.size = "";
   EXPECT_EQ(openGood(head.text() + "1 2 3\n4 5 6\n")->element().count, 2u);
   head.points = "";
-  EXPECT_THAT(failureOf(head.text()), HasSubstr("expected POINTS, or WIDTH and HEIGHT"));
+  EXPECT_THAT(refusalOf(head.text()), HasSubstr("expected POINTS, or WIDTH and HEIGHT"));
   head.size = "WIDTH 3\nHEIGHT 3\n";
   head.points = "POINTS 2\n";
-  EXPECT_THAT(failureOf(head.text()), HasSubstr("width times height points before it: 9, found 2"));
+  EXPECT_THAT(refusalOf(head.text()), HasSubstr("width times height points before it: 9, found 2"));
   head.size = "WIDTH 18446744073709551615\nHEIGHT 2\n";
-  EXPECT_THAT(failureOf(head.text()), HasSubstr("below 2^64"));
+  EXPECT_THAT(refusalOf(head.text()), HasSubstr("below 2^64"));
 }
 
 TEST_F(PcdTest, DamagedHeadersAreRefused) {
   const auto failure = [this](auto change) {
     Head head;
     change(head);
-    return failureOf(head.text() + "1 2 3\n4 5 6\n");
+    return refusalOf(head.text() + "1 2 3\n4 5 6\n");
   };
-  EXPECT_EQ(failure([](Head&) {}), "");
   EXPECT_THAT(failure([](Head& h) { h.sizes = "4 4"; }), HasSubstr("as many sizes"));
   EXPECT_THAT(failure([](Head& h) { h.sizes = "4 4 3"; }),
               HasSubstr("field 'z', which has type F"));
@@ -202,13 +189,13 @@ TEST_F(PcdTest, DamagedHeadersAreRefused) {
 
 TEST_F(PcdTest, TextThatIsNotAsTheHeaderSaysIsRefused) {
   const Head head;
-  EXPECT_THAT(failureOf(head.text() + "1.5 2 3\n4 5\n"),
+  EXPECT_THAT(refusalOf(head.text() + "1.5 2 3\n4 5\n"),
               HasSubstr("row 1 at line 13: line ends early, expected z of type float"));
-  EXPECT_THAT(failureOf(head.text() + "1 2 3\n4 5 a\n"), HasSubstr("found 'a', expected z"));
-  EXPECT_THAT(failureOf(head.text() + "1 2 3 4\n4 5 6\n"),
+  EXPECT_THAT(refusalOf(head.text() + "1 2 3\n4 5 a\n"), HasSubstr("found 'a', expected z"));
+  EXPECT_THAT(refusalOf(head.text() + "1 2 3 4\n4 5 6\n"),
               HasSubstr("row 0 at line 12: found '4'"));
-  EXPECT_THAT(failureOf(head.text() + "1 2 3\n4 5 6\n7 8 9\n"), HasSubstr("after the last row"));
-  EXPECT_EQ(failureOf(head.text() + "1 2 3\r\n\n 4 5 6\n \n"), "");
+  EXPECT_THAT(refusalOf(head.text() + "1 2 3\n4 5 6\n7 8 9\n"), HasSubstr("after the last row"));
+  EXPECT_EQ(readAllRows(*openGood(head.text() + "1 2 3\r\n\n 4 5 6\n \n")).size(), 2 * 12u);
 }
 
 TEST_F(PcdTest, EveryTruncationIsFound) {
@@ -217,10 +204,9 @@ TEST_F(PcdTest, EveryTruncationIsFound) {
     head.data = is_text ? "ascii" : "binary";
     const std::string whole =
         head.text() + (is_text ? "1 2 3\n4 5 6" : bytesOf(1.f, 2.f, 3.f, 4.f, 5.f, 6.f));
-    EXPECT_EQ(failureOf(whole), "");
-    for (std::size_t size = 0; size < whole.size(); ++size) {
-      EXPECT_THAT(failureOf(whole.substr(0, size)), HasSubstr("a.pcd: ")) << size;
-    }
+    EXPECT_EQ(readAllRows(*openGood(whole)).size(), 2 * 12u);
+    expectEveryTruncationFails(openPcd, whole, whole.size());
+    expectDamageIsHarmless(openPcd, whole);
   }
 }
 

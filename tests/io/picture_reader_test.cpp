@@ -1,22 +1,14 @@
 #include "io/picture_reader.h"
 
-#include <OpenEXR/ImfChannelList.h>
-#include <OpenEXR/ImfEnvmapAttribute.h>
-#include <OpenEXR/ImfFrameBuffer.h>
-#include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
-#include <OpenEXR/ImfTiledOutputFile.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
-#include <cmath>
-#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "io/test_directory.h"
+#include "io/exr_test_picture.h"
+#include "io/picture_file_test.h"
 
 namespace surfeit {
 namespace {
@@ -40,7 +32,7 @@ Result<Pixels> readPicture(const std::string& path) {
   return pixels;
 }
 
-class PictureReaderTest : public DirectoryTest {
+class PictureReaderTest : public PictureFileTest {
  protected:
   Pixels read(const std::string& name) const {
     const Result<Pixels> pixels = readPicture(path(name));
@@ -53,61 +45,24 @@ class PictureReaderTest : public DirectoryTest {
 // Whole numbers, which every type of pixel holds exactly.
 float valueAt(int x, int y, int channel) { return float(1 + x + 10 * y + 500 * channel); }
 
-struct ExrKind {
-  std::vector<std::string> channels = {"R", "G", "B"};
-  Imf::PixelType type = Imf::HALF;
-  Imf::Compression compression = Imf::ZIP_COMPRESSION;
-  int tile = 0;  // 0: scan lines
-  Imf::LineOrder order = Imf::INCREASING_Y;
-  Imath::Box2i window{{0, 0}, {5, 3}};
-};
+// Channels of a picture of 6 x 4 pixels.
+ExrTestPart exrOf(const std::vector<std::string>& channels = {"R", "G", "B"},
+                  Imf::PixelType type = Imf::HALF,
+                  Imath::Box2i window = Imath::Box2i({0, 0}, {5, 3})) {
+  ExrTestPart part;
+  part.window = window;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    part.add(
+        channels[c], [&](int x, int y) { return valueAt(x, y, int(c)); }, type);
+  }
+  return part;
+}
 
-void writeExr(const ExrKind& kind, const std::string& path) {
-  const Imath::Box2i& window = kind.window;
-  const int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
-  Imf::Header header(Imath::Box2i({-3, -4}, {90, 80}), window);
-  header.compression() = kind.compression;
-  header.lineOrder() = kind.order;
-  const std::size_t count = std::size_t(width * height);
-  std::vector<std::vector<float>> floats(kind.channels.size(), std::vector<float>(count));
-  std::vector<std::vector<unsigned>> integers(kind.channels.size(), std::vector<unsigned>(count));
-  Imf::FrameBuffer buffer;
-  for (std::size_t c = 0; c < kind.channels.size(); ++c) {
-    for (std::size_t i = 0; i < count; ++i) {
-      floats[c][i] = valueAt(int(i) % width, int(i) / width, int(c));
-      integers[c][i] = unsigned(floats[c][i]);
-    }
-    const bool is_integer = kind.type == Imf::UINT;
-    const Imf::PixelType type = is_integer ? Imf::UINT : Imf::FLOAT;
-    char* const first = is_integer ? reinterpret_cast<char*>(integers[c].data())
-                                   : reinterpret_cast<char*>(floats[c].data());
-    header.channels().insert(kind.channels[c], Imf::Channel(kind.type));
-    buffer.insert(kind.channels[c],
-                  Imf::Slice(type, first - 4 * (window.min.x + window.min.y * width), 4,
-                             4 * std::size_t(width)));
-  }
-  // Files convert nothing when they are written
-  std::vector<std::vector<Imath::half>> halves(kind.channels.size());
-  if (kind.type == Imf::HALF) {
-    for (std::size_t c = 0; c < kind.channels.size(); ++c) {
-      halves[c].assign(floats[c].begin(), floats[c].end());
-      char* const first = reinterpret_cast<char*>(halves[c].data());
-      buffer.insert(kind.channels[c],
-                    Imf::Slice(Imf::HALF, first - 2 * (window.min.x + window.min.y * width), 2,
-                               2 * std::size_t(width)));
-    }
-  }
-  if (kind.tile > 0) {
-    header.setTileDescription(
-        Imf::TileDescription(unsigned(kind.tile), unsigned(kind.tile), Imf::MIPMAP_LEVELS));
-    Imf::TiledOutputFile file(path.c_str(), header, 0);
-    file.setFrameBuffer(buffer);
-    file.writeTiles(0, file.numXTiles(0) - 1, 0, file.numYTiles(0) - 1, 0);
-    return;
-  }
-  Imf::OutputFile file(path.c_str(), header, 0);
-  file.setFrameBuffer(buffer);
-  file.writePixels(height);
+// With tiles of all levels, of which only the largest is written.
+void writeExr(const ExrTestPart& part, const std::string& path) {
+  writeExrTest(path, {part}, [](Imf::Header& header) {
+    if (header.hasTileDescription()) header.tileDescription().mode = Imf::MIPMAP_LEVELS;
+  });
 }
 
 void expectValues(const Pixels& pixels, int width, int height, bool is_grey = false) {
@@ -121,52 +76,37 @@ void expectValues(const Pixels& pixels, int width, int height, bool is_grey = fa
 }
 
 TEST_F(PictureReaderTest, ReadsEveryKindOfOpenExr) {
-  std::vector<ExrKind> kinds(8);
-  kinds[1].type = Imf::FLOAT;
-  kinds[2].type = Imf::UINT;
+  std::vector<ExrTestPart> kinds(8, exrOf());
+  kinds[1] = exrOf({"R", "G", "B"}, Imf::FLOAT);
+  kinds[2] = exrOf({"R", "G", "B"}, Imf::UINT);
   kinds[3].tile = 2;
   kinds[4].window = {{-7, 11}, {-2, 14}};
   kinds[5].window = {{100, -50}, {105, -47}};
   kinds[5].tile = 4;
   kinds[6].order = Imf::DECREASING_Y;
   kinds[6].compression = Imf::PIZ_COMPRESSION;
-  kinds[7].channels = {"R", "G", "B", "A", "Z", "diffuse.R"};
+  kinds[7] = exrOf({"R", "G", "B", "A", "Z", "diffuse.R"});
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     SCOPED_TRACE(i);
     writeExr(kinds[i], path("a.exr"));
     expectValues(read("a.exr"), 6, 4);
   }
-  ExrKind large;
-  large.window = {{0, 0}, {8, 299}};
+  ExrTestPart large = exrOf({"R", "G", "B"}, Imf::FLOAT, Imath::Box2i({0, 0}, {8, 299}));
   large.compression = Imf::RLE_COMPRESSION;
-  large.type = Imf::FLOAT;
   writeExr(large, path("a.hdr"));  // contents count, not names
   expectValues(read("a.hdr"), 9, 300);
 }
 
 TEST_F(PictureReaderTest, LuminanceAloneIsGrey) {
-  ExrKind kind;
-  kind.channels = {"Y", "A"};
-  writeExr(kind, path("a.exr"));
+  writeExr(exrOf({"Y", "A"}), path("a.exr"));
   expectValues(read("a.exr"), 6, 4, true);
 }
 
 TEST_F(PictureReaderTest, KnowsCubeMaps) {
   for (const auto& [envmap, is_cube] :
        {std::pair(Imf::ENVMAP_CUBE, true), {Imf::ENVMAP_LATLONG, false}}) {
-    Imf::Header header(2, 12);
-    Imf::addEnvmap(header, envmap);
-    std::vector<float> zeros(24);
-    Imf::FrameBuffer buffer;
-    for (const char* const name : {"R", "G", "B"}) {
-      header.channels().insert(name, Imf::Channel(Imf::FLOAT));
-      buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(zeros.data()), 4, 8));
-    }
-    {
-      Imf::OutputFile file(path("a.exr").c_str(), header, 0);
-      file.setFrameBuffer(buffer);
-      file.writePixels(12);
-    }
+    writeExrTest(path("a.exr"), {exrOf()},
+                 [envmap](Imf::Header& header) { Imf::addEnvmap(header, envmap); });
     const auto reader = PictureReader::open(path("a.exr"));
     ASSERT_TRUE(reader.ok());
     EXPECT_EQ((*reader)->isCubeMap(), is_cube);
@@ -179,9 +119,7 @@ TEST_F(PictureReaderTest, RefusesOtherChannels) {
            {{"R", "G"}, "channels G R, expected R G B"},
            {{"Y", "RY", "BY"}, "channels BY RY Y, expected"},
            {{"depth"}, "channels depth, expected"}}) {
-    ExrKind kind;
-    kind.channels = channels;
-    writeExr(kind, path("a.exr"));
+    writeExr(exrOf(channels), path("a.exr"));
     EXPECT_THAT(failure("a.exr").message(), AllOf(HasSubstr("a.exr"), HasSubstr(found)));
     EXPECT_EQ(failure("a.exr").code(), StatusCode::kCorruption);
   }
@@ -269,18 +207,14 @@ TEST_F(PictureReaderTest, RefusesAbsurdSizesBeforeAllocating) {
   write("a.hdr", hdr("-Y 1 +X 9999999999", ""));
   EXPECT_EQ(failure("a.hdr").code(), StatusCode::kInvalidArgument);
 
-  ExrKind kind;
-  writeExr(kind, path("a.exr"));
-  std::string bytes = contents("a.exr");
-  const std::size_t window = bytes.find("dataWindow") + 11 + 6 + 4;
-  bytes.replace(window + 8, 8, "\xff\xff\xff\x7f\xff\xff\xff\x7f");
-  write("a.exr", bytes);
+  writeExr(exrOf(), path("a.exr"));
+  write("a.exr", withExrWindow(contents("a.exr"), {0, 0, 0x7fffffff, 0x7fffffff}));
   EXPECT_EQ(failure("a.exr").code(), StatusCode::kCorruption);
   EXPECT_THAT(failure("a.exr").message(), HasSubstr("2147483648 x 2147483648 pixels"));
 }
 
 TEST_F(PictureReaderTest, RefusesAttributesThatTheFileCannotHold) {
-  writeExr({}, path("a.exr"));
+  writeExr(exrOf(), path("a.exr"));
   std::string bytes = contents("a.exr");
   const std::size_t size = bytes.find("screenWindowWidth") + 18 + 6;
   bytes.replace(size, 4, std::string("\xff\xff\xff\x6f", 4));
@@ -290,49 +224,32 @@ TEST_F(PictureReaderTest, RefusesAttributesThatTheFileCannotHold) {
 }
 
 TEST_F(PictureReaderTest, RefusesTilesThatTakeTooMuchMemory) {
-  ExrKind kind;
-  kind.window = {{0, 0}, {3999, 1999}};
-  kind.tile = 4000;
-  kind.compression = Imf::RLE_COMPRESSION;
-  writeExr(kind, path("a.exr"));
+  ExrTestPart part = exrOf({"R", "G", "B"}, Imf::HALF, Imath::Box2i({0, 0}, {3999, 1999}));
+  part.tile = 4000;
+  part.compression = Imf::RLE_COMPRESSION;
+  writeExr(part, path("a.exr"));
   EXPECT_THAT(failure("a.exr").message(), HasSubstr("4000 rows decode to 288000000 bytes"));
 }
 
 TEST_F(PictureReaderTest, RefusesEveryTruncation) {
-  writeExr({}, path("whole.exr"));
+  writeExr(exrOf(), path("whole.exr"));
   write("whole.hdr",
         hdr("-Y 2 +X 8", "\x02\x02" + std::string("\0\x08", 2) +
                              "\x88\x07\x88\x07\x88\x07\x88\x88" + std::string(32, 'a')));
   for (const char* const name : {"whole.exr", "whole.hdr"}) {
-    const std::string bytes = contents(name);
     ASSERT_FALSE(read(name).values.empty());
-    for (std::size_t size = 0; size < bytes.size(); ++size) {
-      std::filesystem::remove(path("cut"));  // what is written over is flushed
-      write("cut", bytes.substr(0, size));
-      const Status status = failure("cut");
-      EXPECT_EQ(status.code(), StatusCode::kCorruption) << name << " at " << size;
-      EXPECT_THAT(status.message(), HasSubstr("cut: ")) << size;
-    }
+    const std::string bytes = contents(name);
+    expectTruncationsAreRefused(bytes, bytes.size(), [&](const char* cut) { return failure(cut); });
   }
 }
 
 TEST_F(PictureReaderTest, SurvivesEveryDamagedByte) {
-  ExrKind tiled;
+  ExrTestPart tiled = exrOf();
   tiled.tile = 2;
-  writeExr({}, path("lines.exr"));
+  writeExr(exrOf(), path("lines.exr"));
   writeExr(tiled, path("tiles.exr"));
-  for (const char* const name : {"lines.exr", "tiles.exr"}) {
-    const std::string bytes = contents(name);
-    for (std::size_t i = 0; i < bytes.size(); ++i) {
-      for (const int flip : {0x01, 0x80, 0xff}) {
-        std::string damaged = bytes;
-        damaged[i] = char(damaged[i] ^ flip);
-        std::filesystem::remove(path("damaged"));
-        write("damaged", damaged);
-        const Status status = failure("damaged");  // or none, when only a value changed
-        EXPECT_TRUE(status.ok() || status.message().find("damaged: ") != std::string::npos) << i;
-      }
-    }
+  for (const char* const whole : {"lines.exr", "tiles.exr"}) {
+    expectDamageIsHarmless(contents(whole), [&](const char* name) { return failure(name); });
   }
 }
 

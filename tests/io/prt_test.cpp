@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "io/compressed_files.h"
 #include "io/formats/prt2_reader.h"
 #include "io/formats/prt_reader.h"
 #include "io/formats/prt_writer.h"
@@ -206,6 +207,29 @@ TEST_F(PrtTest, FailureStaysUntilRewind) {
   ASSERT_TRUE(reader->rewind().ok());
   EXPECT_TRUE(reader->readRows(3, buffer).ok());
   EXPECT_FALSE(reader->readRows(3, buffer).ok());
+}
+
+TEST_F(PrtTest, ManyRowsAreReadAtOnce) {
+  // More bytes than are given room at first
+  std::string records;
+  for (int i = 0; i < 4'500'000; ++i) records += le(float(i / 1000));
+  const auto reader = openPrtOf(prt({{"Position", 4, 3, 0}}, 1'500'000, records));
+  ASSERT_NE(reader, nullptr);
+  const std::vector<std::byte> rows = readAllRows(*reader, ~std::size_t{0});
+  ASSERT_EQ(rows.size(), records.size());
+  EXPECT_EQ(std::memcmp(rows.data(), records.data(), rows.size()), 0);
+}
+
+TEST_F(PrtTest, CompressedCountThatLiesFailsWithoutMemory) {
+  // 2^62 rows of 12 bytes are a multiple of 2^64
+  const std::string records(12 * 50'000, 'x');
+  write("a.prt.gz", gzipped(prt({{"Position", 4, 3, 0}}, std::int64_t{1} << 62, records)));
+  const auto reader = openOk(openPrt, path("a.prt.gz"));
+  ASSERT_NE(reader, nullptr);
+  AlignedBuffer buffer;
+  const Result<Bytes> rows = reader->readRows(~std::size_t{0}, buffer);
+  EXPECT_NE(rows.status().message().find("the particles end here"), std::string::npos);
+  EXPECT_LT(buffer.capacity(), std::size_t{64} << 20);
 }
 
 TEST_F(PrtTest, EveryTruncationIsRefused) {

@@ -13,8 +13,7 @@
 #include "io/formats/ptc_format.h"
 #include "io/formats/ptc_reader.h"
 #include "io/formats/ptc_writer.h"
-#include "io/row_stream_test.h"
-#include "io/test_directory.h"
+#include "io/row_damage_test.h"
 
 namespace surfeit {
 namespace {
@@ -22,8 +21,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-using PtcTest = DirectoryTest;
 
 // Of a version 0 file of two variables, float and color, as the tests below patch it
 constexpr std::size_t kCountAt = 8, kVariablesAt = 40 + 128 + 12;
@@ -43,7 +40,7 @@ std::vector<std::byte> floatRows(std::size_t count, std::size_t floats) {
   return rows;
 }
 
-class PtcFiles : public PtcTest {
+class PtcFiles : public RowFileTest {
  protected:
   void writePtc(const std::string& name, const std::vector<PlyProperty>& columns,
                 const std::vector<std::byte>& rows, int version = 0,
@@ -60,20 +57,9 @@ class PtcFiles : public PtcTest {
   }
 
   std::unique_ptr<RowReader> openGood(const std::string& name, RowReaderOptions options = {}) {
-    Result<std::unique_ptr<RowReader>> reader = openPtc(path(name), options);
-    EXPECT_TRUE(reader.ok()) << reader.status().message();
-    return reader.ok() ? std::move(*reader) : nullptr;
+    return openOk(openPtc, path(name), options);
   }
-
-  // The message of opening or else reading; empty when all is well.
-  std::string failureOf(const std::string& text) {
-    write("damaged.ptc", text);
-    Result<std::unique_ptr<RowReader>> reader = openPtc(path("damaged.ptc"), {});
-    Status status = reader.status();
-    if (reader.ok()) readAllRows(**reader, 5, status);
-    EXPECT_TRUE(status.ok() || status.code() == StatusCode::kCorruption);
-    return status.message();
-  }
+  std::string refusalOf(const std::string& text) { return refusal(openPtc, text); }
 
   std::vector<std::string> notes_;
 };
@@ -312,10 +298,9 @@ TEST_F(PtcFiles, EveryTruncationIsFound) {
     const auto columns = properties({"x", "y", "z", "area"});
     writePtc("a.ptc", columns, floatRows(3, columns.size()), version);
     const std::string whole = contents("a.ptc");
-    EXPECT_EQ(failureOf(whole), "");
-    for (std::size_t size = 0; size < whole.size(); ++size) {
-      EXPECT_THAT(failureOf(whole.substr(0, size)), HasSubstr("damaged.ptc: ")) << size;
-    }
+    EXPECT_EQ(readAllRows(*openGood("a.ptc")).size(), 3 * 32u);
+    expectEveryTruncationFails(openPtc, whole, whole.size());
+    expectDamageIsHarmless(openPtc, whole, 3);
   }
 }
 
@@ -334,20 +319,20 @@ TEST_F(PtcFiles, DamagedHeadersAreRefused) {
     std::memcpy(&text[at], &value, sizeof value);
     return text;
   };
-  EXPECT_THAT(failureOf(patched(0, 'q')), HasSubstr("begins with 'qptc', expected 'pptc'"));
-  EXPECT_THAT(failureOf(patched(4, 3)), HasSubstr("found version 3, expected 0, 1 or 2"));
-  EXPECT_THAT(failureOf(patched(4, -1)), HasSubstr("found version -1"));
+  EXPECT_THAT(refusalOf(patched(0, 'q')), HasSubstr("begins with 'qptc', expected 'pptc'"));
+  EXPECT_THAT(refusalOf(patched(4, 3)), HasSubstr("found version 3, expected 0, 1 or 2"));
+  EXPECT_THAT(refusalOf(patched(4, -1)), HasSubstr("found version -1"));
   for (const double count : {-1.0, 2.5, 1e300, double(NAN), double(INFINITY), 0x1p63}) {
-    EXPECT_THAT(failureOf(patched(kCountAt, count)), HasSubstr("expected a whole number"));
+    EXPECT_THAT(refusalOf(patched(kCountAt, count)), HasSubstr("expected a whole number"));
   }
-  EXPECT_THAT(failureOf(patched(kCountAt, 0x1p62)), HasSubstr("hold 3 records of 36 bytes"));
-  EXPECT_THAT(failureOf(patched(kVariablesAt, -1)), HasSubstr("found -1 variables"));
-  EXPECT_THAT(failureOf(patched(kVariablesAt, 1 << 30)), HasSubstr("expected 0 to 256"));
-  EXPECT_THAT(failureOf(patched(kVariablesAt, 1)), HasSubstr("found 4 floats a point, expected 1"));
-  EXPECT_THAT(failureOf(patched(kVariablesAt + 4, 5)), HasSubstr("expected 4 by the types"));
-  EXPECT_THAT(failureOf(patched(kVariablesAt + 8, 'g')),
+  EXPECT_THAT(refusalOf(patched(kCountAt, 0x1p62)), HasSubstr("hold 3 records of 36 bytes"));
+  EXPECT_THAT(refusalOf(patched(kVariablesAt, -1)), HasSubstr("found -1 variables"));
+  EXPECT_THAT(refusalOf(patched(kVariablesAt, 1 << 30)), HasSubstr("expected 0 to 256"));
+  EXPECT_THAT(refusalOf(patched(kVariablesAt, 1)), HasSubstr("found 4 floats a point, expected 1"));
+  EXPECT_THAT(refusalOf(patched(kVariablesAt + 4, 5)), HasSubstr("expected 4 by the types"));
+  EXPECT_THAT(refusalOf(patched(kVariablesAt + 8, 'g')),
               HasSubstr("found 'gloat _area', expected"));
-  EXPECT_THAT(failureOf(patched(kVariablesAt + 13, '_')), HasSubstr("found 'float__area'"));
+  EXPECT_THAT(refusalOf(patched(kVariablesAt + 13, '_')), HasSubstr("found 'float__area'"));
 }
 
 TEST_F(PtcFiles, SeveralBlanksMayFollowAType) {

@@ -288,8 +288,7 @@ class RecipeSourceTest : public DirectoryTest {
   // As the program writes them.
   void writePly(const std::string& name, const SceneRecipe& recipe) const {
     const SceneGenerator generator = generatorOf(recipe);
-    Result<SurfelWriter> writer =
-        SurfelWriter::create(path(name), generator.channels(), PlyEncoding::kBinaryLittleEndian);
+    Result<SurfelWriter> writer = SurfelWriter::create(path(name), generator.channels());
     ASSERT_TRUE(writer.ok()) << writer.status().message();
     ASSERT_TRUE(writer->write(allSurfels(recipe)).ok());
     ASSERT_TRUE(writer->finish().ok());

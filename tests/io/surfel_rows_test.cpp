@@ -29,8 +29,8 @@ class SurfelRowsTest : public SurfelCloudTest {
   std::string write(std::size_t count, PlyEncoding encoding) {
     std::vector<Surfel> surfels = randomSurfels(count);
     for (std::size_t i = 96; i < count; i += 97) surfels[i].radius = 0;
-    Result<SurfelWriter> writer =
-        SurfelWriter::create(path("a.ply"), {true, true, true, true, true, true}, encoding);
+    Result<SurfelWriter> writer = SurfelWriter::create(
+        path("a.ply"), {true, true, true, true, true, true}, {.ply_encoding = encoding});
     EXPECT_TRUE(writer.ok() && writer->write(surfels).ok() && writer->finish().ok());
     return path("a.ply");
   }

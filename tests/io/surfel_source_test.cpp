@@ -224,8 +224,8 @@ TEST_F(SurfelSourceTest, CloudAfterAnotherElementIsFound) {
 }
 
 TEST_F(SurfelSourceTest, EveryFlippedByteIsReadOrRefused) {
-  Result<SurfelWriter> writer = SurfelWriter::create(
-      path("a.ply"), {true, true, true, true, true, true}, PlyEncoding::kBinaryLittleEndian);
+  Result<SurfelWriter> writer =
+      SurfelWriter::create(path("a.ply"), {true, true, true, true, true, true});
   ASSERT_TRUE(writer.ok());
   ASSERT_TRUE(writer->write(std::vector<Surfel>(2)).ok());
   ASSERT_TRUE(writer->finish().ok());

@@ -21,8 +21,9 @@ TEST_F(SurfelWriterTest, SurfelsRoundTripInEveryEncoding) {
   }
   for (const PlyEncoding encoding :
        {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
-    Result<SurfelWriter> writer = SurfelWriter::create(
-        path("a.ply"), {true, true, true, true, true, true, true}, encoding, {"a comment"});
+    Result<SurfelWriter> writer =
+        SurfelWriter::create(path("a.ply"), {true, true, true, true, true, true, true},
+                             {.comments = {"a comment"}, .ply_encoding = encoding});
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE(writer->write(std::span(surfels).first(1)).ok());
     ASSERT_TRUE(writer->write({}).ok());
@@ -41,8 +42,7 @@ TEST_F(SurfelWriterTest, FileHasOnlyTheChannelsAskedFor) {
   const std::vector<Surfel> surfels = randomSurfels(3);
   CloudChannels channels;
   channels.area = true;
-  Result<SurfelWriter> writer =
-      SurfelWriter::create(path("a.ply"), channels, PlyEncoding::kBinaryLittleEndian);
+  Result<SurfelWriter> writer = SurfelWriter::create(path("a.ply"), channels);
   ASSERT_TRUE(writer.ok());
   ASSERT_TRUE(writer->write(surfels).ok());
   ASSERT_TRUE(writer->finish().ok());
@@ -56,8 +56,7 @@ TEST_F(SurfelWriterTest, FileHasOnlyTheChannelsAskedFor) {
 
 TEST_F(SurfelWriterTest, FileAppearsOnlyWhenFinished) {
   {
-    Result<SurfelWriter> writer =
-        SurfelWriter::create(path("a.ply"), {}, PlyEncoding::kBinaryLittleEndian);
+    Result<SurfelWriter> writer = SurfelWriter::create(path("a.ply"), {});
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE(writer->write(randomSurfels(5)).ok());
     EXPECT_FALSE(std::filesystem::exists(path("a.ply")));

@@ -357,6 +357,44 @@ TEST_F(VdbRows, CloudsWithoutExtentAndOutliersAreWritten) {
   ASSERT_TRUE(readAll("far.vdb", 100, bytes).ok());
 }
 
+// Rows of the file for one copy and for 12 of them, exact or nearly so.
+TEST_F(VdbRows, CopiesOfACloudTakeAsManyBytesPerRowAsTheCloud) {
+  const std::vector<float> rows = someRows(20000);
+  ASSERT_TRUE(writeRows("one.vdb", rows, someOptions()).ok());
+  const double one = double(contents("one.vdb").size());
+  std::mt19937 random(11);
+  for (const float noise : {0.0f, 1e-5f, 1e-3f}) {
+    std::normal_distribution<float> normal(0, 1);
+    std::vector<float> copies;
+    for (int copy = 0; copy < 12; ++copy) {
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        copies.push_back(rows[i] + (i % 7 < 3 ? noise * normal(random) : 0));
+      }
+    }
+    ASSERT_TRUE(writeRows("copies.vdb", copies, someOptions()).ok());
+    EXPECT_LE(double(contents("copies.vdb").size()) / 12, 1.2 * one) << noise;
+    std::string bytes;
+    ASSERT_TRUE(readAll("copies.vdb", 5000, bytes).ok());
+    EXPECT_EQ(bytes.size(), copies.size() * 4);
+  }
+}
+
+TEST_F(VdbRows, LeavesTakeAnyNumberOfPoints) {
+  // 67 MB of an attribute for one voxel, pages 64 times as large as usual
+  RowWriterOptions options = someOptions();
+  for (int i = 0; i < 200; ++i) {
+    PlyProperty property;
+    property.name = "weights_" + std::to_string(i);
+    options.properties.push_back(property);
+  }
+  const std::vector<float> rows(207 * 84000, 0.5f);
+  ASSERT_TRUE(writeRows("dense.vdb", rows, options).ok());
+  std::string bytes;
+  ASSERT_TRUE(readAll("dense.vdb", 100000, bytes).ok());
+  ASSERT_EQ(bytes.size(), rows.size() * 4);
+  EXPECT_EQ(std::memcmp(bytes.data(), rows.data(), bytes.size()), 0);
+}
+
 TEST_F(VdbRows, WhatCannotBeWrittenIsRefused) {
   RowWriterOptions options = someOptions();
   options.properties.erase(options.properties.begin());

@@ -1,7 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <random>
@@ -12,8 +11,7 @@
 #include "io/formats/xyz_reader.h"
 #include "io/formats/xyz_writer.h"
 #include "io/ply_number.h"
-#include "io/row_stream_test.h"
-#include "io/test_directory.h"
+#include "io/row_damage_test.h"
 
 namespace surfeit {
 namespace {
@@ -21,14 +19,12 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-class XyzTest : public DirectoryTest {
+class XyzTest : public RowFileTest {
  protected:
   std::unique_ptr<RowReader> openGood(const std::string& text, RowReaderOptions options = {}) {
     write("a.xyz", text);
     EXPECT_TRUE(recognisesXyz(text.substr(0, kMagicBytes)));
-    Result<std::unique_ptr<RowReader>> reader = openXyz(path("a.xyz"), options);
-    EXPECT_TRUE(reader.ok()) << reader.status().message();
-    return reader.ok() ? std::move(*reader) : nullptr;
+    return openOk(openXyz, path("a.xyz"), options);
   }
 
   // The properties of a row.
@@ -37,15 +33,7 @@ class XyzTest : public DirectoryTest {
     return reader ? describeRow(reader->element()) : "";
   }
 
-  // The message of opening or else reading; empty when all is well.
-  std::string failureOf(const std::string& text) {
-    write("a.xyz", text);
-    Result<std::unique_ptr<RowReader>> reader = openXyz(path("a.xyz"), {});
-    Status status = reader.status();
-    if (reader.ok()) readAllRows(**reader, 5, status);
-    EXPECT_TRUE(status.ok() || status.code() == StatusCode::kCorruption);
-    return status.message();
-  }
+  std::string refusalOf(const std::string& text) { return refusal(openXyz, text); }
 
   void writeXyz(const std::string& name, const std::vector<PlyProperty>& columns,
                 const std::vector<std::byte>& rows, const std::vector<std::string>& comments = {}) {
@@ -256,19 +244,19 @@ TEST_F(XyzTest, OtherFilesAreNotRecognised) {
 }
 
 TEST_F(XyzTest, RowsThatAreNotAsTheFirstAreRefused) {
-  EXPECT_THAT(failureOf("1 2 3\n\n4 5\n"),
+  EXPECT_THAT(refusalOf("1 2 3\n\n4 5\n"),
               HasSubstr("row 1 at line 3: line ends early, expected z"));
-  EXPECT_THAT(failureOf("1 2 3\n4 5 6 7\n"), HasSubstr("row 1 at line 2: found '7'"));
-  EXPECT_THAT(failureOf("1 2 3\n4 b 6\n"), HasSubstr("found 'b', expected y of type float"));
-  EXPECT_THAT(failureOf("1,2,3\n4,,6\n"), HasSubstr("found '', expected y"));
-  EXPECT_THAT(failureOf("1 2 3 x\n"), HasSubstr("found 'x', expected intensity"));
-  EXPECT_THAT(failureOf("x y z w\n1 2 3\n"), HasSubstr("line 2: 3 values, expected 4"));
-  EXPECT_THAT(failureOf("# nothing\n"), HasSubstr("found no line of numbers"));
-  EXPECT_THAT(failureOf("hello\n"), HasSubstr("line 1: found 'hello', expected three numbers"));
+  EXPECT_THAT(refusalOf("1 2 3\n4 5 6 7\n"), HasSubstr("row 1 at line 2: found '7'"));
+  EXPECT_THAT(refusalOf("1 2 3\n4 b 6\n"), HasSubstr("found 'b', expected y of type float"));
+  EXPECT_THAT(refusalOf("1,2,3\n4,,6\n"), HasSubstr("found '', expected y"));
+  EXPECT_THAT(refusalOf("1 2 3 x\n"), HasSubstr("found 'x', expected intensity"));
+  EXPECT_THAT(refusalOf("x y z w\n1 2 3\n"), HasSubstr("line 2: 3 values, expected 4"));
+  EXPECT_THAT(refusalOf("# nothing\n"), HasSubstr("found no line of numbers"));
+  EXPECT_THAT(refusalOf("hello\n"), HasSubstr("line 1: found 'hello', expected three numbers"));
   std::string wide;
   for (int i = 0; i < 300; ++i) wide += "1 ";
-  EXPECT_THAT(failureOf(wide), HasSubstr("more than 256 values"));
-  EXPECT_THAT(failureOf("1 2 3\n" + std::string(300000, ' ') + "4\n"),
+  EXPECT_THAT(refusalOf(wide), HasSubstr("more than 256 values"));
+  EXPECT_THAT(refusalOf("1 2 3\n" + std::string(300000, ' ') + "4\n"),
               HasSubstr("more than 262144"));
 }
 

@@ -131,8 +131,7 @@ inline std::vector<Surfel> moved(std::vector<Surfel> cloud, float scale, const g
 
 inline void writeCloud(const std::string& path, std::span<const Surfel> cloud,
                        const CloudChannels& channels = kAllChannels) {
-  Result<SurfelWriter> writer =
-      SurfelWriter::create(path, channels, PlyEncoding::kBinaryLittleEndian);
+  Result<SurfelWriter> writer = SurfelWriter::create(path, channels);
   ASSERT_TRUE(writer.ok()) << writer.status().message();
   ASSERT_TRUE(writer->write(cloud).ok());
   ASSERT_TRUE(writer->finish().ok());

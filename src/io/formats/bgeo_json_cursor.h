@@ -61,8 +61,6 @@ class BgeoJsonCursor {
   Status start();
   // Whether values have the other byte order than this machine's.
   bool isSwapped() const { return is_swapped_; }
-  // Of the next token.
-  std::uint64_t offset() const { return offset_; }
 
   // The next token; the values of uniform arrays are passed over. kCorruption, naming the byte,
   // for what is no token or does not fit in the file.

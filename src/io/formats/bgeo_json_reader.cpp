@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -381,10 +379,9 @@ class BgeoJsonReader final : public ColumnRowReader {
                                           quotePlyText(attribute.name), found, expected));
   }
 
-  Column columnOf(const Attribute& attribute, const NumberArray& numbers, std::size_t components,
-                  std::size_t used, std::size_t to) const {
+  Column columnOf(const NumberArray& numbers, std::size_t components, std::size_t used,
+                  std::size_t to) const {
     Column column;
-    column.name = attribute.name;
     column.offset = numbers.offset;
     column.is_spooled = numbers.is_spooled;
     column.type = numbers.type;
@@ -400,12 +397,12 @@ class BgeoJsonReader final : public ColumnRowReader {
     if (numbers.length % components != 0 || numbers.length / components != element_.count) {
       return badLength(attribute, numbers.length, element_.count * components);
     }
-    addColumn(columnOf(attribute, numbers, components, used, to));
+    addColumn(columnOf(numbers, components, used, to));
     return {};
   }
 
   Status placePages(Attribute& attribute, std::size_t used, std::size_t to) {
-    Column column = columnOf(attribute, attribute.pages, attribute.components, used, to);
+    Column column = columnOf(attribute.pages, attribute.components, used, to);
     ColumnPages pages;
     pages.rows = attribute.page_rows;
     pages.slices = attribute.packing;

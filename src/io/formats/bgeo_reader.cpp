@@ -174,16 +174,15 @@ class BgeoReader final : public CountedRowReader {
     const std::size_t block = std::max<std::size_t>(1, kBlockBytes / record_bytes_);
     for (std::size_t done = 0; done < count;) {
       const std::size_t step = std::min(count - done, block);
-      const std::uint64_t at = data_begin_ + next_record_ * record_bytes_;
+      const std::uint64_t at = data_begin_ + (row() + done) * record_bytes_;
       SURFEIT_ASSIGN_OR_RETURN(const Bytes records,
                                input_.readView(at, step * record_bytes_, buffer_));
       if (records.size() < step * record_bytes_) {
-        return damagedRow(next_record_ + records.size() / record_bytes_,
+        return damagedRow(row() + done + records.size() / record_bytes_,
                           fmt::format("file ends early: {} bytes at {}, expected {}",
                                       records.size(), at, step * record_bytes_));
       }
       decodeBlock(records.data(), step, rows + done * element_.row_bytes);
-      next_record_ += step;
       done += step;
     }
     return {};
@@ -196,15 +195,10 @@ class BgeoReader final : public CountedRowReader {
     }
   }
 
-  Status moveTo(std::uint64_t row) override {
-    next_record_ = row;
-    return {};
-  }
-
   Status checkEnd() override { return input_.checkUnchanged(); }
 
   ByteInput input_;
-  std::uint64_t data_begin_ = 0, next_record_ = 0;
+  std::uint64_t data_begin_ = 0;
   std::size_t record_bytes_ = 0;
   std::vector<WordRun> runs_;
   AlignedBuffer buffer_;

@@ -9,7 +9,7 @@
 
 #include "core/assert.h"
 #include "io/byte_output.h"
-#include "io/formats/channel_encoder.h"
+#include "io/formats/word_channels.h"
 
 namespace surfeit {
 namespace {
@@ -29,11 +29,6 @@ void putWord(std::vector<std::byte>& bytes, std::uint32_t word, std::size_t size
 
 void putText(std::vector<std::byte>& bytes, std::string_view text) {
   for (const char letter : text) bytes.push_back(static_cast<std::byte>(letter));
-}
-
-bool isReal(const RowChannel& channel) {
-  return channel.type == PlyType::kFloat32 || channel.type == PlyType::kFloat64 ||
-         isCodedColor(channel);
 }
 
 class BgeoWriter final : public RowWriter {
@@ -102,7 +97,6 @@ class BgeoWriter final : public RowWriter {
     for (const PlannedChannel& planned : plan) {
       if (&planned == &position) continue;
       const std::size_t values = planned.channel.properties.size();
-      if (planned.name.size() > std::numeric_limits<std::uint16_t>::max()) continue;
       const bool is_vector = values == 3 && planned.channel.kind != ChannelKind::kColor;
       putWord(bytes, static_cast<std::uint32_t>(planned.name.size()), 2);
       putText(bytes, planned.name);
@@ -117,16 +111,7 @@ class BgeoWriter final : public RowWriter {
   }
 
   void addChannel(const PlannedChannel& planned) {
-    const RowChannel& channel = planned.channel;
-    const PlyType type = isReal(channel) ? PlyType::kFloat32 : PlyType::kInt32;
-    if (isCodedColor(channel)) {
-      notes_.push_back("integers that code sRGB become linear float32: color");
-    } else if (channel.type == PlyType::kFloat64) {
-      notes_.push_back("float64 becomes float32: " + channel.name);
-    } else if (channel.type == PlyType::kUint32) {
-      notes_.push_back("integers from 2^31 up become negative: " + channel.name);
-    }
-    encoders_.push_back({ChannelEncoder(element_, channel, type), record_bytes_});
+    encoders_.push_back({wordEncoder(element_, planned.channel, notes_), record_bytes_});
     record_bytes_ += encoders_.back().encoder.bytes();
   }
 
@@ -167,7 +152,7 @@ class BgeoWriter final : public RowWriter {
 
 Result<std::unique_ptr<RowWriter>> createBgeo(const std::string& path,
                                               const RowWriterOptions& options) {
-  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path));
+  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path, options.progress));
   auto writer = std::make_unique<BgeoWriter>(std::move(output), options);
   SURFEIT_RETURN_IF_ERROR(writer->open(options));
   return std::unique_ptr<RowWriter>(std::move(writer));

@@ -145,6 +145,4 @@ Status ColumnRowReader::decodeRows(std::size_t count, std::byte* rows) {
   return {};
 }
 
-Status ColumnRowReader::moveTo(std::uint64_t) { return {}; }
-
 }  // namespace surfeit

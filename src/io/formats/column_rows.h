@@ -26,7 +26,6 @@ struct ColumnPages {
 
 // The values of an attribute, all of one type.
 struct Column {
-  std::string name;  // for messages
   // In the file, or in the spool of the reader
   std::uint64_t offset = 0;
   bool is_spooled = false;
@@ -55,7 +54,6 @@ class ColumnRowReader : public CountedRowReader {
   // After the last other column.
   void addColumn(Column column);
   Status decodeRows(std::size_t count, std::byte* rows) override;
-  Status moveTo(std::uint64_t row) override;
   Status checkEnd() override { return input_.checkUnchanged(); }
 
   SpooledInput input_;

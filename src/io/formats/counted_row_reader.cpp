@@ -3,14 +3,28 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
+#include <utility>
 
 namespace surfeit {
 
+void growBuffer(AlignedBuffer& buffer, std::size_t used, std::size_t bytes) {
+  if (bytes <= buffer.capacity()) return;
+  AlignedBuffer larger(bytes);
+  if (used > 0) std::memcpy(larger.data(), buffer.data(), used);
+  buffer = std::move(larger);
+}
+
 Status CountedRowReader::readTo(std::size_t count, AlignedBuffer& buffer) {
-  if (count > 0) {
-    buffer.reserve(count * element_.row_bytes);
-    SURFEIT_RETURN_IF_ERROR(decodeRows(count, buffer.data()));
-    row_ += count;
+  // The count of a compressed file may lie: room doubles as rows prove to be there
+  const std::size_t row_bytes = element_.row_bytes;  // 0 when all channels are dropped
+  std::size_t room = std::min(count, kUnprovenBytes / std::max<std::size_t>(1, row_bytes) + 1);
+  buffer.reserve(room * row_bytes);
+  for (std::size_t done = 0; done < count; room = std::min(count, 2 * room)) {
+    growBuffer(buffer, done * row_bytes, room * row_bytes);
+    SURFEIT_RETURN_IF_ERROR(decodeRows(room - done, buffer.data() + done * row_bytes));
+    row_ += room - done;
+    done = room;
   }
   if (row_ == element_.count && !end_checked_) {
     SURFEIT_RETURN_IF_ERROR(checkEnd());
@@ -30,6 +44,7 @@ Result<Bytes> CountedRowReader::readRows(std::size_t max_rows, AlignedBuffer& bu
 
 Status CountedRowReader::rewind() {
   row_ = 0;
+  end_checked_ = false;
   failure_ = moveTo(0);
   return failure_;
 }

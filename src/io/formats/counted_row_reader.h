@@ -12,6 +12,11 @@
 
 namespace surfeit {
 
+// Rows of a count that may lie are given so much room before their bytes have been seen.
+inline constexpr std::size_t kUnprovenBytes = 16 << 20;
+// Makes room for `bytes` in a buffer and keeps the first `used` bytes of it. Throws std::bad_alloc.
+void growBuffer(AlignedBuffer& buffer, std::size_t used, std::size_t bytes);
+
 // A reader whose count is known when it is made. What derives from it only decodes.
 class CountedRowReader : public RowReader {
  public:
@@ -28,8 +33,9 @@ class CountedRowReader : public RowReader {
  protected:
   // Decodes the next `count` rows, at least 1 and no more than are left, to `rows`.
   virtual Status decodeRows(std::size_t count, std::byte* rows) = 0;
-  // The next decodeRows begins with `row`, which is 0 unless isSeekable().
-  virtual Status moveTo(std::uint64_t row) = 0;
+  // The next decodeRows begins with `row`, which is 0 unless isSeekable(). For readers that go on
+  // from where they are; others go by row().
+  virtual Status moveTo(std::uint64_t) { return {}; }
   // Called when the last row has been decoded: whether the file ends as it should.
   virtual Status checkEnd() { return {}; }
 

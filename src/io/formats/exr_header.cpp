@@ -153,6 +153,29 @@ double maxRatio(Imf::Compression compression) {
   }
 }
 
+// Tiled, flat or deep.
+bool hasTiles(const Imf::Header& header) {
+  return header.hasTileDescription() && header.hasType() && Imf::isTiled(header.type());
+}
+
+// Rows that are decoded together.
+std::uint64_t blockRows(const Imf::Header& header) {
+  if (hasTiles(header)) return std::max(header.tileDescription().ySize, 1u);
+  switch (header.compression()) {
+    case Imf::NO_COMPRESSION:
+    case Imf::RLE_COMPRESSION:
+    case Imf::ZIPS_COMPRESSION:
+      return 1;
+    case Imf::ZIP_COMPRESSION:
+    case Imf::PXR24_COMPRESSION:
+      return 16;
+    case Imf::DWAB_COMPRESSION:
+      return 256;
+    default:
+      return 32;  // PIZ, B44, B44A, DWAA
+  }
+}
+
 Status checkPart(const Imf::Header& header, const InputFile& file) {
   const auto [width, height] = windowSize(header);
   if (width == 0 || height == 0) {
@@ -160,8 +183,8 @@ Status checkPart(const Imf::Header& header, const InputFile& file) {
         fmt::format("{}: {} x {} pixels, expected at least one", file.path(), width, height));
   }
   // Every block of rows and every tile has an offset of 8 bytes in the file
-  double chunks = double(height) / double(exrBlockRows(header));
-  if (hasExrTiles(header)) {
+  double chunks = double(height) / double(blockRows(header));
+  if (hasTiles(header)) {
     const Imf::TileDescription& tiles = header.tileDescription();
     if (tiles.xSize == 0 || tiles.ySize == 0) {
       return Status::corruption(fmt::format("{}: tiles of {} x {} pixels, expected at least one",
@@ -188,10 +211,6 @@ Status checkPart(const Imf::Header& header, const InputFile& file) {
 
 }  // namespace
 
-bool hasExrTiles(const Imf::Header& header) {
-  return header.hasTileDescription() && header.hasType() && Imf::isTiled(header.type());
-}
-
 bool isDeepExr(const Imf::Header& header) {
   return header.hasType() && Imf::isDeepData(header.type());
 }
@@ -200,37 +219,24 @@ std::string exrPartName(const Imf::Header& header) {
   return header.hasName() ? header.name() : std::string();
 }
 
-std::uint64_t exrBlockRows(const Imf::Header& header) {
-  if (hasExrTiles(header)) return std::max(header.tileDescription().ySize, 1u);
-  switch (header.compression()) {
-    case Imf::NO_COMPRESSION:
-    case Imf::RLE_COMPRESSION:
-    case Imf::ZIPS_COMPRESSION:
-      return 1;
-    case Imf::ZIP_COMPRESSION:
-    case Imf::PXR24_COMPRESSION:
-      return 16;
-    case Imf::DWAB_COMPRESSION:
-      return 256;
-    default:
-      return 32;  // PIZ, B44, B44A, DWAA
-  }
-}
-
-Status checkExrBlocks(const Imf::Header& header, const std::string& path) {
+Status checkExrBlocks(const Imf::Header& header, std::uint64_t most_bytes,
+                      std::size_t tile_pixel_bytes, const std::string& path) {
   const auto [width, height] = windowSize(header);
-  std::uint64_t columns = width, rows = std::min(exrBlockRows(header), height);
-  if (hasExrTiles(header)) {
+  std::uint64_t columns = width, rows = blockRows(header);
+  double pixel_bytes = pixelBytes(header);
+  if (hasTiles(header)) {
     // OpenEXR holds whole tiles, however small the picture is
     columns = std::max<std::uint64_t>(width, header.tileDescription().xSize);
-    rows = exrBlockRows(header);
+    pixel_bytes += double(tile_pixel_bytes);
+  } else {
+    rows = std::min(rows, height);
   }
-  const double decoded = double(rows) * double(columns) * std::max(pixelBytes(header), 4.0);
-  if (decoded <= double(kMaxExrBlockBytes)) return {};
+  const double decoded = double(rows) * double(columns) * std::max(pixel_bytes, 4.0);
+  if (decoded <= double(most_bytes)) return {};
   return Status::invalidArgument(
       fmt::format("{}: {} rows decode to {:.0f} bytes together, expected at most {}: save it in "
                   "scan lines or smaller tiles, with fewer channels",
-                  path, rows, decoded, kMaxExrBlockBytes));
+                  path, rows, decoded, most_bytes));
 }
 
 Result<std::vector<Imf::Header>> readExrHeaders(ExrInputStream& stream) {

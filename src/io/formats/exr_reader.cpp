@@ -24,6 +24,8 @@ namespace surfeit {
 namespace {
 
 constexpr float kMaxDepth = 1e30f;
+// What must be decoded at once may take this.
+constexpr std::uint64_t kMaxBlockBytes = std::uint64_t{192} << 20;
 
 class ExrReader final : public CountedRowReader {
  public:
@@ -158,7 +160,7 @@ class ExrReader final : public CountedRowReader {
       const ExrSource& source = sources[column.source];
       auto part = std::find(parts_.begin(), parts_.end(), source.part);
       if (part == parts_.end()) {
-        SURFEIT_RETURN_IF_ERROR(checkExrBlocks(headers_[source.part], path_));
+        SURFEIT_RETURN_IF_ERROR(checkExrBlocks(headers_[source.part], kMaxBlockBytes, 0, path_));
         part = parts_.insert(part, source.part);
       }
       columns_.push_back(

@@ -3,28 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 #include <utility>
 
 #include "core/assert.h"
+#include "io/formats/counted_row_reader.h"
 
 namespace surfeit {
 namespace {
 
 // Records that are read at once: they stay in the second-level cache until they are decoded
 constexpr std::size_t kBlockBytes = 512 << 10;
-// Rows of a compressed file that are given room before their bytes have been seen
-constexpr std::size_t kUnprovenBytes = 16 << 20;
 
 }  // namespace
-
-void growBuffer(AlignedBuffer& buffer, std::size_t used, std::size_t bytes) {
-  if (bytes <= buffer.capacity()) return;
-  AlignedBuffer larger(bytes);
-  if (used > 0) std::memcpy(larger.data(), buffer.data(), used);
-  buffer = std::move(larger);
-}
 
 Status FixedRecordReader::setRecords(std::uint64_t data_offset, std::size_t record_bytes) {
   SURFEIT_CHECK(record_bytes > 0 && element_.row_bytes > 0);

@@ -11,9 +11,6 @@
 
 namespace surfeit {
 
-// Makes room for `bytes` in a buffer and keeps the first `used` bytes of it. Throws std::bad_alloc.
-void growBuffer(AlignedBuffer& buffer, std::size_t used, std::size_t bytes);
-
 // A reader as RowReader says. Seekable unless the file is compressed; takes 512 KiB, or a record
 // where that is more. Formats derive from it, fill element_ and call setRecords once.
 class FixedRecordReader : public RowReader {

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -200,9 +199,7 @@ class LasReader : public FixedRecordReader {
       SURFEIT_ASSIGN_OR_RETURN(color_,
                                add("color", 3, ChannelKind::kColor, PlyType::kUint16, renames));
     }
-    if (element_.properties.empty()) {
-      return Status::invalidArgument(fmt::format("{}: every channel is dropped", path()));
-    }
+    SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(element_, path()));
     return {};
   }
 

@@ -213,12 +213,6 @@ bool PcdField::isPackedColor() const {
   return (name == "rgb" || name == "rgba") && count == 1 && storedBytes(type) == 4;
 }
 
-std::size_t PcdHeader::recordBytes() const {
-  std::size_t bytes = 0;
-  for (const PcdField& field : fields) bytes += field.count * storedBytes(field.type);
-  return bytes;
-}
-
 bool recognisesPcd(std::string_view first_bytes) {
   if (first_bytes.starts_with("# .PCD")) return true;
   const bool begins_so = first_bytes.starts_with('#') || first_bytes.starts_with("VERSION ");

@@ -35,9 +35,6 @@ struct PcdHeader {
   bool has_view_point = false;  // other than the origin
   bool is_text = false;
   std::uint64_t data_offset = 0, data_line = 1;  // of the first point
-
-  // Of a point in a binary file.
-  std::size_t recordBytes() const;
 };
 
 bool recognisesPcd(std::string_view first_bytes);

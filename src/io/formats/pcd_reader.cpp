@@ -42,9 +42,7 @@ class PcdLayout {
       element.properties.back().offset = element.row_bytes;
       element.row_bytes += plyTypeBytes(element.properties.back().type);
     }
-    if (element.properties.empty()) {
-      return Status::invalidArgument(fmt::format("{}: every channel is dropped", path));
-    }
+    SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(element, path));
     layout.row_bytes_ = element.row_bytes;
     return layout;
   }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstring>
 #include <utility>
 
@@ -91,7 +90,6 @@ class PdbReader final : public ColumnRowReader {
     }
 
     Column column;
-    column.name = name;
     column.offset = data_at + kDataBytes;
     column.type = type == kInteger ? StoredType::kInt32 : StoredType::kFloat32;
     column.is_swapped = is_swapped_;

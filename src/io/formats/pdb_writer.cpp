@@ -11,8 +11,8 @@
 #include "io/byte_coding.h"
 #include "io/byte_output.h"
 #include "io/file.h"
-#include "io/formats/channel_encoder.h"
 #include "io/formats/spooled_input.h"
+#include "io/formats/word_channels.h"
 
 namespace surfeit {
 namespace {
@@ -23,11 +23,6 @@ constexpr std::uint32_t kVector = 1, kReal = 2, kInteger = 3;
 constexpr std::size_t kBlockRows = 16 << 10;
 
 constexpr ChannelName kNames[] = {{"color", "Cd"}};
-
-bool isReal(const RowChannel& channel) {
-  return channel.type == PlyType::kFloat32 || channel.type == PlyType::kFloat64 ||
-         isCodedColor(channel);
-}
 
 struct PdbColumn {
   std::string name;
@@ -103,22 +98,12 @@ class PdbWriter final : public RowWriter {
  private:
   void addColumn(const PlannedChannel& planned) {
     const RowChannel& channel = planned.channel;
-    const bool is_real = isReal(channel);
-    if (isCodedColor(channel)) {
-      notes_.push_back("integers that code sRGB become linear float32: color");
-    } else if (channel.type == PlyType::kFloat64) {
-      notes_.push_back("float64 becomes float32: " + channel.name);
-    } else if (channel.type == PlyType::kUint32) {
-      notes_.push_back("integers from 2^31 up become negative: " + channel.name);
-    }
-    const bool is_vector = is_real && channel.properties.size() == 3;
-    columns_.push_back(
-        {planned.name,
-         is_vector ? kVector
-         : is_real ? kReal
-                   : kInteger,
-         ChannelEncoder(element_, channel, is_real ? PlyType::kFloat32 : PlyType::kInt32),
-         bytes_per_row_});
+    const bool is_real = isReal(channel), is_vector = is_real && channel.properties.size() == 3;
+    columns_.push_back({planned.name,
+                        is_vector ? kVector
+                        : is_real ? kReal
+                                  : kInteger,
+                        wordEncoder(element_, channel, notes_), bytes_per_row_});
     bytes_per_row_ += columns_.back().encoder.bytes();
   }
 
@@ -189,7 +174,7 @@ class PdbWriter final : public RowWriter {
 
 Result<std::unique_ptr<RowWriter>> createPdb(const std::string& path,
                                              const RowWriterOptions& options) {
-  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path));
+  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path, options.progress));
   SURFEIT_ASSIGN_OR_RETURN(TemporaryFile blocks, TemporaryFile::create(spoolDirectory()));
   auto writer = std::make_unique<PdbWriter>(std::move(output), std::move(blocks), options);
   SURFEIT_RETURN_IF_ERROR(writer->open(options));

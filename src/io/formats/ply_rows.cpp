@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <optional>
 #include <set>
 #include <utility>
 
+#include "io/formats/property_renames.h"
 #include "io/formats/splat_reader.h"
 #include "io/ply_reader.h"
 #include "io/ply_writer.h"
@@ -14,27 +14,6 @@
 
 namespace surfeit {
 namespace {
-
-// The names of a channel's properties after renames: of the channel as a whole, of single
-// properties, or as they are. None: the channel is dropped.
-std::vector<std::string> renamed(const PlyElement& element, const RowChannel& channel,
-                                 std::span<const ChannelRename> renames) {
-  std::vector<std::string> names;
-  for (const std::size_t i : channel.properties) names.push_back(element.properties[i].name);
-  const auto isFrom = [&](std::string_view name) {
-    return std::any_of(renames.begin(), renames.end(),
-                       [&](const ChannelRename& rename) { return rename.from == name; });
-  };
-  if (isFrom(channel.name)) {
-    return propertyNames(channel.name, names.size(), channel.kind, renames);
-  }
-  for (std::string& name : names) {
-    if (!isFrom(name)) continue;
-    const std::vector<std::string> single = propertyNames(name, 1, ChannelKind::kFloat, renames);
-    name = single.empty() ? "" : single.front();
-  }
-  return names;
-}
 
 // The element as rows have it: scalars alone, renamed, without those that are dropped. Their places
 // in a row stay the same. kCorruption when a name is taken twice.
@@ -46,12 +25,7 @@ Result<PlyElement> rowElement(const PlyElement& original, std::span<const Channe
         fmt::format("{}: element {}: property {} is a list, expected a scalar", path, original.name,
                     property.name));
   }
-  std::vector<std::string> names(original.properties.size());
-  for (const RowChannel& channel : channelsOf(original)) {
-    const std::vector<std::string> given = renamed(original, channel, renames);
-    for (std::size_t i = 0; i < given.size(); ++i) names[channel.properties[i]] = given[i];
-  }
-
+  const std::vector<std::string> names = renamedProperties(original, renames);
   PlyElement element = original;
   element.properties.clear();
   std::set<std::string> taken;
@@ -153,8 +127,8 @@ Result<std::unique_ptr<RowReader>> openPlyRows(const std::string& path,
 Result<std::unique_ptr<RowWriter>> createPlyRows(const std::string& path,
                                                  const RowWriterOptions& options) {
   SURFEIT_ASSIGN_OR_RETURN(PlyWriter writer,
-                           PlyWriter::create(path, PlyEncoding::kBinaryLittleEndian,
-                                             options.properties, options.comments));
+                           PlyWriter::create(path, options.ply_encoding, options.properties,
+                                             options.comments, options.progress));
   return std::unique_ptr<RowWriter>(std::make_unique<PlyRowWriter>(std::move(writer)));
 }
 

@@ -15,7 +15,8 @@
 namespace surfeit {
 
 // The name of every property of `element` after renames of whole channels (color=albedo) and of
-// single properties (curvature=weight); empty for what is dropped. Names may come out twice.
+// single properties (curvature=weight); empty for lists and what is dropped. Names may come out
+// twice.
 std::vector<std::string> renamedProperties(const PlyElement& element,
                                            std::span<const ChannelRename> renames);
 

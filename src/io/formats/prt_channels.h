@@ -31,9 +31,8 @@ class PrtLayout {
  public:
   // Channels may lie in any order, and need not fill the record. Adds their properties to
   // `element`, after `renames`, and to `notes` what they cannot keep. kCorruption, naming `path`,
-  // when there is no channel, one has
-  // too many values, the record is longer than kMaxPrtRecordBytes or a property comes
-  // twice.
+  // when there is no channel, one has too many values, the record is longer than
+  // kMaxPrtRecordBytes or a property comes twice.
   static Result<PrtLayout> create(std::span<const PrtChannel> channels,
                                   std::span<const ChannelRename> renames, const std::string& path,
                                   PlyElement& element, std::vector<std::string>& notes);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <limits>
 #include <utility>
 
 #include "core/assert.h"
@@ -157,7 +156,7 @@ class PrtWriter final : public RowWriter {
 
 Result<std::unique_ptr<RowWriter>> createPrt(const std::string& path,
                                              const RowWriterOptions& options) {
-  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path));
+  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path, options.progress));
   auto writer = std::make_unique<PrtWriter>(std::move(output), options);
   SURFEIT_RETURN_IF_ERROR(writer->open(options));
   return std::unique_ptr<RowWriter>(std::move(writer));

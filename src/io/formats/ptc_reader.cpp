@@ -62,9 +62,7 @@ class PtcReader : public FixedRecordReader {
       SURFEIT_RETURN_IF_ERROR(
           addFloats(variable.name, variable.kind, variable.floatCount(), offset, renames));
     }
-    if (element_.properties.empty()) {
-      return Status::invalidArgument(fmt::format("{}: every channel is dropped", path()));
-    }
+    SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(element_, path()));
     return {};
   }
 

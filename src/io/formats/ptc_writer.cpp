@@ -75,7 +75,7 @@ class PtcWriter : public RowWriter {
 
     auto writer = std::unique_ptr<PtcWriter>(new PtcWriter(std::move(element), std::move(header)));
     SURFEIT_RETURN_IF_ERROR(writer->assignChannels(path));
-    SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path));
+    SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path, options.progress));
     SURFEIT_RETURN_IF_ERROR(output.append(formatPtcHeader(writer->header_)));
     writer->output_.emplace(std::move(output));
     return std::unique_ptr<RowWriter>(std::move(writer));

@@ -5,8 +5,7 @@
 // - normal: the rotated axis of the smallest scale; of splats of two scales, their third axis. Its
 //   sign means nothing, so disks are two-sided.
 // - radius: sqrt(2 s1 s2) with the two largest scales. The Gaussian exp(-r^2 / 2) with the scales
-// s1
-//   and s2 integrates to 2 pi s1 s2: the disk covers as much as the splat at full opacity.
+//   s1 and s2 integrates to 2 pi s1 s2: the disk covers as much as the splat at full opacity.
 // - red green blue: 0.5 + f_dc / (2 sqrt(pi)), not below 0. Splats are fitted to pictures that are
 //   coded as sRGB, so this is decoded to scene-linear light.
 // - opacity: 1 / (1 + exp(-opacity)). Splats below 1/255, which viewers leave out, keep their rows.

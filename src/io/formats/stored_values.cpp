@@ -108,28 +108,24 @@ StoredType storedTypeOf(PlyType type) {
 void decodeStored(const StoredPlace& place, const std::byte* from, std::size_t count, std::byte* to,
                   std::size_t to_stride) {
   switch (place.type) {
-    case StoredType::kInt8:
-      return decodeAs<std::int8_t, std::int8_t>(place, from, count, to, to_stride);
-    case StoredType::kUint8:
-      return decodeAs<std::uint8_t, std::uint8_t>(place, from, count, to, to_stride);
-    case StoredType::kInt16:
-      return decodeAs<std::int16_t, std::int16_t>(place, from, count, to, to_stride);
-    case StoredType::kUint16:
-      return decodeAs<std::uint16_t, std::uint16_t>(place, from, count, to, to_stride);
-    case StoredType::kInt32:
-      return decodeAs<std::int32_t, std::int32_t>(place, from, count, to, to_stride);
-    case StoredType::kUint32:
-      return decodeAs<std::uint32_t, std::uint32_t>(place, from, count, to, to_stride);
     case StoredType::kInt64:
       return decodeAs<std::int64_t, double>(place, from, count, to, to_stride);
     case StoredType::kUint64:
       return decodeAs<std::uint64_t, double>(place, from, count, to, to_stride);
     case StoredType::kFloat16:
       return decodeAs<Half, float>(place, from, count, to, to_stride);
-    case StoredType::kFloat32:
-      // As bits, so that NaNs keep theirs
+    default:
+      break;
+  }
+  // All others stay what they are; as bits, so that NaNs keep theirs
+  switch (storedBytes(place.type)) {
+    case 1:
+      return decodeAs<std::uint8_t, std::uint8_t>(place, from, count, to, to_stride);
+    case 2:
+      return decodeAs<std::uint16_t, std::uint16_t>(place, from, count, to, to_stride);
+    case 4:
       return decodeAs<std::uint32_t, std::uint32_t>(place, from, count, to, to_stride);
-    case StoredType::kFloat64:
+    default:
       return decodeAs<std::uint64_t, std::uint64_t>(place, from, count, to, to_stride);
   }
 }

@@ -1,9 +1,8 @@
 #include "io/formats/vdb_attribute.h"
 
-#include <half.h>
-
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace surfeit {
 namespace {
@@ -11,101 +10,62 @@ namespace {
 struct ValueType {
   std::string_view name;
   std::size_t components;
-  VdbStorage storage;
+  StoredType stored;
 };
 
 constexpr ValueType kValueTypes[] = {
-    {"bool", 1, VdbStorage::kUint8},    {"int8", 1, VdbStorage::kInt8},
-    {"uint8", 1, VdbStorage::kUint8},   {"int16", 1, VdbStorage::kInt16},
-    {"uint16", 1, VdbStorage::kUint16}, {"int32", 1, VdbStorage::kInt32},
-    {"uint32", 1, VdbStorage::kUint32}, {"int64", 1, VdbStorage::kInt64},
-    {"uint64", 1, VdbStorage::kUint64}, {"half", 1, VdbStorage::kHalf},
-    {"float", 1, VdbStorage::kFloat},   {"double", 1, VdbStorage::kDouble},
-    {"vec2i", 2, VdbStorage::kInt32},   {"vec2s", 2, VdbStorage::kFloat},
-    {"vec2d", 2, VdbStorage::kDouble},  {"vec2h", 2, VdbStorage::kHalf},
-    {"vec3i", 3, VdbStorage::kInt32},   {"vec3s", 3, VdbStorage::kFloat},
-    {"vec3d", 3, VdbStorage::kDouble},  {"vec3h", 3, VdbStorage::kHalf},
-    {"vec4i", 4, VdbStorage::kInt32},   {"vec4s", 4, VdbStorage::kFloat},
-    {"vec4d", 4, VdbStorage::kDouble},  {"vec4h", 4, VdbStorage::kHalf},
-    {"quats", 4, VdbStorage::kFloat},   {"quatd", 4, VdbStorage::kDouble},
-    {"mat3s", 9, VdbStorage::kFloat},   {"mat3d", 9, VdbStorage::kDouble},
-    {"mat4s", 16, VdbStorage::kFloat},  {"mat4d", 16, VdbStorage::kDouble},
+    {"bool", 1, StoredType::kUint8},     {"int8", 1, StoredType::kInt8},
+    {"uint8", 1, StoredType::kUint8},    {"int16", 1, StoredType::kInt16},
+    {"uint16", 1, StoredType::kUint16},  {"int32", 1, StoredType::kInt32},
+    {"uint32", 1, StoredType::kUint32},  {"int64", 1, StoredType::kInt64},
+    {"uint64", 1, StoredType::kUint64},  {"half", 1, StoredType::kFloat16},
+    {"float", 1, StoredType::kFloat32},  {"double", 1, StoredType::kFloat64},
+    {"vec2i", 2, StoredType::kInt32},    {"vec2s", 2, StoredType::kFloat32},
+    {"vec2d", 2, StoredType::kFloat64},  {"vec2h", 2, StoredType::kFloat16},
+    {"vec3i", 3, StoredType::kInt32},    {"vec3s", 3, StoredType::kFloat32},
+    {"vec3d", 3, StoredType::kFloat64},  {"vec3h", 3, StoredType::kFloat16},
+    {"vec4i", 4, StoredType::kInt32},    {"vec4s", 4, StoredType::kFloat32},
+    {"vec4d", 4, StoredType::kFloat64},  {"vec4h", 4, StoredType::kFloat16},
+    {"quats", 4, StoredType::kFloat32},  {"quatd", 4, StoredType::kFloat64},
+    {"mat3s", 9, StoredType::kFloat32},  {"mat3d", 9, StoredType::kFloat64},
+    {"mat4s", 16, StoredType::kFloat32}, {"mat4d", 16, StoredType::kFloat64},
 };
 
-std::size_t storedBytes(VdbStorage storage) {
-  switch (storage) {
-    case VdbStorage::kInt8:
-    case VdbStorage::kUint8:
-    case VdbStorage::kFixed8:
-    case VdbStorage::kUnitFixed8:
-      return 1;
-    case VdbStorage::kInt16:
-    case VdbStorage::kUint16:
-    case VdbStorage::kHalf:
-    case VdbStorage::kFixed16:
-    case VdbStorage::kUnitFixed16:
-    case VdbStorage::kUnitVector:
-      return 2;
-    case VdbStorage::kInt64:
-    case VdbStorage::kUint64:
-    case VdbStorage::kDouble:
-      return 8;
-    default:
-      return 4;
-  }
-}
+struct Coded {
+  StoredType stored;
+  VdbCodec codec;
+};
 
-// The storage of a component under a codec.
-std::optional<VdbStorage> encodedStorage(const ValueType& type, std::string_view codec) {
-  const bool is_real = type.storage == VdbStorage::kFloat || type.storage == VdbStorage::kDouble;
-  if (codec == "null") return type.storage;
-  if (codec == "trnc" && type.storage == VdbStorage::kFloat) return VdbStorage::kHalf;
-  if (codec == "trnc" && type.storage == VdbStorage::kInt32) return VdbStorage::kInt16;
-  if (codec == "uvec" && is_real && type.components == 3) return VdbStorage::kUnitVector;
-  if (!is_real) return {};
-  if (codec == "fxpt8") return VdbStorage::kFixed8;
-  if (codec == "fxpt16") return VdbStorage::kFixed16;
-  if (codec == "ufxpt8") return VdbStorage::kUnitFixed8;
-  if (codec == "ufxpt16") return VdbStorage::kUnitFixed16;
+// How a component is stored under a codec.
+std::optional<Coded> codedAs(const ValueType& type, std::string_view codec) {
+  if (codec == "null") return Coded{type.stored, VdbCodec::kPlain};
+  if (codec == "trnc" && type.stored == StoredType::kFloat32) {
+    return Coded{StoredType::kFloat16, VdbCodec::kPlain};
+  }
+  if (codec == "trnc" && type.stored == StoredType::kInt32) {
+    return Coded{StoredType::kInt16, VdbCodec::kPlain};
+  }
+  if (type.stored != StoredType::kFloat32 && type.stored != StoredType::kFloat64) return {};
+  if (codec == "uvec" && type.components == 3) {
+    return Coded{StoredType::kUint16, VdbCodec::kUnitVector};
+  }
+  if (codec == "fxpt8") return Coded{StoredType::kUint8, VdbCodec::kFixed};
+  if (codec == "fxpt16") return Coded{StoredType::kUint16, VdbCodec::kFixed};
+  if (codec == "ufxpt8") return Coded{StoredType::kUint8, VdbCodec::kUnitFixed};
+  if (codec == "ufxpt16") return Coded{StoredType::kUint16, VdbCodec::kUnitFixed};
   return {};
 }
 
-PlyType decodedType(VdbStorage value_storage) {
-  switch (value_storage) {
-    case VdbStorage::kInt8:
-      return PlyType::kInt8;
-    case VdbStorage::kUint8:
-      return PlyType::kUint8;
-    case VdbStorage::kInt16:
-      return PlyType::kInt16;
-    case VdbStorage::kUint16:
-      return PlyType::kUint16;
-    case VdbStorage::kInt32:
-      return PlyType::kInt32;
-    case VdbStorage::kUint32:
-      return PlyType::kUint32;
-    case VdbStorage::kInt64:
-    case VdbStorage::kUint64:
-    case VdbStorage::kDouble:
-      return PlyType::kFloat64;
-    default:
-      return PlyType::kFloat32;
-  }
-}
-
-// Decodes every component of every row by `decode`, from Stored to Out.
-template <typename Stored, typename Out, typename Decode>
-void decodeComponents(const std::byte* stored, bool is_uniform, std::size_t uniform_values,
-                      std::size_t rows, std::size_t per_row, std::byte* out, std::size_t row_bytes,
-                      Decode decode) {
-  for (std::size_t row = 0; row < rows; ++row) {
-    std::byte* row_out = out + row * row_bytes;
-    for (std::size_t i = 0; i < per_row; ++i) {
-      const std::size_t index = is_uniform ? i % uniform_values : row * per_row + i;
+template <typename Stored, typename Out>
+void decodeFixed(const StoredPlace& place, float least, const std::byte* from, std::size_t rows,
+                 std::byte* out, std::size_t row_bytes) {
+  constexpr float kMost = std::numeric_limits<Stored>::max();
+  for (std::size_t row = 0; row < rows; ++row, from += place.stride, out += row_bytes) {
+    for (std::size_t i = 0; i < place.components; ++i) {
       Stored value;
-      std::memcpy(&value, stored + index * sizeof(Stored), sizeof(Stored));
-      const Out decoded = static_cast<Out>(decode(value));
-      std::memcpy(row_out + i * sizeof(Out), &decoded, sizeof(Out));
+      std::memcpy(&value, from + i * sizeof(Stored), sizeof(Stored));
+      const Out decoded = static_cast<Out>(value / kMost + least);
+      std::memcpy(out + i * sizeof(Out), &decoded, sizeof(Out));
     }
   }
 }
@@ -126,19 +86,31 @@ void decodeUnitVector(std::uint16_t bits, double (&vector)[3]) {
 }
 
 template <typename Out>
-void decodeUnitVectors(const std::byte* stored, bool is_uniform, std::size_t rows,
-                       std::size_t values_per_row, std::byte* out, std::size_t row_bytes) {
-  for (std::size_t row = 0; row < rows; ++row) {
-    for (std::size_t i = 0; i < values_per_row; ++i) {
-      std::uint16_t bits = 0;
-      std::memcpy(&bits, stored + 2 * (is_uniform ? 0 : row * values_per_row + i), 2);
-      double vector[3];
-      decodeUnitVector(bits, vector);
-      const Out decoded[3] = {static_cast<Out>(vector[0]), static_cast<Out>(vector[1]),
-                              static_cast<Out>(vector[2])};
-      std::memcpy(out + row * row_bytes + i * sizeof(decoded), decoded, sizeof(decoded));
-    }
+void decodeUnitVectors(const StoredPlace& place, const std::byte* from, std::size_t rows,
+                       std::byte* out, std::size_t row_bytes) {
+  for (std::size_t row = 0; row < rows; ++row, from += place.stride, out += row_bytes) {
+    std::uint16_t bits = 0;
+    std::memcpy(&bits, from, sizeof(bits));
+    double vector[3];
+    decodeUnitVector(bits, vector);
+    const Out decoded[3] = {static_cast<Out>(vector[0]), static_cast<Out>(vector[1]),
+                            static_cast<Out>(vector[2])};
+    std::memcpy(out, decoded, sizeof(decoded));
   }
+}
+
+// Values that are coded as reals of type Out.
+template <typename Out>
+void decodeReals(VdbCodec codec, const StoredPlace& place, const std::byte* from, std::size_t rows,
+                 std::byte* out, std::size_t row_bytes) {
+  if (codec == VdbCodec::kUnitVector) {
+    return decodeUnitVectors<Out>(place, from, rows, out, row_bytes);
+  }
+  const float least = codec == VdbCodec::kFixed ? -0.5f : 0.0f;
+  if (place.type == StoredType::kUint8) {
+    return decodeFixed<std::uint8_t, Out>(place, least, from, rows, out, row_bytes);
+  }
+  decodeFixed<std::uint16_t, Out>(place, least, from, rows, out, row_bytes);
 }
 
 }  // namespace
@@ -147,11 +119,12 @@ std::optional<VdbAttributeType> vdbAttributeType(std::string_view value_type,
                                                  std::string_view codec) {
   for (const ValueType& known : kValueTypes) {
     if (known.name != value_type) continue;
-    const std::optional<VdbStorage> storage = encodedStorage(known, codec);
-    if (!storage.has_value()) return {};
-    const bool is_unit_vector = *storage == VdbStorage::kUnitVector;
-    return VdbAttributeType{decodedType(known.storage), known.components, *storage,
-                            storedBytes(*storage) * (is_unit_vector ? 1 : known.components)};
+    const std::optional<Coded> coded = codedAs(known, codec);
+    if (!coded.has_value()) return {};
+    const bool is_unit_vector = coded->codec == VdbCodec::kUnitVector;
+    const StoredType decoded = coded->codec == VdbCodec::kPlain ? coded->stored : known.stored;
+    return VdbAttributeType{plyTypeOf(decoded), known.components, coded->stored, coded->codec,
+                            storedBytes(coded->stored) * (is_unit_vector ? 1 : known.components)};
   }
   return {};
 }
@@ -159,66 +132,32 @@ std::optional<VdbAttributeType> vdbAttributeType(std::string_view value_type,
 void decodeVdbAttribute(const VdbAttributeType& type, const std::byte* stored, bool is_uniform,
                         std::size_t rows, std::size_t values_per_row, std::byte* out,
                         std::size_t row_bytes) {
-  const auto decode = [&]<typename Stored, typename Out>(Stored, Out, auto value) {
-    decodeComponents<Stored, Out>(stored, is_uniform, type.components, rows,
-                                  values_per_row * type.components, out, row_bytes, value);
-  };
-  const auto same = [](auto value) { return value; };
-  const auto decodeReal = [&]<typename Stored>(Stored, auto value) {
-    if (type.type == PlyType::kFloat64) return decode(Stored(), double(), value);
-    decode(Stored(), float(), value);
-  };
-  switch (type.storage) {
-    case VdbStorage::kInt8:
-      return decode(std::int8_t(), std::int8_t(), same);
-    case VdbStorage::kUint8:
-      return decode(std::uint8_t(), std::uint8_t(), same);
-    case VdbStorage::kInt16:
-      if (type.type == PlyType::kInt32) return decode(std::int16_t(), std::int32_t(), same);
-      return decode(std::int16_t(), std::int16_t(), same);
-    case VdbStorage::kUint16:
-      return decode(std::uint16_t(), std::uint16_t(), same);
-    case VdbStorage::kInt32:
-      return decode(std::int32_t(), std::int32_t(), same);
-    case VdbStorage::kUint32:
-      return decode(std::uint32_t(), std::uint32_t(), same);
-    case VdbStorage::kInt64:
-      return decode(std::int64_t(), double(), same);
-    case VdbStorage::kUint64:
-      return decode(std::uint64_t(), double(), same);
-    case VdbStorage::kHalf:
-      return decodeReal(std::uint16_t(), [](std::uint16_t v) { return imath_half_to_float(v); });
-    case VdbStorage::kFloat:
-      return decodeReal(float(), same);
-    case VdbStorage::kDouble:
-      return decode(double(), double(), same);
-    case VdbStorage::kFixed8:
-      return decodeReal(std::uint8_t(), [](std::uint8_t v) { return v / 255.0f - 0.5f; });
-    case VdbStorage::kFixed16:
-      return decodeReal(std::uint16_t(), [](std::uint16_t v) { return v / 65535.0f - 0.5f; });
-    case VdbStorage::kUnitFixed8:
-      return decodeReal(std::uint8_t(), [](std::uint8_t v) { return v / 255.0f; });
-    case VdbStorage::kUnitFixed16:
-      return decodeReal(std::uint16_t(), [](std::uint16_t v) { return v / 65535.0f; });
-    case VdbStorage::kUnitVector:
-      if (type.type == PlyType::kFloat64) {
-        return decodeUnitVectors<double>(stored, is_uniform, rows, values_per_row, out, row_bytes);
-      }
-      return decodeUnitVectors<float>(stored, is_uniform, rows, values_per_row, out, row_bytes);
+  StoredPlace place;
+  place.type = type.stored;
+  place.components = type.components;
+  place.stride = is_uniform ? 0 : values_per_row * type.value_bytes;
+  for (std::size_t i = 0; i < values_per_row; ++i) {
+    if (type.codec == VdbCodec::kPlain) {
+      decodeStored(place, stored, rows, out, row_bytes);
+    } else if (type.type == PlyType::kFloat64) {
+      decodeReals<double>(type.codec, place, stored, rows, out, row_bytes);
+    } else {
+      decodeReals<float>(type.codec, place, stored, rows, out, row_bytes);
+    }
+    if (!is_uniform) stored += type.value_bytes;
+    out += type.components * plyTypeBytes(type.type);
   }
 }
 
 ChannelKind vdbChannelKind(std::string_view name, std::size_t components) {
-  if (components == 16) return ChannelKind::kMatrix;
-  if (components != 3) return ChannelKind::kFloat;
-  if (name == "P") return ChannelKind::kPoint;
-  if (name == "N" || name == "normal") return ChannelKind::kNormal;
-  constexpr std::string_view kColors[] = {"Cd",       "color", "radiosity", "irradiance",
-                                          "emission", "heat",  "albedo",    "flame"};
-  for (const std::string_view color : kColors) {
-    if (name.find(color) != std::string_view::npos) return ChannelKind::kColor;
+  if (components == 3) {
+    if (name == "P") return ChannelKind::kPoint;
+    if (name == "N" || name == "normal") return ChannelKind::kNormal;
+    for (const std::string_view color : {"Cd", "heat", "flame"}) {
+      if (name.find(color) != std::string_view::npos) return ChannelKind::kColor;
+    }
   }
-  return ChannelKind::kVector;
+  return guessChannelKind(name, components);
 }
 
 }  // namespace surfeit

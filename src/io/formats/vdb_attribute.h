@@ -8,36 +8,25 @@
 #include <string_view>
 
 #include "io/channels.h"
-#include "io/file.h"
+#include "io/formats/stored_values.h"
 #include "io/ply_format.h"
 
 namespace surfeit {
 
-// How a component is stored.
-enum class VdbStorage : std::uint8_t {
-  kInt8,
-  kUint8,
-  kInt16,
-  kUint16,
-  kInt32,
-  kUint32,
-  kInt64,   // decoded as doubles
-  kUint64,  // decoded as doubles
-  kHalf,
-  kFloat,
-  kDouble,
-  kFixed8,       // a byte for -0.5 to 0.5
-  kFixed16,      // 16 bits for -0.5 to 0.5
-  kUnitFixed8,   // a byte for 0 to 1
-  kUnitFixed16,  // 16 bits for 0 to 1
-  kUnitVector,   // three components in 16 bits
+// What stored numbers mean.
+enum class VdbCodec : std::uint8_t {
+  kPlain,       // themselves
+  kFixed,       // 0 to the most that they hold: -0.5 to 0.5
+  kUnitFixed,   // 0 to the most that they hold: 0 to 1
+  kUnitVector,  // one for three components
 };
 
 // The type of an attribute's values.
 struct VdbAttributeType {
   PlyType type = PlyType::kFloat32;  // of a component, decoded
   std::size_t components = 1;
-  VdbStorage storage = VdbStorage::kFloat;
+  StoredType stored = StoredType::kFloat32;
+  VdbCodec codec = VdbCodec::kPlain;
   std::size_t value_bytes = 4;  // of all components, stored
 };
 
@@ -46,9 +35,8 @@ struct VdbAttributeType {
 std::optional<VdbAttributeType> vdbAttributeType(std::string_view value_type,
                                                  std::string_view codec);
 
-// Decodes `count` components (values, for unit vectors) one after the other from `stored`, each
-// row's `per_row` components at `out + row * row_bytes`, in the type of `type`. With is_uniform the
-// stored ones are those of the first row, for all.
+// Decodes the values of `rows` points at `stored`, one after the other, to `out`, `row_bytes`
+// apart, in the type of `type`. With is_uniform one value is stored, for all.
 void decodeVdbAttribute(const VdbAttributeType& type, const std::byte* stored, bool is_uniform,
                         std::size_t rows, std::size_t values_per_row, std::byte* out,
                         std::size_t row_bytes);

@@ -3,11 +3,11 @@
 #include <blosc.h>
 #include <fmt/format.h>
 #include <half.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <bit>
-#include <limits>
+
+#include "io/formats/zlib_stream.h"
 
 namespace surfeit {
 namespace {
@@ -26,13 +26,6 @@ enum NodeValues : std::int8_t {
   kSelectedTwoValues = 5,
   kAllValues = 6
 };
-
-bool unpackZip(Bytes packed, std::span<std::byte> bytes) {
-  uLongf size = bytes.size();
-  const int result = uncompress(reinterpret_cast<Bytef*>(bytes.data()), &size,
-                                reinterpret_cast<const Bytef*>(packed.data()), packed.size());
-  return result == Z_OK && size == bytes.size();
-}
 
 }  // namespace
 
@@ -73,7 +66,7 @@ Status readVdbData(VdbCursor& cursor, std::uint32_t compression, std::span<std::
       }
       SURFEIT_ASSIGN_OR_RETURN(const Bytes packed, cursor.take(static_cast<std::uint64_t>(size)));
       const bool ok =
-          (compression & kVdbBlosc) != 0 ? unpackBlosc(packed, bytes) : unpackZip(packed, bytes);
+          (compression & kVdbBlosc) != 0 ? unpackBlosc(packed, bytes) : inflateWhole(packed, bytes);
       return ok ? Status() : cursor.corrupt("compressed values do not unpack");
     }
     if (size != -static_cast<std::int64_t>(bytes.size())) {

@@ -18,6 +18,10 @@ namespace surfeit {
 // Flags of a grid's compression word.
 inline constexpr std::uint32_t kVdbZip = 1, kVdbActiveMask = 2, kVdbBlosc = 4;
 
+// The array of an attribute in a leaf may take this, read or written: 44 million positions. The
+// format has it packed and unpacked as a whole.
+inline constexpr std::uint64_t kVdbMaxArrayBytes = std::uint64_t{1} << 29;
+
 // The value of a voxel.
 struct VdbValueType {
   PlyType type = PlyType::kFloat32;  // of a component, decoded

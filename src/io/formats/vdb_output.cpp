@@ -111,9 +111,12 @@ VdbMetadata vdbCoord(std::string name, const VdbCoord& value) {
 }
 
 struct VdbOutput::State {
-  explicit State(AtomicFile opened) : file(std::move(opened)) { XXH3_128bits_reset(&hash); }
+  State(AtomicFile opened, const Progress* polled) : file(std::move(opened)), progress(polled) {
+    XXH3_128bits_reset(&hash);
+  }
 
   AtomicFile file;
+  const Progress* progress;
   XXH3_state_t hash;  // of all that was appended
   std::uint64_t uuid_begin = 0;
   std::uint64_t places_begin = 0;  // of the grid being written
@@ -129,6 +132,7 @@ VdbOutput::~VdbOutput() = default;
 std::uint64_t VdbOutput::size() const { return state_->file.size(); }
 
 Status VdbOutput::append(Bytes bytes) {
+  if (state_->progress != nullptr && state_->progress->isCancelled()) return Status::interrupted();
   XXH3_128bits_update(&state_->hash, bytes.data(), bytes.size());
   return state_->file.append(bytes);
 }
@@ -158,9 +162,9 @@ Status appendMetadata(VdbOutput& output, std::span<const VdbMetadata> metadata) 
 }  // namespace
 
 Result<VdbOutput> VdbOutput::create(const std::string& path, std::span<const std::string> comments,
-                                    std::uint32_t grid_count) {
+                                    std::uint32_t grid_count, const Progress* progress) {
   SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
-  VdbOutput output(std::make_unique<State>(std::move(file)));
+  VdbOutput output(std::make_unique<State>(std::move(file), progress));
   SURFEIT_RETURN_IF_ERROR(output.appendValue(kVdbMagic));
   SURFEIT_RETURN_IF_ERROR(output.appendValue(kFileVersion));
   SURFEIT_RETURN_IF_ERROR(output.appendValue(kLibraryVersion));

@@ -12,6 +12,7 @@
 
 #include "io/file.h"
 #include "io/formats/vdb_file.h"
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -57,11 +58,11 @@ VdbMetadata vdbBool(std::string name, bool value);
 VdbMetadata vdbCoord(std::string name, const VdbCoord& value);
 
 // A file that appears when it is finished. One thread at a time. The first failure is the answer of
-// every later call.
+// every later call. `progress`, if any, is polled by append(): kInterrupted.
 class VdbOutput {
  public:
   static Result<VdbOutput> create(const std::string& path, std::span<const std::string> comments,
-                                  std::uint32_t grid_count);
+                                  std::uint32_t grid_count, const Progress* progress = nullptr);
   VdbOutput(VdbOutput&&) noexcept;
   VdbOutput& operator=(VdbOutput&&) noexcept;
   ~VdbOutput();

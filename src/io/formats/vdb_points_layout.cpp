@@ -13,9 +13,6 @@ namespace {
 
 // Each has buffers of 128 KiB, and a page
 constexpr std::uint64_t kMaxAttributes = 256;
-// OpenVDB's pages are of 1 MiB, or an array when that is larger: one of 5 million positions in a
-// leaf
-constexpr std::uint64_t kMaxPageBytes = std::uint64_t{1} << 26;
 // lz4, which OpenVDB packs with, makes 255 bytes of one at best
 constexpr std::uint64_t kMostExpansion = 256;
 constexpr std::size_t kVoxelBytes = 4 * kVdbLeafVoxels;
@@ -41,7 +38,7 @@ Status readPageSize(VdbCursor& cursor, PageSize& size) {
   if (size.is_packed) SURFEIT_RETURN_IF_ERROR(cursor.read(unpacked));
   size.unpacked = static_cast<std::uint64_t>(std::abs(static_cast<std::int64_t>(unpacked)));
   size.stored = size.is_packed ? static_cast<std::uint64_t>(packed) : size.unpacked;
-  if (size.unpacked == 0 || (size.is_packed && unpacked < 0) || size.unpacked > kMaxPageBytes ||
+  if (size.unpacked == 0 || (size.is_packed && unpacked < 0) || size.unpacked > kVdbMaxArrayBytes ||
       size.unpacked > kMostExpansion * size.stored) {
     return cursor.corrupt(fmt::format("a page of {} bytes unpacked from {}", unpacked, packed));
   }
@@ -286,7 +283,7 @@ Result<Bytes> VdbArrayStream::readUnpaged(const VdbArrayRecord& record) {
   SURFEIT_RETURN_IF_ERROR(data_.read(is_packed));
   const std::uint64_t bytes = std::uint64_t{record.size} * record.stride * type_.value_bytes;
   if (is_packed == 0 && bytes == record.bytes) return data_.take(bytes);
-  if (is_packed != 1 || bytes > kMaxPageBytes || bytes > kMostExpansion * record.bytes) {
+  if (is_packed != 1 || bytes > kVdbMaxArrayBytes || bytes > kMostExpansion * record.bytes) {
     return data_.corrupt(fmt::format("an array of {} bytes in {}", bytes, record.bytes));
   }
   SURFEIT_ASSIGN_OR_RETURN(const Bytes stored, data_.take(record.bytes));

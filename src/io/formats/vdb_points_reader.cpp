@@ -96,8 +96,8 @@ Status VdbPointsReader::declareAttribute(std::size_t index, const RowReaderOptio
                                      vdbChannelKind(attribute.name, components), type,
                                      options.channels, path(), element_));
   if (element_.properties.size() == before) return {};
-  const VdbStorage storage = attribute.type->storage;
-  if (storage == VdbStorage::kInt64 || storage == VdbStorage::kUint64) {
+  const StoredType stored = attribute.type->stored;
+  if (stored == StoredType::kInt64 || stored == StoredType::kUint64) {
     notes_.push_back(
         fmt::format("64-bit integers become float64: {}", quotePlyText(attribute.name)));
   }

@@ -5,9 +5,10 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
+#include <numeric>
 #include <set>
 
+#include "io/byte_coding.h"
 #include "io/channels.h"
 #include "io/formats/vdb_coding.h"
 #include "io/formats/vdb_held_rows.h"
@@ -20,9 +21,11 @@ namespace surfeit {
 namespace {
 
 constexpr std::uint64_t kLeastPointsPerVoxel = 8;
-constexpr int kMortonBits = 20;  // per axis
+// A leaf takes some 400 bytes besides its points, and far apart more for the nodes above it
+constexpr std::uint64_t kLeastPointsPerLeaf = 256;
+constexpr std::size_t kLeafLevels = 3;  // the edge of a leaf is that of 2^3 voxels
+constexpr int kMortonBits = 20;         // per axis
 constexpr std::size_t kPageBytes = 1 << 20;
-constexpr std::uint64_t kMaxArrayBytes = std::uint64_t{1} << 29;
 // Voxel indices stay below this, whatever the place of the cloud
 constexpr double kMostIndex = 1 << 30;
 
@@ -39,6 +42,7 @@ class VdbPointsWriter final : public RowWriter {
       : path_(std::move(path)),
         element_(std::move(element)),
         comments_(options.comments),
+        progress_(options.progress),
         rows_(path_, element_.row_bytes, sizeof(VdbEntry), options.memory_bytes) {}
 
   Status declare(const RowWriterOptions& options);
@@ -51,6 +55,7 @@ class VdbPointsWriter final : public RowWriter {
  private:
   bool position(std::uint64_t row, std::array<double, 3>& position) const;
   void findFinite();
+  int finestLevel() const;
   double chooseVoxelSize();
   void sortIntoVoxels();
   void splitPosition(std::uint64_t row, VdbCoord& voxel, float (&local)[3]) const;
@@ -67,6 +72,7 @@ class VdbPointsWriter final : public RowWriter {
   std::string path_;
   PlyElement element_;
   std::vector<std::string> comments_, notes_;
+  const Progress* progress_;
   std::vector<VdbWrittenAttribute> attributes_;
   std::size_t position_attribute_ = 0;
   VdbHeldRows rows_;
@@ -123,8 +129,29 @@ void VdbPointsWriter::findFinite() {
   }
 }
 
-// Sorted by Morton keys, the points of a voxel of any power of 2 follow each other; how many voxels
-// of each size are occupied is told by the digits at which neighbours first differ.
+// How often the extent may be halved. Of entries sorted by Morton keys the points of a voxel of any
+// such size follow each other; how many voxels of each are occupied is told by the digits at which
+// neighbours first differ. Leaves count too, since points that repeat each other, or lie in tight
+// groups, fill voxels of any size: only leaves tell that smaller ones part nothing but the groups.
+int VdbPointsWriter::finestLevel() const {
+  std::array<std::uint64_t, kMortonBits + 1> occupied = {1};
+  for (std::size_t i = 1; i < entries_.size(); ++i) {
+    const std::uint64_t differing = entries_[i].key ^ entries_[i - 1].key;
+    if (differing == 0) continue;
+    const int digit = (static_cast<int>(std::bit_width(differing)) - 1) / 3;
+    ++occupied[static_cast<std::size_t>(kMortonBits - digit)];
+  }
+  std::partial_sum(occupied.begin(), occupied.end(), occupied.begin());
+  const auto isTooFine = [&](std::size_t level) {
+    const std::uint64_t leaves = level > kLeafLevels ? occupied[level - kLeafLevels] : 1;
+    return entries_.size() < kLeastPointsPerVoxel * occupied[level] ||
+           (leaves > 1 && entries_.size() < kLeastPointsPerLeaf * leaves);
+  };
+  int level = 0;
+  while (level < kMortonBits && !isTooFine(static_cast<std::size_t>(level) + 1)) ++level;
+  return level;
+}
+
 double VdbPointsWriter::chooseVoxelSize() {
   double extent = 0, most = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -144,21 +171,7 @@ double VdbPointsWriter::chooseVoxelSize() {
     }
   }
   std::sort(entries_.begin(), entries_.end());
-  std::array<std::uint64_t, kMortonBits + 1> occupied = {};
-  for (std::size_t i = 1; i < entries_.size(); ++i) {
-    const std::uint64_t differing = entries_[i].key ^ entries_[i - 1].key;
-    if (differing == 0) continue;
-    const int digit = (static_cast<int>(std::bit_width(differing)) - 1) / 3;
-    ++occupied[static_cast<std::size_t>(kMortonBits - digit)];
-  }
-  int level = 0;
-  std::uint64_t voxels = 1;
-  for (int next = 1; next <= kMortonBits; ++next) {
-    voxels += occupied[static_cast<std::size_t>(next)];
-    if (entries_.size() / voxels < kLeastPointsPerVoxel) break;
-    level = next;
-  }
-  return std::max(std::ldexp(extent, -level), least_size);
+  return std::max(std::ldexp(extent, -finestLevel()), least_size);
 }
 
 // The voxel of a row, and its place from the voxel's centre, in voxels.
@@ -235,10 +248,12 @@ Status VdbPointsWriter::writeRecords(VdbOutput& output) {
     const std::uint64_t size = leaf.end - leaf.begin;
     for (const VdbWrittenAttribute& attribute : attributes_) {
       const std::uint64_t bytes = size * attribute.pointBytes();
-      if (bytes > kMaxArrayBytes) {
+      if (bytes > kVdbMaxArrayBytes) {
         return Status::failed(
-            fmt::format("{}: {} points in 8^3 voxels, more than {} bytes of attribute {}", path_,
-                        size, kMaxArrayBytes, attribute.name));
+            fmt::format("{}: {} points in 8^3 voxels of edge {} have {} bytes of attribute {}, "
+                        "expected at most {}: leave out what lies far away from most, or convert "
+                        "the cloud in parts",
+                        path_, size, voxel_size_, bytes, attribute.name, kVdbMaxArrayBytes));
       }
       const bool is_strided = attribute.stride != 1;
       SURFEIT_RETURN_IF_ERROR(output.appendValue(bytes + 6));
@@ -354,20 +369,16 @@ Status VdbPointsWriter::finish() {
 
   // A uniform scale, with the values that OpenVDB derives from it
   std::vector<std::byte> transform;
-  const auto put = [&](Bytes bytes) {
-    transform.insert(transform.end(), bytes.begin(), bytes.end());
-  };
+  ByteWriter writer(transform);
   constexpr std::string_view kType = "UniformScaleMap";
-  const std::uint32_t type_size = kType.size();
-  put(std::as_bytes(std::span(&type_size, 1)));
-  put(std::as_bytes(std::span(kType)));
+  writer.put(static_cast<std::uint32_t>(kType.size()));
+  writer.putBytes(std::as_bytes(std::span(kType)));
   const double h = voxel_size_;
   for (const double value : {h, h, 1 / h, 1 / (h * h), 0.5 / h}) {
-    const std::array<double, 3> vector = {value, value, value};
-    put(std::as_bytes(std::span(vector)));
+    for (int axis = 0; axis < 3; ++axis) writer.put(value);
   }
 
-  SURFEIT_ASSIGN_OR_RETURN(VdbOutput output, VdbOutput::create(path_, comments_, 1));
+  SURFEIT_ASSIGN_OR_RETURN(VdbOutput output, VdbOutput::create(path_, comments_, 1, progress_));
   SURFEIT_RETURN_IF_ERROR(
       output.beginGrid("points", "Tree_ptdataidx32_5_4_3", gridMetadata(), transform));
   SURFEIT_RETURN_IF_ERROR(output.appendTree(order_, entries_, leaves_, sizeof(std::uint32_t)));

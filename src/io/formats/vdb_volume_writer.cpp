@@ -28,6 +28,7 @@ class VdbVolumeWriter final : public RowWriter {
       : path_(std::move(path)),
         element_(std::move(element)),
         comments_(options.comments),
+        progress_(options.progress),
         is_level_set_(like.text("class") == "level set"),
         like_metadata_(like.metadata),
         transform_record_(like.transform_record),
@@ -52,6 +53,7 @@ class VdbVolumeWriter final : public RowWriter {
   std::string path_;
   PlyElement element_;
   std::vector<std::string> comments_, notes_;
+  const Progress* progress_;
   bool is_level_set_ = false, is_finished_ = false;
   std::vector<VdbMetadata> like_metadata_;
   std::vector<std::byte> transform_record_;
@@ -238,7 +240,7 @@ Status VdbVolumeWriter::finish() {
   sortIntoVoxels();
   SURFEIT_ASSIGN_OR_RETURN(
       VdbOutput output,
-      VdbOutput::create(path_, comments_, static_cast<std::uint32_t>(grids_.size())));
+      VdbOutput::create(path_, comments_, static_cast<std::uint32_t>(grids_.size()), progress_));
   for (const Grid& grid : grids_) SURFEIT_RETURN_IF_ERROR(writeGrid(output, grid));
   return output.finish();
 }

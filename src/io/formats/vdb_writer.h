@@ -21,13 +21,15 @@ namespace surfeit {
 // 2^-25 of a voxel), and an attribute per channel by the names of Houdini and Blender: N, pscale,
 // Cd, v, id; others keep theirs, with _ for what such names may not have. Colors of 8 and 16 bits
 // become linear floats; uint8 int16, uint16 int32, uint32 int64; other types are kept. The edge of
-// a voxel is the largest extent of the cloud over a power of 2, the smallest that leaves 8 points
-// or more per occupied voxel, of clouds without an extent 1. Points are written in the order of
-// their voxels, then of the rows; those without finite positions are left out, which notes() tells
-// when the file is finished.
+// a voxel is the largest extent of the cloud over a power of 2, at most 2^20, the smallest that
+// leaves 8 points or more per occupied voxel and 256 or more per leaf of 8^3 voxels on average, of
+// clouds without an extent 1. A leaf may have any number of points, up to 512 MiB of an attribute.
+// Points are written in the order of their voxels, then of the rows; those without finite positions
+// are left out, which notes() tells when the file is finished.
 //
 // Either way rows are held until finish(), with 16 bytes each; kBudgetTooSmall when they need more
-// than options.memory_bytes, at once where options.count tells.
+// than options.memory_bytes, at once where options.count tells. Besides, finish() takes two pages
+// of 1 MiB, or of the largest leaf's array of an attribute.
 Result<std::unique_ptr<RowWriter>> createVdb(const std::string& path,
                                              const RowWriterOptions& options);
 

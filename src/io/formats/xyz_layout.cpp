@@ -1,7 +1,5 @@
 #include "io/formats/xyz_layout.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -98,6 +96,7 @@ bool areBytes(std::span<const XyzColumn> triple) {
   });
 }
 
+bool isPlace(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
 bool isColor(std::string_view name) { return name == "red" || name == "green" || name == "blue"; }
 bool isSmallCount(std::string_view name) {
   return name == "group" || name == "light_group" || name == "two_sided";
@@ -230,8 +229,7 @@ std::vector<std::size_t> wholeColumns(std::span<const XyzColumn> sample,
                                       std::span<const std::string> names) {
   std::vector<std::size_t> columns;
   for (std::size_t i = 0; i < sample.size(); ++i) {
-    const bool is_place = names[i] == "x" || names[i] == "y" || names[i] == "z";
-    if (sample[i].are_wholes && !is_place) columns.push_back(i);
+    if (sample[i].are_wholes && !isPlace(names[i])) columns.push_back(i);
   }
   return columns;
 }
@@ -243,12 +241,10 @@ std::vector<PlyType> typeXyzColumns(std::span<const XyzColumn> sample,
   bool are_places_floats = true;
   for (std::size_t i = 0; i < names.size(); ++i) {
     types.push_back(sample[i].are_floats ? PlyType::kFloat32 : PlyType::kFloat64);
-    const bool is_place = names[i] == "x" || names[i] == "y" || names[i] == "z";
-    if (is_place && !sample[i].are_floats) are_places_floats = false;
+    if (isPlace(names[i]) && !sample[i].are_floats) are_places_floats = false;
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const bool is_place = names[i] == "x" || names[i] == "y" || names[i] == "z";
-    if (is_place && !are_places_floats) types[i] = PlyType::kFloat64;
+    if (isPlace(names[i]) && !are_places_floats) types[i] = PlyType::kFloat64;
   }
 
   // By all rows

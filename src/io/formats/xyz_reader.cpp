@@ -179,9 +179,7 @@ class XyzReader final : public CountedRowReader {
       element_.properties.back().name = called[i];
       packPlyRow(element_);
     }
-    if (element_.properties.empty()) {
-      return Status::invalidArgument(fmt::format("{}: every channel is dropped", path_));
-    }
+    SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(element_, path_));
     parser_.emplace(std::move(columns), element_.row_bytes, true);
     return {};
   }

@@ -110,7 +110,7 @@ Result<std::unique_ptr<RowWriter>> createXyz(const std::string& path,
   packPlyRow(element);
   SURFEIT_RETURN_IF_ERROR(checkProperties(path, element));
   const char separator = withoutCompression(path).ends_with(".csv") ? ',' : ' ';
-  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path));
+  SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path, options.progress));
   auto writer = std::make_unique<XyzWriter>(std::move(output), std::move(element), separator);
   SURFEIT_RETURN_IF_ERROR(writer->writeHead(options.comments));
   return std::unique_ptr<RowWriter>(std::move(writer));
