@@ -19,8 +19,8 @@ inline constexpr float kLayerReach = 0.7f;
 // open where the mean coverage of the pixels around is `begin`, and all of it from `end` on; the
 // second pass sees the pixels around as the first left them. Steeper ramps thicken silhouettes
 // less, but make steps between neighbours that share different far fields. (Between .86 and .94,
-// then .9 and .95: AO bias of spheres on a plane +.0037 instead of +.0050; receivers of Sponza
-// whose AO changes by more than .01 with the shared far field, 1.5 % instead of 0.6 %.)
+// then .9 and .95: AO bias of spheres on a plane +.0037 instead of +.0050, and steps that show in
+// the passes of Sponza.)
 struct FillPass {
   float begin, end;
 };
