@@ -15,12 +15,14 @@ void addChannelOptions(CLI::App& command, std::string& channels, std::string& pa
       ->type_name("NAME");
 }
 
-void addCloudOutputOption(CLI::App& command, std::string& output, const std::string& what) {
+void addCloudOutputOption(CLI::App& command, std::string& output, const std::string& what,
+                          bool has_pictures) {
   command
       .add_option("-o,--output", output,
                   what +
-                      "; the extension tells the format: .ply, .ptc, .vdb, .prt, .bgeo, .pdb, "
-                      ".exr, .xyz, .csv, with .gz or .zst behind it")
+                      "; the extension tells the format: .ply, .ptc, .prt, .bgeo, .pdb, .xyz, "
+                      ".csv, .txt or .asc, with .gz or .zst behind it, or .vdb" +
+                      (has_pictures ? ", .exr for pixels of pictures" : ""))
       ->required()
       ->type_name("CLOUD");
 }

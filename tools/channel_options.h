@@ -10,7 +10,9 @@ namespace surfeit {
 // The library parses `channels`: a text that is no list of FROM=TO is a usage error of its own.
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part);
 
-// `what` begins the description: "Cloud to write". Any format that is written will do.
-void addCloudOutputOption(CLI::App& command, std::string& output, const std::string& what);
+// `what` begins the description: "Cloud to write". Any format that is written will do, pictures
+// where what is written may be their pixels.
+void addCloudOutputOption(CLI::App& command, std::string& output, const std::string& what,
+                          bool has_pictures = false);
 
 }  // namespace surfeit

@@ -201,11 +201,7 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<ConvertArguments>();
   command->add_option("CLOUD", arguments->inputs, "Clouds of any format (docs/files.md)")
       ->required();
-  command
-      ->add_option("-o,--output", arguments->output,
-                   "Cloud to write; the extension tells the format: .ply, .ptc, .vdb, .prt, .bgeo, "
-                   ".pdb, .exr, .xyz, .csv, with .gz or .zst behind it")
-      ->required();
+  addCloudOutputOption(*command, arguments->output, "Cloud to write", true);
   addChoiceOptions(*command, arguments->options);
   addPlaceOptions(*command, *arguments);
   context.addCommonOptions(*command, {.threads = false});

@@ -70,9 +70,9 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
   command->add_option("SCENE", arguments->scene, "Scene file (.sft)")->required();
   command
       ->add_option("RECEIVERS", arguments->receivers,
-                   "Cloud with x y z and nx ny nz (docs/files.md)")
+                   "Cloud with x y z and nx ny nz, passes (.exr) or volumes (.vdb); docs/files.md")
       ->required();
-  addCloudOutputOption(*command, arguments->result, "Result cloud");
+  addCloudOutputOption(*command, arguments->result, "Result cloud", true);
   addGatherOptions(*command, arguments->options);
   addLightOptions(*command, arguments->options);
   addSubsetOption(*command, arguments->options.groups);

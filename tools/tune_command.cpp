@@ -190,7 +190,7 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
   command->add_option("SCENE", arguments->scene, "Scene file (.sft)")->required();
   command
       ->add_option("RECEIVERS", arguments->receivers,
-                   "Cloud with x y z and nx ny nz (docs/files.md)")
+                   "Cloud with x y z and nx ny nz, passes (.exr) or volumes (.vdb); docs/files.md")
       ->required();
   command
       ->add_option("--sample", options.sample_receivers,

@@ -123,6 +123,12 @@ std::string fitName(std::string_view name) {
   return fit.empty() ? "_" : fit;
 }
 
+// Whether integers of 8 or 16 bits code sRGB in this channel.
+bool isColorOfSurfel(const RowChannel& channel) {
+  return channel.properties.size() == 3 &&
+         (channel.name == "color" || channel.name == "radiosity" || channel.name == "albedo");
+}
+
 // Finds what belongs together with a property.
 class ChannelFinder {
  public:
@@ -307,11 +313,15 @@ std::vector<RowChannel> channelsOf(const PlyElement& element) {
   return ChannelFinder(element).find();
 }
 
+bool isCodedColor(const RowChannel& channel) {
+  return isColorOfSurfel(channel) && codesSrgb(channel.type);
+}
+
 double channelValue(const PlyElement& element, const RowChannel& channel, std::size_t component,
                     const std::byte* row) {
   const PlyProperty& property = element.properties[channel.properties[component]];
   const double value = plyValue(row + property.offset, property.type);
-  if (channel.kind == ChannelKind::kColor && codesSrgb(property.type)) {
+  if (isColorOfSurfel(channel) && codesSrgb(property.type)) {
     return linearFromSrgbCode(value / (property.type == PlyType::kUint8 ? 255 : 65535));
   }
   return value;

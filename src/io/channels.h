@@ -49,11 +49,14 @@ struct RowChannel {
   PlyType type = PlyType::kFloat32;     // the widest of its properties
 };
 // The channels of a row, in order of their first property: the inverse of addChannel. Triples that
-// are not complete are single values. `red green blue` as integers of 8 or 16 bits code sRGB
-// (docs/format.md); channelValue() decodes them.
+// are not complete are single values.
 std::vector<RowChannel> channelsOf(const PlyElement& element);
 
-// A value of a row as a double; integers of red, green and blue as scene-linear values from 0 to 1.
+// Whether the values are integers of 8 or 16 bits that code sRGB: a color, radiosity or albedo
+// (docs/format.md).
+bool isCodedColor(const RowChannel& channel);
+
+// A value of a row as a double; those of coded colors as scene-linear values from 0 to 1.
 double channelValue(const PlyElement& element, const RowChannel& channel, std::size_t component,
                     const std::byte* row);
 

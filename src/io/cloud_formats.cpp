@@ -60,6 +60,7 @@ constexpr std::string_view kPictureAdvice =
     "pictures are textures of `sample` and environments of `gather`; passes are .exr";
 constexpr OtherFormat kOtherFormats[] = {
     {kSceneMagic, "a Surfeit scene (.sft)", "give the cloud that it was indexed from"},
+    {"surfeit-recipe"sv, "a recipe of `surfeit generate`", "give it to `surfeit index`"},
     {"ASTM-E57"sv, "E57", "convert it to PLY or LAS first (e57unpack, CloudCompare)"},
     {"ICECACHE"sv, "a particle cache of Softimage ICE",
      "save it as .bgeo, .prt or .pdb (partconv)"},

@@ -86,7 +86,9 @@ class ZstdDecompressor final : public Decompressor {
       return {};
     }
     if (ZSTD_getErrorCode(result) == ZSTD_error_frameParameter_windowTooLarge) {
-      return Status::failed(fmt::format("a window larger than 2^{} bytes", kMaxWindowLog));
+      return Status::failed(fmt::format(
+          "a window larger than 2^{} bytes, expected one compressed without --long and --ultra",
+          kMaxWindowLog));
     }
     return Status::failed(ZSTD_getErrorName(result));
   }

@@ -12,11 +12,11 @@
 namespace surfeit {
 namespace {
 
-// By property, whether it belongs to a color.
+// By property, whether it belongs to a color that is coded.
 std::vector<bool> findColors(const PlyElement& element) {
   std::vector<bool> is_color(element.properties.size(), false);
   for (const RowChannel& channel : channelsOf(element)) {
-    if (channel.kind != ChannelKind::kColor) continue;
+    if (!isCodedColor(channel)) continue;
     for (const std::size_t i : channel.properties) is_color[i] = true;
   }
   return is_color;

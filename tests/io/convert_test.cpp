@@ -69,6 +69,38 @@ TEST_F(ConvertTest, MergedColorsKeepTheirShade) {
   EXPECT_EQ(column(linear, "green")[0], column(linear, "green")[2]);
 }
 
+TEST_F(ConvertTest, CodesOfLightStayThatLightInEveryFormat) {
+  Table table = tableOf({{"x", kFloat},
+                         {"y", kFloat},
+                         {"z", kFloat},
+                         {"radiosity_r", kByte},
+                         {"radiosity_g", kByte},
+                         {"radiosity_b", kByte},
+                         {"albedo_r", PlyType::kUint16},
+                         {"albedo_g", PlyType::kUint16},
+                         {"albedo_b", PlyType::kUint16}});
+  table.rows = {{1, 2, 3, 128, 255, 0, 188 * 257, 65535, 0}};
+  writeTable("a.ply", table);
+  for (const char* name :
+       {"b.ply", "b.ptc", "b.vdb", "b.prt", "b.bgeo", "b.pdb", "b.csv", "b.xyz.gz"}) {
+    SCOPED_TRACE(name);
+    convertOk({"a.ply"}, name);
+    const auto reader = openRowReader(path(name));
+    ASSERT_TRUE(reader.ok());
+    const std::vector<std::byte> row = readAllRows(**reader);
+    const PlyElement& element = (*reader)->element();
+    for (const RowChannel& channel : channelsOf(element)) {
+      const bool is_radiosity = channel.name == "radiosity";
+      if (!is_radiosity && channel.name != "albedo") continue;
+      EXPECT_NEAR(channelValue(element, channel, 0, row.data()), is_radiosity ? .21586 : .5029,
+                  1e-4);
+      EXPECT_NEAR(channelValue(element, channel, 1, row.data()), 1, 1e-6);
+      EXPECT_EQ(channelValue(element, channel, 2, row.data()), 0);
+    }
+    EXPECT_EQ(channelsOf(element).size(), std::string(name) == "b.ptc" ? 5u : 3u);
+  }
+}
+
 TEST_F(ConvertTest, FormatsMixAndEmptyCloudsAddNothing) {
   writeTable("a.xyz", pointsOf({{1, 2, 3}}));
   writeTable("b.ptc", pointsOf({{4, 5, 6}}));
@@ -265,7 +297,7 @@ TEST_F(ConvertTest, OptionsThatCannotWorkAreRefused) {
   options.crop = CropBox{{0, 0, 0}, {1, 0, 1}};
   EXPECT_THAT(refusal("a.ply", options).message(), HasSubstr("crop: found 0 to 0 along y"));
   options.crop = CropBox{{0, 0, 0}, {1, 1, 1}};
-  EXPECT_THAT(refusal("bare.ply", options).message(), HasSubstr("crop: found no property x"));
+  EXPECT_THAT(refusal("bare.ply", options).message(), HasSubstr("found no property x"));
   options = {};
   options.channels = "x";
   EXPECT_EQ(refusal("a.ply", options).code(), StatusCode::kInvalidArgument);

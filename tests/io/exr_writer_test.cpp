@@ -199,7 +199,7 @@ TEST_F(ExrWriterTest, SaysWhatItNeeds) {
   options.properties = reader->element().properties;
   EXPECT_EQ(createExr(path("a.exr"), options).status().code(), StatusCode::kInvalidArgument);
   EXPECT_THAT(createExr(path("a.exr"), options).status().message(),
-              HasSubstr("only what is computed from OpenEXR receivers"));
+              HasSubstr("write .exr from OpenEXR receivers"));
   options.like = reader.get();
   EXPECT_THAT(createExr(path("a.exr.gz"), options).status().message(),
               HasSubstr("OpenEXR is compressed inside"));

@@ -70,11 +70,6 @@ const PlannedChannel* findChannel(std::span<const PlannedChannel> channels, std:
   return found != channels.end() ? &*found : nullptr;
 }
 
-bool isCodedColor(const RowChannel& channel) {
-  return channel.name == "color" && channel.properties.size() == 3 &&
-         (channel.type == PlyType::kUint8 || channel.type == PlyType::kUint16);
-}
-
 ChannelEncoder::ChannelEncoder(const PlyElement& element, const RowChannel& channel, PlyType type)
     : element_(element), channel_(channel), type_(type) {
   if (!isCodedColor(channel) || type != PlyType::kFloat32) return;

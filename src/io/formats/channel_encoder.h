@@ -33,9 +33,6 @@ std::vector<PlannedChannel> planChannels(const PlyElement& element,
 // The channel of that name, or nullptr.
 const PlannedChannel* findChannel(std::span<const PlannedChannel> channels, std::string_view name);
 
-// Whether values of a channel are integers that code sRGB: they are stored as linear floats.
-bool isCodedColor(const RowChannel& channel);
-
 // Immutable and safe from any thread.
 class ChannelEncoder {
  public:

@@ -261,8 +261,8 @@ Result<std::unique_ptr<RowWriter>> createExr(const std::string& path,
   const Imf::Header* const like = exrHeaderOf(options.like);
   if (like == nullptr) {
     return Status::invalidArgument(
-        fmt::format("{}: a picture needs the windows of one: only what is computed from OpenEXR "
-                    "receivers can be written as .exr, write .ply instead",
+        fmt::format("{}: a picture needs the windows of one: write .exr from OpenEXR receivers, by "
+                    "`surfeit convert` with --like PICTURE.exr, or write .ply instead",
                     path));
   }
   auto writer = std::make_unique<ExrWriter>(path, options);

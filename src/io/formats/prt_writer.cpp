@@ -113,7 +113,9 @@ class PrtWriter final : public RowWriter {
       }
       const bool is_coded = isCodedColor(planned.channel);
       const PlyType type = is_coded ? PlyType::kFloat32 : planned.channel.type;
-      if (is_coded) notes_.push_back("integers that code sRGB become linear float32: color");
+      if (is_coded) {
+        notes_.push_back("integers that code sRGB become linear float32: " + planned.channel.name);
+      }
       encoders_.emplace_back(element_, planned.channel, type);
       putText(writer, planned.name, kNameBytes);
       writer.put(numberOf(type));

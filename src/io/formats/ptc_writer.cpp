@@ -185,8 +185,7 @@ class PtcWriter : public RowWriter {
   void noteLoss(const RowChannel& channel) {
     std::string names;
     for (const std::size_t i : channel.properties) names += " " + element_.properties[i].name;
-    if (channel.name == "color" && channel.kind == ChannelKind::kColor &&
-        (channel.type == PlyType::kUint8 || channel.type == PlyType::kUint16)) {
+    if (isCodedColor(channel)) {
       notes_.push_back(fmt::format("sRGB becomes scene-linear float:{}", names));
     } else if (channel.type == PlyType::kFloat64 || channel.type == PlyType::kInt32 ||
                channel.type == PlyType::kUint32) {

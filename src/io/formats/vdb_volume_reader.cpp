@@ -147,20 +147,26 @@ Status VdbVolumeReader::declare(const RowReaderOptions& options) {
   const std::string own_name =
       isLevelSet(grid_) ? "distance" : (grid_.name.empty() ? "density" : grid_.name);
   SURFEIT_RETURN_IF_ERROR(declareVolume(grid_, own_name, options));
+  std::size_t other_transforms = 0;
+  std::string other_name;
   for (const VdbGrid& grid : file_->grids) {
     if (&grid == &grid_) continue;
     if (grid.isPoints() || !vdbValueType(grid).has_value()) {
       notes_.push_back(fmt::format("grid {} of type {} is not read", quotePlyText(grid.name),
                                    quotePlyText(grid.type)));
     } else if (grid.transform != grid_.transform) {
-      notes_.push_back(fmt::format("grid {} has another transform: read it by its name",
-                                   quotePlyText(grid.name)));
+      if (++other_transforms == 1) other_name = quotePlyText(grid.name);
     } else if (volumes_.size() >= kMaxVolumes) {
       notes_.push_back(fmt::format("grid {}: after {} others it is not read",
                                    quotePlyText(grid.name), volumes_.size()));
     } else {
       SURFEIT_RETURN_IF_ERROR(declareVolume(grid, grid.name, options));
     }
+  }
+  if (other_transforms > 0) {
+    notes_.push_back(
+        fmt::format("grids with other transforms are not read, {} and {} more: read them by name",
+                    other_name, other_transforms - 1));
   }
   return rewind();
 }

@@ -82,7 +82,7 @@ bool VdbVolumeWriter::isGrid(const RowChannel& channel) {
 
 void VdbVolumeWriter::addGrid(const RowChannel& channel, std::vector<std::size_t> components,
                               std::string name) {
-  const bool is_coded = channel.name == "color";  // integers are decoded
+  const bool is_coded = isCodedColor(channel);
   bool is_whole = !is_coded && components.size() == 1;
   for (const std::size_t component : components) {
     const PlyType type = element_.properties[channel.properties[component]].type;

@@ -34,12 +34,10 @@ VdbWrittenAttribute vdbWrittenAttribute(const RowChannel& channel, const PlyElem
     vector = vector_type;
     matrix = nullptr;
   };
-  const bool is_coded = channel.name == "color" && channel.type != PlyType::kFloat32 &&
-                        channel.type != PlyType::kFloat64;
   using Kind = VdbWrittenAttribute::Kind;
   if (channel.name == "position") {
     attribute.kind = Kind::kPosition;
-  } else if (is_coded) {
+  } else if (isCodedColor(channel)) {
     attribute.kind = Kind::kFloat;
   } else {
     switch (channel.type) {

@@ -17,7 +17,7 @@ inline bool isReal(const RowChannel& channel) {
 inline ChannelEncoder wordEncoder(const PlyElement& element, const RowChannel& channel,
                                   std::vector<std::string>& notes) {
   if (isCodedColor(channel)) {
-    notes.push_back("integers that code sRGB become linear float32: color");
+    notes.push_back("integers that code sRGB become linear float32: " + channel.name);
   } else if (channel.type == PlyType::kFloat64) {
     notes.push_back("float64 becomes float32: " + channel.name);
   } else if (channel.type == PlyType::kUint32) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "io/byte_output.h"
+#include "io/channels.h"
 #include "io/ply_format.h"
 #include "io/ply_number.h"
 
@@ -18,7 +19,15 @@ constexpr std::size_t kBufferBytes = 256 << 10;
 class XyzWriter final : public RowWriter {
  public:
   XyzWriter(ByteOutput output, PlyElement element, char separator)
-      : output_(std::move(output)), element_(std::move(element)), separator_(separator) {}
+      : output_(std::move(output)), element_(std::move(element)), separator_(separator) {
+    for (const RowChannel& channel : channelsOf(element_)) {
+      if (channel.name == "color" || !isCodedColor(channel)) continue;
+      notes_.push_back("integers that code sRGB become linear float32: " + channel.name);
+      for (std::size_t i = 0; i < channel.properties.size(); ++i) {
+        coded_.push_back({&element_.properties[channel.properties[i]], channel, i});
+      }
+    }
+  }
 
   Status writeHead(std::vector<std::string> comments) {
     std::string head;
@@ -36,6 +45,7 @@ class XyzWriter final : public RowWriter {
   }
 
   const PlyElement& element() const override { return element_; }
+  std::vector<std::string> notes() const override { return notes_; }
 
   Status writeRows(std::span<const std::byte> rows) override {
     if (is_finished_ || rows.size() % element_.row_bytes != 0) {
@@ -52,7 +62,7 @@ class XyzWriter final : public RowWriter {
           used = 0;
         }
         char* const begin = text_.data() + used;
-        char* const end = formatPlyNumber(&rows[property.offset], property.type, begin);
+        char* const end = format(rows.data(), property, begin);
         *end = &property == &element_.properties.back() ? '\n' : separator_;
         used += static_cast<std::size_t>(end - begin) + 1;
       }
@@ -70,12 +80,31 @@ class XyzWriter final : public RowWriter {
   }
 
  private:
+  char* format(const std::byte* row, const PlyProperty& property, char* begin) const {
+    for (const Coded& coded : coded_) {
+      if (&property != coded.property) continue;
+      const auto linear =
+          static_cast<float>(channelValue(element_, coded.channel, coded.component, row));
+      return formatPlyNumber(reinterpret_cast<const std::byte*>(&linear), PlyType::kFloat32, begin);
+    }
+    return formatPlyNumber(row + property.offset, property.type, begin);
+  }
+
   Status append(std::size_t used) {
     return output_.append(std::as_bytes(std::span(text_).first(used)));
   }
 
+  // Integers of other columns than red, green and blue would be read as they stand.
+  struct Coded {
+    const PlyProperty* property;
+    RowChannel channel;
+    std::size_t component;
+  };
+
   ByteOutput output_;
   PlyElement element_;
+  std::vector<Coded> coded_;
+  std::vector<std::string> notes_;
   char separator_;
   std::vector<char> text_;
   bool is_finished_ = false;
