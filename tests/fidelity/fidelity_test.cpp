@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "io/ply_reader.h"
+#include "fidelity/baked_rows.h"
 #include "io/test_directory.h"
 #include "sample/reference.h"
 #include "sample/sample.h"
@@ -92,21 +92,9 @@ class Fidelity : public DirectoryTest {
   static double average(const glm::vec3& rgb) { return double(rgb.x + rgb.y + rgb.z) / 3; }
 
   std::vector<Baked> readBaked() {
-    Result<PlyReader> reader = PlyReader::open(path("baked.ply"));
-    EXPECT_TRUE(reader.ok());
-    const PlyElement& element = reader->header().elements[0];
-    std::vector<std::byte> rows(element.count * element.row_bytes);
-    EXPECT_TRUE(reader->seekElement(0).ok());
-    for (std::size_t at = 0; at < rows.size();) {
-      const Result<std::size_t> got = reader->readRows(std::span(rows).subspan(at));
-      if (!got.ok() || *got == 0) break;
-      at += *got * element.row_bytes;
-    }
-    const auto value = [&](std::size_t row, const std::string& property) {
-      const PlyProperty* found = element.find(property);
-      return float(plyValue(&rows[row * element.row_bytes + found->offset], found->type));
-    };
-    std::vector<Baked> baked(element.count);
+    const BakedRows rows = readBakedRows(path("baked.ply"));
+    const auto value = [&](std::size_t row, const char* name) { return rows.value(row, name); };
+    std::vector<Baked> baked(rows.element.count);
     for (std::size_t i = 0; i < baked.size(); ++i) {
       baked[i] = {{value(i, "x"), value(i, "y"), value(i, "z")},
                   {value(i, "nx"), value(i, "ny"), value(i, "nz")},

@@ -13,7 +13,7 @@
 
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
-#include "io/ply_reader.h"
+#include "fidelity/baked_rows.h"
 #include "io/test_directory.h"
 #include "sample/photon_tracer.h"
 #include "sample/reference.h"
@@ -58,25 +58,11 @@ class PhotonMap : public DirectoryTest {
   }
 
   std::vector<Baked> readBaked() const {
-    Result<PlyReader> reader = PlyReader::open(path("baked.ply"));
-    EXPECT_TRUE(reader.ok());
-    const PlyElement& element = reader->header().elements[0];
-    std::vector<std::byte> rows(element.count * element.row_bytes);
-    EXPECT_TRUE(reader->seekElement(0).ok());
-    for (std::size_t at = 0; at < rows.size();) {
-      const Result<std::size_t> got = reader->readRows(std::span(rows).subspan(at));
-      if (!got.ok() || *got == 0) break;
-      at += *got * element.row_bytes;
-    }
-    std::vector<Baked> baked(element.count);
+    const BakedRows rows = readBakedRows(path("baked.ply"));
     const auto triple = [&](std::size_t row, const char* x, const char* y, const char* z) {
-      glm::vec3 value;
-      for (int i = 0; i < 3; ++i) {
-        const PlyProperty* found = element.find(i == 0 ? x : i == 1 ? y : z);
-        value[i] = float(plyValue(&rows[row * element.row_bytes + found->offset], found->type));
-      }
-      return value;
+      return glm::vec3(rows.value(row, x), rows.value(row, y), rows.value(row, z));
     };
+    std::vector<Baked> baked(rows.element.count);
     for (std::size_t i = 0; i < baked.size(); ++i) {
       baked[i] = {triple(i, "x", "y", "z"), triple(i, "nx", "ny", "nz"),
                   triple(i, "irradiance_r", "irradiance_g", "irradiance_b")};

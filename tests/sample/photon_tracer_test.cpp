@@ -233,17 +233,8 @@ TEST_F(PhotonTracing, NoLightAndBadOptionsAreRefusedAndLeaveNothing) {
   EXPECT_FALSE(std::filesystem::exists(path("photons.ply")));
 }
 
-class CancelSoon : public Progress {
- public:
-  void advance(std::uint64_t count) override { done_ += count; }
-  bool isCancelled() const override { return done_ > 5000; }
-
- private:
-  std::atomic<std::uint64_t> done_ = 0;
-};
-
 TEST_F(PhotonTracing, CancelledWorkLeavesNothing) {
-  CancelSoon progress;
+  CancelAfter progress(5000);
   PhotonTracingOptions options;
   options.photons = 1'000'000;
   const Result<PhotonTracingStats> stats =

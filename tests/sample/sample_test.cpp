@@ -198,17 +198,8 @@ TEST_F(Sampling, BadOptionsAreRefusedAndLeaveNothing) {
   EXPECT_FALSE(std::filesystem::exists(path("out.ply")));
 }
 
-class CancelAfterAWhile : public Progress {
- public:
-  void advance(std::uint64_t count) override { done_ += count; }
-  bool isCancelled() const override { return done_ > 10000; }
-
- private:
-  std::atomic<std::uint64_t> done_ = 0;
-};
-
 TEST_F(Sampling, CancelledWorkLeavesNothing) {
-  CancelAfterAWhile progress;
+  CancelAfter progress(10000);
   const Result<SampleStats> stats =
       sampleMeshes({write("floor.ply", floorPly(4))}, path("out.ply"), SampleOptions{}, progress);
   EXPECT_EQ(stats.status().code(), StatusCode::kInterrupted);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -42,6 +43,18 @@ class SceneFiles : public ::testing::Test {
 
  private:
   std::filesystem::path directory_;
+};
+
+// Cancels when more than `most` units of work are done.
+class CancelAfter : public Progress {
+ public:
+  explicit CancelAfter(std::uint64_t most) : most_(most) {}
+  void advance(std::uint64_t count) override { done_ += count; }
+  bool isCancelled() const override { return done_ > most_; }
+
+ private:
+  const std::uint64_t most_;
+  std::atomic<std::uint64_t> done_ = 0;
 };
 
 // Remembers what the library told the user.
