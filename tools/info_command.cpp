@@ -130,7 +130,7 @@ std::string surfelsText(const nlohmann::json& json) {
   return text;
 }
 
-// Any PLY: elements and properties; bounds when the records are surfels.
+// Any PLY as it is stored: elements and properties; bounds when the records are surfels.
 Result<nlohmann::json> plyJson(const InfoArguments& arguments, Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(const PlyReader reader, PlyReader::open(arguments.path));
   nlohmann::json json = {{"format", "ply"}, {"elements", nlohmann::json::array()}};
@@ -160,7 +160,8 @@ std::string plyText(const std::string& path, const nlohmann::json& json) {
   return text + surfelsText(json);
 }
 
-// Any other cloud: what a row holds, and what of the file it does not.
+// Any other cloud, and a PLY whose channels are renamed: what a row holds, and what of the file it
+// does not.
 Result<nlohmann::json> cloudJson(const InfoArguments& arguments, Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions options, readingOf(arguments));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader,
@@ -215,7 +216,8 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
   SURFEIT_ASSIGN_OR_RETURN(const std::string first_bytes, firstBytes(arguments.path));
   nlohmann::json json;
   std::string text;
-  if (first_bytes.starts_with("ply")) {
+  const bool is_as_stored = arguments.channels.empty() && arguments.part.empty();
+  if (is_as_stored && first_bytes.starts_with("ply")) {
     SURFEIT_ASSIGN_OR_RETURN(json, plyJson(arguments, context.progress()));
     text = plyText(arguments.path, json);
   } else if (isSceneFile(first_bytes)) {

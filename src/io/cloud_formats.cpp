@@ -35,9 +35,9 @@ namespace {
 // Formats with a magic first; text, which is recognised by looking at more, last.
 constexpr CloudFormat kFormats[] = {
     {"PLY", ".ply", recognisesPly, openPlyRows, createPlyRows},
-    {"OpenEXR", ".exr", recognisesExr, openExr, createExr},
+    {"OpenEXR", ".exr", recognisesExr, openExr, createExr, false},
     {"PTC", ".ptc", recognisesPtc, openPtc, createPtc},
-    {"OpenVDB", ".vdb", recognisesVdb, openVdb, createVdb},
+    {"OpenVDB", ".vdb", recognisesVdb, openVdb, createVdb, false},
     {"LAS", "", recognisesLas, openLas, nullptr},
     {"PCD", "", recognisesPcd, openPcd, nullptr},
     {"PRT", ".prt", recognisesPrt, openPrt, createPrt},
@@ -144,6 +144,12 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
   first_bytes.resize(size);
   for (const CloudFormat& format : kFormats) {
     if (format.open == nullptr || !format.recognises(first_bytes)) continue;
+    if (input.isCompressed() && !format.is_read_compressed) {
+      return Status::corruption(
+          fmt::format("{}: found {} compressed as a whole, expected it as it is: unpack it first "
+                      "(gunzip, unzstd)",
+                      path, format.name));
+    }
     SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, format.open(path, options));
     SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element(), path));
     return reader;

@@ -39,6 +39,7 @@ struct CloudFormat {
                                              const RowReaderOptions& options);
   Result<std::unique_ptr<RowWriter>> (*create)(const std::string& path,
                                                const RowWriterOptions& options);
+  bool is_read_compressed = true;  // from .gz and .zst: not those that are read from place to place
 };
 inline constexpr std::size_t kMagicBytes = 4096;
 

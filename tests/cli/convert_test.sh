@@ -78,6 +78,8 @@ partsAreChosenByName() {
     end_header "9 9 9" "1 2 3 0 0 1 1 1 1 1" "4 5 6 0 0 1 1 1 1 1" > two.ply
   run 0 convert two.ply -o a.csv --part lamps --keep position
   [[ $(cat a.csv) == $'x,y,z\n1,2,3\n4,5,6' ]] || fail "$(cat a.csv)"
+  run 0 info two.ply --part lamps --channels radius=width
+  says "width          float width" "power"
   run 0 index two.ply -o lamps.sft --part lamps
   says "2 surfels"
   run 0 gather lamps.sft two.ply -o lit.ply --part lamps --memory 64M

@@ -47,6 +47,8 @@ TEST_F(CloudFormatsTest, FormatsThatAreNotReadAreToldWhatToDo) {
   EXPECT_THAT(refusal("PXR-USDC...."), HasSubstr("found USD"));
   EXPECT_THAT(refusal(zstdPacked("NGSP....")), HasSubstr("found SPZ"));
   EXPECT_THAT(refusal("\xFF\xD8\xFF...."), HasSubstr("found a JPEG picture"));
+  EXPECT_THAT(refusal("surfeit-recipe 1\nkind city\n"), HasSubstr("`surfeit index`"));
+  EXPECT_THAT(refusal(gzipped("\x76\x2f\x31\x01....")), HasSubstr("OpenEXR compressed as a whole"));
   EXPECT_THAT(refusal("# no cloud\no cube\nv 0 0 0\n"), HasSubstr("`surfeit sample`"));
 }
 
