@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "io/formats/exr_reader.h"
 #include "io/formats/exr_stream.h"
 
 namespace surfeit {
@@ -165,7 +166,10 @@ Imf::Header exrHeaderLike(const Imf::Header& part) {
   for (auto i = part.begin(); i != part.end(); ++i) {
     const bool is_storage = std::find(std::begin(kStorageAttributes), std::end(kStorageAttributes),
                                       std::string_view(i.name())) != std::end(kStorageAttributes);
-    if (!is_storage) header.insert(i.name(), i.attribute());
+    // Left out here: Imf::Header::erase would leak it
+    if (!is_storage && std::string_view(i.name()) != kExrMainLayerAttribute) {
+      header.insert(i.name(), i.attribute());
+    }
   }
   return header;
 }

@@ -24,7 +24,8 @@ struct ExrImageChannel {
 };
 
 // The header of a picture like that of `part`: its windows, pixel aspect and attributes, but for
-// those that say how the part was stored (channels, compression, tiles, name, preview, ...).
+// those that say how the part was stored (channels, what R G B shows, compression, tiles, name,
+// preview, ...).
 Imf::Header exrHeaderLike(const Imf::Header& part);
 
 // One thread at a time. The file appears under its name only when finish() succeeds; destroyed

@@ -76,7 +76,6 @@ class ExrWriter final : public RowWriter {
     }
     window_ = like.dataWindow();
     Imf::Header header = exrHeaderLike(like);
-    header.erase(kExrMainLayerAttribute);
     std::vector<ExrImageChannel> channels = chooseChannels(like, header);
     SURFEIT_ASSIGN_OR_RETURN(image_, ExrImageWriter::create(path_, header, std::move(channels)));
     clearLine();
