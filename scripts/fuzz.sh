@@ -3,7 +3,7 @@
 #
 #   scripts/fuzz.sh [SECONDS for each (60)] [FORMAT ...]
 #
-# What is found and the corpora as they grow are kept in build/fuzz/work/FORMAT. Ends with 1 when
+# What is found and the corpora as they grow are kept in build/fuzz/found/FORMAT. Ends with 1 when
 # something was found.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -25,7 +25,7 @@ cmake --build --preset fuzz --parallel "$(nproc)" --target read_cloud_fuzzer
 export UBSAN_OPTIONS=print_stacktrace=1
 found=0
 for format in "${formats[@]}"; do
-  work=build/fuzz/work/$format
+  work=build/fuzz/found/$format
   mkdir -p "$work/corpus"
   echo "fuzz.sh: $format"
   build/fuzz/fuzz/read_cloud_fuzzer --format="$format" "$work/corpus" "fuzz/corpus/$format" \

@@ -81,7 +81,6 @@ Result<GenerateStats> generateScene(const SceneRecipe& recipe, const std::string
   progress.beginPhase("generate", generator.recordCount(), "surfels");
   SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(output, generator.channels(),
                                                                      {.progress = &progress}));
-  for (const std::string& note : writer.notes()) progress.note(output + ": " + note);
   SURFEIT_RETURN_IF_ERROR(writeRecords(generator, threads, writer, progress));
   SURFEIT_RETURN_IF_ERROR(writer.finish());
   return GenerateStats{generator.recordCount(), generator.area()};

@@ -18,8 +18,8 @@ namespace surfeit {
 // that headers can be completed; the disk needs room for both. One thread at a time.
 class ByteOutput {
  public:
-  // `progress`, if any, outlives the output. commit() polls it while it compresses,
-  // and counts bytes: kInterrupted.
+  // `progress`, if any, outlives the output. append() and commit() poll it:
+  // kInterrupted; what commit() compresses is counted.
   static Result<ByteOutput> create(const std::string& path, Progress* progress = nullptr);
   ByteOutput(ByteOutput&&) noexcept;
   ByteOutput& operator=(ByteOutput&&) noexcept;

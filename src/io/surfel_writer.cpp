@@ -44,6 +44,9 @@ Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudCh
   if (channels.group) add(kGroupNames[0], PlyType::kUint8);
 
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> file, createRowWriter(path, options));
+  if (options.progress != nullptr) {
+    for (const std::string& note : file->notes()) options.progress->note(path + ": " + note);
+  }
   return SurfelWriter(std::make_unique<State>(State{std::move(file), channels, {}}));
 }
 
@@ -51,8 +54,6 @@ SurfelWriter::SurfelWriter(std::unique_ptr<State> state) : state_(std::move(stat
 SurfelWriter::SurfelWriter(SurfelWriter&&) noexcept = default;
 SurfelWriter& SurfelWriter::operator=(SurfelWriter&&) noexcept = default;
 SurfelWriter::~SurfelWriter() = default;
-
-std::vector<std::string> SurfelWriter::notes() const { return state_->file->notes(); }
 
 Status SurfelWriter::write(std::span<const Surfel> surfels) {
   const CloudChannels& channels = state_->channels;

@@ -4,7 +4,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "io/row_writer.h"
 #include "surfeit/status.h"
@@ -17,14 +16,12 @@ namespace surfeit {
 class SurfelWriter {
  public:
   // `channels` says which optional properties the file gets. `options` has the rest; its
-  // properties are set here.
+  // properties are set here, and its progress is told what the format cannot keep.
   static Result<SurfelWriter> create(const std::string& path, const CloudChannels& channels,
                                      RowWriterOptions options = {});
   SurfelWriter(SurfelWriter&&) noexcept;
   SurfelWriter& operator=(SurfelWriter&&) noexcept;
   ~SurfelWriter();
-  // What the format cannot keep, one sentence each.
-  std::vector<std::string> notes() const;
   Status write(std::span<const Surfel> surfels);
   Status finish();
 

@@ -315,7 +315,6 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.radiosity = light.hasLight();
     SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer,
                              SurfelWriter::create(output, channels, {.progress = &progress}));
-    for (const std::string& note : writer.notes()) progress.note(output + ": " + note);
     const SurfelMaker maker(mesh, plan, light.hasLight() ? &light : nullptr);
     SURFEIT_RETURN_IF_ERROR(writeSurfels(plan, maker, stats.threads, writer, progress, stats));
     SURFEIT_RETURN_IF_ERROR(writer.finish());

@@ -31,6 +31,7 @@ constexpr std::string_view kStorageAttributes[] = {"channels",
                                                    "dwaCompressionLevel",
                                                    "idManifest",
                                                    "lineOrder",
+                                                   kExrMainLayerAttribute,
                                                    "maxSamplesPerPixel",
                                                    "name",
                                                    "pixelAspectRatio",
@@ -166,10 +167,8 @@ Imf::Header exrHeaderLike(const Imf::Header& part) {
   for (auto i = part.begin(); i != part.end(); ++i) {
     const bool is_storage = std::find(std::begin(kStorageAttributes), std::end(kStorageAttributes),
                                       std::string_view(i.name())) != std::end(kStorageAttributes);
-    // Left out here: Imf::Header::erase would leak it
-    if (!is_storage && std::string_view(i.name()) != kExrMainLayerAttribute) {
-      header.insert(i.name(), i.attribute());
-    }
+    // What is not wanted must not come in: Imf::Header::erase leaks it
+    if (!is_storage) header.insert(i.name(), i.attribute());
   }
   return header;
 }
