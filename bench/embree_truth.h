@@ -13,12 +13,12 @@
 namespace surfeit {
 
 struct TruthOptions {
-  int rays = 6400;  // the square of a multiple of 4
+  int rays = 25600;  // the square of a multiple of 4
   int threads = 1;
 };
 
-// Occlusion and irradiance at the judged receivers of a set, in their order. With 6,400 rays their
-// noise is about 0.001. Kept beside the scene when its directory is, and read from there next time.
+// Occlusion and irradiance at the judged receivers of a set, in their order. With 25,600 rays
+// their noise is about 0.0005 of occlusion and, on the lion, 0.4 % of color. Kept beside the scene when its directory is, and read from there next time.
 // kFailed when Embree refuses, kIoError when the file cannot be written.
 Result<std::vector<GatherResult>> traceTruth(const GatherScene& scene, const ReceiverSet& set,
                                              const TruthOptions& options);

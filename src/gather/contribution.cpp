@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 
 #include "gather/coverage_rules.h"
 
@@ -66,14 +67,60 @@ float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& bas
   return facing;
 }
 
+// Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,
+// the front moment F times v is the sum of (x_i - c) w_i: what faces the receiver, less what turns
+// away. With m and -m the offsets of the middles of either, as in anything symmetric, that is
+// (front + back) m; and when all of it faces the receiver, it is front m. So m is exact for a
+// sphere (two thirds of its radius towards the receiver), for an edge of which one face shows, and
+// for a cap.
+//
+// From a finite distance D the surfels turn: of the solid angles A_i n_i . (D v - x_i) / |D v -
+// x_i|^3 the sum is front / D^2 (1 + (3 m . v - q) / D) to first order, with q the mean of n_i .
+// x_i, which the trace of F gives like m. In the distance of m it looks 1 + 2 m . v / D as large,
+// and the rest is `perspective`: of a sphere, whose rim is behind its middle, the same less.
+SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
+                  GatherSides sides) {
+  const float both = facing.front + facing.back, distance = glm::length(to_node);
+  const glm::vec3 v = -to_node / distance;
+  const auto& moment = node.front_moment;
+  const glm::vec3 weighted(glm::dot(moment[0], v), glm::dot(moment[1], v), glm::dot(moment[2], v));
+  const float trace = moment[0].x + moment[1].y + moment[2].z;
+  float part = 1 / both;
+  if (sides == GatherSides::kBack) part = -part;
+  if (sides == GatherSides::kBoth) part *= (facing.front - facing.back) / both;
+
+  glm::vec3 middle = part * weighted;
+  const float length = glm::length(middle);
+  if (length > node.radius) middle *= node.radius / length;
+  const float turn = part * (glm::dot(v, weighted) - trace) / distance;
+  return {middle, 1 + std::clamp(turn, -kMostTurn, kMostTurn)};
+}
+
+// No more than the outline of the sphere that holds all disks; of what is rough, no more than a
+// part of the ellipse that spreads as the node does, projected along the direction: what lies
+// behind each other shows once.
+float mostVisibleArea(const Node& node, const glm::vec3& direction) {
+  const float most = std::min(node.area, kPi * node.radius * node.radius);
+  if (node.isFlat()) return most;
+  const float determinant = quadraticForm(adjugate(node.covariance), direction);
+  const float ellipse = 4 * kPi * std::sqrt(std::max(0.f, determinant));
+  return std::min(most, kFilledOutline * ellipse);
+}
+
+SymmetricMatrix shapeOf(const Node& node) {
+  const float trace = node.covariance.trace();
+  // Of the smallest surfels it may be zero
+  if (!(trace >= std::numeric_limits<float>::min())) return withoutDirection(glm::vec3(0));
+  return (2 / trace) * node.covariance;
+}
+
 bool makeContribution(const Node& node, const glm::vec3& to_node, const ContributionRules& rules,
                       Contribution& contribution) {
-  const float distance_sq = glm::dot(to_node, to_node);
-  const glm::vec3 direction = to_node / std::sqrt(distance_sq);
+  const glm::vec3 direction = glm::normalize(to_node);
 
   // Area that the receiver sees, and what of it sends light
-  float area = 0, front_area = 0, overlap = 0;
-  glm::vec3 power(0);
+  float area = 0, front_area = 0, overlap = 0, perspective = 1;
+  glm::vec3 power(0), to_seen = to_node;
   if (node.isFlat()) {
     const float cosine = -node.flatness * glm::dot(direction, node.normal);
     front_area = node.area * std::max(0.f, cosine);
@@ -98,6 +145,9 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
         break;
     }
     if (!(area > kLeastVisiblePart * node.area)) return false;
+    const SeenPart seen = seenPart(node, to_node, {front_area, back_area}, rules.sides);
+    to_seen += seen.middle;
+    perspective = seen.perspective;
     if (rules.has_color && rules.sides != GatherSides::kBack) {
       float ignored;
       for (int channel = 0; channel < 3; ++channel) {
@@ -106,17 +156,19 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
     }
   }
 
-  // However the surfels lie, they show no more than their area, and no more than the outline of the
-  // sphere that holds them; what exceeds that hides behind the rest. (Spheres and two-sided surfels
-  // count twice in front plus back, which the first limit takes back head-on.)
-  const float visible_area = std::min({area, node.area, kPi * node.radius * node.radius});
+  // What exceeds the limit hides behind the rest. (Spheres and two-sided surfels count twice in
+  // front plus back, which the limit of the area takes back head-on.)
+  const float visible_area = std::min(perspective * area, mostVisibleArea(node, direction));
+  const float distance_sq = glm::dot(to_seen, to_seen);
+  if (!(distance_sq > 0)) return false;
   contribution.distance_sq = distance_sq;
   contribution.radius = node.radius;
-  contribution.direction = direction;
+  contribution.direction = to_seen / std::sqrt(distance_sq);
   contribution.solid_angle = visible_area / distance_sq;
   contribution.spread = node.area / distance_sq;
   contribution.overlap = overlap;
   contribution.normal = node.flatness * node.normal;
+  contribution.shape = shapeOf(node);
   contribution.radiosity = rules.has_color ? power / area : glm::vec3(0);
   return contribution.solid_angle > 0;
 }
@@ -139,6 +191,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.spread = surfel.area / distance_sq;
   contribution.overlap = 0;
   contribution.normal = surfel.normal;
+  contribution.shape = withoutDirection(surfel.normal);
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);
   return contribution.solid_angle > 0;
 }

@@ -4,6 +4,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "core/symmetric_matrix.h"
 #include "octree/node.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
@@ -16,16 +17,17 @@ inline constexpr float kLeastVisiblePart = 0.01f;
 
 // A patch as the receiver sees it. Plain floats without padding.
 struct Contribution {
-  float distance_sq;    // from the receiver, > 0
-  float radius;         // of what it stands for: how far that reaches before and behind
-  glm::vec3 direction;  // unit, from the receiver
-  float solid_angle;    // steradians, > 0
-  float spread;         // area / distance^2: the solid angle that it would have head-on
-  float overlap;        // of its parts with those of its layer, 0..1; see RasterCube::Patch
-  glm::vec3 normal;     // shape for RasterCube::splat; zero: looks round
-  glm::vec3 radiosity;  // of what covers; back sides are black. Zero when color is not asked for.
+  float distance_sq;      // from the receiver, > 0
+  float radius;           // of what it stands for: how far that reaches before and behind
+  glm::vec3 direction;    // unit, from the receiver
+  float solid_angle;      // steradians, > 0
+  float spread;           // area / distance^2: the solid angle that it would have head-on
+  float overlap;          // of its parts with those of its layer, 0..1; see RasterCube::Patch
+  glm::vec3 normal;       // unit length for a disk, zero for a sphere, in between when partly flat
+  SymmetricMatrix shape;  // how it spreads; see RasterCube::Patch
+  glm::vec3 radiosity;    // of what covers; back sides are black. Zero when color is not asked for.
 };
-static_assert(sizeof(Contribution) == 14 * sizeof(float));
+static_assert(sizeof(Contribution) == 20 * sizeof(float));
 
 // How contributions are to be made.
 struct ContributionRules {
@@ -43,6 +45,25 @@ Surfel withSides(const Surfel& surfel, GatherSides sides);
 // Two-sided surfels and spheres may be part of the sum.
 float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& basis,
                    float& opposite);
+
+// What a receiver sees of a rough node: the area of what faces it, and of what turns away.
+struct FacingAreas {
+  float front, back;
+};
+
+// Where that is, seen from `to_node` before the node's position.
+struct SeenPart {
+  glm::vec3 middle;   // from the node's position; no longer than its radius
+  float perspective;  // what it looks like in the distance of its middle, over what it faces
+};
+SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
+                  GatherSides sides);
+
+// The largest area that a node may show in unit direction `direction` (or its opposite).
+float mostVisibleArea(const Node& node, const glm::vec3& direction);
+
+// How a node spreads, for RasterCube::Patch.
+SymmetricMatrix shapeOf(const Node& node);
 
 // The patch of a node, or false when the receiver sees nothing of it. `to_node` leads from the
 // receiver to the node's position; the receiver must lie outside the node's radius.

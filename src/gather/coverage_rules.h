@@ -71,6 +71,14 @@ inline float softDiskPeak(float radius, float area) {
   return share < 0.5f ? 2 * share : 1 / (2 * (1 - share));
 }
 
+// A rough node covers at most this part of its outline, which is that of an ellipse with its
+// covariance: of what fills the outline, and no thicket does wholly.
+inline constexpr float kFilledOutline = 0.8f;
+
+// What a rough node looks like from close by differs from its projected area by no more than this
+// part: beyond, first order says nothing.
+inline constexpr float kMostTurn = 0.3f;
+
 // A node that is seen mostly from behind shows fronts that face each other: folds, bumps and
 // leaves, which hide each other instead of lying side by side. Overlap grows from 0 where fronts
 // and backs are equal (anything closed) to 1 where backs are 11/9 of the fronts. (AO bias of

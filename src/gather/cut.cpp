@@ -30,7 +30,7 @@ constexpr float kMostTurnedAway = 0.5f;
 // surface and drawn as such; a rough one is a corner, an edge or a thicket, of which the receiver
 // sees a part that need not lie in its middle. (Sponza, AO RMSE and contributions: .0143 and 1,000
 // with one limit of .05; .0073 and 1,600 with .1 for flat and .025 for rough nodes.)
-constexpr float kRoughShare = 0.25f;
+constexpr float kRoughShare = 0.35f;
 
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 

@@ -155,6 +155,25 @@ class Brush {
     }
   }
 
+  // Entries of a shape in the frame of the raster, w towards the face that is drawn.
+  struct FaceShape {
+    V uu, vv, ww, uv, uw, vw;
+  };
+  FaceShape InRaster(const SymmetricMatrix& m) const {
+    const int w_axis = face_ / 2, u_axis = (w_axis + 1) % 3, v_axis = (w_axis + 2) % 3;
+    if constexpr (Kind::kFrame) {
+      const V3 mx = frames_.Times(m, 0), my = frames_.Times(m, 1), mz = frames_.Times(m, 2);
+      // The raster of a cone has the face +x alone
+      return {Dot(frames_.y, my), Dot(frames_.z, mz), Dot(frames_.x, mx),
+              Dot(frames_.y, mz), Dot(frames_.x, my), Dot(frames_.x, mz)};
+    } else {
+      const float sign = face_ % 2 == 0 ? 1.f : -1.f;
+      return {Splat(m(u_axis, u_axis)),        Splat(m(v_axis, v_axis)),
+              Splat(m(w_axis, w_axis)),        Splat(m(u_axis, v_axis)),
+              Splat(sign * m(u_axis, w_axis)), Splat(sign * m(v_axis, w_axis))};
+    }
+  }
+
   // For all lanes.
   void ClearFace() {
     const D d;
@@ -224,10 +243,12 @@ class Brush {
     const V g_u = hn::NegMulAdd(u, n_axis, Axis(normal, u_axis));
     const V g_v = hn::NegMulAdd(v, n_axis, Axis(normal, v_axis));
 
-    // The spread of a disk, and what is left of a row's when it is sheared
-    const V a = hn::Max(least, hn::NegMulAdd(g_u, g_u, hn::MulAdd(u, u, one)));
-    const V c = hn::Max(least, hn::NegMulAdd(g_v, g_v, hn::MulAdd(v, v, one)));
-    const V b = hn::NegMulAdd(g_u, g_v, hn::Mul(u, v));
+    // The spread on the face, and what is left of a row's when it is sheared
+    const FaceShape m = InRaster(patch.shape);
+    const V wu = hn::NegMulAdd(u, m.ww, m.uw), wv = hn::NegMulAdd(v, m.ww, m.vw);
+    const V a = hn::Max(least, hn::NegMulAdd(u, hn::Add(m.uw, wu), m.uu));
+    const V c = hn::Max(least, hn::NegMulAdd(v, hn::Add(m.vw, wv), m.vv));
+    const V b = hn::NegMulAdd(v, wu, hn::NegMulAdd(u, m.vw, m.uv));
     const V inverse_c = Reciprocal(c);
     const V shear = hn::Mul(b, inverse_c);
     const V row_a = hn::Max(hn::Mul(least, a), hn::NegMulAdd(b, shear, a));

@@ -69,6 +69,13 @@ struct Frames {
   V3 ToLocal(const Vector& v) const {
     return {Dot(x, v), Dot(y, v), Dot(z, v)};
   }
+  // A matrix times one of the axes.
+  V3 Times(const SymmetricMatrix& m, int axis) const {
+    const V3& v = axis == 0 ? x : axis == 1 ? y : z;
+    const glm::vec3 rows[3] = {
+        {m(0, 0), m(0, 1), m(0, 2)}, {m(1, 0), m(1, 1), m(1, 2)}, {m(2, 0), m(2, 1), m(2, 2)}};
+    return {Dot(v, rows[0]), Dot(v, rows[1]), Dot(v, rows[2])};
+  }
   // A component of v = (x, y, z) in the frame, of the world.
   V ToWorld(const glm::vec3& v, int axis) const {
     return hn::MulAdd(Axis(x, axis), Splat(v.x),

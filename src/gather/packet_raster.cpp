@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "gather/contribution.h"
 #include "gather/coverage_rules.h"
 
 namespace surfeit {
@@ -129,9 +130,10 @@ void PacketRaster::addNode(const Node& node) {
   RoughSight seen{};
   const GatherSides sides = rules_.quality.sides;
   const bool shows_fronts = sides != GatherSides::kBack, shows_backs = sides != GatherSides::kFront;
+  const glm::vec3 to_node = node.position - view_.centre, direction = glm::normalize(to_node);
   float round_area = 0;
   if (!node.isFlat()) {
-    kernel_.seeRoughNode(node, glm::normalize(node.position - view_.centre), seen);
+    kernel_.seeRoughNode(node, direction, seen);
     round_area = (shows_fronts ? seen.area : 0) + (shows_backs ? seen.opposite_area : 0);
     if (!(round_area > kLeastVisiblePart * node.area)) return;
   }
@@ -139,15 +141,18 @@ void PacketRaster::addNode(const Node& node) {
   patch.position = node.position;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
+  patch.shape = shapeOf(node);
   patch.area = node.area;
-  patch.most_area = std::min(node.area, kPi * node.radius * node.radius);
+  patch.most_area = mostVisibleArea(node, direction);
   if (node.isFlat()) {
     patch.disk_area = node.area;
     patch.radiosity = node.radiosity;
     patch.facing_limit = sides == GatherSides::kBoth ? Patch::kDarkBack : Patch::kFrontOnly;
     if (!shows_fronts) patch.normal = -patch.normal;
   } else {
-    patch.round_area = round_area;
+    const SeenPart part = seenPart(node, to_node, {seen.area, seen.opposite_area}, sides);
+    patch.position += part.middle;
+    patch.round_area = std::min(part.perspective * round_area, patch.most_area);
     patch.radiosity = seen.power / round_area;
     if (sides == GatherSides::kFront) patch.overlap = overlapOf(seen.area, seen.opposite_area);
     if (sides == GatherSides::kBack) patch.overlap = overlapOf(seen.opposite_area, seen.area);
@@ -166,6 +171,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     patch.position = surfel.position;
     patch.radius = effectiveRadius(surfel.radius, surfel.area);
     patch.normal = surfel.normal;
+    patch.shape = withoutDirection(surfel.normal);
     patch.area = patch.most_area = surfel.area;
     (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
     patch.radiosity = surfel.radiosity;

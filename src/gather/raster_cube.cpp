@@ -74,6 +74,16 @@ ConeFrame::ConeFrame(const glm::vec3& axis) : x(axis) {
   z = frame.bitangent;
 }
 
+SymmetricMatrix ConeFrame::toLocal(const SymmetricMatrix& m) const {
+  const glm::vec3 axes[3] = {x, y, z};
+  SymmetricMatrix local;
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    local.entries[i] =
+        glm::dot(axes[SymmetricMatrix::kRow[i]], m * axes[SymmetricMatrix::kColumn[i]]);
+  }
+  return local;
+}
+
 RasterCube::RasterCube(const RasterGeometry& geometry, bool has_color, bool fades)
     : geometry_(&geometry),
       coverage_(geometry.pixels().size()),
@@ -181,11 +191,13 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, float 
 // The shape of a patch on the plane of the face that its direction meets along `axis`; it may lie
 // outside the face.
 //
-// A disk with normal n spreads by I - n n^T, and on the face by the gradients of u and v, which are
-// (e_u - u e_axis) / |d[axis]| and the same with v. With a, b, c the entries of that spread on the
-// face, a row is shifted by b / c for each unit of v and as wide as what is left of a. For a square
-// on a plane of the world, as cells of the octree cut it, that is its exact image to first order,
-// so neighbours tile.
+// A patch spreads by its shape (a disk with normal n by I - n n^T), and on the face by the
+// gradients of u and v, which are (e_u - u e_axis) / |d[axis]| and the same with v. With a, b, c
+// the entries of that spread on the face, a row is shifted by b / c for each unit of v and as wide
+// as what is left of a. For a rectangle on a plane of the world, as cells of the octree cut it,
+// that is its exact image to first order, so neighbours tile. (With I - n n^T for nodes, too: AO
+// RMSE .0037 instead of .0031 for the bunny, and 1.9 % instead of 1 % missing at the worst place of
+// a closed shell.)
 //
 // The area on the face is du dv = solid angle / |d[axis]|^3 for something small. Distances along
 // the axis vary by area (1 - n[axis]^2) / 12 over a square, and the mean of 1 / w^3 is greater than
@@ -199,9 +211,12 @@ RasterCube::Parallelogram RasterCube::onFace(const Patch& patch, int axis) {
   const float n_axis = d[axis] < 0 ? -n[axis] : n[axis];
   const float g_u = n[u_axis] - u * n_axis, g_v = n[v_axis] - v * n_axis;
 
-  const float a = std::max(kLeastSpread, 1 + u * u - g_u * g_u);
-  const float c = std::max(kLeastSpread, 1 + v * v - g_v * g_v);
-  const float b = u * v - g_u * g_v;
+  const SymmetricMatrix& m = patch.shape;
+  const float sign = d[axis] < 0 ? -1.f : 1.f;
+  const float uw = sign * m(u_axis, axis), vw = sign * m(v_axis, axis), ww = m(axis, axis);
+  const float a = std::max(kLeastSpread, m(u_axis, u_axis) - u * (2 * uw - u * ww));
+  const float c = std::max(kLeastSpread, m(v_axis, v_axis) - v * (2 * vw - v * ww));
+  const float b = m(u_axis, v_axis) - u * vw - v * (uw - u * ww);
   const float shear = b / c;
   const float row_a = std::max(kLeastSpread * a, a - b * shear);
 

@@ -15,6 +15,8 @@
 #include <span>
 #include <vector>
 
+#include "core/symmetric_matrix.h"
+
 namespace surfeit {
 
 // Directions and solid angles of the pixels for one resolution. Immutable, so threads may share it.
@@ -71,6 +73,7 @@ struct ConeFrame {
     return {glm::dot(x, v), glm::dot(y, v), glm::dot(z, v)};
   }
   glm::vec3 toWorld(const glm::vec3& v) const { return v.x * x + v.y * y + v.z * z; }
+  SymmetricMatrix toLocal(const SymmetricMatrix& m) const;
 };
 
 struct FillPass;
@@ -98,6 +101,7 @@ class RasterCube {
   struct Patch {
     glm::vec3 direction;  // unit
     glm::vec3 normal;     // unit length for a disk, zero for a sphere, in between when partly flat
+    SymmetricMatrix shape;  // covariance of its area, of trace 2; of a sphere the identity
     float solid_angle;
     float spread = 0;  // area / distance^2
     // How far it hides behind its own layer, 0..1: 0 for a tile beside the others, 1 for what lies
@@ -105,7 +109,8 @@ class RasterCube {
     float overlap = 0;
   };
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
-  // image of a square with the patch's normal whose sides follow the rows, to first order.
+  // image, to first order, of a parallelogram that spreads as the patch does and whose sides follow
+  // the rows.
   void splat(const Patch& patch, const DepthRange& depth, const glm::vec3& radiosity);
 
   // Peak of a disk that covers all its pixels fully.

@@ -39,9 +39,9 @@ void ReceiverRaster::begin(const Receiver& receiver) {
 
 void ReceiverRaster::addNode(const Node& node) {
   const glm::vec3 to_node = node.position - receiver_.position;
-  if (!(heightAboveHorizon(receiver_, to_node) > 0)) return;
   Entry entry;
   if (!makeContribution(node, to_node, contribution_rules_, entry.contribution)) return;
+  if (!(heightAboveHorizon(receiver_, entry.contribution.direction) > 0)) return;
   if (!(entry.contribution.distance_sq <= max_distance_sq_)) return;
   contributions_.push_back(entry);
 }
@@ -169,8 +169,8 @@ GatherResult ReceiverRaster::finish() {
     if (entry.near_index >= 0) {
       trace(near_surfels_[std::size_t(entry.near_index)], depth);
     } else {
-      cube_.splat({inRaster(patch.direction), inRaster(patch.normal), patch.solid_angle,
-                   patch.spread, patch.overlap},
+      cube_.splat({inRaster(patch.direction), inRaster(patch.normal), inRaster(patch.shape),
+                   patch.solid_angle, patch.spread, patch.overlap},
                   depth, patch.radiosity);
     }
   }

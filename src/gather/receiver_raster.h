@@ -62,7 +62,10 @@ class ReceiverRaster {
   float rayBias(const Surfel& surfel) const;
   bool showsTracedSide(const Surfel& surfel, const glm::vec3& centre) const;
   // In the frame of the raster.
-  glm::vec3 inRaster(const glm::vec3& v) const { return has_frame_ ? frame_.toLocal(v) : v; }
+  template <typename T>  // a vector, or a shape
+  T inRaster(const T& v) const {
+    return has_frame_ ? frame_.toLocal(v) : v;
+  }
   void trace(const Surfel& surfel, const DepthRange& depth);
   GatherResult integrate() const;
 

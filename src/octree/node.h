@@ -7,6 +7,7 @@
 #include <glm/vec3.hpp>
 
 #include "core/spherical_harmonics.h"
+#include "core/symmetric_matrix.h"
 
 namespace surfeit {
 
@@ -42,6 +43,12 @@ struct Node {
   std::array<std::array<float, kNodeShKinds>, kShCount> sh;
   std::uint64_t
       groups;  // set of those of the surfels below; group 0 alone in scenes without groups
+  // Area-weighted mean of (x - position)(x - position)^T over the disks, not only their middles:
+  // how the area spreads. Trace above 0 and at most about radius^2.
+  SymmetricMatrix covariance;
+  // sum A (x - position) n^T over one-sided disks, row by row: where the fronts of each direction
+  // lie. Zero in a flat node.
+  std::array<glm::vec3, 3> front_moment;
 
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
@@ -51,7 +58,7 @@ struct Node {
     return values;
   }
 };
-static_assert(sizeof(Node) == 216);
+static_assert(sizeof(Node) == 280);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

@@ -10,6 +10,7 @@
 #include "core/curve_key.h"
 #include "core/thread_scratch.h"
 #include "octree/column_codec.h"
+#include "octree/node_moments.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
@@ -209,10 +210,23 @@ Status checkNodes(std::span<const Node> nodes) {
   return {};
 }
 
+std::size_t countRough(std::span<const Node> nodes) {
+  const auto isRough = [](const Node& node) { return !node.isFlat(); };
+  return static_cast<std::size_t>(std::count_if(nodes.begin(), nodes.end(), isRough));
+}
+
+Status decodeMoments(PayloadReader& reader, bool full_precision, std::span<Node> nodes) {
+  MomentColumns moments(nodes.size(), countRough(nodes), full_precision);
+  if (!moments.get(reader)) return damaged("moments");
+  for (Node& node : nodes) {
+    if (!moments.take(node)) return damaged("moments");
+  }
+  return {};
+}
+
 // Harmonics of the nodes that are not flat; zeros for the others.
 Status decodeCoefficients(PayloadReader& reader, bool full_precision, std::span<Node> nodes) {
-  std::size_t rough = 0;
-  for (const Node& node : nodes) rough += node.isFlat() ? 0 : 1;
+  const std::size_t rough = countRough(nodes);
   const auto floats = coefficientColumns<float>(rough);
   const auto codes = coefficientColumns<std::int16_t>(rough);
   for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
@@ -314,6 +328,9 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   if (form.has_groups) putCounts(writer, columns.groups);
   RoughNodes rough;
   for (const LevelNode& node : nodes) rough.add(node.node);
+  MomentColumns moments(nodes.size(), rough.nodes.size(), full_precision);
+  for (const LevelNode& node : nodes) moments.add(node.node);
+  moments.put(writer);
   for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
     encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
   }
@@ -342,6 +359,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
     SURFEIT_RETURN_IF_ERROR(resolveReference(limits, level, columns.child_level[i], columns.page[i],
                                              columns.first[i], out[i]));
   }
+  SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
   SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
   if (reader.remaining() != 0) {
     return Status::corruption(
@@ -372,9 +390,12 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
   const PayloadReader references = reader;
   SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
 
-  // The projected area stays; power is stored relative to its codes
+  // Moments and the projected area stay; power is stored relative to the codes of that
   RoughNodes rough;
   for (const Node& node : nodes) rough.add(node);
+  if (!MomentColumns(nodes.size(), rough.nodes.size(), full_precision).get(reader)) {
+    return damaged("moments");
+  }
   const bool has_area =
       full_precision ? getFloats(reader, coefficientColumns<float>(rough.nodes.size())[kAreaKind])
                      : getSmallIntegers(reader, rough.codes);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <iterator>
 
 namespace surfeit {
 namespace {
@@ -14,9 +15,17 @@ const ZonalFactors& lobeOf(const Surfel& surfel) {
   return surfel.isTwoSided() ? kAbsoluteCosine : kClampedCosine;
 }
 
+// The mean of x x^T over a disk of area A around the origin is A / (4 pi) (I - n n^T); over the
+// disk that a sphere looks like, the same without a normal.
+double diskSpread(const Surfel& surfel) {
+  const double radius = double(surfel.radius);
+  return std::min(double(surfel.area) / (4 * double(kPi)), radius * radius / 4);
+}
+
 }  // namespace
 
 void NodeSums::add(const Surfel& surfel) {
+  addMoments(surfel);
   const double a = double(surfel.area);
   const double area_and_power[4] = {1, double(surfel.radiosity[0]), double(surfel.radiosity[1]),
                                     double(surfel.radiosity[2])};
@@ -24,7 +33,6 @@ void NodeSums::add(const Surfel& surfel) {
   groups |= groupBit(surfel.group);
   area += a;
   for (int axis = 0; axis < 3; ++axis) {
-    position[axis] += a * double(surfel.position[axis]);
     radiosity[axis] += a * area_and_power[axis + 1];
     // Both sides of a two-sided disk face everywhere: it gives a node no direction
     if (!surfel.isTwoSided()) normal[axis] += a * double(surfel.normal[axis]);
@@ -44,12 +52,56 @@ void NodeSums::add(const Surfel& surfel) {
   disk_bounds.add(surfel.position + half);
 }
 
+// Of positions, which are relative to the origin.
+void NodeSums::addMoments(const Surfel& surfel) {
+  if (surfel_count == 0) {
+    for (int axis = 0; axis < 3; ++axis) origin[axis] = double(surfel.position[axis]);
+  }
+  const double a = double(surfel.area), spread = diskSpread(surfel);
+  const bool has_front = !surfel.isSphere() && !surfel.isTwoSided();
+  double x[3], n[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    x[axis] = double(surfel.position[axis]) - origin[axis];
+    n[axis] = surfel.isSphere() ? 0 : double(surfel.normal[axis]);
+    position[axis] += a * x[axis];
+  }
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
+    const double identity = row == column ? 1 : 0;
+    second_moment[i] += a * (x[row] * x[column] + spread * (identity - n[row] * n[column]));
+  }
+  if (!has_front) return;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      front_moment[row][column] += a * x[row] * n[column];
+    }
+  }
+}
+
+// The child's, moved by d from its origin to ours: (x + d)(x + d)^T, and (x + d) n^T.
+void NodeSums::addMoments(const NodeSums& child) {
+  if (surfel_count == 0) std::copy(std::begin(child.origin), std::end(child.origin), origin);
+  double d[3];
+  for (int axis = 0; axis < 3; ++axis) d[axis] = child.origin[axis] - origin[axis];
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
+    second_moment[i] += child.second_moment[i] + d[row] * child.position[column] +
+                        child.position[row] * d[column] + child.area * d[row] * d[column];
+  }
+  for (int row = 0; row < 3; ++row) {
+    position[row] += child.position[row] + child.area * d[row];
+    for (int column = 0; column < 3; ++column) {
+      front_moment[row][column] += child.front_moment[row][column] + d[row] * child.normal[column];
+    }
+  }
+}
+
 void NodeSums::add(const NodeSums& child) {
+  addMoments(child);
   surfel_count += child.surfel_count;
   groups |= child.groups;
   area += child.area;
   for (int axis = 0; axis < 3; ++axis) {
-    position[axis] += child.position[axis];
     normal[axis] += child.normal[axis];
     radiosity[axis] += child.radiosity[axis];
   }
@@ -60,7 +112,9 @@ void NodeSums::add(const NodeSums& child) {
 }
 
 glm::vec3 NodeSums::centre() const {
-  return {float(position[0] / area), float(position[1] / area), float(position[2] / area)};
+  glm::vec3 mean;
+  for (int axis = 0; axis < 3; ++axis) mean[axis] = float(origin[axis] + position[axis] / area);
+  return mean;
 }
 
 Node NodeSums::toNode(float flatness_limit) const {
@@ -76,12 +130,23 @@ Node NodeSums::toNode(float flatness_limit) const {
     node.normal[axis] = length > 0 ? float(normal[axis] / length) : 0;
     node.radiosity[axis] = float(radiosity[axis] / area);
   }
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
+    node.covariance.entries[i] =
+        float(second_moment[i] / area - position[row] / area * (position[column] / area));
+  }
   if (node.flatness > flatness_limit) {
     node.flags = kNodeFlat;
     return node;
   }
   for (int i = 0; i < kShCount; ++i) {
     for (int kind = 0; kind < kNodeShKinds; ++kind) node.sh[i][kind] = float(sh[i][kind]);
+  }
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      node.front_moment[row][column] =
+          float(front_moment[row][column] - position[row] / area * normal[column]);
+    }
   }
   return node;
 }

@@ -15,11 +15,14 @@ namespace surfeit {
 // Sums over surfels i with area A, position x, normal n, radiosity B. Plain data.
 struct NodeSums {
   std::uint64_t surfel_count = 0;
-  std::uint64_t groups = 0;     // set of groups
-  double area = 0;              // sum A
-  double position[3] = {};      // sum A x
-  double normal[3] = {};        // sum A n over one-sided disks
-  double radiosity[3] = {};     // sum A B
+  std::uint64_t groups = 0;  // set of groups
+  double area = 0;           // sum A
+  double origin[3] = {};     // of positions below: the first surfel, so that nothing cancels
+  double position[3] = {};   // sum A x
+  double second_moment[SymmetricMatrix::kEntries] = {};  // sum A (x x^T + what a disk spreads)
+  double front_moment[3][3] = {};                        // sum A x n^T over one-sided disks
+  double normal[3] = {};                                 // sum A n over one-sided disks
+  double radiosity[3] = {};                              // sum A B
   double sh[kShCount][4] = {};  // sum A K_l Y_lm(n) times 1, B_r, B_g and B_b
   Bounds3 disk_bounds;          // boxes around every surfel's bounding sphere
 
@@ -30,6 +33,10 @@ struct NodeSums {
   glm::vec3 centre() const;
   // The node's numbers, without references and radius. `flatness_limit` decides kNodeFlat.
   Node toNode(float flatness_limit) const;
+
+ private:
+  void addMoments(const Surfel& surfel);
+  void addMoments(const NodeSums& child);
 };
 
 // Radius of the sphere around `centre` that holds the box, for when it is smaller than what the

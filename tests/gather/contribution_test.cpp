@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "octree/node_sums.h"
+
 namespace surfeit {
 namespace {
 
@@ -41,6 +43,7 @@ Node makeNode(std::span<const glm::vec3> normals, const glm::vec3& radiosity) {
   node.flatness = glm::length(sum) / float(normals.size());
   node.normal = glm::length(sum) > 0 ? glm::normalize(sum) : glm::vec3(0);
   node.radiosity = radiosity;
+  node.covariance = (1 / 3.f) * withoutDirection(glm::vec3(0));  // as of a shell
   const ShCoefficients lobes = projectLobes(normals, kClampedCosine);
   for (std::size_t i = 0; i < kShCount; ++i) {
     node.sh[i][kAreaKind] = lobes[i] / float(normals.size());
@@ -148,10 +151,118 @@ TEST(NodeContribution, FrontsOverlapWhereBacksPrevail) {
 TEST(NodeContribution, NeverExceedsTheOutlineOfItsSphere) {
   Node node = makeNode(evenDirections(500), {1, 1, 1});
   node.radius = .1f;
+  node.covariance = .01f * node.covariance;
   Contribution patch;
   ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
   EXPECT_FLOAT_EQ(patch.solid_angle, kPi * .01f / 4);
   EXPECT_NEAR(patch.radiosity.x, 1, .01);
+}
+
+// A rough node of small surfels at these places with these normals.
+Node nodeOf(std::span<const glm::vec3> positions, std::span<const glm::vec3> normals) {
+  NodeSums sums;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    Surfel surfel;
+    surfel.position = positions[i];
+    surfel.normal = normals[i];
+    surfel.radius = 1e-3f;
+    surfel.area = 1e-6f;
+    sums.add(surfel);
+  }
+  Node node = sums.toNode(1);
+  for (const glm::vec3& position : positions) {
+    node.radius = std::max(node.radius, glm::length(position - node.position));
+  }
+  return node;
+}
+
+// The middle of what is seen of a node, along v from its position towards the receiver.
+glm::vec3 middleOfSeen(const Node& node, const glm::vec3& v, GatherSides sides) {
+  float back;
+  const float front = projectedSum(node.coefficients(kAreaKind), shBasis(v), back);
+  return seenPart(node, -100.f * v, {front, back}, sides).middle;
+}
+
+TEST(RoughNode, OfASphereTheCapTowardsTheReceiverIsSeen) {
+  const std::vector<glm::vec3> all = evenDirections(2000);
+  const Node node = nodeOf(all, all);
+  for (const glm::vec3& v : evenDirections(20)) {
+    const glm::vec3 front = middleOfSeen(node, v, GatherSides::kFront);
+    EXPECT_LT(glm::length(front - 2 / 3.f * v), .01f);
+    const glm::vec3 back = middleOfSeen(node, v, GatherSides::kBack);
+    EXPECT_LT(glm::length(back + 2 / 3.f * v), .01f);
+    EXPECT_LT(glm::length(middleOfSeen(node, v, GatherSides::kBoth)), .01f);
+  }
+}
+
+TEST(RoughNode, OfAnEdgeTheFaceThatShowsIsSeen) {
+  // Two unit squares that meet at right angles along y
+  std::vector<glm::vec3> positions, normals;
+  for (int i = 0; i < 400; ++i) {
+    const float x = (float(i % 20) + .5f) / 20, y = (float(i / 20) + .5f) / 20;
+    positions.push_back({-x, y, 0});
+    normals.push_back({0, 0, 1});
+    positions.push_back({0, y, -x});
+    normals.push_back({1, 0, 0});
+  }
+  const Node node = nodeOf(positions, normals);
+  // Three bands see 5 % of the other face
+  const auto seenFrom = [&](const glm::vec3& v) {
+    return node.position + middleOfSeen(node, glm::normalize(v), GatherSides::kFront);
+  };
+  EXPECT_LT(glm::length(seenFrom({0, 0, 1}) - glm::vec3(-.5f, .5f, 0)), .05f);
+  EXPECT_LT(glm::length(seenFrom({1, 0, 0}) - glm::vec3(0, .5f, -.5f)), .05f);
+  EXPECT_LT(glm::length(seenFrom({1, 0, 1}) - glm::vec3(-.25f, .5f, -.25f)), .02f);
+}
+
+// What a node looks like from `distance` of its position, over its projected area.
+float perspectiveOf(const Node& node, const glm::vec3& v, float distance) {
+  Contribution patch;
+  EXPECT_TRUE(makeContribution(node, -distance * v, {}, patch));
+  float back;
+  const float front = projectedSum(node.coefficients(kAreaKind), shBasis(v), back);
+  return patch.solid_angle * distance * distance / front;
+}
+
+TEST(RoughNode, IsAsLargeFromCloseByAsItLooks) {
+  const std::vector<glm::vec3> all = evenDirections(2000);
+  const Node sphere = nodeOf(all, all);
+  // A disk seen from behind the same sphere, and its hollow
+  std::vector<glm::vec3> bowl, bowl_normals;
+  for (const glm::vec3& d : all) {
+    if (d.z < 0) bowl.push_back(d), bowl_normals.push_back(-d);
+  }
+  const Node hollow = nodeOf(bowl, bowl_normals);
+  for (const float distance : {8.f, 16.f, 100.f}) {
+    const float ball = 2 * (distance * distance) * (1 - std::sqrt(1 - 1 / (distance * distance)));
+    EXPECT_NEAR(perspectiveOf(sphere, {0, 0, 1}, distance), ball, .03f) << distance;
+    // Through its rim, half a radius before its middle
+    const float rim = distance / (distance - .5f);
+    EXPECT_NEAR(perspectiveOf(hollow, {0, 0, 1}, distance), rim * rim, .03f) << distance;
+  }
+}
+
+TEST(RoughNode, TheMiddleOfWhatIsSeenStaysWithinTheRadius) {
+  const std::vector<glm::vec3> all = evenDirections(200);
+  Node node = nodeOf(all, all);
+  for (glm::vec3& row : node.front_moment) row *= 100.f;
+  for (const glm::vec3& v : evenDirections(20)) {
+    EXPECT_NEAR(glm::length(middleOfSeen(node, v, GatherSides::kFront)), node.radius, 1e-4f);
+  }
+}
+
+TEST(RoughNode, ShowsNoMoreThanAPartOfItsOutline) {
+  // 10 parallel unit squares behind each other: ten times what shows
+  std::vector<glm::vec3> positions, normals;
+  for (int i = 0; i < 4000; ++i) {
+    positions.push_back({float(i % 20) / 20, float(i / 20 % 20) / 20, float(i / 400) / 10});
+    normals.push_back(i % 3 == 0 ? glm::vec3(0, 0, -1) : glm::vec3(0, 0, 1));
+  }
+  Node node = nodeOf(positions, normals);
+  node.area = 10;
+  // The square has the covariance of an ellipse of 4 pi / 12
+  EXPECT_NEAR(mostVisibleArea(node, {0, 0, 1}), .8f * kPi / 3, .01f);
+  EXPECT_NEAR(mostVisibleArea(node, {0, 1, 0}), .8f * kPi / 3, .02f);
 }
 
 TEST(SurfelContribution, IsItsProjectedArea) {

@@ -16,6 +16,11 @@ constexpr glm::vec3 kRound{0};  // the normal of what looks the same from everyw
 constexpr glm::vec3 kWhite{1};
 constexpr DepthRange kDepth{1, 1};
 
+RasterCube::Patch diskPatch(const glm::vec3& direction, const glm::vec3& normal, float solid_angle,
+                            float spread = 0, float overlap = 0) {
+  return {direction, normal, withoutDirection(normal), solid_angle, spread, overlap};
+}
+
 // Covered solid angle of the whole cube.
 double coveredSolidAngle(const RasterCube& cube) {
   double sum = 0;
@@ -74,7 +79,7 @@ TEST(RasterCube, SplatKeepsItsSolidAngleEverywhere) {
     for (const glm::vec3& direction : testDirections()) {
       for (const float solid_angle : {1e-4f, .01f, .05f}) {
         cube.clear();
-        cube.splat({direction, kRound, solid_angle, solid_angle}, kDepth, kWhite);
+        cube.splat(diskPatch(direction, kRound, solid_angle, solid_angle), kDepth, kWhite);
         // What spills over an edge is drawn as a rectangle instead of a trapezoid, the part of a
         // pixel that is covered is measured on the face, and pixels nearly full are filled
         const double tolerance = resolution == 12 ? .18 : .10;
@@ -91,7 +96,7 @@ TEST(RasterCube, SplatsOfAllDirectionsConserveSolidAngleOnAverage) {
   double ratio = 0;
   for (const glm::vec3& direction : testDirections()) {
     cube.clear();
-    cube.splat({direction, kRound, 2e-4f}, kDepth, kWhite);
+    cube.splat(diskPatch(direction, kRound, 2e-4f), kDepth, kWhite);
     ratio += coveredSolidAngle(cube) / 2e-4;
   }
   EXPECT_NEAR(ratio / double(testDirections().size()), 1, .01);
@@ -101,7 +106,7 @@ TEST(RasterCube, SplatOfSlantedDiskFollowsItsShape) {
   const RasterGeometry geometry(64);
   RasterCube cube(geometry, false);
   // Seen from straight below, a disk leaning in z is narrow in z and wide in y on the +x face
-  cube.splat({{1, 0, 0}, glm::normalize(glm::vec3(-.3f, 0, 1)), .01f}, kDepth, kWhite);
+  cube.splat(diskPatch({1, 0, 0}, glm::normalize(glm::vec3(-.3f, 0, 1)), .01f), kDepth, kWhite);
   int columns = 0, rows = 0;
   for (std::size_t i = 0; i < 64; ++i) {
     columns += cube.coverage(32 * 64 + i) > 0;
@@ -153,7 +158,7 @@ TEST(RasterCube, CoverageAddsWithinALayerAndNeverExceedsOne) {
   for (int i = 0; i < 1000; ++i) {
     for (const glm::vec3& direction : testDirections()) {
       const DepthRange depth = {1 + float(i) / 100, 1 + float(i + 7) / 100};
-      cube.splat({direction, kRound, .06f}, depth, kWhite);
+      cube.splat(diskPatch(direction, kRound, .06f), depth, kWhite);
     }
   }
   for (std::size_t i = 0; i < geometry.pixels().size(); ++i) {
@@ -168,7 +173,7 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
   const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
   const float axis_cubed = direction.x * direction.x * direction.x;
   const auto splatHalf = [&](DepthRange depth, const glm::vec3& radiosity) {
-    cube.splat({direction, kRound, .5f * axis_cubed}, depth, radiosity);
+    cube.splat(diskPatch(direction, kRound, .5f * axis_cubed), depth, radiosity);
   };
   const std::size_t pixel = 3;
 
@@ -195,7 +200,7 @@ class FilledCube : public ::testing::Test {
     const float axis = shape.direction.x;
     // As much of the face as a pixel takes, but for a rim, lest neighbours be touched
     const float area = amount * 4 / 144.f;
-    cube_.splat({shape.direction, kRound, area * axis * axis * axis}, {1, 2}, kWhite);
+    cube_.splat(diskPatch(shape.direction, kRound, area * axis * axis * axis), {1, 2}, kWhite);
   }
   static std::size_t at(int column, int row) { return std::size_t(row * 12 + column); }
 
@@ -236,7 +241,7 @@ TEST(RasterCube, WhatOverlapsHidesBehindItsOwnLayer) {
   const auto cover = [&](float overlap) {
     cube.clear();
     for (int i = 0; i < 10; ++i) {
-      cube.splat({direction, kRound, .1f * axis_cubed, 0, overlap}, {1, 2}, kWhite);
+      cube.splat(diskPatch(direction, kRound, .1f * axis_cubed, 0, overlap), {1, 2}, kWhite);
     }
     return double(cube.coverage(3));
   };
@@ -244,18 +249,18 @@ TEST(RasterCube, WhatOverlapsHidesBehindItsOwnLayer) {
   EXPECT_NEAR(cover(1), 1 - std::exp(-1.), .06);  // as anything spread at random
 }
 
-TEST(RasterCube, NeighboursOfASlantedPlaneTile) {
-  // Squares of a floor, as octree cells cut it, on the side faces and across the edges of the cube
+// What is left open of a floor of rectangles with these sides, on the side faces and across the
+// edges of the cube, too; as a part of the whole.
+double gapsOfFloor(float side_x, float side_y, const SymmetricMatrix& shape) {
   const RasterGeometry geometry(12);
   RasterCube cube(geometry, false);
-  constexpr float kSide = .2f;
-  for (int i = -100; i < 100; ++i) {
-    for (int j = -100; j < 100; ++j) {
-      const glm::vec3 to_square((float(i) + .5f) * kSide, (float(j) + .5f) * kSide, -1);
-      const float distance_sq = glm::dot(to_square, to_square);
-      const glm::vec3 direction = to_square / std::sqrt(distance_sq);
-      const float spread = kSide * kSide / distance_sq;
-      cube.splat({direction, {0, 0, 1}, spread * -direction.z, spread, 0}, kDepth, kWhite);
+  for (float x = -20 + side_x / 2; x < 20; x += side_x) {
+    for (float y = -20 + side_y / 2; y < 20; y += side_y) {
+      const glm::vec3 to_middle(x, y, -1);
+      const float distance_sq = glm::dot(to_middle, to_middle);
+      const glm::vec3 direction = to_middle / std::sqrt(distance_sq);
+      const float spread = side_x * side_y / distance_sq;
+      cube.splat({direction, {0, 0, 1}, shape, spread * -direction.z, spread, 0}, kDepth, kWhite);
     }
   }
   double error = 0, weight = 0;
@@ -265,7 +270,19 @@ TEST(RasterCube, NeighboursOfASlantedPlaneTile) {
     error += double(1 - cube.coverage(i)) * double(pixel.solid_angle);
     weight += double(pixel.solid_angle);
   }
-  EXPECT_LT(error / weight, .0025);
+  return error / weight;
+}
+
+TEST(RasterCube, NeighboursOfASlantedPlaneTile) {
+  // Squares, as octree cells cut it
+  EXPECT_LT(gapsOfFloor(.2f, .2f, withoutDirection({0, 0, 1})), .0025);
+}
+
+TEST(RasterCube, OblongNeighboursTileWhenTheyAreDrawnByTheirShape) {
+  const float sides_sq = .1f * .1f + .3f * .3f;
+  const SymmetricMatrix shape = {{2 * .1f * .1f / sides_sq, 2 * .3f * .3f / sides_sq, 0, 0, 0, 0}};
+  EXPECT_LT(gapsOfFloor(.1f, .3f, shape), .008);
+  EXPECT_GT(gapsOfFloor(.1f, .3f, withoutDirection({0, 0, 1})), .1);
 }
 
 TEST(RasterCube, SoftDiskCoversItsShare) {

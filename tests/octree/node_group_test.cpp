@@ -73,6 +73,8 @@ TEST_F(NodeGroupTest, FullPrecisionIsExact) {
     EXPECT_EQ(a.child_count, b.child_count);
     EXPECT_EQ(a.surfel_count, b.surfel_count);
     EXPECT_EQ(a.sh, b.sh);
+    EXPECT_EQ(a.covariance.entries, b.covariance.entries);
+    EXPECT_EQ(a.front_moment, b.front_moment);
     // Pages count within the level of the children in the file, and through it afterwards
     EXPECT_EQ(b.page, a.isLeaf() ? a.page : a.page + first_page_[2]);
   }
@@ -99,6 +101,49 @@ TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
         EXPECT_NEAR(a.sh[k][powerKind(c)], b.sh[k][powerKind(c)], 4e-3f * a.area * a.radiosity[c]);
       }
     }
+  }
+}
+
+TEST_F(NodeGroupTest, QuantizedMomentsAreClose) {
+  const std::vector<LevelNode> nodes = someNodes(100);
+  std::vector<std::byte> payload;
+  encodeNodeGroup(nodes, kQuantized, payload);
+  ASSERT_TRUE(decode(payload, kQuantized).ok());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Node& a = nodes[i].node;
+    const Node& b = found_[i];
+    const float trace = a.covariance.trace();
+    ASSERT_GT(trace, 0);
+    EXPECT_NEAR(std::sqrt(b.covariance.trace() / trace), 1,
+                .5f / 255 * a.radius / std::sqrt(trace) + 2e-3f);
+    for (std::size_t k = 0; k < SymmetricMatrix::kEntries; ++k) {
+      EXPECT_NEAR(a.covariance.entries[k] / trace, b.covariance.entries[k] / b.covariance.trace(),
+                  5e-3f);
+    }
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        EXPECT_NEAR(a.front_moment[row][column], b.front_moment[row][column],
+                    6e-3f * a.area * a.radius);
+      }
+    }
+  }
+}
+
+TEST_F(NodeGroupTest, DecodeRejectsMomentsOfNoSuchNode) {
+  for (const bool of_front : {false, true}) {
+    std::vector<LevelNode> nodes = someNodes(5);
+    Node& node = nodes[1].node;
+    ASSERT_FALSE(node.isFlat());
+    if (of_front) {
+      node.front_moment[2].x = 1.1f * node.area * node.radius;
+    } else {
+      node.covariance.entries[4] = -1.1f * node.radius * node.radius;
+    }
+    std::vector<std::byte> payload;
+    encodeNodeGroup(nodes, kFull, payload);
+    const Status status = decode(payload, kFull).status();
+    EXPECT_EQ(status.code(), StatusCode::kCorruption);
+    EXPECT_NE(status.message().find("field moments"), std::string::npos) << status.message();
   }
 }
 
@@ -171,6 +216,10 @@ TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
         ASSERT_TRUE(node.radius > 0 && node.area > 0 && node.surfel_count <= 5120u * 1000);
         ASSERT_TRUE(node.flatness >= 0 && node.flatness <= 1);
         ASSERT_NE(node.groups, 0u);
+        for (const float entry : node.covariance.entries) ASSERT_TRUE(std::isfinite(entry));
+        for (const glm::vec3& row : node.front_moment) {
+          ASSERT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
+        }
         for (int c = 0; c < 3; ++c) {
           ASSERT_TRUE(std::isfinite(node.position[c]) && node.radiosity[c] >= 0);
           for (const float k : node.coefficients(powerKind(c))) ASSERT_TRUE(std::isfinite(k));

@@ -1,0 +1,101 @@
+#include "octree/node_sums.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "octree/test_scenes.h"
+
+namespace surfeit {
+namespace {
+
+// Sums made by a tree: of halves, of halves.
+NodeSums sumsOf(std::span<const Surfel> cloud) {
+  NodeSums sums;
+  if (cloud.size() <= 3) {
+    for (const Surfel& surfel : cloud) sums.add(surfel);
+    return sums;
+  }
+  sums.add(sumsOf(cloud.first(cloud.size() / 2)));
+  sums.add(sumsOf(cloud.subspan(cloud.size() / 2)));
+  return sums;
+}
+
+// Points of each disk, from which its surfel's moments follow by definition.
+struct Moments {
+  double area = 0;
+  glm::dvec3 mean{0};
+  double covariance[3][3] = {}, front[3][3] = {};
+};
+
+Moments momentsOfPoints(std::span<const Surfel> cloud) {
+  Moments moments;
+  for (const Surfel& surfel : cloud) {
+    moments.area += double(surfel.area);
+    moments.mean += double(surfel.area) * glm::dvec3(surfel.position);
+  }
+  moments.mean /= moments.area;
+  for (const Surfel& surfel : cloud) {
+    const glm::dvec3 x = glm::dvec3(surfel.position) - moments.mean, n(surfel.normal);
+    // A disk of area A = pi r^2 has the covariance r^2 / 4 along each axis of its plane
+    const double disk = double(surfel.area) / double(4 * kPi);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const double spread = disk * ((i == j ? 1 : 0) - n[i] * n[j]);
+        moments.covariance[i][j] += double(surfel.area) * (x[i] * x[j] + spread) / moments.area;
+        if (surfel.isSphere() || surfel.isTwoSided()) continue;
+        moments.front[i][j] += double(surfel.area) * x[i] * n[j];
+      }
+    }
+  }
+  return moments;
+}
+
+void expectMoments(std::span<const Surfel> cloud, float tolerance) {
+  const Node node = sumsOf(cloud).toNode(1);
+  const Moments expected = momentsOfPoints(cloud);
+  const double size =
+      std::sqrt(expected.covariance[0][0] + expected.covariance[1][1] + expected.covariance[2][2]);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      EXPECT_NEAR(double(node.covariance(i, j)), expected.covariance[i][j],
+                  double(tolerance) * size * size);
+      EXPECT_NEAR(double(node.front_moment[std::size_t(i)][j]), expected.front[i][j],
+                  double(tolerance) * size * expected.area);
+    }
+  }
+}
+
+TEST(NodeSums, MomentsAreThoseOfTheDisks) {
+  expectMoments(randomCloud(300), 1e-6f);
+  expectMoments(planeCloud(8, .1f), 1e-6f);
+  expectMoments(sphereCloud(500), 1e-6f);
+}
+
+TEST(NodeSums, MomentsFarFromTheOriginLoseNothing) {
+  // A scan of a square metre in the coordinates of a country, and a speck a thousand miles away
+  expectMoments(moved(randomCloud(300), 1, {512000, 5400000, 300}), 1e-6f);
+  expectMoments(moved(sphereCloud(200), 1e-3f, {0, 1e6f, 0}), 1e-5f);
+}
+
+TEST(NodeSums, ADiskLargerThanItsRadiusSpreadsNoFartherThanThat) {
+  Surfel surfel;
+  surfel.normal = {0, 0, 1};
+  surfel.radius = 2;
+  surfel.area = 1000;
+  NodeSums sums;
+  sums.add(surfel);
+  const Node node = sums.toNode(1);
+  EXPECT_FLOAT_EQ(node.covariance(0, 0), 1);
+  EXPECT_FLOAT_EQ(node.covariance(2, 2), 0);
+}
+
+TEST(NodeSums, AFlatNodeHasNoFrontMoment) {
+  const Node node = sumsOf(planeCloud(8, .1f)).toNode(.97f);
+  ASSERT_TRUE(node.isFlat());
+  for (const glm::vec3& row : node.front_moment) EXPECT_EQ(row, glm::vec3(0));
+}
+
+}  // namespace
+}  // namespace surfeit
