@@ -18,8 +18,9 @@ struct TruthOptions {
 };
 
 // Occlusion and irradiance at the judged receivers of a set, in their order. With 25,600 rays
-// their noise is about 0.0005 of occlusion and, on the lion, 0.4 % of color. Kept beside the scene when its directory is, and read from there next time.
-// kFailed when Embree refuses, kIoError when the file cannot be written.
+// their noise is about 0.0005 of occlusion and, on the lion, 0.4 % of color. Kept beside the scene
+// when its directory is, and read from there next time. kFailed when Embree refuses, kIoError when
+// the file cannot be written.
 Result<std::vector<GatherResult>> traceTruth(const GatherScene& scene, const ReceiverSet& set,
                                              const TruthOptions& options);
 

@@ -1,4 +1,5 @@
-// The 9 real spherical harmonics of bands 0 to 2, and surfels projected onto them (memo 3.2).
+// Real spherical harmonics: the 9 of bands 0 to 2, with surfels projected onto them (memo 3.2), and
+// the 9 of band 4.
 //
 // Order of the coefficients: Y00, Y1-1, Y10, Y11, Y2-2, Y2-1, Y20, Y21, Y22.
 #pragma once
@@ -24,6 +25,16 @@ inline ShCoefficients shBasis(const glm::vec3& d) {
           0.546274215f * (d.x * d.x - d.y * d.y)};
 }
 
+// Values of the 9 basis functions of band 4 in unit direction d: Y4-4 to Y44.
+inline ShCoefficients shBand4(const glm::vec3& d) {
+  const float xx = d.x * d.x, yy = d.y * d.y, zz = d.z * d.z;
+  return {2.503342942f * d.x * d.y * (xx - yy),         1.770130769f * d.y * d.z * (3 * xx - yy),
+          0.946174696f * d.x * d.y * (7 * zz - 1),      0.669046544f * d.y * d.z * (7 * zz - 3),
+          0.105785547f * (zz * (35 * zz - 30) + 3),     0.669046544f * d.x * d.z * (7 * zz - 3),
+          0.473087348f * (xx - yy) * (7 * zz - 1),      1.770130769f * d.x * d.z * (xx - 3 * yy),
+          0.625835735f * (xx * (xx - 6 * yy) + yy * yy)};
+}
+
 // Zonal factors that turn Y_lm(n) into the coefficients of a lobe around n: band 0, 1, 2. A
 // surfel is such a lobe, so no integration is needed (course, "Point Clustering").
 using ZonalFactors = std::array<float, 3>;
@@ -38,7 +49,7 @@ inline constexpr ZonalFactors kConstant = {4 * kPi, 0, 0};
 // Band of coefficient i.
 inline constexpr std::array<int, kShCount> kShBand = {0, 1, 1, 1, 2, 2, 2, 2, 2};
 
-// Value of the expansion in unit direction d.
+// Value of the expansion in unit direction d, or of its band 4.
 inline float shEvaluate(const ShCoefficients& coefficients, const ShCoefficients& basis) {
   float sum = 0;
   for (int i = 0; i < kShCount; ++i) sum += coefficients[i] * basis[i];

@@ -67,6 +67,37 @@ float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& bas
   return facing;
 }
 
+// Two moments of x say little about E |x|, of which front plus back is made: three faces of a box
+// may show 1/3 or 0.58 of its area. Four moments bound it closely: with y = x^2, E y = s and E y^2
+// = q, the least E sqrt(y) has all y that are not 0 alike, at q / s, and the greatest has some at 1
+// and the rest alike (the principal representations of Chebyshev and Markov). Evenly spread normals
+// lie at 0.64 of the way, and so nearly everything does: over the rough nodes of Sponza areas are
+// 0.3 % too large and off by 2.4 % in the mean, where `projectedSum` gives 7.7 % too little and is
+// off by 10.8 %; of a city 2.7 and 5.0 %, instead of 7.9 and 14.6 %.
+FacingAreas facingAreas(float total, float mean, float mean_sq, float mean_fourth) {
+  constexpr float kUpwards = 0.64f, kTiny = 1e-9f;
+  const float inverse = 1 / total;
+  const float m = mean * inverse, s = std::clamp(mean_sq * inverse, 0.f, 1.f);
+  const float q = std::clamp(mean_fourth * inverse, s * s, s);
+  const float least = s * std::sqrt(s / std::max(q, kTiny));
+  const float at_one = (q - s * s) / std::max(1 - 2 * s + q, kTiny);
+  const float rest_sq = (s - q) / std::max(1 - s, kTiny);
+  const float greatest = at_one + (1 - at_one) * std::sqrt(rest_sq);
+  const float both = std::max(std::abs(m), least + kUpwards * (greatest - least));
+  return {0.5f * total * (both + m), 0.5f * total * (both - m)};
+}
+
+// By bands, as in projectedSum: sum w P2(x) = 3.2 s2, and sum w P4(x) is what the node has.
+FacingAreas facingAreas(const Node& node, const glm::vec3& to_receiver) {
+  const ShCoefficients y = shBasis(to_receiver), c = node.coefficients(kAreaKind);
+  const float total = 4 * c[0] * y[0];
+  const float mean = 2 * (c[1] * y[1] + c[2] * y[2] + c[3] * y[3]);
+  const float second = 3.2f * (c[4] * y[4] + c[5] * y[5] + c[6] * y[6] + c[7] * y[7] + c[8] * y[8]);
+  const float fourth = shEvaluate(node.area_band_4, shBand4(to_receiver));
+  return facingAreas(total, mean, (total + 2 * second) / 3,
+                     (7 * total + 20 * second + 8 * fourth) / 35);
+}
+
 // Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,
 // the front moment F times v is the sum of (x_i - c) w_i: what faces the receiver, less what turns
 // away. With m and -m the offsets of the middles of either, as in anything symmetric, that is
@@ -114,46 +145,53 @@ SymmetricMatrix shapeOf(const Node& node) {
   return (2 / trace) * node.covariance;
 }
 
+// The radiosity of what faces `to_receiver`: power over area by the same rule, and what that rule
+// sees nearly nothing of sends the mean.
+glm::vec3 seenRadiosity(const Node& node, const glm::vec3& to_receiver) {
+  const ShCoefficients basis = shBasis(to_receiver);
+  float ignored;
+  const float area = projectedSum(node.coefficients(kAreaKind), basis, ignored);
+  if (!(area > kLeastVisiblePart * node.area)) return node.radiosity;
+  glm::vec3 power;
+  for (int channel = 0; channel < 3; ++channel) {
+    power[channel] = projectedSum(node.coefficients(powerKind(channel)), basis, ignored);
+  }
+  return power / area;
+}
+
 bool makeContribution(const Node& node, const glm::vec3& to_node, const ContributionRules& rules,
                       Contribution& contribution) {
   const glm::vec3 direction = glm::normalize(to_node);
 
-  // Area that the receiver sees, and what of it sends light
+  // Area that the receiver sees, and the radiosity of what of it sends light
   float area = 0, front_area = 0, overlap = 0, perspective = 1;
-  glm::vec3 power(0), to_seen = to_node;
+  glm::vec3 radiosity = node.radiosity, to_seen = to_node;
   if (node.isFlat()) {
     const float cosine = -node.flatness * glm::dot(direction, node.normal);
     front_area = node.area * std::max(0.f, cosine);
     area = node.area * shownCosine(cosine, rules.sides);
     if (!(area > 0)) return false;
-    power = front_area * node.radiosity;
   } else {
-    const ShCoefficients basis = shBasis(-direction);
-    float back_area;
-    front_area = projectedSum(node.coefficients(kAreaKind), basis, back_area);
+    const FacingAreas facing = facingAreas(node, -direction);
+    front_area = facing.front;
     switch (rules.sides) {
       case GatherSides::kBoth:
-        area = front_area + back_area;
+        area = facing.front + facing.back;
         break;
       case GatherSides::kBack:
-        area = back_area;
-        overlap = overlapOf(back_area, front_area);
+        area = facing.back;
+        overlap = overlapOf(facing.back, facing.front);
         break;
       case GatherSides::kFront:
-        area = front_area;
-        overlap = overlapOf(front_area, back_area);
+        area = facing.front;
+        overlap = overlapOf(facing.front, facing.back);
         break;
     }
     if (!(area > kLeastVisiblePart * node.area)) return false;
-    const SeenPart seen = seenPart(node, to_node, {front_area, back_area}, rules.sides);
+    const SeenPart seen = seenPart(node, to_node, facing, rules.sides);
     to_seen += seen.middle;
     perspective = seen.perspective;
-    if (rules.has_color && rules.sides != GatherSides::kBack) {
-      float ignored;
-      for (int channel = 0; channel < 3; ++channel) {
-        power[channel] = projectedSum(node.coefficients(powerKind(channel)), basis, ignored);
-      }
-    }
+    if (rules.has_color) radiosity = seenRadiosity(node, -direction);
   }
 
   // What exceeds the limit hides behind the rest. (Spheres and two-sided surfels count twice in
@@ -162,14 +200,16 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   const float distance_sq = glm::dot(to_seen, to_seen);
   if (!(distance_sq > 0)) return false;
   contribution.distance_sq = distance_sq;
-  contribution.radius = node.radius;
+  contribution.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   contribution.direction = to_seen / std::sqrt(distance_sq);
   contribution.solid_angle = visible_area / distance_sq;
   contribution.spread = node.area / distance_sq;
   contribution.overlap = overlap;
   contribution.normal = node.flatness * node.normal;
   contribution.shape = shapeOf(node);
-  contribution.radiosity = rules.has_color ? power / area : glm::vec3(0);
+  contribution.radiosity = rules.has_color && rules.sides != GatherSides::kBack
+                               ? (front_area / area) * radiosity
+                               : glm::vec3(0);
   return contribution.solid_angle > 0;
 }
 
@@ -185,7 +225,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   if (!sends_light && rules.sides != GatherSides::kBoth) return false;
 
   contribution.distance_sq = distance_sq;
-  contribution.radius = surfel.radius;
+  contribution.reach = layerReachOfDisk(surfel.radius, surfel.isSphere() ? 0 : cosine);
   contribution.direction = direction;
   contribution.solid_angle = surfel.area * std::abs(cosine) / distance_sq;
   contribution.spread = surfel.area / distance_sq;

@@ -18,7 +18,7 @@ inline constexpr float kLeastVisiblePart = 0.01f;
 // A patch as the receiver sees it. Plain floats without padding.
 struct Contribution {
   float distance_sq;      // from the receiver, > 0
-  float radius;           // of what it stands for: how far that reaches before and behind
+  float reach;            // how far before and behind that it meets others of its layer
   glm::vec3 direction;    // unit, from the receiver
   float solid_angle;      // steradians, > 0
   float spread;           // area / distance^2: the solid angle that it would have head-on
@@ -46,12 +46,22 @@ Surfel withSides(const Surfel& surfel, GatherSides sides);
 float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& basis,
                    float& opposite);
 
-// What a receiver sees of a rough node: the area of what faces it, and of what turns away.
+// Of a rough node, the projected area of what faces a receiver, and of what turns away.
 struct FacingAreas {
   float front, back;
 };
 
-// Where that is, seen from `to_node` before the node's position.
+// With w_i the weights and x_i = d . n_i of the surfels of a node: sum w, sum w x, sum w x^2, sum w
+// x^4 to sum w max(x, 0) and sum w max(-x, 0). Exact when all |x| but those of 0 are alike, and for
+// evenly spread normals.
+FacingAreas facingAreas(float total, float mean, float mean_sq, float mean_fourth);
+// The same of a node in unit direction `to_receiver` from it.
+FacingAreas facingAreas(const Node& node, const glm::vec3& to_receiver);
+
+// Radiosity of the fronts that face a receiver in unit direction `to_receiver` of a rough node.
+glm::vec3 seenRadiosity(const Node& node, const glm::vec3& to_receiver);
+
+// Where what is seen of a rough node is, seen from `to_node` before the node's position.
 struct SeenPart {
   glm::vec3 middle;   // from the node's position; no longer than its radius
   float perspective;  // what it looks like in the distance of its middle, over what it faces

@@ -104,14 +104,14 @@ void setQuality(QualityPreset preset, GatherQuality& quality) {
   };
   switch (preset) {
     case QualityPreset::kDraft:
-      set(0.3f, 12, 4, 0.5f);
+      set(0.2f, 10, 4, 0.5f);
       break;
     case QualityPreset::kStandard:
       set(standard.max_solid_angle, standard.raster_resolution, standard.near_field_radii,
           standard.far_field_parallax);
       break;
     case QualityPreset::kFinal:
-      set(0.03f, 20, 16, 0.1f);
+      set(0.025f, 26, 16, 0.1f);
       break;
   }
 }

@@ -188,7 +188,7 @@ class Brush {
   }
 
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance) const {
-    const V reach = Splat(kLayerReach * patch.radius);
+    const V reach = Splat(patch.reach);
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
     cover.depth_end = hn::Add(distance, reach);

@@ -32,11 +32,11 @@ HWY_ATTR bool IsSeen(const PacketCanvas& canvas, const Patch& patch) {
   return false;
 }
 
-// All four kinds of coefficients at once; the derivation is at projectedSum.
+// All four kinds of coefficients at once, and band 4 of the area.
 void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sight) {
   const hn::CappedTag<float, kNodeShKinds> d4;
   const ShCoefficients basis = shBasis(-direction);
-  alignas(16) std::array<float, kNodeShKinds> facing_of, opposite_of;
+  alignas(16) std::array<float, kNodeShKinds> facing_of, total_of, mean_of, band_2_of;
   for (std::size_t kind = 0; kind < kNodeShKinds; kind += hn::Lanes(d4)) {
     const auto term = [&](std::size_t i) {
       return hn::Mul(hn::LoadU(d4, node.sh[i].data() + kind), hn::Set(d4, basis[i]));
@@ -60,11 +60,20 @@ void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sigh
     const auto partly = hn::IfThenElse(hn::Le(sum, zero), zero, between);
     const auto facing = hn::IfThenElse(hn::Ge(mean, range), mean, partly);
     hn::Store(facing, d4, facing_of.data() + kind);
-    hn::Store(hn::Sub(facing, mean), d4, opposite_of.data() + kind);
+    hn::Store(total, d4, total_of.data() + kind);
+    hn::Store(mean, d4, mean_of.data() + kind);
+    hn::Store(band_2, d4, band_2_of.data() + kind);
   }
-  sight.area = facing_of[kAreaKind];
-  sight.opposite_area = opposite_of[kAreaKind];
-  sight.power = {facing_of[powerKind(0)], facing_of[powerKind(1)], facing_of[powerKind(2)]};
+  const float total = total_of[kAreaKind], second = 3.2f * band_2_of[kAreaKind];
+  const float fourth = shEvaluate(node.area_band_4, shBand4(-direction));
+  sight.facing = facingAreas(total, mean_of[kAreaKind], (total + 2 * second) / 3,
+                             (7 * total + 20 * second + 8 * fourth) / 35);
+  const float area = facing_of[kAreaKind];
+  sight.radiosity = node.radiosity;
+  if (area > kLeastVisiblePart * node.area) {
+    const float inverse = 1 / area;
+    for (int c = 0; c < 3; ++c) sight.radiosity[c] = inverse * facing_of[powerKind(c)];
+  }
 }
 
 template <typename Kind>

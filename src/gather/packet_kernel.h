@@ -12,6 +12,7 @@
 #include <span>
 
 #include "core/symmetric_matrix.h"
+#include "gather/contribution.h"
 #include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
 #include "gather/receiver.h"
@@ -37,6 +38,7 @@ struct Patch {
   // kDarkBack, when it is seen from both sides and sends light from its front
   float facing_limit = 0;
   float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
+  float reach = 0;          // how far before and behind its middle it meets others of its layer
   float soft_peak = 0;      // of the ray traced disk; see softDiskPeak
 
   static constexpr float kFrontOnly = 0;
@@ -86,8 +88,8 @@ struct SharedFarField {
 };
 
 struct RoughSight {
-  float area, opposite_area;
-  glm::vec3 power;
+  FacingAreas facing;
+  glm::vec3 radiosity;
 };
 
 // An entry of the order: one patch on one face of the cube, [ face : 3 | distance : 29 | index of
@@ -107,8 +109,8 @@ struct PacketKernel {
   const char* name;  // of the instruction set
   // Whether any receiver sees something of the patch, which stands for a surfel.
   bool (*isSeen)(const PacketCanvas& canvas, const Patch& patch);
-  // What the receivers see of a rough node in unit direction `direction` from them: the areas that
-  // face them and turn away, and of the former the power. As projectedSum.
+  // What the receivers see of a rough node in unit direction `direction` from them; as facingAreas
+  // and seenRadiosity.
   void (*seeRoughNode)(const Node& node, const glm::vec3& direction, RoughSight& sight);
   // Draws patches in this order, all of one face after those of another.
   void (*draw)(const PacketCanvas& canvas, const Patch* patches,

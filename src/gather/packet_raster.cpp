@@ -134,13 +134,14 @@ void PacketRaster::addNode(const Node& node) {
   float round_area = 0;
   if (!node.isFlat()) {
     kernel_.seeRoughNode(node, direction, seen);
-    round_area = (shows_fronts ? seen.area : 0) + (shows_backs ? seen.opposite_area : 0);
+    round_area = (shows_fronts ? seen.facing.front : 0) + (shows_backs ? seen.facing.back : 0);
     if (!(round_area > kLeastVisiblePart * node.area)) return;
   }
   Patch& patch = patches_.emplace_back();
   patch.position = node.position;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
+  patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   patch.shape = shapeOf(node);
   patch.area = node.area;
   patch.most_area = mostVisibleArea(node, direction);
@@ -150,12 +151,13 @@ void PacketRaster::addNode(const Node& node) {
     patch.facing_limit = sides == GatherSides::kBoth ? Patch::kDarkBack : Patch::kFrontOnly;
     if (!shows_fronts) patch.normal = -patch.normal;
   } else {
-    const SeenPart part = seenPart(node, to_node, {seen.area, seen.opposite_area}, sides);
+    const SeenPart part = seenPart(node, to_node, seen.facing, sides);
     patch.position += part.middle;
     patch.round_area = std::min(part.perspective * round_area, patch.most_area);
-    patch.radiosity = seen.power / round_area;
-    if (sides == GatherSides::kFront) patch.overlap = overlapOf(seen.area, seen.opposite_area);
-    if (sides == GatherSides::kBack) patch.overlap = overlapOf(seen.opposite_area, seen.area);
+    const auto [front, back] = seen.facing;
+    patch.radiosity = (front / round_area) * seen.radiosity;
+    if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
+    if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
     patch.facing_limit = Patch::kBothSides;
   }
   if (!shows_fronts) patch.radiosity = glm::vec3(0);
@@ -178,6 +180,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     patch.facing_limit = surfel.isSphere() || surfel.isTwoSided()     ? Patch::kBothSides
                          : rules_.quality.sides == GatherSides::kBoth ? Patch::kDarkBack
                                                                       : Patch::kFrontOnly;
+    const glm::vec3 to_surfel = surfel.position - view_.centre;
+    const float distance_sq =
+        std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
+    patch.reach =
+        layerReachOfDisk(patch.radius, glm::dot(to_surfel, surfel.normal) / std::sqrt(distance_sq));
     patch.soft_peak = softDiskPeak(patch.radius, surfel.area);
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =

@@ -82,7 +82,9 @@ void ReceiverRaster::addSurfel(const Surfel& stored) {
   Entry entry;
   entry.contribution = {};
   entry.contribution.distance_sq = distance_sq;
-  entry.contribution.radius = surfel.radius;
+  const float cosine_of_view = glm::dot(to_surfel, surfel.normal) /
+                               std::sqrt(std::max(distance_sq, std::numeric_limits<float>::min()));
+  entry.contribution.reach = layerReachOfDisk(surfel.radius, cosine_of_view);
   entry.near_index = std::int32_t(near_surfels_.size());
   near_surfels_.push_back(surfel);
   contributions_.push_back(entry);
@@ -163,8 +165,7 @@ GatherResult ReceiverRaster::finish() {
     const Entry& entry = contributions_[std::uint32_t(key)];
     const Contribution& patch = entry.contribution;
     const float distance = std::sqrt(patch.distance_sq);
-    const float reach = kLayerReach * patch.radius;
-    const DepthRange depth = {distance - reach, distance + reach,
+    const DepthRange depth = {distance - patch.reach, distance + patch.reach,
                               rules_.fades() ? fadeAt(distance, rules_) : 1};
     if (entry.near_index >= 0) {
       trace(near_surfels_[std::size_t(entry.near_index)], depth);

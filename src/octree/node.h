@@ -49,6 +49,10 @@ struct Node {
   // sum A (x - position) n^T over one-sided disks, row by row: where the fronts of each direction
   // lie. Zero in a flat node.
   std::array<glm::vec3, 3> front_moment;
+  // sum w (4 pi / 9) Y4m(n) over disks, w = A, or 2 A of two-sided ones: with shBand4(d) it gives
+  // sum w P4(d . n), what bands 0 to 2 do not tell of the fourth moment of d . n. Zero in a flat
+  // node.
+  ShCoefficients area_band_4;
 
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
@@ -58,7 +62,7 @@ struct Node {
     return values;
   }
 };
-static_assert(sizeof(Node) == 280);
+static_assert(sizeof(Node) == 312);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

@@ -33,11 +33,20 @@ float signedFractionOf(std::uint8_t code) { return float(int{code} - 128) * (1.f
 // Off the diagonal an entry is no more than half of the trace.
 constexpr float kMostShear = 0.5f;
 
+// Two-sided disks count twice: 8 pi / 9 times the greatest value of a basis function, Y40 = 0.846.
+constexpr float kMostBand4 = 2.4f;
+
+// Moment `k` of a rough node: the rows of its front moment, then band 4 of its area.
+template <typename NodeType>
+auto& roughMoment(NodeType& node, std::size_t k) {
+  return k < 9 ? node.front_moment[k / 3][static_cast<int>(k % 3)] : node.area_band_4[k - 9];
+}
+
 }  // namespace
 
 MomentColumns::MomentColumns(std::size_t count, std::size_t rough_count, bool full_precision)
     : count_(count), rough_count_(rough_count), full_precision_(full_precision) {
-  const std::size_t size = kCovariance * count + kFront * rough_count;
+  const std::size_t size = kCovariance * count + kRough * rough_count;
   if (full_precision) {
     floats_ = threadColumns<float>(size);
   } else {
@@ -50,8 +59,8 @@ void MomentColumns::add(const Node& node) {
     for (std::size_t k = 0; k < kCovariance; ++k) {
       floats_[covarianceAt(k)] = node.covariance.entries[k];
     }
-    for (std::size_t k = 0; k < kFront && !node.isFlat(); ++k) {
-      floats_[frontAt(k)] = node.front_moment[k / 3][static_cast<int>(k % 3)];
+    for (std::size_t k = 0; k < kRough && !node.isFlat(); ++k) {
+      floats_[roughAt(k)] = roughMoment(node, k);
     }
   } else {
     addCodes(node);
@@ -75,8 +84,10 @@ void MomentColumns::addCodes(const Node& node) {
   if (node.isFlat()) return;
   const float inverse = 1 / (node.area * node.radius);
   for (std::size_t k = 0; k < kFront; ++k) {
-    codes_[frontAt(k)] =
-        signedFractionCode(node.front_moment[k / 3][static_cast<int>(k % 3)] * inverse);
+    codes_[roughAt(k)] = signedFractionCode(roughMoment(node, k) * inverse);
+  }
+  for (std::size_t k = kFront; k < kRough; ++k) {
+    codes_[roughAt(k)] = signedFractionCode(roughMoment(node, k) / (kMostBand4 * node.area));
   }
 }
 
@@ -90,12 +101,13 @@ bool MomentColumns::get(PayloadReader& reader) {
 
 bool MomentColumns::take(Node& node) {
   node.front_moment = {};
+  node.area_band_4 = {};
   if (full_precision_) {
     for (std::size_t k = 0; k < kCovariance; ++k) {
       node.covariance.entries[k] = floats_[covarianceAt(k)];
     }
-    for (std::size_t k = 0; k < kFront && !node.isFlat(); ++k) {
-      node.front_moment[k / 3][static_cast<int>(k % 3)] = floats_[frontAt(k)];
+    for (std::size_t k = 0; k < kRough && !node.isFlat(); ++k) {
+      roughMoment(node, k) = floats_[roughAt(k)];
     }
   } else {
     takeCodes(node);
@@ -117,6 +129,9 @@ bool MomentColumns::take(Node& node) {
       if (!isWithin(row[column], largest)) return false;
     }
   }
+  for (const float value : node.area_band_4) {
+    if (!isWithin(value, kMostBand4 * node.area)) return false;
+  }
   return true;
 }
 
@@ -134,8 +149,10 @@ void MomentColumns::takeCodes(Node& node) const {
   if (node.isFlat()) return;
   const float scale = node.area * node.radius;
   for (std::size_t k = 0; k < kFront; ++k) {
-    node.front_moment[k / 3][static_cast<int>(k % 3)] =
-        scale * signedFractionOf(codes_[frontAt(k)]);
+    roughMoment(node, k) = scale * signedFractionOf(codes_[roughAt(k)]);
+  }
+  for (std::size_t k = kFront; k < kRough; ++k) {
+    roughMoment(node, k) = kMostBand4 * node.area * signedFractionOf(codes_[roughAt(k)]);
   }
 }
 

@@ -1,5 +1,5 @@
-// Columns of the moments of a page's nodes: covariances of all, and front moments of the rough
-// ones. docs/format.md, "Node-group page", has the bytes.
+// Columns of the moments of a page's nodes: covariances of all; front moments and band 4 of
+// the area of the rough ones. docs/format.md, "Node-group page", has the bytes.
 #pragma once
 
 #include <cstddef>
@@ -30,10 +30,11 @@ class MomentColumns {
 
  private:
   static constexpr std::size_t kCovariance = SymmetricMatrix::kEntries, kFront = 9;
+  static constexpr std::size_t kRough = kFront + kShCount;
 
-  // Entry of column `k` of the covariances, or of the front moments, of the node at hand.
+  // Entry of column `k` of the covariances, or of those of rough nodes, of the node at hand.
   std::size_t covarianceAt(std::size_t k) const { return k * count_ + next_; }
-  std::size_t frontAt(std::size_t k) const {
+  std::size_t roughAt(std::size_t k) const {
     return kCovariance * count_ + k * rough_count_ + next_rough_;
   }
   void addCodes(const Node& node);

@@ -46,6 +46,11 @@ void NodeSums::add(const Surfel& surfel) {
     const double lobe = bands[kShBand[i]] * double(basis[i]);
     for (int k = 0; k < 4; ++k) sh[i][k] += lobe * area_and_power[k];
   }
+  if (!surfel.isSphere()) {
+    const ShCoefficients fourth = shBand4(surfel.normal);
+    const double weight = a * (surfel.isTwoSided() ? 2 : 1) * (4 * double(kPi) / 9);
+    for (int i = 0; i < kShCount; ++i) band_4[i] += weight * double(fourth[i]);
+  }
   // Far from the origin a sum of position and radius rounds by more than the radius
   const glm::vec3 half = glm::abs(surfel.position) * 0x1p-23f + surfel.radius;
   disk_bounds.add(surfel.position - half);
@@ -107,6 +112,7 @@ void NodeSums::add(const NodeSums& child) {
   }
   for (int i = 0; i < kShCount; ++i) {
     for (int k = 0; k < 4; ++k) sh[i][k] += child.sh[i][k];
+    band_4[i] += child.band_4[i];
   }
   disk_bounds.add(child.disk_bounds);
 }
@@ -141,6 +147,7 @@ Node NodeSums::toNode(float flatness_limit) const {
   }
   for (int i = 0; i < kShCount; ++i) {
     for (int kind = 0; kind < kNodeShKinds; ++kind) node.sh[i][kind] = float(sh[i][kind]);
+    node.area_band_4[i] = float(band_4[i]);
   }
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {

@@ -23,8 +23,9 @@ struct NodeSums {
   double front_moment[3][3] = {};                        // sum A x n^T over one-sided disks
   double normal[3] = {};                                 // sum A n over one-sided disks
   double radiosity[3] = {};                              // sum A B
-  double sh[kShCount][4] = {};  // sum A K_l Y_lm(n) times 1, B_r, B_g and B_b
-  Bounds3 disk_bounds;          // boxes around every surfel's bounding sphere
+  double sh[kShCount][4] = {};   // sum A K_l Y_lm(n) times 1, B_r, B_g and B_b
+  double band_4[kShCount] = {};  // Node::area_band_4
+  Bounds3 disk_bounds;           // boxes around every surfel's bounding sphere
 
   void add(const Surfel& surfel);
   void add(const NodeSums& child);

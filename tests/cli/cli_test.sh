@@ -291,16 +291,16 @@ optionsOfTheirOwnWinOverThePreset() {
   makeScene 5000
   makePatch
   gatherPatch default
-  jsonIs default.json max_solid_angle 0.08 raster_resolution 12 near_field_radii 8 \
+  jsonIs default.json max_solid_angle 0.1 raster_resolution 14 near_field_radii 8 \
     far_field_parallax 0.3
   gatherPatch standard --quality standard
   sameBytes standard.ply default.ply
   gatherPatch draft --quality draft
-  jsonIs draft.json max_solid_angle 0.3 raster_resolution 12 near_field_radii 4 \
+  jsonIs draft.json max_solid_angle 0.2 raster_resolution 10 near_field_radii 4 \
     far_field_parallax 0.5
   differentBytes draft.ply default.ply
   gatherPatch final --quality final
-  jsonIs final.json max_solid_angle 0.03 raster_resolution 20 near_field_radii 16 \
+  jsonIs final.json max_solid_angle 0.025 raster_resolution 26 near_field_radii 16 \
     far_field_parallax 0.1
 
   # One, all, before and after; what is not given comes from the preset

@@ -44,6 +44,19 @@ TEST(SphericalHarmonics, BasisIsOrthonormal) {
   }
 }
 
+TEST(SphericalHarmonics, Band4IsOrthonormalAndApartFromBands0To2) {
+  for (int a = 0; a < kShCount; ++a) {
+    for (int b = 0; b < kShCount; ++b) {
+      const double dot = integrateSphere(
+          [&](glm::vec3 d) { return double(shBand4(d)[a]) * double(shBand4(d)[b]); });
+      EXPECT_NEAR(dot, a == b ? 1.0 : 0.0, 2e-4) << a << " " << b;
+      const double apart = integrateSphere(
+          [&](glm::vec3 d) { return double(shBand4(d)[a]) * double(shBasis(d)[b]); });
+      EXPECT_NEAR(apart, 0, 2e-4) << a << " " << b;
+    }
+  }
+}
+
 TEST(SphericalHarmonics, ZonalFactorsEqualTheIntegralsOfTheMemo) {
   expectProjection(kClampedCosine, [](double cosine) { return std::max(cosine, 0.0); });
   expectProjection(kAbsoluteCosine, [](double cosine) { return std::abs(cosine); });

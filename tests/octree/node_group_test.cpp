@@ -75,6 +75,7 @@ TEST_F(NodeGroupTest, FullPrecisionIsExact) {
     EXPECT_EQ(a.sh, b.sh);
     EXPECT_EQ(a.covariance.entries, b.covariance.entries);
     EXPECT_EQ(a.front_moment, b.front_moment);
+    EXPECT_EQ(a.area_band_4, b.area_band_4);
     // Pages count within the level of the children in the file, and through it afterwards
     EXPECT_EQ(b.page, a.isLeaf() ? a.page : a.page + first_page_[2]);
   }
@@ -120,6 +121,9 @@ TEST_F(NodeGroupTest, QuantizedMomentsAreClose) {
       EXPECT_NEAR(a.covariance.entries[k] / trace, b.covariance.entries[k] / b.covariance.trace(),
                   5e-3f);
     }
+    for (std::size_t k = 0; k < kShCount; ++k) {
+      EXPECT_NEAR(a.area_band_4[k], b.area_band_4[k], .012f * a.area);
+    }
     for (std::size_t row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
         EXPECT_NEAR(a.front_moment[row][column], b.front_moment[row][column],
@@ -130,11 +134,13 @@ TEST_F(NodeGroupTest, QuantizedMomentsAreClose) {
 }
 
 TEST_F(NodeGroupTest, DecodeRejectsMomentsOfNoSuchNode) {
-  for (const bool of_front : {false, true}) {
+  for (const int moment : {0, 1, 2}) {
     std::vector<LevelNode> nodes = someNodes(5);
     Node& node = nodes[1].node;
     ASSERT_FALSE(node.isFlat());
-    if (of_front) {
+    if (moment == 2) {
+      node.area_band_4[4] = 2.6f * node.area;
+    } else if (moment == 1) {
       node.front_moment[2].x = 1.1f * node.area * node.radius;
     } else {
       node.covariance.entries[4] = -1.1f * node.radius * node.radius;
@@ -220,6 +226,7 @@ TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
         for (const glm::vec3& row : node.front_moment) {
           ASSERT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
         }
+        for (const float value : node.area_band_4) ASSERT_TRUE(std::isfinite(value));
         for (int c = 0; c < 3; ++c) {
           ASSERT_TRUE(std::isfinite(node.position[c]) && node.radiosity[c] >= 0);
           for (const float k : node.coefficients(powerKind(c))) ASSERT_TRUE(std::isfinite(k));

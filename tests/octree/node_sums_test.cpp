@@ -91,10 +91,29 @@ TEST(NodeSums, ADiskLargerThanItsRadiusSpreadsNoFartherThanThat) {
   EXPECT_FLOAT_EQ(node.covariance(2, 2), 0);
 }
 
+TEST(NodeSums, Band4GivesTheFourthMomentOfTheNormals) {
+  const std::vector<Surfel> cloud = randomCloud(200);
+  const Node node = sumsOf(cloud).toNode(1);
+  TestRandom random(9);
+  for (int i = 0; i < 20; ++i) {
+    const glm::vec3 d = random.direction();
+    double expected = 0;
+    for (const Surfel& surfel : cloud) {
+      if (surfel.isSphere()) continue;
+      const double x = double(glm::dot(d, surfel.normal));
+      const double p4 = (35 * x * x * x * x - 30 * x * x + 3) / 8;
+      expected += double(surfel.area) * (surfel.isTwoSided() ? 2 : 1) * p4;
+    }
+    EXPECT_NEAR(double(shEvaluate(node.area_band_4, shBand4(d))), expected,
+                1e-5 * double(node.area));
+  }
+}
+
 TEST(NodeSums, AFlatNodeHasNoFrontMoment) {
   const Node node = sumsOf(planeCloud(8, .1f)).toNode(.97f);
   ASSERT_TRUE(node.isFlat());
   for (const glm::vec3& row : node.front_moment) EXPECT_EQ(row, glm::vec3(0));
+  for (const float value : node.area_band_4) EXPECT_EQ(value, 0);
 }
 
 }  // namespace
