@@ -319,7 +319,7 @@ optionsOfTheirOwnWinOverThePreset() {
   gatherPatch after --quality draft --raster-resolution 8
   gatherPatch before --raster-resolution 8 --quality draft
   for name in after before; do
-    jsonIs $name.json max_solid_angle 0.3 raster_resolution 8 near_field_radii 4 \
+    jsonIs $name.json max_solid_angle 0.2 raster_resolution 8 near_field_radii 4 \
       far_field_parallax 0.5
   done
   sameBytes after.ply before.ply
