@@ -327,7 +327,7 @@ optionsOfTheirOwnWinOverThePreset() {
 
   # No preset touches these
   local limits=(--max-dist 0.7 --sides both --bias 0.3)
-  gatherPatch own --max-solid-angle 0.3 --near-field 4 --far-parallax 0.5 "${limits[@]}"
+  gatherPatch own --max-solid-angle 0.2 --raster-resolution 10 --near-field 4 --far-parallax 0.5 "${limits[@]}"
   gatherPatch after --quality draft "${limits[@]}"
   gatherPatch before "${limits[@]}" --quality draft
   sameBytes after.ply own.ply
