@@ -129,11 +129,15 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 
 // No more than the outline of the sphere that holds all disks; of what is rough, no more than a
 // part of the ellipse that spreads as the node does, projected along the direction: what lies
-// behind each other shows once.
+// behind each other shows once. The covariance is stored in steps of 1/255 of its trace: that much
+// is added, lest a thin wire has no outline.
 float mostVisibleArea(const Node& node, const glm::vec3& direction) {
+  constexpr float kStep = 1.f / 255;
   const float most = std::min(node.area, kPi * node.radius * node.radius);
   if (node.isFlat()) return most;
-  const float determinant = quadraticForm(adjugate(node.covariance), direction);
+  SymmetricMatrix spread = node.covariance;
+  for (std::size_t i = 0; i < 3; ++i) spread.entries[i] += kStep * node.covariance.trace();
+  const float determinant = quadraticForm(adjugate(spread), direction);
   const float ellipse = 4 * kPi * std::sqrt(std::max(0.f, determinant));
   return std::min(most, kFilledOutline * ellipse);
 }

@@ -81,10 +81,10 @@ inline float softDiskPeak(float radius, float area) {
 }
 
 // A rough node covers at most this part of its outline, which is that of an ellipse with its
-// covariance: a ball covers 3/4 of that, a rectangle 0.95. (AO bias with .8, .88, 1: lion on a
+// covariance: a ball covers 3/4 of that, a rectangle 0.95. (AO bias with .8, .87, 1: lion on a
 // plane
 // -.0002, +.0017, +.0029; bunny -.0035, -.0027, -.0024; Sponza -.0039, -.0027, -.0023.)
-inline constexpr float kFilledOutline = 0.88f;
+inline constexpr float kFilledOutline = 0.87f;
 
 // What a rough node looks like from close by differs from its projected area by no more than this
 // part: beyond, first order says nothing.

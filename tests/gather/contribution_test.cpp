@@ -339,6 +339,20 @@ TEST(RoughNode, ShowsNoMoreThanAPartOfItsOutline) {
   EXPECT_NEAR(mostVisibleArea(node, {0, 1, 0}), kFilledOutline * kPi / 3, .02f);
 }
 
+TEST(RoughNode, OfAWireShowsAllThatFacesTheReceiver) {
+  // Eight sides of a wire of radius 1 / 200 along x; of its spread across a file keeps nothing
+  std::vector<glm::vec3> positions, normals;
+  for (int i = 0; i < 800; ++i) {
+    const float angle = float(i % 8) * kPi / 4;
+    normals.push_back({0, std::cos(angle), std::sin(angle)});
+    positions.push_back(glm::vec3(float(i / 8) / 100, 0, 0) + .005f * normals.back());
+  }
+  Node node = nodeOf(positions, normals);
+  node.area = 2 * kPi * .005f;
+  node.covariance = {{1 / 12.f, 0, 0, 0, 0, 0}};
+  EXPECT_GT(mostVisibleArea(node, {0, 0, 1}), .01f);
+}
+
 TEST(SurfelContribution, IsItsProjectedArea) {
   Surfel surfel;
   surfel.position = {0, 0, 2};
