@@ -16,7 +16,7 @@ struct SymmetricMatrix {
   // Where row i and column j are.
   static constexpr std::size_t kAt[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
 
-  std::array<float, kEntries> entries{};
+  std::array<float, kEntries> entries;
 
   float operator()(int row, int column) const { return entries[kAt[row][column]]; }
   float trace() const { return entries[0] + entries[1] + entries[2]; }

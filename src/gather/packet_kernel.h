@@ -26,9 +26,9 @@ namespace surfeit {
 struct Patch {
   glm::vec3 position{0};
   float radius = 0;
-  glm::vec3 normal{0};    // of a node: times its flatness; zero: looks round
-  SymmetricMatrix shape;  // how it spreads; RasterCube::Patch
-  float area = 0;         // all of it, whatever shows
+  glm::vec3 normal{0};      // of a node: times its flatness; zero: looks round
+  SymmetricMatrix shape{};  // how it spreads; RasterCube::Patch
+  float area = 0;           // all of it, whatever shows
   // The area that it shows: disk_area times the cosine, plus round_area, which everyone sees
   float disk_area = 0, round_area = 0;
   float most_area = 0;  // and no more than this

@@ -38,7 +38,7 @@ class SiblingSink {
 // them all. Rounding of the sums is made up for in the last digits.
 float reach(const glm::vec3& centre, const glm::vec3& at, float radius);
 
-// Open cells, at most one of a level. One thread at a time; 2 KiB for every level.
+// Open cells, at most one of a level. One thread at a time; 3 KiB for every level.
 class CellSweep {
  public:
   CellSweep(SiblingSink& sink, float flatness_limit)

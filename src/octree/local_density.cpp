@@ -41,20 +41,24 @@ struct Nearest {
 // A node to visit, by the least distance that its surfels can have.
 struct Candidate {
   float distance;
-  Node node;
+  NodeRange children;          // of a leaf: where its surfels begin
+  std::uint64_t surfel_count;  // of a leaf, else 0
 };
 
 float leastDistance(const glm::vec3& position, const Node& node) {
   return std::max(0.f, glm::length(node.position - position) - node.radius);
 }
 
-// Depth first, nearest child first; a visited range is copied because the reader may drop its page.
+// Depth first, nearest child first; what is needed of a visited range is copied because the reader
+// may drop its page.
 Status search(const glm::vec3& position, const NodeRange& range, PagedOctree::Reader& reader,
               Nearest& nearest) {
   SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(range));
   std::array<Candidate, 8> candidates;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    candidates[i] = {leastDistance(position, nodes[i]), nodes[i]};
+    const Node& node = nodes[i];
+    candidates[i] = {leastDistance(position, node), childrenOf(node),
+                     node.isLeaf() ? node.surfel_count : 0};
   }
   const std::span<Candidate> order = std::span(candidates).first(nodes.size());
   std::sort(order.begin(), order.end(),
@@ -62,16 +66,19 @@ Status search(const glm::vec3& position, const NodeRange& range, PagedOctree::Re
   for (const Candidate& candidate : order) {
     // Positions count, not disks; a slack of one part in a million covers rounding
     if (candidate.distance * candidate.distance > nearest.limit() * 1.000001f) break;
-    if (!candidate.node.isLeaf()) {
-      SURFEIT_RETURN_IF_ERROR(search(position, childrenOf(candidate.node), reader, nearest));
+    const NodeRange& below = candidate.children;
+    if (candidate.surfel_count == 0) {
+      SURFEIT_RETURN_IF_ERROR(search(position, below, reader, nearest));
       continue;
     }
-    SURFEIT_RETURN_IF_ERROR(reader.visitLeaf(candidate.node, [&](std::span<const Surfel> surfels) {
+    const auto visit = [&](std::span<const Surfel> surfels) {
       for (const Surfel& surfel : surfels) {
         const glm::vec3 d = surfel.position - position;
         nearest.add(glm::dot(d, d));
       }
-    }));
+    };
+    SURFEIT_RETURN_IF_ERROR(
+        reader.visitSurfels(below.page, below.first, candidate.surfel_count, visit));
   }
   return {};
 }

@@ -201,7 +201,7 @@ std::uint64_t buildOctreeBytes(const SlabForm& form, int threads) {
   // A slab has at most 2 * kBrickSurfels surfels, with their nodes and pages, in vectors that grow
   // by doubling; a thread fetches the surfels of one slab at a time
   constexpr double kSlack = 1.5;
-  constexpr double kQuantizedBytes = 20, kFullBytes = 60;
+  constexpr double kQuantizedBytes = 24, kFullBytes = 64;
   constexpr std::uint64_t kFetchBytes = 2 * kBrickSurfels * (sizeof(Surfel) + sizeof(CurveKey));
   const double surfel_bytes = form.nodesPerSurfel() * sizeof(LevelNode) +
                               (form.full_precision ? kFullBytes : kQuantizedBytes);

@@ -91,12 +91,16 @@ class PagedOctree {
     // Calls visit(std::span<const Surfel>) for the surfels of a leaf, page by page, in curve order.
     template <typename Visit>
     Status visitLeaf(const Node& leaf, Visit&& visit) {
-      std::uint32_t page = leaf.page;
-      std::uint32_t first = leaf.first;
-      for (std::uint64_t left = leaf.surfel_count; left > 0; ++page, first = 0) {
-        SURFEIT_ASSIGN_OR_RETURN(const std::span<const Surfel> run, surfels(page, first, left));
+      return visitSurfels(leaf.page, leaf.first, leaf.surfel_count, visit);
+    }
+    // The same of `count` surfels from index `first` of a page on, into the following pages.
+    template <typename Visit>
+    Status visitSurfels(std::uint32_t page, std::uint32_t first, std::uint64_t count,
+                        Visit&& visit) {
+      for (; count > 0; ++page, first = 0) {
+        SURFEIT_ASSIGN_OR_RETURN(const std::span<const Surfel> run, surfels(page, first, count));
         visit(run);
-        left -= run.size();
+        count -= run.size();
       }
       return {};
     }
