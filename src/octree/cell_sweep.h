@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "core/curve_key.h"
 #include "octree/node_group.h"
@@ -38,7 +39,8 @@ class SiblingSink {
 // them all. Rounding of the sums is made up for in the last digits.
 float reach(const glm::vec3& centre, const glm::vec3& at, float radius);
 
-// Open cells, at most one of a level. One thread at a time; 3 KiB for every level.
+// Open cells, at most one of a level; 3 KiB for every level. One thread at a time. Making one may
+// throw std::bad_alloc.
 class CellSweep {
  public:
   CellSweep(SiblingSink& sink, float flatness_limit)
@@ -65,7 +67,8 @@ class CellSweep {
 
   SiblingSink& sink_;
   const float flatness_limit_;
-  std::array<OpenCell, kCurveLevels + 1> cells_;  // levels rise
+  // Levels rise. Not within this object: 70 KiB are much for a stack.
+  std::vector<OpenCell> cells_ = std::vector<OpenCell>(kCurveLevels + 1);
   std::size_t depth_ = 0;
 };
 

@@ -20,7 +20,7 @@ sameSceneByEveryWay() {
   generate cloud.ply "$@"
   run 0 index cloud.ply -o expected.sft --quiet
   for threads in 1 2 5; do
-    for memory in 64M 256M 1G; do
+    for memory in 80M 256M 1G; do
       run 0 index cloud.ply -o scene.sft --memory "$memory" --threads "$threads" --quiet
       sameBytes scene.sft expected.sft
     done
