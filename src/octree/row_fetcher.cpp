@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <new>
 
 namespace surfeit {
 
@@ -21,16 +22,19 @@ RowFetcher::~RowFetcher() {
   thread_.join();
 }
 
-// No exception may leave the thread.
-Result<Bytes> RowFetcher::readRows(AlignedBuffer& buffer) {
+// No exception may leave the thread: not even that there is no memory for the text of another.
+void RowFetcher::run() {
   try {
-    return source_.readRows(max_rows_, buffer);
-  } catch (const std::exception& error) {
-    return Status::failed(source_.path() + ": " + error.what());
+    fetchRows();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    exception_ = std::current_exception();
+    ended_ = true;
+    changed_.notify_all();
   }
 }
 
-void RowFetcher::run() {
+void RowFetcher::fetchRows() {
   std::uint64_t record = 0;
   for (;;) {
     std::size_t slot = 0;
@@ -41,7 +45,7 @@ void RowFetcher::run() {
       slot = free_.back();
       free_.pop_back();
     }
-    const Result<Bytes> bytes = readRows(buffers_[slot]);
+    const Result<Bytes> bytes = source_.readRows(max_rows_, buffers_[slot]);
     const std::lock_guard lock(mutex_);
     if (!bytes.ok() || bytes->empty()) {
       status_ = bytes.status();
@@ -72,7 +76,14 @@ void RowFetcher::giveBack(const Rows& rows) {
 
 Status RowFetcher::status() const {
   const std::lock_guard lock(mutex_);
-  return status_;
+  if (exception_ == nullptr) return status_;
+  try {
+    std::rethrow_exception(exception_);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    return Status::failed(source_.path() + ": " + error.what());
+  }
 }
 
 }  // namespace surfeit

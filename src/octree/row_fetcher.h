@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -34,12 +35,12 @@ class RowFetcher {
   Rows next();
   // Frees the rows' buffer. From any thread.
   void giveBack(const Rows& rows);
-  // What ended the fetching, once next() gave nothing.
+  // What ended the fetching, once next() gave nothing. Throws std::bad_alloc, if that was it.
   Status status() const;
 
  private:
   void run();
-  Result<Bytes> readRows(AlignedBuffer& buffer);
+  void fetchRows();
 
   SurfelSource& source_;
   const std::size_t max_rows_;
@@ -50,6 +51,7 @@ class RowFetcher {
   std::vector<Rows> ready_;  // oldest first
   bool ended_ = false, stopping_ = false;
   Status status_;
+  std::exception_ptr exception_;  // of the thread
   std::thread thread_;
 };
 
