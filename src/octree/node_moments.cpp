@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "core/thread_scratch.h"
@@ -29,6 +30,11 @@ std::uint8_t signedFractionCode(float value) {
   return static_cast<std::uint8_t>(127 * std::clamp(value > -1 ? value : -1, -1.f, 1.f) + 128.5f);
 }
 float signedFractionOf(std::uint8_t code) { return float(int{code} - 128) * (1.f / 127); }
+
+// The largest front moment of a node; of clouds near the limits of all sizes it would be infinite.
+float mostFrontMoment(const Node& node) {
+  return std::min(node.area * node.radius, std::numeric_limits<float>::max());
+}
 
 // Off the diagonal an entry is no more than half of the trace.
 constexpr float kMostShear = 0.5f;
@@ -82,7 +88,7 @@ void MomentColumns::addCodes(const Node& node) {
     codes_[covarianceAt(k)] = signedFractionCode(covariance.entries[k] / (kMostShear * trace));
   }
   if (node.isFlat()) return;
-  const float inverse = 1 / (node.area * node.radius);
+  const float inverse = 1 / mostFrontMoment(node);
   for (std::size_t k = 0; k < kFront; ++k) {
     codes_[roughAt(k)] = signedFractionCode(roughMoment(node, k) * inverse);
   }
@@ -114,8 +120,8 @@ bool MomentColumns::take(Node& node) {
   }
   ++next_;
   next_rough_ += node.isFlat() ? 0 : 1;
-  const float radius_sq = node.radius * node.radius, largest = node.area * node.radius;
-  if (!std::isfinite(radius_sq) || !std::isfinite(largest)) return false;
+  const float radius_sq = node.radius * node.radius, largest = mostFrontMoment(node);
+  if (!std::isfinite(radius_sq)) return false;
   if (!full_precision_) return true;
 
   const auto isWithin = [](float value, float limit) {
@@ -147,7 +153,7 @@ void MomentColumns::takeCodes(Node& node) const {
     entries[k] = trace * kMostShear * signedFractionOf(codes_[covarianceAt(k)]);
   }
   if (node.isFlat()) return;
-  const float scale = node.area * node.radius;
+  const float scale = mostFrontMoment(node);
   for (std::size_t k = 0; k < kFront; ++k) {
     roughMoment(node, k) = scale * signedFractionOf(codes_[roughAt(k)]);
   }

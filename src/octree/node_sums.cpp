@@ -5,6 +5,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <limits>
 
 namespace surfeit {
 namespace {
@@ -151,8 +152,9 @@ Node NodeSums::toNode(float flatness_limit) const {
   }
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
-      node.front_moment[row][column] =
-          float(front_moment[row][column] - position[row] / area * normal[column]);
+      constexpr double kMost = std::numeric_limits<float>::max();
+      const double moment = front_moment[row][column] - position[row] / area * normal[column];
+      node.front_moment[row][column] = float(std::clamp(moment, -kMost, kMost));
     }
   }
   return node;

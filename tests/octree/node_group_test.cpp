@@ -133,6 +133,26 @@ TEST_F(NodeGroupTest, QuantizedMomentsAreClose) {
   }
 }
 
+TEST_F(NodeGroupTest, MomentsOfEnormousNodesStayNumbers) {
+  for (const PageForm& form : {kQuantized, kFull}) {
+    NodeSums sums;
+    for (Surfel surfel : moved(sphereCloud(2000), 1e12f, glm::vec3(0))) {
+      surfel.radiosity = glm::vec3(0);
+      surfel.area = 1e24f;
+      sums.add(surfel);
+    }
+    LevelNode node{sums.toNode(0.97f), 0};
+    node.node.radius = 1.1e12f;
+    std::vector<std::byte> payload;
+    encodeNodeGroup(std::span(&node, 1), form, payload);
+    const Result<std::uint32_t> count = decode(payload, form);
+    ASSERT_TRUE(count.ok()) << count.status().message();
+    for (const glm::vec3& row : found_[0].front_moment) {
+      EXPECT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
+    }
+  }
+}
+
 TEST_F(NodeGroupTest, DecodeRejectsMomentsOfNoSuchNode) {
   for (const int moment : {0, 1, 2}) {
     std::vector<LevelNode> nodes = someNodes(5);
