@@ -71,14 +71,15 @@ float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& bas
 // may show 1/3 or 0.58 of its area. Four moments bound it closely: with y = x^2, E y = s and E y^2
 // = q, the least E sqrt(y) has all y that are not 0 alike, at q / s, and the greatest has some at 1
 // and the rest alike (the principal representations of Chebyshev and Markov). Evenly spread normals
-// lie at 0.64 of the way, and so nearly everything does: over the rough nodes of Sponza areas are
-// 0.3 % too large and off by 2.4 % in the mean, where `projectedSum` gives 7.7 % too little and is
-// off by 10.8 %; of a city 2.7 and 5.0 %, instead of 7.9 and 14.6 %.
-FacingAreas facingAreas(float total, float mean, float mean_sq, float mean_fourth) {
+// lie at 0.64 of the way, and so nearly everything does. (Against the surfels below the rough nodes
+// of a cut in Sponza, by a probe that was not kept: areas 0.3 % too large and off by 2.4 % in the
+// mean, where `projectedSum` gives 7.7 % too little and is off by 10.8 %.)
+FacingAreas facingAreas(float total, float mean, float second, float fourth) {
   constexpr float kUpwards = 0.64f, kTiny = 1e-9f;
   const float inverse = 1 / total;
-  const float m = mean * inverse, s = std::clamp(mean_sq * inverse, 0.f, 1.f);
-  const float q = std::clamp(mean_fourth * inverse, s * s, s);
+  const float p2 = second * inverse, p4 = fourth * inverse;
+  const float m = mean * inverse, s = std::clamp((1 + 2 * p2) / 3, 0.f, 1.f);
+  const float q = std::clamp((7 + 20 * p2 + 8 * p4) / 35, s * s, s);
   const float least = s * std::sqrt(s / std::max(q, kTiny));
   const float at_one = (q - s * s) / std::max(1 - 2 * s + q, kTiny);
   const float rest_sq = (s - q) / std::max(1 - s, kTiny);
@@ -94,8 +95,7 @@ FacingAreas facingAreas(const Node& node, const glm::vec3& to_receiver) {
   const float mean = 2 * (c[1] * y[1] + c[2] * y[2] + c[3] * y[3]);
   const float second = 3.2f * (c[4] * y[4] + c[5] * y[5] + c[6] * y[6] + c[7] * y[7] + c[8] * y[8]);
   const float fourth = shEvaluate(node.area_band_4, shBand4(to_receiver));
-  return facingAreas(total, mean, (total + 2 * second) / 3,
-                     (7 * total + 20 * second + 8 * fourth) / 35);
+  return facingAreas(total, mean, second, fourth);
 }
 
 // Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,

@@ -51,10 +51,10 @@ struct FacingAreas {
   float front, back;
 };
 
-// With w_i the weights and x_i = d . n_i of the surfels of a node: sum w, sum w x, sum w x^2, sum w
-// x^4 to sum w max(x, 0) and sum w max(-x, 0). Exact when all |x| but those of 0 are alike, and for
-// evenly spread normals.
-FacingAreas facingAreas(float total, float mean, float mean_sq, float mean_fourth);
+// With w_i the weights and x_i = d . n_i of the surfels of a node: sum w, sum w x, sum w P2(x), sum
+// w P4(x) to sum w max(x, 0) and sum w max(-x, 0). Exact when all |x| but those of 0 are alike, and
+// for evenly spread normals.
+FacingAreas facingAreas(float total, float mean, float second, float fourth);
 // The same of a node in unit direction `to_receiver` from it.
 FacingAreas facingAreas(const Node& node, const glm::vec3& to_receiver);
 

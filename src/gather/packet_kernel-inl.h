@@ -66,8 +66,7 @@ void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sigh
   }
   const float total = total_of[kAreaKind], second = 3.2f * band_2_of[kAreaKind];
   const float fourth = shEvaluate(node.area_band_4, shBand4(-direction));
-  sight.facing = facingAreas(total, mean_of[kAreaKind], (total + 2 * second) / 3,
-                             (7 * total + 20 * second + 8 * fourth) / 35);
+  sight.facing = facingAreas(total, mean_of[kAreaKind], second, fourth);
   const float area = facing_of[kAreaKind];
   sight.radiosity = node.radiosity;
   if (area > kLeastVisiblePart * node.area) {

@@ -173,9 +173,9 @@ TEST(FacingAreas, AreNeverNegativeAndDifferByTheMean) {
 
 TEST(FacingAreas, OfDamagedMomentsAreNumbers) {
   for (const float total : {0.f, 1e-38f, 1.f}) {
-    for (const float mean_sq : {-1.f, 0.f, 1.f, 3.f}) {
-      for (const float mean_fourth : {-1.f, 0.f, .5f, 2.f}) {
-        const FacingAreas facing = facingAreas(total, 0, mean_sq * total, mean_fourth * total);
+    for (const float second : {-2.f, -.5f, 0.f, 1.f, 3.f}) {
+      for (const float fourth : {-2.f, -.4f, 0.f, 1.f, 3.f}) {
+        const FacingAreas facing = facingAreas(total, 0, second * total, fourth * total);
         EXPECT_TRUE(!(facing.front < 0) && !(facing.front > 1)) << total;
       }
     }

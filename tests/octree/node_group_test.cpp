@@ -45,6 +45,12 @@ class NodeGroupTest : public testing::Test {
     return decodeNodeGroup(payload, form, page, {first_page_, 10, 128, 512}, found_);
   }
 
+  Result<std::uint32_t> storeAndRead(std::span<const LevelNode> nodes, const PageForm& form) {
+    std::vector<std::byte> payload;
+    encodeNodeGroup(nodes, form, payload);
+    return decode(payload, form);
+  }
+
   static constexpr PageForm kQuantized = {}, kFull = {true};
   static constexpr PageForm kForms[] = {kQuantized, kFull, {false, true, true}, {true, true, true}};
 
@@ -83,9 +89,7 @@ TEST_F(NodeGroupTest, FullPrecisionIsExact) {
 
 TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
   const std::vector<LevelNode> nodes = someNodes(100);
-  std::vector<std::byte> payload;
-  encodeNodeGroup(nodes, kQuantized, payload);
-  ASSERT_TRUE(decode(payload, kQuantized).ok());
+  ASSERT_TRUE(storeAndRead(nodes, kQuantized).ok());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const Node& a = nodes[i].node;
     const Node& b = found_[i];
@@ -107,9 +111,7 @@ TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
 
 TEST_F(NodeGroupTest, QuantizedMomentsAreClose) {
   const std::vector<LevelNode> nodes = someNodes(100);
-  std::vector<std::byte> payload;
-  encodeNodeGroup(nodes, kQuantized, payload);
-  ASSERT_TRUE(decode(payload, kQuantized).ok());
+  ASSERT_TRUE(storeAndRead(nodes, kQuantized).ok());
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const Node& a = nodes[i].node;
     const Node& b = found_[i];
@@ -143,9 +145,7 @@ TEST_F(NodeGroupTest, MomentsOfEnormousNodesStayNumbers) {
     }
     LevelNode node{sums.toNode(0.97f), 0};
     node.node.radius = 1.1e12f;
-    std::vector<std::byte> payload;
-    encodeNodeGroup(std::span(&node, 1), form, payload);
-    const Result<std::uint32_t> count = decode(payload, form);
+    const Result<std::uint32_t> count = storeAndRead(std::span(&node, 1), form);
     ASSERT_TRUE(count.ok()) << count.status().message();
     for (const glm::vec3& row : found_[0].front_moment) {
       EXPECT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
@@ -165,9 +165,7 @@ TEST_F(NodeGroupTest, DecodeRejectsMomentsOfNoSuchNode) {
     } else {
       node.covariance.entries[4] = -1.1f * node.radius * node.radius;
     }
-    std::vector<std::byte> payload;
-    encodeNodeGroup(nodes, kFull, payload);
-    const Status status = decode(payload, kFull).status();
+    const Status status = storeAndRead(nodes, kFull).status();
     EXPECT_EQ(status.code(), StatusCode::kCorruption);
     EXPECT_NE(status.message().find("field moments"), std::string::npos) << status.message();
   }
