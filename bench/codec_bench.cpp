@@ -207,8 +207,8 @@ class Tree {
   }
 
   std::size_t addNode(const NodeSums& sums, int level, std::size_t child_count, std::size_t first) {
-    LevelNode node{sums.toNode(kFlatnessLimit), 0};
-    node.node.radius = radiusOfBox(node.node.position, sums.disk_bounds);
+    const float radius = radiusOfBox(sums.centre(), sums.disk_bounds);
+    LevelNode node{sums.toNode(kFlatnessLimit, radius), 0};
     node.node.child_count = static_cast<std::uint8_t>(child_count);
     if (child_count > 0) node.child_level = static_cast<std::uint8_t>(level + 1);
     const std::size_t capacity = child_count > 0 ? kNodeGroup : kSurfelGroup;
@@ -329,8 +329,8 @@ void measureSums(const SortedCloud& cloud, const Tree& tree) {
   });
   const double node_ns = timeOf(tree.nodeCount(), [&] {
     for (const NodeSums& sums : tree.sums()) {
-      const Node node = sums.toNode(kFlatnessLimit);
-      checksum += double(node.area + radiusOfBox(node.position, sums.disk_bounds));
+      const float radius = radiusOfBox(sums.centre(), sums.disk_bounds);
+      checksum += double(sums.toNode(kFlatnessLimit, radius).area);
     }
   });
   fmt::print("  sums     add surfel {:.1f}  add child {:.1f}  to node {:.1f} ns  (area {:g})\n",

@@ -9,22 +9,17 @@
 #include "gather/coverage_rules.h"
 
 namespace surfeit {
-namespace {
-
-// What a side of something flat shows, by the cosine of its front.
-float shownCosine(float cosine, GatherSides sides) {
+float shownArea(const FacingAreas& facing, GatherSides sides) {
   switch (sides) {
     case GatherSides::kBoth:
-      return std::abs(cosine);
+      return facing.front + facing.back;
     case GatherSides::kBack:
-      return std::max(0.f, -cosine);
+      return facing.back;
     case GatherSides::kFront:
       break;
   }
-  return std::max(0.f, cosine);
+  return facing.front;
 }
-
-}  // namespace
 
 Surfel withSides(const Surfel& surfel, GatherSides sides) {
   if (sides != GatherSides::kBack) return surfel;
@@ -90,12 +85,34 @@ FacingAreas facingAreas(float total, float mean, float second, float fourth) {
 
 // By bands, as in projectedSum: sum w P2(x) = 3.2 s2, and sum w P4(x) is what the node has.
 FacingAreas facingAreas(const Node& node, const glm::vec3& to_receiver) {
-  const ShCoefficients y = shBasis(to_receiver), c = node.coefficients(kAreaKind);
+  const ShCoefficients y = shBasis(to_receiver), c = node.rough.coefficients(kAreaKind);
   const float total = 4 * c[0] * y[0];
   const float mean = 2 * (c[1] * y[1] + c[2] * y[2] + c[3] * y[3]);
   const float second = 3.2f * (c[4] * y[4] + c[5] * y[5] + c[6] * y[6] + c[7] * y[7] + c[8] * y[8]);
-  const float fourth = shEvaluate(node.area_band_4, shBand4(to_receiver));
+  const float fourth = shEvaluate(node.rough.area_band_4, shBand4(to_receiver));
   return facingAreas(total, mean, second, fourth);
+}
+
+// The normals n_i of what curves a little have a mean shorter than 1. Their variance 1 - |n|^2 lies
+// in the two directions across it, half in each; x = d . n_i spread evenly over [m - r, m + r] has
+// the variance r^2 / 3.
+float normalRange(const Facet& facet) {
+  return std::sqrt(std::max(0.f, 1.5f * (1 - glm::dot(facet.normal, facet.normal))));
+}
+
+// As projectedSum: at the rim of a curved thing, a part of a piece faces the receiver whose mean
+// normal does not. (Without it, AO RMSE and bias of the bunny on a plane .0047 and -.0038, instead
+// of .0037 and -.0020.)
+FacingAreas facingAreas(const Facet& facet, const glm::vec3& to_receiver) {
+  const float m = glm::dot(facet.normal, to_receiver), range = normalRange(facet);
+  float front = std::max(m, 0.f);
+  if (std::abs(m) < range) front = (m + range) * (m + range) / (4 * range);
+  return {facet.area * front, facet.area * (front - m)};
+}
+
+Facet facetOf(const Node& node) {
+  return {node.position, node.radius,    node.flatness * node.normal,
+          node.area,     node.radiosity, node.covariance};
 }
 
 // Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,
@@ -113,7 +130,7 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
                   GatherSides sides) {
   const float both = facing.front + facing.back, distance = glm::length(to_node);
   const glm::vec3 v = -to_node / distance;
-  const auto& moment = node.front_moment;
+  const auto& moment = node.rough.front_moment;
   const glm::vec3 weighted(glm::dot(moment[0], v), glm::dot(moment[1], v), glm::dot(moment[2], v));
   const float trace = moment[0].x + moment[1].y + moment[2].z;
   float part = 1 / both;
@@ -134,7 +151,6 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 float mostVisibleArea(const Node& node, const glm::vec3& direction) {
   constexpr float kStep = 1.f / 255;
   const float most = std::min(node.area, kPi * node.radius * node.radius);
-  if (node.isFlat()) return most;
   SymmetricMatrix spread = node.covariance;
   for (std::size_t i = 0; i < 3; ++i) spread.entries[i] += kStep * node.covariance.trace();
   const float determinant = quadraticForm(adjugate(spread), direction);
@@ -142,11 +158,15 @@ float mostVisibleArea(const Node& node, const glm::vec3& direction) {
   return std::min(most, kFilledOutline * ellipse);
 }
 
-SymmetricMatrix shapeOf(const Node& node) {
-  const float trace = node.covariance.trace();
+float mostVisibleArea(const Facet& facet) {
+  return std::min(facet.area, kPi * facet.radius * facet.radius);
+}
+
+SymmetricMatrix shapeOf(const SymmetricMatrix& covariance) {
+  const float trace = covariance.trace();
   // Of the smallest surfels it may be zero
   if (!(trace >= std::numeric_limits<float>::min())) return withoutDirection(glm::vec3(0));
-  return (2 / trace) * node.covariance;
+  return (2 / trace) * covariance;
 }
 
 // The radiosity of what faces `to_receiver`: power over area by the same rule, and what that rule
@@ -154,66 +174,72 @@ SymmetricMatrix shapeOf(const Node& node) {
 glm::vec3 seenRadiosity(const Node& node, const glm::vec3& to_receiver) {
   const ShCoefficients basis = shBasis(to_receiver);
   float ignored;
-  const float area = projectedSum(node.coefficients(kAreaKind), basis, ignored);
+  const float area = projectedSum(node.rough.coefficients(kAreaKind), basis, ignored);
   if (!(area > kLeastVisiblePart * node.area)) return node.radiosity;
   glm::vec3 power;
   for (int channel = 0; channel < 3; ++channel) {
-    power[channel] = projectedSum(node.coefficients(powerKind(channel)), basis, ignored);
+    power[channel] = projectedSum(node.rough.coefficients(powerKind(channel)), basis, ignored);
   }
   return power / area;
 }
 
+bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const ContributionRules& rules,
+                      Contribution& contribution) {
+  const float distance_sq = glm::dot(to_facet, to_facet);
+  if (!(distance_sq > 0)) return false;
+  const glm::vec3 direction = to_facet / std::sqrt(distance_sq);
+  const FacingAreas facing = facingAreas(facet, -direction);
+  const float area = shownArea(facing, rules.sides);
+  if (!(area > 0)) return false;
+
+  contribution.distance_sq = distance_sq;
+  contribution.reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+  contribution.direction = direction;
+  contribution.solid_angle = std::min(area, mostVisibleArea(facet)) / distance_sq;
+  contribution.spread = facet.area / distance_sq;
+  contribution.overlap = 0;
+  contribution.normal = facet.normal;
+  contribution.shape = shapeOf(facet.covariance);
+  contribution.radiosity = rules.has_color && rules.sides != GatherSides::kBack
+                               ? (facing.front / area) * facet.radiosity
+                               : glm::vec3(0);
+  return contribution.solid_angle > 0;
+}
+
 bool makeContribution(const Node& node, const glm::vec3& to_node, const ContributionRules& rules,
                       Contribution& contribution) {
-  const glm::vec3 direction = glm::normalize(to_node);
+  if (node.isFlat()) return makeContribution(facetOf(node), to_node, rules, contribution);
 
   // Area that the receiver sees, and the radiosity of what of it sends light
-  float area = 0, front_area = 0, overlap = 0, perspective = 1;
-  glm::vec3 radiosity = node.radiosity, to_seen = to_node;
-  if (node.isFlat()) {
-    const float cosine = -node.flatness * glm::dot(direction, node.normal);
-    front_area = node.area * std::max(0.f, cosine);
-    area = node.area * shownCosine(cosine, rules.sides);
-    if (!(area > 0)) return false;
-  } else {
-    const FacingAreas facing = facingAreas(node, -direction);
-    front_area = facing.front;
-    switch (rules.sides) {
-      case GatherSides::kBoth:
-        area = facing.front + facing.back;
-        break;
-      case GatherSides::kBack:
-        area = facing.back;
-        overlap = overlapOf(facing.back, facing.front);
-        break;
-      case GatherSides::kFront:
-        area = facing.front;
-        overlap = overlapOf(facing.front, facing.back);
-        break;
-    }
-    if (!(area > kLeastVisiblePart * node.area)) return false;
-    const SeenPart seen = seenPart(node, to_node, facing, rules.sides);
-    to_seen += seen.middle;
-    perspective = seen.perspective;
-    if (rules.has_color) radiosity = seenRadiosity(node, -direction);
-  }
+  const glm::vec3 direction = glm::normalize(to_node);
+  const FacingAreas facing = facingAreas(node, -direction);
+  const float area = shownArea(facing, rules.sides);
+  if (!(area > kLeastVisiblePart * node.area)) return false;
+  const SeenPart seen = seenPart(node, to_node, facing, rules.sides);
+  const glm::vec3 to_seen = to_node + seen.middle;
+  const float distance_sq = glm::dot(to_seen, to_seen);
+  if (!(distance_sq > 0)) return false;
 
   // What exceeds the limit hides behind the rest. (Spheres and two-sided surfels count twice in
   // front plus back, which the limit of the area takes back head-on.)
-  const float visible_area = std::min(perspective * area, mostVisibleArea(node, direction));
-  const float distance_sq = glm::dot(to_seen, to_seen);
-  if (!(distance_sq > 0)) return false;
+  const float visible_area = std::min(seen.perspective * area, mostVisibleArea(node, direction));
   contribution.distance_sq = distance_sq;
   contribution.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   contribution.direction = to_seen / std::sqrt(distance_sq);
   contribution.solid_angle = visible_area / distance_sq;
   contribution.spread = node.area / distance_sq;
-  contribution.overlap = overlap;
+  contribution.overlap = 0;
+  if (rules.sides == GatherSides::kFront) {
+    contribution.overlap = overlapOf(facing.front, facing.back);
+  } else if (rules.sides == GatherSides::kBack) {
+    contribution.overlap = overlapOf(facing.back, facing.front);
+  }
   contribution.normal = node.flatness * node.normal;
-  contribution.shape = shapeOf(node);
-  contribution.radiosity = rules.has_color && rules.sides != GatherSides::kBack
-                               ? (front_area / area) * radiosity
-                               : glm::vec3(0);
+  contribution.shape = shapeOf(node.covariance);
+  contribution.radiosity = glm::vec3(0);
+  if (rules.has_color && rules.sides != GatherSides::kBack) {
+    contribution.radiosity = (facing.front / area) * seenRadiosity(node, -direction);
+  }
   return contribution.solid_angle > 0;
 }
 

@@ -46,10 +46,12 @@ Surfel withSides(const Surfel& surfel, GatherSides sides);
 float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& basis,
                    float& opposite);
 
-// Of a rough node, the projected area of what faces a receiver, and of what turns away.
+// The projected area of what faces a receiver, and of what turns away.
 struct FacingAreas {
   float front, back;
 };
+// What counts of them.
+float shownArea(const FacingAreas& facing, GatherSides sides);
 
 // With w_i the weights and x_i = d . n_i of the surfels of a node: sum w, sum w x, sum w P2(x), sum
 // w P4(x) to sum w max(x, 0) and sum w max(-x, 0). Exact when all |x| but those of 0 are alike, and
@@ -57,6 +59,14 @@ struct FacingAreas {
 FacingAreas facingAreas(float total, float mean, float second, float fourth);
 // The same of a node in unit direction `to_receiver` from it.
 FacingAreas facingAreas(const Node& node, const glm::vec3& to_receiver);
+
+// Those of something that is nearly flat.
+FacingAreas facingAreas(const Facet& facet, const glm::vec3& to_receiver);
+// Its normals spread by this much to either side of their mean, as cosines.
+float normalRange(const Facet& facet);
+
+// A flat node is one facet.
+Facet facetOf(const Node& node);
 
 // Radiosity of the fronts that face a receiver in unit direction `to_receiver` of a rough node.
 glm::vec3 seenRadiosity(const Node& node, const glm::vec3& to_receiver);
@@ -69,14 +79,22 @@ struct SeenPart {
 SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
                   GatherSides sides);
 
-// The largest area that a node may show in unit direction `direction` (or its opposite).
+// The largest area that a rough node may show in unit direction `direction` (or its opposite), and
+// a facet in any.
 float mostVisibleArea(const Node& node, const glm::vec3& direction);
+float mostVisibleArea(const Facet& facet);
 
-// How a node spreads, for RasterCube::Patch.
-SymmetricMatrix shapeOf(const Node& node);
+// How what has this covariance spreads, for RasterCube::Patch.
+SymmetricMatrix shapeOf(const SymmetricMatrix& covariance);
 
-// The patch of a node, or false when the receiver sees nothing of it. `to_node` leads from the
-// receiver to the node's position; the receiver must lie outside the node's radius.
+// The patch of a facet, or false when the receiver sees nothing of it. `to_facet` leads from the
+// receiver to its position.
+bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const ContributionRules& rules,
+                      Contribution& contribution);
+
+// The patch of a node that is rough or flat, or false when the receiver sees nothing of it.
+// `to_node` leads from the receiver to the node's position; the receiver must lie outside the
+// node's radius.
 bool makeContribution(const Node& node, const glm::vec3& to_node, const ContributionRules& rules,
                       Contribution& contribution);
 

@@ -9,13 +9,13 @@
 
 namespace surfeit {
 
-// How far before and behind its middle a contribution meets others of its layer: a little more than
+// How far before and behind its middle a contribution meets others of its layer: hardly more than
 // it extends, by its variance along the direction, so that tiles of one surface meet whether they
-// are seen head-on or aslant; and at least a part of its radius. Less tears surfaces apart (AO
-// RMSE and bias with a factor of 1: bunny .0043 and -.0032, instead of .0036 and -.0027), more
-// joins what is apart (1.6: spheres on a plane .0066 and +.0034, instead of .0060 and +.0027).
+// are seen head-on or aslant, and no rounding decides; and at least a part of its radius. Less
+// tears surfaces apart, more joins what is apart (AO RMSE and bias with 1.1 and 1 times as far:
+// bunny .0031 and -.0019, .0039 and -.0027; city .0061 and +.0034, .0058 and +.0028).
 inline float layerReach(float radius, float variance) {
-  constexpr float kLeastReach = 0.6f, kDepthReach = 1.2f;
+  constexpr float kLeastReach = 0.45f, kDepthReach = 1.05f;
   return std::max(kLeastReach * radius, kDepthReach * std::sqrt(std::max(0.f, 3 * variance)));
 }
 // Of a disk, seen at an angle with this cosine; of a sphere that of a disk along the direction.
@@ -28,12 +28,12 @@ inline float layerReachOfDisk(float radius, float cosine) {
 // filled: it is of a surface that goes on, and no silhouette. A pass fills none of what is left
 // open where the mean coverage of the pixels around is `begin`, and all of it from `end` on; the
 // second pass sees the pixels around as the first left them. Beginning earlier thickens
-// silhouettes, later leaves gaps. (AO bias from .75 on: spheres on a plane +.0066, Sponza -.0011;
-// from .85: +.0027 and -.0027; from .92: .0000 and -.0059.)
+// silhouettes, later leaves gaps. (AO bias from .845 on: spheres on a plane +.0042, bunny -.0013;
+// from .875: +.0030 and -.0015.)
 struct FillPass {
   float begin, end;
 };
-inline constexpr FillPass kFillPasses[] = {{0.845f, 0.95f}, {0.865f, 0.95f}};
+inline constexpr FillPass kFillPasses[] = {{0.89f, 0.95f}, {0.905f, 0.95f}};
 
 // A pixel is filled by a part that grows from 0 to 1 between these coverages of its own: what
 // covers little of it is a thing of its own, or an edge.

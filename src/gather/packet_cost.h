@@ -2,6 +2,7 @@
 // is near to any of its receivers, so scattered receivers are cheaper in narrow packets or alone.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -26,7 +27,7 @@ class PacketCost {
 
   // Starts over for a receiver here.
   void begin(const glm::vec3& position);
-  void node(const Node& node) { add(node, 1); }
+  void node(const Node& node) { add(node, float(std::max<int>(1, node.facet_count))); }
   void leaf(const Node& node) { add(node, float(node.surfel_count)); }
   void surfels(std::span<const Surfel>) {}
 

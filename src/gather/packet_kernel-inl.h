@@ -39,10 +39,10 @@ void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sigh
   alignas(16) std::array<float, kNodeShKinds> facing_of, total_of, mean_of, band_2_of;
   for (std::size_t kind = 0; kind < kNodeShKinds; kind += hn::Lanes(d4)) {
     const auto term = [&](std::size_t i) {
-      return hn::Mul(hn::LoadU(d4, node.sh[i].data() + kind), hn::Set(d4, basis[i]));
+      return hn::Mul(hn::LoadU(d4, node.rough.sh[i].data() + kind), hn::Set(d4, basis[i]));
     };
     const auto plus = [&](auto sum, std::size_t i) {
-      return hn::MulAdd(hn::LoadU(d4, node.sh[i].data() + kind), hn::Set(d4, basis[i]), sum);
+      return hn::MulAdd(hn::LoadU(d4, node.rough.sh[i].data() + kind), hn::Set(d4, basis[i]), sum);
     };
     const auto zero = hn::Zero(d4);
     const auto band_1 = plus(plus(term(1), 2), 3);
@@ -65,7 +65,7 @@ void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sigh
     hn::Store(band_2, d4, band_2_of.data() + kind);
   }
   const float total = total_of[kAreaKind], second = 3.2f * band_2_of[kAreaKind];
-  const float fourth = shEvaluate(node.area_band_4, shBand4(-direction));
+  const float fourth = shEvaluate(node.rough.area_band_4, shBand4(-direction));
   sight.facing = facingAreas(total, mean_of[kAreaKind], second, fourth);
   const float area = facing_of[kAreaKind];
   sight.radiosity = node.radiosity;

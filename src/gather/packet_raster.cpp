@@ -127,40 +127,64 @@ void PacketRaster::orderLastPatch() {
 }
 
 void PacketRaster::addNode(const Node& node) {
-  RoughSight seen{};
+  if (node.isRough()) return addRoughNode(node);
+  if (node.isFlat()) return addFacet(facetOf(node));
+  for (std::size_t i = 0; i < node.facet_count; ++i) addFacet(node.facet(i));
+}
+
+void PacketRaster::addFacet(const Facet& facet) {
   const GatherSides sides = rules_.quality.sides;
-  const bool shows_fronts = sides != GatherSides::kBack, shows_backs = sides != GatherSides::kFront;
-  const glm::vec3 to_node = node.position - view_.centre, direction = glm::normalize(to_node);
-  float round_area = 0;
-  if (!node.isFlat()) {
-    kernel_.seeRoughNode(node, direction, seen);
-    round_area = (shows_fronts ? seen.facing.front : 0) + (shows_backs ? seen.facing.back : 0);
-    if (!(round_area > kLeastVisiblePart * node.area)) return;
-  }
+  const glm::vec3 to_facet = facet.position - view_.centre;
+  const float distance = glm::length(to_facet);
+  const glm::vec3 direction = to_facet / distance;
+  const float range = normalRange(facet), cosine = -glm::dot(direction, facet.normal);
+  const float side = sides == GatherSides::kBack ? -1.f : 1.f;
+  if (sides != GatherSides::kBoth && side * cosine < -range - view_.radius / distance) return;
+
   Patch& patch = patches_.emplace_back();
-  patch.position = node.position;
+  patch.position = facet.position;
+  patch.radius = facet.radius;
+  patch.normal = side * facet.normal;
+  patch.reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+  patch.shape = shapeOf(facet.covariance);
+  patch.area = facet.area;
+  patch.most_area = mostVisibleArea(facet);
+  if (sides != GatherSides::kBack) patch.radiosity = facet.radiosity;
+  if (std::abs(cosine) >= range) {
+    patch.disk_area = facet.area;
+    patch.facing_limit = sides == GatherSides::kBoth ? Patch::kDarkBack : Patch::kFrontOnly;
+  } else {
+    // At the rim of something curved all lanes see as much as the centre
+    const FacingAreas facing = facingAreas(facet, -direction);
+    patch.round_area = shownArea(facing, sides);
+    patch.radiosity *= facing.front / patch.round_area;
+    patch.facing_limit = Patch::kBothSides;
+  }
+  orderLastPatch();
+}
+
+void PacketRaster::addRoughNode(const Node& node) {
+  RoughSight seen;
+  const GatherSides sides = rules_.quality.sides;
+  const glm::vec3 to_node = node.position - view_.centre, direction = glm::normalize(to_node);
+  kernel_.seeRoughNode(node, direction, seen);
+  const float round_area = shownArea(seen.facing, sides);
+  if (!(round_area > kLeastVisiblePart * node.area)) return;
+  const SeenPart part = seenPart(node, to_node, seen.facing, sides);
+  Patch& patch = patches_.emplace_back();
+  patch.position = node.position + part.middle;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
   patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
-  patch.shape = shapeOf(node);
+  patch.shape = shapeOf(node.covariance);
   patch.area = node.area;
   patch.most_area = mostVisibleArea(node, direction);
-  if (node.isFlat()) {
-    patch.disk_area = node.area;
-    patch.radiosity = node.radiosity;
-    patch.facing_limit = sides == GatherSides::kBoth ? Patch::kDarkBack : Patch::kFrontOnly;
-    if (!shows_fronts) patch.normal = -patch.normal;
-  } else {
-    const SeenPart part = seenPart(node, to_node, seen.facing, sides);
-    patch.position += part.middle;
-    patch.round_area = std::min(part.perspective * round_area, patch.most_area);
-    const auto [front, back] = seen.facing;
-    patch.radiosity = (front / round_area) * seen.radiosity;
-    if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
-    if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
-    patch.facing_limit = Patch::kBothSides;
-  }
-  if (!shows_fronts) patch.radiosity = glm::vec3(0);
+  patch.round_area = std::min(part.perspective * round_area, patch.most_area);
+  const auto [front, back] = seen.facing;
+  if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
+  if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
+  if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
+  patch.facing_limit = Patch::kBothSides;
   orderLastPatch();
 }
 

@@ -63,6 +63,8 @@ class PacketRaster {
   static std::size_t memoryBytes(const GatherRules& rules);
 
  private:
+  void addFacet(const Facet& facet);
+  void addRoughNode(const Node& node);
   void orderLastPatch();
   PacketCanvas canvas() const;
 

@@ -38,9 +38,15 @@ void ReceiverRaster::begin(const Receiver& receiver) {
 }
 
 void ReceiverRaster::addNode(const Node& node) {
-  const glm::vec3 to_node = node.position - receiver_.position;
+  if (!node.hasFacets()) return addPatch(node);
+  for (std::size_t i = 0; i < node.facet_count; ++i) addPatch(node.facet(i));
+}
+
+template <typename NodeOrFacet>
+void ReceiverRaster::addPatch(const NodeOrFacet& source) {
+  const glm::vec3 to_source = source.position - receiver_.position;
   Entry entry;
-  if (!makeContribution(node, to_node, contribution_rules_, entry.contribution)) return;
+  if (!makeContribution(source, to_source, contribution_rules_, entry.contribution)) return;
   if (!(heightAboveHorizon(receiver_, entry.contribution.direction) > 0)) return;
   if (!(entry.contribution.distance_sq <= max_distance_sq_)) return;
   contributions_.push_back(entry);

@@ -57,6 +57,8 @@ class ReceiverRaster {
     Contribution contribution;     // near surfels: distance and radius, the rest is zero
     std::int32_t near_index = -1;  // in near_surfels_, or -1
   };
+  template <typename NodeOrFacet>
+  void addPatch(const NodeOrFacet& source);
   void sortByDistance();
   bool isLessContent(const Entry& a, const Entry& b) const;
   float rayBias(const Surfel& surfel) const;

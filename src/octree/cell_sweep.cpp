@@ -37,14 +37,14 @@ void CellSweep::close(const OpenCell& cell, FinishedNode& parent) {
   const std::span<const LevelNode> children = std::span(cell.children).first(cell.child_count);
   const GroupPlace place = sink_.addSiblings(cell.level + 1, children);
   parent.sums = cell.sums;
-  Node& node = parent.node.node;
-  node = cell.sums.toNode(flatness_limit_);
+  const glm::vec3 centre = cell.sums.centre();
+  float radius = 0;
   for (const LevelNode& child : children) {
-    node.radius =
-        std::max(node.radius, reach(node.position, child.node.position, child.node.radius));
+    radius = std::max(radius, reach(centre, child.node.position, child.node.radius));
   }
-  node.radius =
-      std::min(node.radius, radiusOfBox(node.position, cell.sums.disk_bounds) * 1.000001f);
+  radius = std::min(radius, radiusOfBox(centre, cell.sums.disk_bounds) * 1.000001f);
+  Node& node = parent.node.node;
+  node = cell.sums.toNode(flatness_limit_, radius);
   node.page = place.page;
   node.first = place.first;
   node.child_count = cell.child_count;

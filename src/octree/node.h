@@ -8,22 +8,42 @@
 
 #include "core/spherical_harmonics.h"
 #include "core/symmetric_matrix.h"
+#include "octree/node_facet.h"
 
 namespace surfeit {
 
 // What a node is beyond its numbers.
 enum NodeFlags : std::uint8_t {
   // Flat: |sum A n| / sum A above the file's flatness limit. Drawn as one disk (mean normal, summed
-  // area); its coefficients are not stored and are zero here. Order-2 harmonics ring on flat
-  // clusters, one disk is wrong for rough ones.
+  // area). Order-2 harmonics ring on flat clusters, one disk is wrong for rough ones.
   kNodeFlat = 1u << 0,
 };
 
-// What coefficients a rough node has: of its projected area, and of its projected power in red,
-// green and blue (memo 3.2).
+// A node that is neither flat nor made of a few facets is rough: it is drawn as what its harmonics
+// and moments tell. What coefficients it has: of its projected area, and of its projected power in
+// red, green and blue (memo 3.2).
 inline constexpr int kNodeShKinds = 4;
 inline constexpr int kAreaKind = 0;
 inline constexpr int powerKind(int channel) { return channel + 1; }
+
+// What a rough node knows of how its surfels face.
+struct RoughNode {
+  // By coefficient, then by kind: kAreaKind, and a kind per color. Side by side, so that a gather
+  // evaluates all kinds at once.
+  std::array<std::array<float, kNodeShKinds>, kShCount> sh;
+  // sum A (x - position) n^T over one-sided disks, row by row: where the fronts of each direction
+  // lie.
+  std::array<glm::vec3, 3> front_moment;
+  // sum w (4 pi / 9) Y4m(n) over disks, w = A, or 2 A of two-sided ones: with shBand4(d) it gives
+  // sum w P4(d . n), what bands 0 to 2 do not tell of the fourth moment of d . n.
+  ShCoefficients area_band_4;
+
+  ShCoefficients coefficients(int kind) const {
+    ShCoefficients values;
+    for (int i = 0; i < kShCount; ++i) values[i] = sh[i][kind];
+    return values;
+  }
+};
 
 // A cluster of surfels: one octree cell, single-child levels skipped.
 struct Node {
@@ -38,31 +58,24 @@ struct Node {
   std::uint8_t child_count;    // 0: a leaf
   std::uint8_t flags;          // NodeFlags
   std::uint64_t surfel_count;  // below this node; those of a leaf may run on into following pages
-  // By coefficient, then by kind: kAreaKind, and a kind per color. Side by side, so that a gather
-  // evaluates all kinds at once.
-  std::array<std::array<float, kNodeShKinds>, kShCount> sh;
   std::uint64_t
       groups;  // set of those of the surfels below; group 0 alone in scenes without groups
   // Area-weighted mean of (x - position)(x - position)^T over the disks, not only their middles:
   // how the area spreads. Trace above 0 and at most about radius^2.
   SymmetricMatrix covariance;
-  // sum A (x - position) n^T over one-sided disks, row by row: where the fronts of each direction
-  // lie. Zero in a flat node.
-  std::array<glm::vec3, 3> front_moment;
-  // sum w (4 pi / 9) Y4m(n) over disks, w = A, or 2 A of two-sided ones: with shBand4(d) it gives
-  // sum w P4(d . n), what bands 0 to 2 do not tell of the fourth moment of d . n. Zero in a flat
-  // node.
-  ShCoefficients area_band_4;
+  std::uint8_t facet_count;  // 0: it is flat or rough
+  union {
+    RoughNode rough;  // without facets; zero in a flat node
+    std::array<NodeFacet, kMostFacets> facets;
+  };
 
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
-  ShCoefficients coefficients(int kind) const {
-    ShCoefficients values;
-    for (int i = 0; i < kShCount; ++i) values[i] = sh[i][kind];
-    return values;
-  }
+  bool hasFacets() const { return facet_count > 0; }
+  bool isRough() const { return !isFlat() && !hasFacets(); }
+  Facet facet(std::size_t i) const { return facets[i].decode(position, radius, area); }
 };
-static_assert(sizeof(Node) == 312);
+static_assert(sizeof(Node) == 320);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

@@ -10,6 +10,7 @@
 #include "core/curve_key.h"
 #include "core/thread_scratch.h"
 #include "octree/column_codec.h"
+#include "octree/facet_columns.h"
 #include "octree/node_moments.h"
 #include "surfeit/surfel.h"
 
@@ -96,6 +97,8 @@ class Columns {
       node.flatness = flatness[i];
       node.child_count = child_count[i];
       node.flags = flags[i];
+      node.facet_count = 0;
+      node.rough = {};
       node.surfel_count = surfel_count[i];
       node.groups = has_groups ? groups[i] : groupBit(0);
     }
@@ -211,7 +214,7 @@ Status checkNodes(std::span<const Node> nodes) {
 }
 
 std::size_t countRough(std::span<const Node> nodes) {
-  const auto isRough = [](const Node& node) { return !node.isFlat(); };
+  const auto isRough = [](const Node& node) { return node.isRough(); };
   return static_cast<std::size_t>(std::count_if(nodes.begin(), nodes.end(), isRough));
 }
 
@@ -224,31 +227,32 @@ Status decodeMoments(PayloadReader& reader, bool full_precision, std::span<Node>
   return {};
 }
 
-// Harmonics of the nodes that are not flat; zeros for the others.
+// Harmonics of rough nodes, and the radiosities of facets amid them.
 Status decodeCoefficients(PayloadReader& reader, bool full_precision, std::span<Node> nodes) {
   const std::size_t rough = countRough(nodes);
   const auto floats = coefficientColumns<float>(rough);
   const auto codes = coefficientColumns<std::int16_t>(rough);
   for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
+    if (kind == kAreaKind + 1 && !FacetColumns::getRadiosity(reader, nodes)) {
+      return damaged("facet radiosity");
+    }
     if (!(full_precision ? getFloats(reader, floats[kind])
                          : getSmallIntegers(reader, codes[kind]))) {
       return damaged("coefficients");
     }
     std::size_t next = 0;
     for (Node& node : nodes) {
-      if (node.isFlat()) {
-        for (std::size_t i = 0; i < kShCount; ++i) node.sh[i][kind] = 0;
-        continue;
-      }
+      if (!node.isRough()) continue;
+      auto& sh = node.rough.sh;
       if (full_precision) {
-        for (std::size_t i = 0; i < kShCount; ++i) node.sh[i][kind] = floats[kind][next + i];
+        for (std::size_t i = 0; i < kShCount; ++i) sh[i][kind] = floats[kind][next + i];
       } else {
         const float scale = coefficientScale(node, kind) * (kCoefficientLimit / 32767);
         for (std::size_t i = 0; i < kShCount; ++i) {
           // Each kind is stored as what it differs from the one before
           std::int16_t& code = codes[kind][next + i];
           if (kind > 0) code = static_cast<std::int16_t>(code + codes[kind - 1][next + i]);
-          node.sh[i][kind] = float(code) * scale;
+          sh[i][kind] = float(code) * scale;
         }
       }
       next += kShCount;
@@ -264,7 +268,7 @@ void encodeKind(std::span<const Node* const> rough, std::size_t kind, bool full_
   if (full_precision) {
     const std::span<float> values = coefficientColumns<float>(rough.size())[kind];
     for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = rough[i / kShCount]->sh[i % kShCount][kind];
+      values[i] = rough[i / kShCount]->rough.sh[i % kShCount][kind];
     }
     return putFloats(writer, values);
   }
@@ -274,7 +278,7 @@ void encodeKind(std::span<const Node* const> rough, std::size_t kind, bool full_
     const float scale = coefficientScale(*node, kind);
     const float inverse = scale >= std::numeric_limits<float>::min() ? 1 / scale : 0;
     for (std::size_t i = 0; i < kShCount; ++i, ++next) {
-      const std::int16_t code = signedCode(node->sh[i][kind] * inverse, kCoefficientLimit);
+      const std::int16_t code = signedCode(node->rough.sh[i][kind] * inverse, kCoefficientLimit);
       codes[next] = static_cast<std::int16_t>(code - before[next]);
       before[next] = code;
     }
@@ -293,7 +297,7 @@ struct RoughNodes {
     codes.clear();
   }
   void add(const Node& node) {
-    if (node.isFlat()) return;
+    if (!node.isRough()) return;
     nodes.push_back(&node);
     codes.resize(codes.size() + kShCount);
   }
@@ -326,12 +330,18 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   putCounts(writer, columns.first);
   putCounts(writer, columns.surfel_count);
   if (form.has_groups) putCounts(writer, columns.groups);
+  FacetColumns facets;
   RoughNodes rough;
-  for (const LevelNode& node : nodes) rough.add(node.node);
+  for (const LevelNode& node : nodes) {
+    facets.add(node.node);
+    rough.add(node.node);
+  }
+  facets.put(writer);
   MomentColumns moments(nodes.size(), rough.nodes.size(), full_precision);
   for (const LevelNode& node : nodes) moments.add(node.node);
   moments.put(writer);
   for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
+    if (kind == kAreaKind + 1) facets.putRadiosity(writer, full_precision);
     encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
   }
   return writer.finish();
@@ -359,6 +369,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
     SURFEIT_RETURN_IF_ERROR(resolveReference(limits, level, columns.child_level[i], columns.page[i],
                                              columns.first[i], out[i]));
   }
+  if (!FacetColumns::get(reader, out)) return damaged("facets");
   SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
   SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
   if (reader.remaining() != 0) {
@@ -390,9 +401,14 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
   const PayloadReader references = reader;
   SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
 
-  // Moments and the projected area stay; power is stored relative to the codes of that
+  // Facets, moments and the projected area stay; power is stored relative to the codes of that
+  FacetColumns facets;
   RoughNodes rough;
-  for (const Node& node : nodes) rough.add(node);
+  for (const Node& node : nodes) {
+    facets.add(node);
+    rough.add(node);
+  }
+  if (!facets.pass(reader)) return damaged("facets");
   if (!MomentColumns(nodes.size(), rough.nodes.size(), full_precision).get(reader)) {
     return damaged("moments");
   }
@@ -401,6 +417,7 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
                      : getSmallIntegers(reader, rough.codes);
   if (!has_area) return damaged("coefficients");
   copyTaken(references, reader, writer);
+  facets.putRadiosity(writer, full_precision);
   for (std::size_t kind = kAreaKind + 1; kind < kCoefficientKinds; ++kind) {
     encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
   }

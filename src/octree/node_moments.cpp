@@ -7,6 +7,7 @@
 
 #include "core/thread_scratch.h"
 #include "octree/column_codec.h"
+#include "octree/moment_codes.h"
 
 namespace surfeit {
 namespace {
@@ -21,23 +22,10 @@ std::span<T> threadColumns(std::size_t size) {
   return std::span(values).first(size);
 }
 
-// 0..1, and -1..1 with 0 exact, as a byte. What is outside, and NaN, becomes an end.
-std::uint8_t fractionCode(float value) {
-  return static_cast<std::uint8_t>(255 * std::clamp(value > 0 ? value : 0, 0.f, 1.f) + 0.5f);
-}
-float fractionOf(std::uint8_t code) { return float(code) * (1.f / 255); }
-std::uint8_t signedFractionCode(float value) {
-  return static_cast<std::uint8_t>(127 * std::clamp(value > -1 ? value : -1, -1.f, 1.f) + 128.5f);
-}
-float signedFractionOf(std::uint8_t code) { return float(int{code} - 128) * (1.f / 127); }
-
 // The largest front moment of a node; of clouds near the limits of all sizes it would be infinite.
 float mostFrontMoment(const Node& node) {
   return std::min(node.area * node.radius, std::numeric_limits<float>::max());
 }
-
-// Off the diagonal an entry is no more than half of the trace.
-constexpr float kMostShear = 0.5f;
 
 // Two-sided disks count twice: 8 pi / 9 times the greatest value of a basis function, Y40 = 0.846.
 constexpr float kMostBand4 = 2.4f;
@@ -45,7 +33,8 @@ constexpr float kMostBand4 = 2.4f;
 // Moment `k` of a rough node: the rows of its front moment, then band 4 of its area.
 template <typename NodeType>
 auto& roughMoment(NodeType& node, std::size_t k) {
-  return k < 9 ? node.front_moment[k / 3][static_cast<int>(k % 3)] : node.area_band_4[k - 9];
+  return k < 9 ? node.rough.front_moment[k / 3][static_cast<int>(k % 3)]
+               : node.rough.area_band_4[k - 9];
 }
 
 }  // namespace
@@ -65,29 +54,21 @@ void MomentColumns::add(const Node& node) {
     for (std::size_t k = 0; k < kCovariance; ++k) {
       floats_[covarianceAt(k)] = node.covariance.entries[k];
     }
-    for (std::size_t k = 0; k < kRough && !node.isFlat(); ++k) {
+    for (std::size_t k = 0; k < kRough && node.isRough(); ++k) {
       floats_[roughAt(k)] = roughMoment(node, k);
     }
   } else {
     addCodes(node);
   }
   ++next_;
-  next_rough_ += node.isFlat() ? 0 : 1;
+  next_rough_ += node.isRough() ? 1 : 0;
 }
 
-// A covariance is the root of its trace over the radius, and its entries over the trace; zz follows
-// from the others. A front moment is over area times radius.
+// A front moment is over area times radius.
 void MomentColumns::addCodes(const Node& node) {
-  const SymmetricMatrix& covariance = node.covariance;
-  const float trace = covariance.trace();
-  codes_[covarianceAt(0)] = fractionCode(std::sqrt(trace) / node.radius);
-  for (std::size_t k = 0; k < 2; ++k) {
-    codes_[covarianceAt(1 + k)] = fractionCode(covariance.entries[k] / trace);
-  }
-  for (std::size_t k = 3; k < kCovariance; ++k) {
-    codes_[covarianceAt(k)] = signedFractionCode(covariance.entries[k] / (kMostShear * trace));
-  }
-  if (node.isFlat()) return;
+  const CovarianceCodes covariance = covarianceCodes(node.covariance, node.radius);
+  for (std::size_t k = 0; k < kCovariance; ++k) codes_[covarianceAt(k)] = covariance[k];
+  if (!node.isRough()) return;
   const float inverse = 1 / mostFrontMoment(node);
   for (std::size_t k = 0; k < kFront; ++k) {
     codes_[roughAt(k)] = signedFractionCode(roughMoment(node, k) * inverse);
@@ -106,20 +87,18 @@ bool MomentColumns::get(PayloadReader& reader) {
 }
 
 bool MomentColumns::take(Node& node) {
-  node.front_moment = {};
-  node.area_band_4 = {};
   if (full_precision_) {
     for (std::size_t k = 0; k < kCovariance; ++k) {
       node.covariance.entries[k] = floats_[covarianceAt(k)];
     }
-    for (std::size_t k = 0; k < kRough && !node.isFlat(); ++k) {
+    for (std::size_t k = 0; k < kRough && node.isRough(); ++k) {
       roughMoment(node, k) = floats_[roughAt(k)];
     }
   } else {
     takeCodes(node);
   }
   ++next_;
-  next_rough_ += node.isFlat() ? 0 : 1;
+  next_rough_ += node.isRough() ? 1 : 0;
   const float radius_sq = node.radius * node.radius, largest = mostFrontMoment(node);
   if (!std::isfinite(radius_sq)) return false;
   if (!full_precision_) return true;
@@ -130,29 +109,23 @@ bool MomentColumns::take(Node& node) {
   for (const float entry : node.covariance.entries) {
     if (!isWithin(entry, radius_sq)) return false;
   }
-  for (const glm::vec3& row : node.front_moment) {
+  if (!node.isRough()) return true;
+  for (const glm::vec3& row : node.rough.front_moment) {
     for (int column = 0; column < 3; ++column) {
       if (!isWithin(row[column], largest)) return false;
     }
   }
-  for (const float value : node.area_band_4) {
+  for (const float value : node.rough.area_band_4) {
     if (!isWithin(value, kMostBand4 * node.area)) return false;
   }
   return true;
 }
 
 void MomentColumns::takeCodes(Node& node) const {
-  const float deviation = node.radius * fractionOf(codes_[covarianceAt(0)]);
-  const float trace = deviation * deviation;
-  std::array<float, kCovariance>& entries = node.covariance.entries;
-  const float xx = fractionOf(codes_[covarianceAt(1)]), yy = fractionOf(codes_[covarianceAt(2)]);
-  entries[0] = trace * xx;
-  entries[1] = trace * yy;
-  entries[2] = trace * std::max(0.f, 1 - xx - yy);
-  for (std::size_t k = 3; k < kCovariance; ++k) {
-    entries[k] = trace * kMostShear * signedFractionOf(codes_[covarianceAt(k)]);
-  }
-  if (node.isFlat()) return;
+  CovarianceCodes covariance;
+  for (std::size_t k = 0; k < kCovariance; ++k) covariance[k] = codes_[covarianceAt(k)];
+  node.covariance = covarianceOf(covariance, node.radius);
+  if (!node.isRough()) return;
   const float scale = mostFrontMoment(node);
   for (std::size_t k = 0; k < kFront; ++k) {
     roughMoment(node, k) = scale * signedFractionOf(codes_[roughAt(k)]);

@@ -24,8 +24,8 @@ class MomentColumns {
 
   // False when the columns end early or are not finite.
   bool get(PayloadReader& reader);
-  // Gives the next node its moments; radius, area and flags are there. False when these cannot be
-  // moments of such a node.
+  // Gives the next node its moments; radius, area, flags and facets are there. False when these
+  // cannot be moments of such a node.
   bool take(Node& node);
 
  private:

@@ -16,28 +16,26 @@ const ZonalFactors& lobeOf(const Surfel& surfel) {
   return surfel.isTwoSided() ? kAbsoluteCosine : kClampedCosine;
 }
 
-// The mean of x x^T over a disk of area A around the origin is A / (4 pi) (I - n n^T); over the
-// disk that a sphere looks like, the same without a normal.
-double diskSpread(const Surfel& surfel) {
-  const double radius = double(surfel.radius);
-  return std::min(double(surfel.area) / (4 * double(kPi)), radius * radius / 4);
-}
-
 }  // namespace
 
 void NodeSums::add(const Surfel& surfel) {
-  addMoments(surfel);
+  if (surfel_count == 0) {
+    for (int axis = 0; axis < 3; ++axis) origin[axis] = double(surfel.position[axis]);
+  }
+  const AreaSums one(surfel, origin);
+  AreaSums::add(one);
+  const bool has_one_front = !surfel.isSphere() && !surfel.isTwoSided();
+  has_one_front ? facets.add(one) : facets.giveUp();
+  for (int row = 0; row < 3 && has_one_front; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      front_moment[row][column] += one.position[row] * double(surfel.normal[column]);
+    }
+  }
+  surfel_count += 1;
+  groups |= groupBit(surfel.group);
   const double a = double(surfel.area);
   const double area_and_power[4] = {1, double(surfel.radiosity[0]), double(surfel.radiosity[1]),
                                     double(surfel.radiosity[2])};
-  surfel_count += 1;
-  groups |= groupBit(surfel.group);
-  area += a;
-  for (int axis = 0; axis < 3; ++axis) {
-    radiosity[axis] += a * area_and_power[axis + 1];
-    // Both sides of a two-sided disk face everywhere: it gives a node no direction
-    if (!surfel.isTwoSided()) normal[axis] += a * double(surfel.normal[axis]);
-  }
   const ZonalFactors& factors = lobeOf(surfel);
   const double bands[3] = {a * double(factors[0]), a * double(factors[1]), a * double(factors[2])};
   const ShCoefficients basis = shBasis(surfel.normal);
@@ -58,59 +56,23 @@ void NodeSums::add(const Surfel& surfel) {
   disk_bounds.add(surfel.position + half);
 }
 
-// Of positions, which are relative to the origin.
-void NodeSums::addMoments(const Surfel& surfel) {
-  if (surfel_count == 0) {
-    for (int axis = 0; axis < 3; ++axis) origin[axis] = double(surfel.position[axis]);
-  }
-  const double a = double(surfel.area), spread = diskSpread(surfel);
-  const bool has_front = !surfel.isSphere() && !surfel.isTwoSided();
-  double x[3], n[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    x[axis] = double(surfel.position[axis]) - origin[axis];
-    n[axis] = surfel.isSphere() ? 0 : double(surfel.normal[axis]);
-    position[axis] += a * x[axis];
-  }
-  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
-    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
-    const double identity = row == column ? 1 : 0;
-    second_moment[i] += a * (x[row] * x[column] + spread * (identity - n[row] * n[column]));
-  }
-  if (!has_front) return;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      front_moment[row][column] += a * x[row] * n[column];
-    }
-  }
-}
-
-// The child's, moved by d from its origin to ours: (x + d)(x + d)^T, and (x + d) n^T.
-void NodeSums::addMoments(const NodeSums& child) {
-  if (surfel_count == 0) std::copy(std::begin(child.origin), std::end(child.origin), origin);
-  double d[3];
-  for (int axis = 0; axis < 3; ++axis) d[axis] = child.origin[axis] - origin[axis];
-  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
-    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
-    second_moment[i] += child.second_moment[i] + d[row] * child.position[column] +
-                        child.position[row] * d[column] + child.area * d[row] * d[column];
-  }
-  for (int row = 0; row < 3; ++row) {
-    position[row] += child.position[row] + child.area * d[row];
-    for (int column = 0; column < 3; ++column) {
-      front_moment[row][column] += child.front_moment[row][column] + d[row] * child.normal[column];
-    }
-  }
-}
-
+// Moved by d from the child's origin to ours: (x + d) n^T.
 void NodeSums::add(const NodeSums& child) {
-  addMoments(child);
+  if (surfel_count == 0) std::copy(std::begin(child.origin), std::end(child.origin), origin);
+  double shift[3];
+  for (int axis = 0; axis < 3; ++axis) shift[axis] = child.origin[axis] - origin[axis];
+  AreaSums moved = child;
+  moved.move(shift);
+  AreaSums::add(moved);
+  facets.add(child.facets, shift);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      front_moment[row][column] +=
+          child.front_moment[row][column] + shift[row] * child.normal[column];
+    }
+  }
   surfel_count += child.surfel_count;
   groups |= child.groups;
-  area += child.area;
-  for (int axis = 0; axis < 3; ++axis) {
-    normal[axis] += child.normal[axis];
-    radiosity[axis] += child.radiosity[axis];
-  }
   for (int i = 0; i < kShCount; ++i) {
     for (int k = 0; k < 4; ++k) sh[i][k] += child.sh[i][k];
     band_4[i] += child.band_4[i];
@@ -124,38 +86,62 @@ glm::vec3 NodeSums::centre() const {
   return mean;
 }
 
-Node NodeSums::toNode(float flatness_limit) const {
-  Node node{};
-  node.position = centre();
-  node.area = float(area);
-  node.surfel_count = surfel_count;
-  node.groups = groups;
-  const double length =
-      std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-  node.flatness = float(std::min(length / area, 1.0));
+Facet NodeSums::toFacet(const AreaSums& group) const {
+  Facet facet{};
+  facet.area = float(group.area);
   for (int axis = 0; axis < 3; ++axis) {
-    node.normal[axis] = length > 0 ? float(normal[axis] / length) : 0;
-    node.radiosity[axis] = float(radiosity[axis] / area);
+    facet.position[axis] = float(origin[axis] + group.position[axis] / group.area);
+    facet.normal[axis] = float(group.normal[axis] / group.area);
+    facet.radiosity[axis] = float(group.radiosity[axis] / group.area);
   }
-  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
-    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
-    node.covariance.entries[i] =
-        float(second_moment[i] / area - position[row] / area * (position[column] / area));
-  }
-  if (node.flatness > flatness_limit) {
-    node.flags = kNodeFlat;
-    return node;
-  }
+  facet.covariance = group.covariance();
+  return facet;
+}
+
+RoughNode NodeSums::toRough() const {
+  RoughNode rough{};
   for (int i = 0; i < kShCount; ++i) {
-    for (int kind = 0; kind < kNodeShKinds; ++kind) node.sh[i][kind] = float(sh[i][kind]);
-    node.area_band_4[i] = float(band_4[i]);
+    for (int kind = 0; kind < kNodeShKinds; ++kind) rough.sh[i][kind] = float(sh[i][kind]);
+    rough.area_band_4[i] = float(band_4[i]);
   }
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
       constexpr double kMost = std::numeric_limits<float>::max();
       const double moment = front_moment[row][column] - position[row] / area * normal[column];
-      node.front_moment[row][column] = float(std::clamp(moment, -kMost, kMost));
+      rough.front_moment[row][column] = float(std::clamp(moment, -kMost, kMost));
     }
+  }
+  return rough;
+}
+
+Node NodeSums::toNode(float flatness_limit, float radius) const {
+  Node node{};
+  node.radius = radius;
+  node.surfel_count = surfel_count;
+  node.groups = groups;
+  const Facet all = toFacet(*this);
+  node.position = all.position;
+  node.area = all.area;
+  node.radiosity = all.radiosity;
+  node.covariance = all.covariance;
+  const double length = normalLength();
+  node.flatness = float(std::min(length / area, 1.0));
+  for (int axis = 0; axis < 3; ++axis) {
+    node.normal[axis] = length > 0 ? float(normal[axis] / length) : 0;
+  }
+  if (node.flatness > flatness_limit) {
+    node.flags = kNodeFlat;
+    return node;
+  }
+  const FacetSums fewest = facets.fewest(flatness_limit);
+  if (fewest.groups().empty()) {
+    node.rough = toRough();
+    return node;
+  }
+  node.facets = {};
+  for (const AreaSums& group : fewest.groups()) {
+    node.facets[node.facet_count++] =
+        NodeFacet::encode(toFacet(group), node.position, node.radius, node.area);
   }
   return node;
 }

@@ -7,37 +7,36 @@
 #include <span>
 
 #include "core/bounds.h"
+#include "octree/area_sums.h"
+#include "octree/facet_sums.h"
 #include "octree/node.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 
 // Sums over surfels i with area A, position x, normal n, radiosity B. Plain data.
-struct NodeSums {
+struct NodeSums : AreaSums {
   std::uint64_t surfel_count = 0;
-  std::uint64_t groups = 0;  // set of groups
-  double area = 0;           // sum A
-  double origin[3] = {};     // of positions below: the first surfel, so that nothing cancels
-  double position[3] = {};   // sum A x
-  double second_moment[SymmetricMatrix::kEntries] = {};  // sum A (x x^T + what a disk spreads)
-  double front_moment[3][3] = {};                        // sum A x n^T over one-sided disks
-  double normal[3] = {};                                 // sum A n over one-sided disks
-  double radiosity[3] = {};                              // sum A B
-  double sh[kShCount][4] = {};   // sum A K_l Y_lm(n) times 1, B_r, B_g and B_b
-  double band_4[kShCount] = {};  // Node::area_band_4
-  Bounds3 disk_bounds;           // boxes around every surfel's bounding sphere
+  std::uint64_t groups = 0;        // set of groups
+  double origin[3] = {};           // of positions: the first surfel, so that nothing cancels
+  double front_moment[3][3] = {};  // sum A x n^T over one-sided disks
+  double sh[kShCount][4] = {};     // sum A K_l Y_lm(n) times 1, B_r, B_g and B_b
+  double band_4[kShCount] = {};    // Node::area_band_4
+  FacetSums facets;
+  Bounds3 disk_bounds;  // boxes around every surfel's bounding sphere
 
   void add(const Surfel& surfel);
   void add(const NodeSums& child);
 
   // Mean position.
   glm::vec3 centre() const;
-  // The node's numbers, without references and radius. `flatness_limit` decides kNodeFlat.
-  Node toNode(float flatness_limit) const;
+  // The node's numbers, without references. `radius`: of a sphere around centre() that holds all
+  // disks. `flatness_limit` decides what is flat, and what is made of facets that are.
+  Node toNode(float flatness_limit, float radius) const;
 
  private:
-  void addMoments(const Surfel& surfel);
-  void addMoments(const NodeSums& child);
+  Facet toFacet(const AreaSums& group) const;
+  RoughNode toRough() const;
 };
 
 // Radius of the sphere around `centre` that holds the box, for when it is smaller than what the

@@ -177,8 +177,8 @@ void SlabStitcher::addGiantPiece(BuiltSlab& slab, BuiltSlab::Root& root) {
   if (!slab.giant->ends) return;
   const Node first = giant_.node.node;
   Node& node = giant_.node.node;
-  node = giant_.sums.toNode(writer_.header().flatness_limit);
-  node.radius = radiusOfBox(node.position, giant_.sums.disk_bounds) * 1.000001f;
+  const float radius = radiusOfBox(giant_.sums.centre(), giant_.sums.disk_bounds) * 1.000001f;
+  node = giant_.sums.toNode(writer_.header().flatness_limit, radius);
   node.page = first.page;
   node.first = first.first;
   join(giant_, root.boundary_level);

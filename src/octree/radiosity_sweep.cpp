@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace surfeit {
@@ -15,12 +18,55 @@ int levelOf(const SceneHeader& header, std::uint32_t node_page) {
          1;
 }
 
+// The facet of a node that faces most as a group of surfels does.
+std::size_t nearestFacet(std::span<const NodeFacet> facets, const AreaSums& group) {
+  std::size_t nearest = 0;
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < facets.size(); ++k) {
+    double dot = 0, length_sq = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double n = double(facets[k].normal[axis]);
+      dot += n * group.normal[axis];
+      length_sq += n * n;
+    }
+    if (dot / std::sqrt(length_sq) > most) {
+      most = dot / std::sqrt(length_sq);
+      nearest = k;
+    }
+  }
+  return nearest;
+}
+
+// Surfels as they are stored may group a little otherwise than the indexer found them: each group
+// gives its light to the facet that faces most as it does.
+void setFacetRadiosity(const FacetSums& sums, float flatness_limit, Node& node) {
+  struct Light {
+    double area = 0, power[3] = {};
+  };
+  std::array<Light, kMostFacets> lights;
+  const std::span<NodeFacet> facets = std::span(node.facets).first(node.facet_count);
+  const FacetSums fewest = sums.fewest(flatness_limit);
+  for (const AreaSums& group : fewest.groups().empty() ? sums.groups() : fewest.groups()) {
+    Light& light = lights[nearestFacet(facets, group)];
+    light.area += group.area;
+    for (int c = 0; c < 3; ++c) light.power[c] += group.radiosity[c];
+  }
+  for (std::size_t k = 0; k < facets.size(); ++k) {
+    const Light& light = lights[k];
+    for (int c = 0; c < 3; ++c) {
+      facets[k].radiosity[c] =
+          light.area > 0 ? float(light.power[c] / light.area) : node.radiosity[c];
+    }
+  }
+}
+
 // What the indexer's NodeSums::toNode gives from the same sums; the rest of the node stays.
-void setRadiosity(const NodeSums& sums, Node& node) {
+void setRadiosity(const NodeSums& sums, float flatness_limit, Node& node) {
   for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.area);
-  if (node.isFlat()) return;
+  if (node.hasFacets()) setFacetRadiosity(sums.facets, flatness_limit, node);
+  if (!node.isRough()) return;
   for (int i = 0; i < kShCount; ++i) {
-    for (int c = 0; c < 3; ++c) node.sh[i][powerKind(c)] = float(sums.sh[i][powerKind(c)]);
+    for (int c = 0; c < 3; ++c) node.rough.sh[i][powerKind(c)] = float(sums.sh[i][powerKind(c)]);
   }
 }
 
@@ -125,7 +171,7 @@ void RadiositySweep::closePage(int level, std::vector<SweptNodePage>& complete) 
 // The node at hand is complete, and with it every parent of which it is the last child.
 void RadiositySweep::leave(NodeSums sums) {
   while (!path_.empty()) {
-    setRadiosity(sums, current());
+    setRadiosity(sums, scene_.header().flatness_limit, current());
     Siblings& siblings = path_.back();
     siblings.sums.add(sums);
     if (++siblings.at < siblings.end) return;

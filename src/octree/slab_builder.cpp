@@ -133,12 +133,14 @@ void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& lea
   const std::span<const Surfel> surfels = std::span(surfels_).subspan(begin, end - begin);
   leaf.sums = NodeSums();
   for (const Surfel& surfel : surfels) leaf.sums.add(surfel);
-  Node& node = leaf.node.node;
-  node = leaf.sums.toNode(header_.flatness_limit);
-  leaf.node.child_level = 0;
+  const glm::vec3 centre = leaf.sums.centre();
+  float radius = 0;
   for (const Surfel& surfel : surfels) {
-    node.radius = std::max(node.radius, reach(node.position, surfel.position, surfel.radius));
+    radius = std::max(radius, reach(centre, surfel.position, surfel.radius));
   }
+  Node& node = leaf.node.node;
+  node = leaf.sums.toNode(header_.flatness_limit, radius);
+  leaf.node.child_level = 0;
   const GroupPlace place = placeSurfels(begin, end);
   node.page = place.page;
   node.first = place.first;

@@ -292,7 +292,7 @@ optionsOfTheirOwnWinOverThePreset() {
   makePatch
   gatherPatch default
   jsonIs default.json max_solid_angle 0.1 raster_resolution 14 near_field_radii 8 \
-    far_field_parallax 0.3
+    far_field_parallax 0.2
   gatherPatch standard --quality standard
   sameBytes standard.ply default.ply
   gatherPatch draft --quality draft
@@ -300,8 +300,8 @@ optionsOfTheirOwnWinOverThePreset() {
     far_field_parallax 0.5
   differentBytes draft.ply default.ply
   gatherPatch final --quality final
-  jsonIs final.json max_solid_angle 0.025 raster_resolution 26 near_field_radii 16 \
-    far_field_parallax 0.1
+  jsonIs final.json max_solid_angle 0.02 raster_resolution 28 near_field_radii 16 \
+    far_field_parallax 0.05
 
   # One, all, before and after; what is not given comes from the preset
   local own=(--max-solid-angle 0.2 --raster-resolution 8 --near-field 5 --far-parallax 0.4)

@@ -58,9 +58,10 @@ Node makeNode(std::span<const glm::vec3> normals, const glm::vec3& radiosity) {
   const ShCoefficients lobes = projectLobes(normals, kClampedCosine);
   const ShCoefficients fourth = projectBand4(normals);
   for (std::size_t i = 0; i < kShCount; ++i) {
-    node.area_band_4[i] = fourth[i] / float(normals.size());
-    node.sh[i][kAreaKind] = lobes[i] / float(normals.size());
-    for (int c = 0; c < 3; ++c) node.sh[i][powerKind(c)] = node.sh[i][kAreaKind] * radiosity[c];
+    node.rough.area_band_4[i] = fourth[i] / float(normals.size());
+    node.rough.sh[i][kAreaKind] = lobes[i] / float(normals.size());
+    for (int c = 0; c < 3; ++c)
+      node.rough.sh[i][powerKind(c)] = node.rough.sh[i][kAreaKind] * radiosity[c];
   }
   return node;
 }
@@ -144,7 +145,7 @@ TEST(FacingAreas, AreExactForEvenlySpreadNormalsAndForSpheres) {
   ball.flags = kSurfelSphere;
   NodeSums sums;
   sums.add(ball);
-  const Node sphere = sums.toNode(.97f);
+  const Node sphere = sums.toNode(.97f, 1);
   for (const glm::vec3& d : evenDirections(20)) {
     EXPECT_NEAR(facingOf(normals, d).front, .25f, 2e-3);
     EXPECT_NEAR(facingAreas(sphere, d).front, 2, .01);
@@ -186,7 +187,7 @@ TEST(NodeContribution, FlatNodeIsADisk) {
   const glm::vec3 normal{0, 0, -1};
   Node node = makeNode(std::span(&normal, 1), {3, 2, 1});
   node.flags = kNodeFlat;
-  node.sh = {};
+  node.rough.sh = {};
   Contribution patch;
   ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
   EXPECT_FLOAT_EQ(patch.solid_angle, .25f);
@@ -248,11 +249,11 @@ Node nodeOf(std::span<const glm::vec3> positions, std::span<const glm::vec3> nor
     surfel.area = 1e-6f;
     sums.add(surfel);
   }
-  Node node = sums.toNode(1);
+  float radius = 0;
   for (const glm::vec3& position : positions) {
-    node.radius = std::max(node.radius, glm::length(position - node.position));
+    radius = std::max(radius, glm::length(position - sums.centre()));
   }
-  return node;
+  return sums.toNode(1, radius);
 }
 
 // The middle of what is seen of a node, along v from its position towards the receiver.
@@ -316,10 +317,35 @@ TEST(RoughNode, IsAsLargeFromCloseByAsItLooks) {
   }
 }
 
+// A cap of a sphere: the area that faces away from it shows at its rim.
+TEST(Facet, ThatCurvesShowsWhatOfItFacesTheReceiver) {
+  constexpr float kCapCosine = .9f;
+  std::vector<glm::vec3> cap;
+  for (const glm::vec3& d : evenDirections(20000)) {
+    if (d.z > kCapCosine) cap.push_back(d);
+  }
+  glm::vec3 mean(0);
+  for (const glm::vec3& normal : cap) mean += normal / float(cap.size());
+  Facet facet{};
+  facet.normal = mean;
+  facet.area = 1;
+  for (float angle = 0; angle < 3; angle += .05f) {
+    const glm::vec3 d(std::sin(angle), 0, std::cos(angle));
+    float front = 0;
+    for (const glm::vec3& normal : cap) front += std::max(0.f, glm::dot(normal, d));
+    const FacingAreas facing = facingAreas(facet, d);
+    EXPECT_NEAR(facing.front, front / float(cap.size()), .012f) << angle;
+    EXPECT_NEAR(facing.front - facing.back, glm::dot(mean, d), 1e-5f);
+  }
+  // With one normal there is nothing between front and back
+  facet.normal = {0, 0, 1};
+  EXPECT_EQ(facingAreas(facet, glm::normalize(glm::vec3(1, 0, -.01f))).front, 0);
+}
+
 TEST(RoughNode, TheMiddleOfWhatIsSeenStaysWithinTheRadius) {
   const std::vector<glm::vec3> all = evenDirections(200);
   Node node = nodeOf(all, all);
-  for (glm::vec3& row : node.front_moment) row *= 100.f;
+  for (glm::vec3& row : node.rough.front_moment) row *= 100.f;
   for (const glm::vec3& v : evenDirections(20)) {
     EXPECT_NEAR(glm::length(middleOfSeen(node, v, GatherSides::kFront)), node.radius, 1e-4f);
   }

@@ -14,8 +14,11 @@
 namespace surfeit {
 namespace {
 
-// What instruction sets may differ by, and packets of equal receivers from the scalar gather.
+// What instruction sets may differ by, and packets of equal receivers from the scalar gather. Where
+// rounding decides whether two things are of one layer, instruction sets differ by as much as the
+// scalar gather may; that must be rare.
 constexpr float kKernelTolerance = 1e-4f;
+constexpr float kMostBeyondTolerance = 1e-3f;  // of all receivers
 constexpr float kScalarTolerance = 2e-3f;
 
 constexpr std::uint32_t kMost = kAllOutputs & ~std::uint32_t{kOutputEnvironment};
@@ -155,24 +158,29 @@ TEST_F(GatherModes, EqualReceiversGiveWhatTheScalarGatherGives) {
 TEST_F(GatherModes, InstructionSetsAgree) {
   const Cloud cloud = mixedCloud();
   Scene scene(cloud);
+  std::size_t count = 0, beyond_count = 0;
   for (const Case& tried : cases()) {
+    // Pixels of a cone of .02 are a tenth as wide as those of others
+    const float scale = tried.name == "sharp" ? 20.f : 1.f;
     PacketGatherer definition(tried.rules, packetKernels().back());
     for (const PacketKernel& kernel : packetKernels()) {
       SCOPED_TRACE(tried.name + ", " + kernel.name);
       PacketGatherer gatherer(tried.rules, kernel);
-      float worst = 0;
       for (std::size_t run = 0; run < kRuns; ++run) {
         const std::vector<Receiver> receivers = neighbours(cloud, run * cloud.size() / kRuns);
         const std::vector<GatherResult> expected = gatherPacket(definition, scene, receivers);
         const std::vector<GatherResult> results = gatherPacket(gatherer, scene, receivers);
         for (std::size_t i = 0; i < results.size(); ++i) {
-          worst = std::max(worst, difference(results[i], expected[i]));
+          const float worst = difference(results[i], expected[i]);
+          EXPECT_LT(worst, scale * kScalarTolerance);
+          if (!(worst < scale * kKernelTolerance)) ++beyond_count;
+          ++count;
         }
       }
-      // Pixels of a cone of .02 are a tenth as wide as those of others
-      EXPECT_LT(worst, tried.name == "sharp" ? 20 * kKernelTolerance : kKernelTolerance);
     }
   }
+  fmt::print("{} of {} receivers beyond the tolerance\n", beyond_count, count);
+  EXPECT_LT(float(beyond_count), kMostBeyondTolerance * float(count));
 }
 
 TEST(GatherOutputs, ResultsArePackedAndUnpacked) {

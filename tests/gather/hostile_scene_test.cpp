@@ -39,8 +39,8 @@ class HostileScene : public DirectoryTest {
     NodeSums sums;
     sums.add(surfel);
     LevelNode node;
-    node.node = sums.toNode(kDefaultFlatnessLimit);
-    node.node.radius = 10;  // holds every receiver, so that nothing is far enough
+    // The radius holds every receiver, so that nothing is far enough
+    node.node = sums.toNode(kDefaultFlatnessLimit, 10);
     std::vector<std::byte> payload, stored;
     encodeSurfelGroup({&surfel, 1}, header.pageForm(), payload);
     ASSERT_TRUE(compressPage(payload, stored).ok());

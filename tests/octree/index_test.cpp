@@ -57,7 +57,8 @@ class IndexTest : public SceneTest {
       // Only a leaf that begins a page may run over its end
       EXPECT_LE(node.first + node.surfel_count, header.surfel_group_capacity);
     }
-    EXPECT_EQ(node.isFlat(), node.sh[0][kAreaKind] == 0);
+    EXPECT_FALSE(node.isFlat() && node.hasFacets());
+    EXPECT_EQ(node.isRough(), !node.hasFacets() && node.rough.sh[0][kAreaKind] != 0);
     for (const Surfel& surfel : surfels) {
       ASSERT_LE(glm::length(surfel.position - node.position) + surfel.radius, node.radius * 1.002f);
     }
@@ -265,9 +266,9 @@ TEST_F(IndexTest, NodesAreTheSumsOfTheirSurfels) {
         // The sum's direction is as sure as the sum is long
         ASSERT_NEAR(double(node.normal[axis]) * length / area, normal[axis] / area, tolerance);
       }
-      for (int k = 0; k < kShCount && !node.isFlat(); ++k) {
-        ASSERT_NEAR(double(node.sh[k][kAreaKind]), area_sh[k], tolerance * area);
-        ASSERT_NEAR(double(node.sh[k][powerKind(1)]), power_sh[k], tolerance * area);
+      for (int k = 0; k < kShCount && node.isRough(); ++k) {
+        ASSERT_NEAR(double(node.rough.sh[k][kAreaKind]), area_sh[k], tolerance * area);
+        ASSERT_NEAR(double(node.rough.sh[k][powerKind(1)]), power_sh[k], tolerance * area);
       }
     }
   }

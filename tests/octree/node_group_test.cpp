@@ -20,16 +20,17 @@ class NodeGroupTest : public testing::Test {
     }
   }
 
-  // Nodes of level 1: leaves and parents of nodes on level 2, flat and rough.
+  // Nodes of level 1: leaves and parents of nodes on level 2, flat ones, rough ones, and some with
+  // 2 to 6 facets.
   static std::vector<LevelNode> someNodes(std::size_t count) {
     std::vector<LevelNode> nodes;
     for (std::size_t i = 0; i < count; ++i) {
       NodeSums sums;
       const auto seed = static_cast<std::uint32_t>(i);
-      const std::vector<Surfel> cloud = i % 3 == 0 ? planeCloud(4, 0.1f) : randomCloud(9, seed);
+      std::vector<Surfel> cloud = i % 3 == 0 ? planeCloud(4, 0.1f) : randomCloud(9, seed);
+      if (i % 4 == 3) cloud = boxCloud(3, 0.1f, 2 + int(i / 4 % 5));
       for (const Surfel& surfel : cloud) sums.add(surfel);
-      LevelNode node{sums.toNode(0.97f), 0};
-      node.node.radius = radiusOfBox(node.node.position, sums.disk_bounds);
+      LevelNode node{sums.toNode(0.97f, radiusOfBox(sums.centre(), sums.disk_bounds)), 0};
       node.node.page = seed % 10;
       node.node.first = static_cast<std::uint16_t>(i);
       if (i % 2 == 0) {
@@ -78,12 +79,17 @@ TEST_F(NodeGroupTest, FullPrecisionIsExact) {
     EXPECT_EQ(a.flags, b.flags);
     EXPECT_EQ(a.child_count, b.child_count);
     EXPECT_EQ(a.surfel_count, b.surfel_count);
-    EXPECT_EQ(a.sh, b.sh);
-    EXPECT_EQ(a.covariance.entries, b.covariance.entries);
-    EXPECT_EQ(a.front_moment, b.front_moment);
-    EXPECT_EQ(a.area_band_4, b.area_band_4);
     // Pages count within the level of the children in the file, and through it afterwards
     EXPECT_EQ(b.page, a.isLeaf() ? a.page : a.page + first_page_[2]);
+    EXPECT_EQ(a.covariance.entries, b.covariance.entries);
+    ASSERT_EQ(a.facet_count, b.facet_count);
+    if (a.hasFacets()) {
+      EXPECT_EQ(a.facets, b.facets);
+      continue;
+    }
+    EXPECT_EQ(a.rough.sh, b.rough.sh);
+    EXPECT_EQ(a.rough.front_moment, b.rough.front_moment);
+    EXPECT_EQ(a.rough.area_band_4, b.rough.area_band_4);
   }
 }
 
@@ -100,10 +106,19 @@ TEST_F(NodeGroupTest, QuantizedNodesAreCloseAndHoldWhatTheyHeld) {
     EXPECT_NEAR(a.area, b.area, 1e-3f * a.area);
     EXPECT_LE(glm::length(a.normal - b.normal), 1e-4f);
     EXPECT_NEAR(a.flatness, b.flatness, 2e-5f);
+    for (std::size_t k = 0; k < a.facet_count; ++k) {
+      NodeFacet facet = b.facets[k];
+      EXPECT_LE(glm::length(facet.radiosity - a.facets[k].radiosity),
+                1e-3f * glm::length(a.facets[k].radiosity));
+      facet.radiosity = a.facets[k].radiosity;
+      EXPECT_EQ(facet, a.facets[k]);
+    }
+    if (!a.isRough()) continue;
     for (std::size_t k = 0; k < kShCount; ++k) {
-      EXPECT_NEAR(a.sh[k][kAreaKind], b.sh[k][kAreaKind], 2e-3f * a.area);
+      EXPECT_NEAR(a.rough.sh[k][kAreaKind], b.rough.sh[k][kAreaKind], 2e-3f * a.area);
       for (int c = 0; c < 3; ++c) {
-        EXPECT_NEAR(a.sh[k][powerKind(c)], b.sh[k][powerKind(c)], 4e-3f * a.area * a.radiosity[c]);
+        EXPECT_NEAR(a.rough.sh[k][powerKind(c)], b.rough.sh[k][powerKind(c)],
+                    4e-3f * a.area * a.radiosity[c]);
       }
     }
   }
@@ -123,12 +138,13 @@ TEST_F(NodeGroupTest, QuantizedMomentsAreClose) {
       EXPECT_NEAR(a.covariance.entries[k] / trace, b.covariance.entries[k] / b.covariance.trace(),
                   5e-3f);
     }
+    if (!a.isRough()) continue;
     for (std::size_t k = 0; k < kShCount; ++k) {
-      EXPECT_NEAR(a.area_band_4[k], b.area_band_4[k], .012f * a.area);
+      EXPECT_NEAR(a.rough.area_band_4[k], b.rough.area_band_4[k], .012f * a.area);
     }
     for (std::size_t row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
-        EXPECT_NEAR(a.front_moment[row][column], b.front_moment[row][column],
+        EXPECT_NEAR(a.rough.front_moment[row][column], b.rough.front_moment[row][column],
                     6e-3f * a.area * a.radius);
       }
     }
@@ -143,11 +159,11 @@ TEST_F(NodeGroupTest, MomentsOfEnormousNodesStayNumbers) {
       surfel.area = 1e24f;
       sums.add(surfel);
     }
-    LevelNode node{sums.toNode(0.97f), 0};
-    node.node.radius = 1.1e12f;
+    sums.facets.giveUp();
+    LevelNode node{sums.toNode(0.97f, 1.1e12f), 0};
     const Result<std::uint32_t> count = storeAndRead(std::span(&node, 1), form);
     ASSERT_TRUE(count.ok()) << count.status().message();
-    for (const glm::vec3& row : found_[0].front_moment) {
+    for (const glm::vec3& row : found_[0].rough.front_moment) {
       EXPECT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
     }
   }
@@ -157,17 +173,30 @@ TEST_F(NodeGroupTest, DecodeRejectsMomentsOfNoSuchNode) {
   for (const int moment : {0, 1, 2}) {
     std::vector<LevelNode> nodes = someNodes(5);
     Node& node = nodes[1].node;
-    ASSERT_FALSE(node.isFlat());
+    ASSERT_TRUE(node.isRough());
     if (moment == 2) {
-      node.area_band_4[4] = 2.6f * node.area;
+      node.rough.area_band_4[4] = 2.6f * node.area;
     } else if (moment == 1) {
-      node.front_moment[2].x = 1.1f * node.area * node.radius;
+      node.rough.front_moment[2].x = 1.1f * node.area * node.radius;
     } else {
       node.covariance.entries[4] = -1.1f * node.radius * node.radius;
     }
     const Status status = storeAndRead(nodes, kFull).status();
     EXPECT_EQ(status.code(), StatusCode::kCorruption);
     EXPECT_NE(status.message().find("field moments"), std::string::npos) << status.message();
+  }
+}
+
+TEST_F(NodeGroupTest, DecodeRejectsFacetsOfNoSuchNode) {
+  for (const bool too_many : {false, true}) {
+    std::vector<LevelNode> nodes = someNodes(5);
+    Node& node = nodes[3].node;
+    ASSERT_EQ(node.facet_count, 2);
+    if (too_many) node.facet_count = kMostFacets + 1;
+    if (!too_many) node.flags = kNodeFlat;
+    const Status status = storeAndRead(nodes, kFull).status();
+    EXPECT_EQ(status.code(), StatusCode::kCorruption);
+    EXPECT_NE(status.message().find("field facets"), std::string::npos) << status.message();
   }
 }
 
@@ -241,14 +270,6 @@ TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
         ASSERT_TRUE(node.flatness >= 0 && node.flatness <= 1);
         ASSERT_NE(node.groups, 0u);
         for (const float entry : node.covariance.entries) ASSERT_TRUE(std::isfinite(entry));
-        for (const glm::vec3& row : node.front_moment) {
-          ASSERT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
-        }
-        for (const float value : node.area_band_4) ASSERT_TRUE(std::isfinite(value));
-        for (int c = 0; c < 3; ++c) {
-          ASSERT_TRUE(std::isfinite(node.position[c]) && node.radiosity[c] >= 0);
-          for (const float k : node.coefficients(powerKind(c))) ASSERT_TRUE(std::isfinite(k));
-        }
         if (node.isLeaf()) {
           ASSERT_LT(node.page, 10u);
           ASSERT_LT(node.first, 512);
@@ -256,6 +277,20 @@ TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
           ASSERT_GE(node.page, first_page_[2]);
           ASSERT_LT(node.page, first_page_[kCurveLevels + 1]);
           ASSERT_LE(node.first + node.child_count, 128);
+        }
+        for (std::size_t k = 0; k < node.facet_count; ++k) {
+          const Facet facet = node.facet(k);
+          ASSERT_TRUE(std::isfinite(facet.radius) && facet.area >= 0);
+          ASSERT_GE(std::min({facet.radiosity.x, facet.radiosity.y, facet.radiosity.z}), 0);
+        }
+        if (node.hasFacets()) continue;
+        for (const glm::vec3& row : node.rough.front_moment) {
+          ASSERT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
+        }
+        for (const float value : node.rough.area_band_4) ASSERT_TRUE(std::isfinite(value));
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_TRUE(std::isfinite(node.position[c]) && node.radiosity[c] >= 0);
+          for (const float k : node.rough.coefficients(powerKind(c))) ASSERT_TRUE(std::isfinite(k));
         }
       }
     }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "octree/test_scenes.h"
@@ -53,7 +55,7 @@ Moments momentsOfPoints(std::span<const Surfel> cloud) {
 }
 
 void expectMoments(std::span<const Surfel> cloud, float tolerance) {
-  const Node node = sumsOf(cloud).toNode(1);
+  const Node node = sumsOf(cloud).toNode(1, 1);
   const Moments expected = momentsOfPoints(cloud);
   const double size =
       std::sqrt(expected.covariance[0][0] + expected.covariance[1][1] + expected.covariance[2][2]);
@@ -61,7 +63,7 @@ void expectMoments(std::span<const Surfel> cloud, float tolerance) {
     for (int j = 0; j < 3; ++j) {
       EXPECT_NEAR(double(node.covariance(i, j)), expected.covariance[i][j],
                   double(tolerance) * size * size);
-      EXPECT_NEAR(double(node.front_moment[std::size_t(i)][j]), expected.front[i][j],
+      EXPECT_NEAR(double(node.rough.front_moment[std::size_t(i)][j]), expected.front[i][j],
                   double(tolerance) * size * expected.area);
     }
   }
@@ -86,14 +88,14 @@ TEST(NodeSums, ADiskLargerThanItsRadiusSpreadsNoFartherThanThat) {
   surfel.area = 1000;
   NodeSums sums;
   sums.add(surfel);
-  const Node node = sums.toNode(1);
+  const Node node = sums.toNode(1, 1);
   EXPECT_FLOAT_EQ(node.covariance(0, 0), 1);
   EXPECT_FLOAT_EQ(node.covariance(2, 2), 0);
 }
 
 TEST(NodeSums, Band4GivesTheFourthMomentOfTheNormals) {
   const std::vector<Surfel> cloud = randomCloud(200);
-  const Node node = sumsOf(cloud).toNode(1);
+  const Node node = sumsOf(cloud).toNode(1, 1);
   TestRandom random(9);
   for (int i = 0; i < 20; ++i) {
     const glm::vec3 d = random.direction();
@@ -104,16 +106,61 @@ TEST(NodeSums, Band4GivesTheFourthMomentOfTheNormals) {
       const double p4 = (35 * x * x * x * x - 30 * x * x + 3) / 8;
       expected += double(surfel.area) * (surfel.isTwoSided() ? 2 : 1) * p4;
     }
-    EXPECT_NEAR(double(shEvaluate(node.area_band_4, shBand4(d))), expected,
+    EXPECT_NEAR(double(shEvaluate(node.rough.area_band_4, shBand4(d))), expected,
                 1e-5 * double(node.area));
   }
 }
 
+// Centre, area and light of each face of a box, in whatever order.
+TEST(NodeSums, ABoxHasItsFacesAsFacets) {
+  for (const int faces : {2, 3, 5, 6}) {
+    const NodeSums sums = sumsOf(boxCloud(8, .1f, faces));
+    const Node node = sums.toNode(.97f, radiusOfBox(sums.centre(), sums.disk_bounds));
+    ASSERT_EQ(node.facet_count, faces);
+    std::uint32_t found = 0;
+    for (std::size_t k = 0; k < node.facet_count; ++k) {
+      const Facet facet = node.facet(k);
+      const auto face = static_cast<int>(facet.radiosity.x - .5f);
+      found |= 1u << face;
+      glm::vec3 normal(0), middle(.35f);
+      normal[face % 3] = face < 3 ? 1.f : -1.f;
+      middle[face % 3] = face < 3 ? .75f : -.05f;
+      EXPECT_LT(glm::length(facet.normal - normal), 1e-4f);
+      EXPECT_LT(glm::length(facet.position - middle), .01f * node.radius);
+      EXPECT_NEAR(facet.area, node.area / float(faces), 1e-4f * node.area);
+      // A square of 0.8, by its surfels' middles and what their disks spread
+      const float along = quadraticForm(facet.covariance, glm::vec3(1) - glm::abs(normal)) / 2;
+      EXPECT_NEAR(along, .64f / 12, .15f * .64f / 12);
+      EXPECT_NEAR(quadraticForm(facet.covariance, normal), 0, .003f * .64f);
+    }
+    EXPECT_EQ(found, (1u << faces) - 1);
+  }
+}
+
+TEST(NodeSums, WhatCurvesSlowlyHasFewFacetsAndWhatIsSeenFromBothSidesNone) {
+  // A quarter of a cylinder: three pieces of 30 degrees are flat enough, two of 45 are not
+  std::vector<Surfel> cloud;
+  for (const Surfel& flat : planeCloud(30, .1f)) {
+    Surfel surfel = flat;
+    const float angle = flat.position.x / 2.9f * kPi / 2;
+    surfel.normal = {std::cos(angle), 0, std::sin(angle)};
+    surfel.position = {surfel.normal.x, flat.position.y, surfel.normal.z};
+    cloud.push_back(surfel);
+  }
+  const Node node = sumsOf(cloud).toNode(.97f, 3);
+  EXPECT_GE(node.facet_count, 2);
+  EXPECT_LE(node.facet_count, 4);
+  EXPECT_EQ(sumsOf(sphereCloud(2000)).toNode(.97f, 2).facet_count, 0);
+  cloud = boxCloud(4, .1f);
+  cloud[50].flags = kSurfelTwoSided;
+  EXPECT_TRUE(sumsOf(cloud).toNode(.97f, 2).isRough());
+}
+
 TEST(NodeSums, AFlatNodeHasNoFrontMoment) {
-  const Node node = sumsOf(planeCloud(8, .1f)).toNode(.97f);
+  const Node node = sumsOf(planeCloud(8, .1f)).toNode(.97f, 1);
   ASSERT_TRUE(node.isFlat());
-  for (const glm::vec3& row : node.front_moment) EXPECT_EQ(row, glm::vec3(0));
-  for (const float value : node.area_band_4) EXPECT_EQ(value, 0);
+  for (const glm::vec3& row : node.rough.front_moment) EXPECT_EQ(row, glm::vec3(0));
+  for (const float value : node.rough.area_band_4) EXPECT_EQ(value, 0);
 }
 
 }  // namespace

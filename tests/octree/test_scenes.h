@@ -120,6 +120,26 @@ inline std::vector<Surfel> planeCloud(int side, float spacing) {
   return cloud;
 }
 
+// The first `faces` of six squares of side * side surfels that make a box.
+inline std::vector<Surfel> boxCloud(int side, float spacing, int faces = 6) {
+  std::vector<Surfel> cloud;
+  const float height = spacing * float(side - 1);
+  for (int face = 0; face < faces; ++face) {
+    for (Surfel surfel : planeCloud(side, spacing)) {
+      const glm::vec3 at = surfel.position;
+      const int axis = face % 3;
+      surfel.normal = glm::vec3(0);
+      surfel.normal[axis] = face < 3 ? 1.f : -1.f;
+      surfel.position[axis] = face < 3 ? height + spacing / 2 : -spacing / 2;
+      surfel.position[(axis + 1) % 3] = at.x;
+      surfel.position[(axis + 2) % 3] = at.y;
+      surfel.radiosity = glm::vec3(float(1 + face), 0, 0);
+      cloud.push_back(surfel);
+    }
+  }
+  return cloud;
+}
+
 inline std::vector<Surfel> moved(std::vector<Surfel> cloud, float scale, const glm::vec3& offset) {
   for (Surfel& surfel : cloud) {
     surfel.position = surfel.position * scale + offset;

@@ -244,7 +244,7 @@ TEST_F(VerifyTest, ReferencesThatLeadNowhereAreCorruption) {
          n.node.area = 10;
        }},
       {"flatness 2", [](LevelNode& n) { n.node.flatness = 2; }},
-      {"coefficient NaN", [](LevelNode& n) { n.node.sh[8][powerKind(2)] = NAN; }},
+      {"coefficient NaN", [](LevelNode& n) { n.node.rough.sh[8][powerKind(2)] = NAN; }},
   };
   for (const auto& edit : edits) {
     SCOPED_TRACE(edit.name);
