@@ -223,13 +223,23 @@ class Brush {
     if (hn::AllFalse(D(), seen)) return;
 
     // The visible area, times the distance
-    const V area = hn::Min(hn::MulAdd(Splat(patch.disk_area), hn::Abs(sight.facing),
-                                      hn::Mul(Splat(patch.round_area), distance)),
-                           hn::Mul(Splat(patch.most_area), distance));
+    const V cosine = patch.range > 0
+                         ? RimCosine(sight.facing, hn::Mul(Splat(patch.range), distance))
+                         : hn::Abs(sight.facing);
+    const V area = hn::Min(
+        hn::MulAdd(Splat(patch.disk_area), cosine, hn::Mul(Splat(patch.round_area), distance)),
+        hn::Mul(Splat(patch.most_area), distance));
     // Numbers of lanes that see nothing must be numbers, too
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
     CoverParallelogram(OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w), seen,
                        MakeCover(patch, sight, distance));
+  }
+
+  // As facingAreas of a facet; all times the distance.
+  static V RimCosine(V facing, V range) {
+    const V sum = hn::Max(hn::Zero(D()), hn::Sub(range, facing));
+    const V rim = hn::Div(hn::Mul(sum, sum), hn::Mul(Splat(4), range));
+    return hn::IfThenElse(hn::Lt(hn::Neg(facing), range), rim, hn::Neg(facing));
   }
 
   // As RasterCube::onFace; `area` is the visible area times the distance.

@@ -32,6 +32,8 @@ struct Patch {
   // The area that it shows: disk_area times the cosine, plus round_area, which everyone sees
   float disk_area = 0, round_area = 0;
   float most_area = 0;  // and no more than this
+  // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
+  float range = 0;
   float overlap = 0;    // RasterCube::Patch
   glm::vec3 radiosity{0};
   // It is seen where offset . normal, from the receiver, is below this: kFrontOnly, kBothSides, or

@@ -150,11 +150,15 @@ void PacketRaster::addFacet(const Facet& facet) {
   patch.area = facet.area;
   patch.most_area = mostVisibleArea(facet);
   if (sides != GatherSides::kBack) patch.radiosity = facet.radiosity;
-  if (std::abs(cosine) >= range) {
-    patch.disk_area = facet.area;
+  patch.disk_area = facet.area;
+  if (!(std::abs(cosine) < range + view_.radius / distance)) {
     patch.facing_limit = sides == GatherSides::kBoth ? Patch::kDarkBack : Patch::kFrontOnly;
+  } else if (sides != GatherSides::kBoth) {
+    patch.range = range;
+    patch.facing_limit = range > 0 ? Patch::kBothSides : Patch::kFrontOnly;
   } else {
-    // At the rim of something curved all lanes see as much as the centre
+    // From both sides, at the rim of something curved all lanes see as much as the centre
+    patch.disk_area = 0;
     const FacingAreas facing = facingAreas(facet, -direction);
     patch.round_area = shownArea(facing, sides);
     patch.radiosity *= facing.front / patch.round_area;
@@ -209,7 +213,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach =
         layerReachOfDisk(patch.radius, glm::dot(to_surfel, surfel.normal) / std::sqrt(distance_sq));
-    patch.soft_peak = softDiskPeak(patch.radius, surfel.area);
+    patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =
         std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());

@@ -160,7 +160,7 @@ void ReceiverRaster::trace(const Surfel& surfel, const DepthRange& depth) {
   }
   const bool sends_light = surfel.isTwoSided() || glm::dot(centre, surfel.normal) < 0;
   cube_.traceDisk(inRaster(centre), inRaster(surfel.normal), surfel.radius,
-                  softDiskPeak(surfel.radius, surfel.area), depth,
+                  softDiskPeak(surfel.radius, surfel.area, surfel.isTwoSided()), depth,
                   sends_light ? surfel.radiosity : glm::vec3(0));
 }
 
