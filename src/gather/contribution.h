@@ -62,8 +62,9 @@ FacingAreas facingAreas(const Node& node, const glm::vec3& to_receiver);
 
 // Those of something that is nearly flat.
 FacingAreas facingAreas(const Facet& facet, const glm::vec3& to_receiver);
-// Its normals spread by this much to either side of their mean, as cosines.
-float normalRange(const Facet& facet);
+// Its normals spread by this much to either side of their mean, as cosines. `normal`: that mean,
+// shorter where they spread more.
+float normalRange(const glm::vec3& normal);
 
 // A flat node is one facet.
 Facet facetOf(const Node& node);

@@ -129,7 +129,20 @@ void PacketRaster::orderLastPatch() {
 void PacketRaster::addNode(const Node& node) {
   if (node.isRough()) return addRoughNode(node);
   if (node.isFlat()) return addFacet(facetOf(node));
-  for (std::size_t i = 0; i < node.facet_count; ++i) addFacet(node.facet(i));
+  for (std::size_t i = 0; i < node.facet_count; ++i) {
+    const NodeFacet& codes = node.facets[i];
+    const glm::vec3 position = codes.positionIn(node.position, node.radius);
+    if (!turnsAway(position, codes.meanNormal())) addFacet(node.facet(i));
+  }
+}
+
+// Whether no receiver sees any of a facet.
+bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal) const {
+  const GatherSides sides = rules_.quality.sides;
+  const glm::vec3 to_facet = position - view_.centre;
+  const float away = glm::dot(to_facet, normal) * (sides == GatherSides::kBack ? -1.f : 1.f);
+  return sides != GatherSides::kBoth &&
+         away > normalRange(normal) * glm::length(to_facet) + view_.radius;
 }
 
 void PacketRaster::addFacet(const Facet& facet) {
@@ -137,9 +150,8 @@ void PacketRaster::addFacet(const Facet& facet) {
   const glm::vec3 to_facet = facet.position - view_.centre;
   const float distance = glm::length(to_facet);
   const glm::vec3 direction = to_facet / distance;
-  const float range = normalRange(facet), cosine = -glm::dot(direction, facet.normal);
+  const float range = normalRange(facet.normal), cosine = -glm::dot(direction, facet.normal);
   const float side = sides == GatherSides::kBack ? -1.f : 1.f;
-  if (sides != GatherSides::kBoth && side * cosine < -range - view_.radius / distance) return;
 
   Patch& patch = patches_.emplace_back();
   patch.position = facet.position;

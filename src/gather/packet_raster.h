@@ -63,6 +63,7 @@ class PacketRaster {
   static std::size_t memoryBytes(const GatherRules& rules);
 
  private:
+  bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   void addFacet(const Facet& facet);
   void addRoughNode(const Node& node);
   void orderLastPatch();

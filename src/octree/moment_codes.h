@@ -41,8 +41,12 @@ inline CovarianceCodes covarianceCodes(const SymmetricMatrix& covariance, float 
   return codes;
 }
 
+// The root of its trace.
+inline float deviationOf(const CovarianceCodes& codes, float radius) {
+  return radius * fractionOf(codes[0]);
+}
 inline SymmetricMatrix covarianceOf(const CovarianceCodes& codes, float radius) {
-  const float deviation = radius * fractionOf(codes[0]), trace = deviation * deviation;
+  const float deviation = deviationOf(codes, radius), trace = deviation * deviation;
   const float xx = fractionOf(codes[1]), yy = fractionOf(codes[2]);
   SymmetricMatrix covariance;
   covariance.entries = {trace * xx, trace * yy, trace * std::max(0.f, 1 - xx - yy), 0, 0, 0};

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -37,20 +36,25 @@ struct NodeFacet {
   CovarianceCodes covariance;          // within its radius
 
   static NodeFacet encode(const Facet& facet, const glm::vec3& position, float radius, float area);
-  // `position`, `radius` and `area`: of the node.
+  // These and decode(): what the facet is, by the position, radius and area of the node.
+  glm::vec3 positionIn(const glm::vec3& node_position, float node_radius) const {
+    return node_position + node_radius * glm::vec3(signedFractionOf(offset[0]),
+                                                   signedFractionOf(offset[1]),
+                                                   signedFractionOf(offset[2]));
+  }
+  glm::vec3 meanNormal() const {
+    return glm::vec3(normal[0], normal[1], normal[2]) * (1.f / 32767);
+  }
   Facet decode(const glm::vec3& node_position, float node_radius, float node_area) const {
-    Facet facet;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(axis);
-      facet.position[axis] = node_position[axis] + node_radius * signedFractionOf(offset[i]);
-      facet.normal[axis] = float(normal[i]) * (1.f / 32767);
-    }
-    facet.area = node_area * (float(area) * (1.f / 65535));
-    facet.radiosity = radiosity;
-    facet.covariance = covarianceOf(covariance, node_radius);
-    // Between a disk, of which the square is twice the trace, and a rectangle, three times
-    facet.radius = std::sqrt(3 * facet.covariance.trace());
-    return facet;
+    // The radius is between that of a disk, of which the square is twice the trace, and that of a
+    // rectangle, three times
+    constexpr float kRootOf3 = 1.7320508f;
+    return {.position = positionIn(node_position, node_radius),
+            .radius = kRootOf3 * deviationOf(covariance, node_radius),
+            .normal = meanNormal(),
+            .area = node_area * (float(area) * (1.f / 65535)),
+            .radiosity = radiosity,
+            .covariance = covarianceOf(covariance, node_radius)};
   }
   bool operator==(const NodeFacet&) const = default;
 };
