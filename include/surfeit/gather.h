@@ -75,7 +75,7 @@ struct GatherQuality {
   // sigma_max, steradians, >= 0; 0 opens every node (memo 5). Rough nodes keep below
   // 0.6 of it.
   float max_solid_angle = 0.1f;
-  int raster_resolution = 14;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
+  int raster_resolution = 16;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
   // Rays and horizon start this far above the receiver, in radii of the surfel looked at.
   float bias = 0.15f;
   // Surfels closer than this many of their radii are ray traced (memo 3.4.1).
@@ -189,7 +189,7 @@ struct GatherStats {
 // plus `occlusion` and with kBleeding `irradiance_r irradiance_g irradiance_b`. A receiver without
 // a normal gathers over the whole sphere. The result depends on scene, receivers, order, mode,
 // quality and the machine's instruction set alone, bit for bit; instruction sets agree within 1e-4,
-// and for one of 1000 receivers within 2e-3.
+// and for two of 1000 receivers within 2e-3.
 // Errors: as indexClouds.
 Result<GatherStats> gatherCloud(const std::string& scene_path, const std::string& receivers_path,
                                 const std::string& result_path, const GatherOptions& options,

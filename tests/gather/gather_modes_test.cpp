@@ -18,7 +18,7 @@ namespace {
 // rounding decides whether two things are of one layer, instruction sets differ by as much as the
 // scalar gather may; that must be rare.
 constexpr float kKernelTolerance = 1e-4f;
-constexpr float kMostBeyondTolerance = 1e-3f;  // of all receivers
+constexpr float kMostBeyondTolerance = 2e-3f;  // of all receivers
 constexpr float kScalarTolerance = 2e-3f;
 
 constexpr std::uint32_t kMost = kAllOutputs & ~std::uint32_t{kOutputEnvironment};
@@ -66,7 +66,10 @@ class GatherModes : public testing::Test {
     constexpr GatherMode kOcclusion = GatherMode::kOcclusion, kBleeding = GatherMode::kBleeding;
     constexpr GatherMode kGlossy = GatherMode::kGlossy;
     const auto lookFrom = [](GatherRules& rules) { rules.eye = {3, -9, 4}; };
+    const auto asItIs = [](GatherRules&) {};
     return {
+        makeCase("occlusion", kOcclusion, asItIs),
+        makeCase("bleeding", kBleeding, asItIs),
         makeCase("all outputs", kBleeding, [](GatherRules& rules) { rules.outputs = kMost; }),
         makeCase("environment", kBleeding,
                  [&](GatherRules& rules) {
@@ -158,6 +161,7 @@ TEST_F(GatherModes, EqualReceiversGiveWhatTheScalarGatherGives) {
 TEST_F(GatherModes, InstructionSetsAgree) {
   const Cloud cloud = mixedCloud();
   Scene scene(cloud);
+  ASSERT_GE(packetKernels().size(), 2u);
   std::size_t count = 0, beyond_count = 0;
   for (const Case& tried : cases()) {
     // Pixels of a cone of .02 are a tenth as wide as those of others

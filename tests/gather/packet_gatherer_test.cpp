@@ -1,16 +1,14 @@
-// Packets are held to the scalar gather, and instruction sets to each other.
+// Packets are held to the scalar gather; gather_modes_test.cpp holds instruction sets to each
+// other.
 #include "gather/packet_gatherer.h"
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
-#include <memory>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "gather/gather_point.h"
@@ -18,9 +16,6 @@
 
 namespace surfeit {
 namespace {
-
-// What instruction sets may differ by (packet_kernel.h).
-constexpr float kTolerance = 1e-4f;
 
 double difference(const GatherResult& a, const GatherResult& b) {
   const glm::vec3 color = glm::abs(a.irradiance - b.irradiance);
@@ -156,30 +151,6 @@ TEST(PacketGatherer, DenseReceiversAreNotDivided) {
     PacketGatherer gatherer(GatherMode::kBleeding, quality);
     gatherPacket(gatherer, scene, denseReceivers());
     EXPECT_EQ(gatherer.work().packets, kClusterPackets) << parallax;
-  }
-}
-
-TEST(PacketGatherer, InstructionSetsAgree) {
-  const Cloud cloud = mixedCloud();
-  Scene scene(cloud);
-  ASSERT_GE(packetKernels().size(), 2u);
-  for (const GatherMode mode : {GatherMode::kOcclusion, GatherMode::kBleeding}) {
-    const GatherQuality quality;
-    PacketGatherer definition(mode, quality, packetKernels().back());
-    for (const PacketKernel& kernel : packetKernels()) {
-      PacketGatherer gatherer(mode, quality, kernel);
-      double worst = 0;
-      for (std::size_t run = 0; run < kRuns; ++run) {
-        const std::vector<Receiver> receivers = neighbours(cloud, run * cloud.size() / kRuns);
-        const std::vector<GatherResult> expected = gatherPacket(definition, scene, receivers);
-        const std::vector<GatherResult> results = gatherPacket(gatherer, scene, receivers);
-        for (std::size_t i = 0; i < results.size(); ++i) {
-          worst = std::max(worst, difference(results[i], expected[i]));
-        }
-      }
-      fmt::print("{}: largest difference {:.2g}\n", kernel.name, worst);
-      EXPECT_LT(worst, kTolerance) << kernel.name;
-    }
   }
 }
 
