@@ -97,10 +97,11 @@ Status LookUpTrace::walk(std::span<const Receiver> receivers, Reader& reader) {
   }
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
     const std::span<const Receiver> packet = cluster.receivers(i);
-    SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(packet, [&](std::size_t begin, std::size_t count) {
-      return cut_->walk(viewPacket(packet.subspan(begin, count), rules_), cluster.regionOf(i),
-                        reader, IgnoreCut{});
-    }));
+    SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(
+        packet, cluster.mostPacketRadius(), [&](std::size_t begin, std::size_t count) {
+          return cut_->walk(viewPacket(packet.subspan(begin, count), rules_), cluster.regionOf(i),
+                            reader, IgnoreCut{});
+        }));
   }
   return {};
 }

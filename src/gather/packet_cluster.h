@@ -48,6 +48,8 @@ class PacketCluster {
     return std::span(places_).subspan(i * kPacketReceivers, packetSize(i));
   }
   const PacketView& packet(std::size_t i) const { return packets_[i]; }
+  // Wider packets are to be divided.
+  float mostPacketRadius() const { return most_packet_radius_; }
   // What packet i looks at by itself.
   CutRegion regionOf(std::size_t i) const {
     return shares(i) ? region(CutRegion::Part::kNear) : CutRegion();
@@ -80,6 +82,7 @@ class PacketCluster {
   PacketView view_;
   std::uint32_t sharing_ = 0;
   float limit_ = 0;
+  float most_packet_radius_ = 0;
 };
 
 }  // namespace surfeit

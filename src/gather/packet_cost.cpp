@@ -55,14 +55,17 @@ float PacketCost::cost(float radius) const {
 }
 
 // Halves cost no less than two receivers alone.
-PacketCost::Division PacketCost::divide(std::span<const Receiver> packet, float least_cost) const {
-  const Division together = {cost(viewPacket(packet).radius), 1};
+PacketCost::Division PacketCost::divide(std::span<const Receiver> packet, float most_radius,
+                                        float least_cost) const {
+  const float radius = viewPacket(packet).radius;
+  const bool may_stay = radius <= most_radius;
+  const Division together = {cost(radius), 1};
   const std::size_t half = firstHalf(packet.size());
-  if (half == 0 || together.cost <= 2 * least_cost) return together;
-  const Division first = divide(packet.first(half), least_cost);
-  const Division second = divide(packet.subspan(half), least_cost);
+  if (half == 0 || (may_stay && together.cost <= 2 * least_cost)) return together;
+  const Division first = divide(packet.first(half), most_radius, least_cost);
+  const Division second = divide(packet.subspan(half), most_radius, least_cost);
   const float apart = first.cost + second.cost;
-  if (together.cost <= kWorthDividing * apart) return together;
+  if (may_stay && together.cost <= kWorthDividing * apart) return together;
   return {apart, first.begins | second.begins << half};
 }
 

@@ -40,11 +40,11 @@ class PacketCost {
   static constexpr std::size_t memoryBytes() { return kReservedClusters * sizeof(Cluster); }
 
   // Calls visit(begin, count), which answers a Status, for the parts that the receivers of a packet
-  // are best gathered in: all, or halves (firstHalf), or halves of these, whatever draws least.
-  // Stops at the first failure.
+  // are best gathered in: all, or halves (firstHalf), or halves of these, whatever draws least, but
+  // none wider than `most_radius`. Stops at the first failure.
   template <typename Visit>
-  Status forEachPart(std::span<const Receiver> packet, Visit&& visit) const {
-    std::uint32_t begins = divide(packet, cost(0)).begins;
+  Status forEachPart(std::span<const Receiver> packet, float most_radius, Visit&& visit) const {
+    std::uint32_t begins = divide(packet, most_radius, cost(0)).begins;
     while (begins != 0) {
       const auto begin = static_cast<std::size_t>(std::countr_zero(begins));
       begins &= begins - 1;
@@ -66,7 +66,7 @@ class PacketCost {
     std::uint32_t begins;  // bit i: a part begins at receiver i
   };
   void add(const Node& node, float least_patches);
-  Division divide(std::span<const Receiver> packet, float least_cost) const;
+  Division divide(std::span<const Receiver> packet, float most_radius, float least_cost) const;
 
   const float pixels_per_slope_, most_side_;
   glm::vec3 position_{0};

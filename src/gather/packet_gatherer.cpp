@@ -103,8 +103,8 @@ Status PacketGatherer::gather(std::span<const Receiver> receivers, PagedOctree::
                          .far = cluster.shares(i) ? &far_raster_ : nullptr,
                          .far_lane = i,
                          .far_distance = cluster.farDistance()};
-    SURFEIT_RETURN_IF_ERROR(
-        cost_.forEachPart(packet.receivers, [&](std::size_t begin, std::size_t count) {
+    SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(
+        packet.receivers, cluster.mostPacketRadius(), [&](std::size_t begin, std::size_t count) {
           return gatherPart(packet.of(begin, count), octree, results);
         }));
   }

@@ -204,5 +204,24 @@ TEST(PacketCluster, DividesByPlaceAndNormal) {
   EXPECT_LE(mixed, 4);
 }
 
+// Seen from two places at once, what is between has no one look.
+TEST(PacketCluster, TwoPlacesShareNothingAndPacketsAcrossAreToBeDivided) {
+  for (const float apart : {0.f, 5.f}) {
+    std::mt19937 random(3);
+    std::vector<Receiver> receivers;
+    for (int i = 0; i < 200; ++i) {  // 104 here, 96 there: one packet reaches across
+      const glm::vec3 at = .1f * randomDirection(random) * glm::vec3(1, 1, 0);
+      receivers.push_back({at + (i < 104 ? glm::vec3(0) : glm::vec3(apart, 0, 0)), {0, 0, 1}});
+    }
+    const PacketCluster cluster(receivers, {GatherMode::kBleeding, {}});
+    EXPECT_EQ(cluster.shares(), apart == 0);
+    int wide = 0;
+    for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
+      wide += cluster.packet(i).radius > cluster.mostPacketRadius();
+    }
+    EXPECT_EQ(wide, apart == 0 ? 0 : 1);
+  }
+}
+
 }  // namespace
 }  // namespace surfeit
