@@ -11,7 +11,7 @@ namespace {
 
 // A packet that is wider than this many times the median one would push the far field away for all:
 // it looks by itself.
-constexpr float kMostWidth = 1.5f;
+constexpr float kMostSharingWidth = 1.5f;
 
 // Where the curve jumps, a packet has receivers on both sides. One that is wider than this many
 // times the median is divided: it sees what is near from between them. (Largest step of occlusion
@@ -85,7 +85,7 @@ PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherRu
   // Cones that look elsewhere have no raster in common
   const GatherQuality& quality = rules.quality;
   if (packet_count_ < 2 || !(quality.far_field_parallax > 0) || rules.hasConeRaster()) return;
-  const float most_width = kMostWidth * *middle;
+  const float most_width = kMostSharingWidth * *middle;
 
   // Those that share, and the sphere and cone around them
   std::array<Receiver, kClusterReceivers> members;

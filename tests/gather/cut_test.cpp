@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gather/packet_cluster.h"
+#include "gather/packet_cost.h"
 #include "gather/test_scene.h"
 
 namespace surfeit {
@@ -220,6 +221,28 @@ TEST(PacketCluster, TwoPlacesShareNothingAndPacketsAcrossAreToBeDivided) {
       wide += cluster.packet(i).radius > cluster.mostPacketRadius();
     }
     EXPECT_EQ(wide, apart == 0 ? 0 : 1);
+  }
+}
+
+// Of nothing to draw, whose cost would divide no packet.
+TEST(PacketCost, NoPartIsWiderThanAllowed) {
+  std::vector<Receiver> receivers(kPacketReceivers);
+  for (std::size_t i = 0; i < receivers.size(); ++i) {
+    receivers[i].position = {.01f * float(i) + (i < 3 ? 0.f : 5.f), 0, 0};
+  }
+  const PacketCost cost({GatherMode::kBleeding, {}});
+  for (const float most_radius : {10.f, .2f}) {
+    std::size_t next = 0, parts = 0;
+    const auto visit = [&](std::size_t begin, std::size_t count) {
+      EXPECT_EQ(begin, next);
+      EXPECT_LE(viewPacket(std::span(receivers).subspan(begin, count)).radius, most_radius);
+      next += count;
+      ++parts;
+      return Status();
+    };
+    EXPECT_TRUE(cost.forEachPart(receivers, most_radius, visit).ok());
+    EXPECT_EQ(next, receivers.size());
+    EXPECT_EQ(parts > 1, most_radius < 1);
   }
 }
 
