@@ -45,14 +45,13 @@ PacketView viewPacket(std::span<const Receiver> receivers, const GatherRules& ru
 struct CutRegion {
   enum class Part : std::uint8_t { kAll, kNear, kFar };
   Part part = Part::kAll;
-  glm::vec3 centre{0};  // of the cluster
-  float radius = 0;     // of a sphere around it that holds all receivers
+  PacketView cluster{};  // all its receivers
   float limit = 0;
 
   // Whether a surfel here is of the part.
   bool holds(const glm::vec3& position) const {
     if (part == Part::kAll) return true;
-    const glm::vec3 offset = position - centre;
+    const glm::vec3 offset = position - cluster.centre;
     const bool is_near = glm::dot(offset, offset) < limit * limit;
     return is_near == (part == Part::kNear);
   }
@@ -64,6 +63,7 @@ struct CutRules {
   float max_distance = 0;
   float facing = 1;                   // 1: only fronts are seen, -1: only backs, 0: both
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
+  bool weighs_by_cosine = false;      // of the angle to the normal: what is low may be coarser
 
   bool approximates() const { return max_solid_angle > 0; }
   bool seesAllGroups() const { return groups == kAllGroups; }
@@ -99,7 +99,7 @@ class CutWalk {
   explicit CutWalk(const GatherRules& rules,
                    SiblingClassifier classify = fastestSiblingClassifier())
       : rules_{maxSolidAngle(rules), rules.quality.max_distance, facingOf(rules.quality.sides),
-               rules.groups},
+               rules.groups, weighsByCosine(rules)},
         classify_(classify) {}
 
   template <typename Reader, typename Visit>

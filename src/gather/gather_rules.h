@@ -118,6 +118,11 @@ inline float maxSolidAngle(const GatherRules& rules) {
   const float share = std::min(1.f, kConeShare * (1 - std::cos(rules.weights.cone_angle)));
   return rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1);
 }
+// Whether directions weigh by the cosine of their angle to the normal.
+inline bool weighsByCosine(const GatherRules& rules) {
+  return !rules.isGlossy() && !rules.hasCone() &&
+         rules.weights.distribution == GatherWeights::Distribution::kCosine;
+}
 inline float nearFieldRadii(const GatherRules& rules) {
   const float slope = rules.hasConeRaster() ? std::tan(rules.weights.cone_angle) : 1;
   return rules.quality.near_field_radii / std::sqrt(std::min(1.f, slope));

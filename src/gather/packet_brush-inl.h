@@ -17,6 +17,7 @@
 #include <type_traits>
 
 #include "gather/coverage_rules.h"
+#include "gather/packet_cover-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
 
@@ -25,84 +26,9 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-// How some of the receivers' pixels are covered.
-struct Cover {
-  V depth_begin, depth_end;
-  M is_lit;
-  bool is_all_lit;
-  float overlap;
-  glm::vec3 radiosity;
-  V fade;  // only when something fades
-};
-
-// What a kernel for one kind of raster draws.
-template <bool kHasColor, bool kHasFade, bool kHasFrame>
-struct BrushKind {
-  static constexpr bool kColor = kHasColor, kFade = kHasFade;
-  static constexpr bool kFrame = kHasFrame;  // the raster of a cone, in a frame of each lane
-  static constexpr std::size_t kChannels = (kColor ? 3 : 0) + (kFade ? 1 : 0);
-};
-
-// As RasterCube::coverPixel, where `amount` is positive.
-template <typename Kind>
-inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
-  const D d;
-  const V zero = hn::Zero(d), one = Splat(1);
-  float* const room_at = pixel;
-  float* const layer_at = pixel + kPacketReceivers;
-  float* const end_at = pixel + 2 * kPacketReceivers;
-  const V end = hn::Load(d, end_at);
-  V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
-
-  // A gap in depth begins a new layer
-  const M touched = hn::Gt(amount, zero);
-  const M is_new = hn::And(touched, hn::Gt(cover.depth_begin, end));
-  room = hn::IfThenElse(is_new, hn::NegMulAdd(room, before, room), room);
-  before = hn::IfThenZeroElse(is_new, before);
-  hn::Store(room, d, room_at);
-  hn::Store(hn::IfThenElse(touched, hn::Max(end, cover.depth_end), end), d, end_at);
-
-  const V middle = hn::Min(one, hn::MulAdd(Splat(0.5f), amount, before));
-  const V slope = hn::NegMulAdd(middle, Splat(cover.overlap), one);
-  const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
-  hn::Store(layer, d, layer_at);
-  if constexpr (Kind::kChannels > 0) {
-    V added = hn::Mul(room, hn::Sub(layer, before));
-    float* at = pixel + PacketCanvas::kCoverageChannels * kPacketReceivers;
-    if constexpr (Kind::kFade) {
-      float* const fade_at = at + (Kind::kChannels - 1) * kPacketReceivers;
-      hn::Store(hn::MulAdd(added, cover.fade, hn::Load(d, fade_at)), d, fade_at);
-    }
-    if constexpr (Kind::kColor) {
-      if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
-      for (int c = 0; c < 3; ++c) {
-        hn::Store(hn::MulAdd(added, Splat(cover.radiosity[c]), hn::Load(d, at)), d, at);
-        at += kPacketReceivers;
-      }
-    }
-  }
-}
-
-// Pixels of a face, half open.
-struct PixelRange {
-  int column_begin, column_end, row_begin, row_end;
-  bool isEmpty() const { return column_begin >= column_end || row_begin >= row_end; }
-};
-
-// The pixels that rectangles [x0, x1] x [y0, y1], in pixels within the face, reach in lanes of
-// `active`.
-inline PixelRange RangeOf(M active, V x0, V x1, V y0, V y1, int resolution) {
-  const D d;
-  const V far_away = Splat(float(resolution));
-  PixelRange range;
-  range.column_begin = int(hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(active, x0, far_away))));
-  range.row_begin = int(hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(active, y0, far_away))));
-  const float x_end = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(active, x1)));
-  const float y_end = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(active, y1)));
-  range.column_end = std::min(resolution, int(x_end) + 1);
-  range.row_end = std::min(resolution, int(y_end) + 1);
-  return range;
-}
+// What begins closer than this part of its distance, measured across the face, is taken to reach
+// behind the receiver.
+constexpr float kLeastInFront = 1e-3f;
 
 // As RasterCube::Parallelogram, in pixels.
 struct Parallelogram {
@@ -123,6 +49,7 @@ class Brush {
   // What follows draws to this face alone.
   void BeginFace(int face) {
     face_ = face;
+    seen_ = &canvas_.seen->faces[std::size_t(face)];
     pixels_ = canvas_.pixels + std::size_t(face * resolution_ * resolution_) * kPixelFloats;
     if (!(*canvas_.is_face_used)[std::size_t(face)]) ClearFace();
     pixels_ += lane_;
@@ -177,12 +104,14 @@ class Brush {
   // For all lanes.
   void ClearFace() {
     const D d;
-    float* at = pixels_;
-    for (int i = 0; i < resolution_ * resolution_; ++i) {
-      for (std::size_t lane = 0; lane < kPixelFloats; lane += kStep) {
-        hn::Store(Splat(lane < kPacketReceivers ? 1.f : 0.f), d, at + lane);
+    for (int row = seen_->row_begin; row < seen_->row_end; ++row) {
+      const auto [begin, end] = seen_->rows[std::size_t(row)];
+      float* at = pixels_ + std::size_t(row * resolution_ + begin) * kPixelFloats;
+      for (int column = begin; column < end; ++column, at += kPixelFloats) {
+        for (std::size_t lane = 0; lane < kPixelFloats; lane += kStep) {
+          hn::Store(Splat(lane < kPacketReceivers ? 1.f : 0.f), d, at + lane);
+        }
       }
-      at += kPixelFloats;
     }
     (*canvas_.is_face_used)[std::size_t(face_)] = true;
   }
@@ -294,7 +223,7 @@ class Brush {
     const V y1 = hn::Min(size, hn::Add(shape.y, shape.half_y));
     seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)));
     if (hn::AllFalse(d, seen)) return;
-    const PixelRange range = RangeOf(seen, x0, x1, y0, y1, resolution_);
+    const PixelRange range = RangeOf(seen, x0, x1, y0, y1, resolution_, *seen_);
     if (range.isEmpty()) return;
 
     const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
@@ -304,8 +233,9 @@ class Brush {
       const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
       const V x = hn::NegMulAdd(shape.shear, along, shape.x);
       const V left = hn::Sub(x, half_x), right = hn::Add(x, half_x);
-      float* pixel = pixels_ + std::size_t(row * resolution_ + range.column_begin) * kPixelFloats;
-      for (int column = range.column_begin; column < range.column_end; ++column) {
+      const auto [begin, end] = ColumnsOf(range, row, *seen_);
+      float* pixel = pixels_ + std::size_t(row * resolution_ + begin) * kPixelFloats;
+      for (int column = begin; column < end; ++column) {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
         CoverPixel<Kind>(pixel, hn::Mul(width, height), cover);
@@ -340,50 +270,130 @@ class Brush {
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
                 const Cover& cover) {
     const D d;
-    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    const int axis = face_ / 2;
     const V centre_sq = Dot(centre, centre);
     const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(centre, axis));
     const V half_w = HalfSide(patch, normal, axis);
-    const V w_far = hn::Add(w, half_w);
-    traced = hn::And(traced, hn::Gt(w_far, hn::Zero(d)));
+    traced = hn::And(traced, hn::Gt(hn::Add(w, half_w), hn::Zero(d)));
     if (hn::AllFalse(d, traced)) return;
-
-    // Pixels that see the box; what lies behind the face's origin reaches everywhere
-    const V inverse_far = Reciprocal(w_far);
-    const V inverse_near = Reciprocal(hn::Max(hn::Sub(w, half_w), hn::Mul(w_far, Splat(1e-3f))));
     V x0, x1, y0, y1;
-    Slopes(Axis(centre, u_axis), HalfSide(patch, normal, u_axis), inverse_near, inverse_far, x0,
-           x1);
-    Slopes(Axis(centre, v_axis), HalfSide(patch, normal, v_axis), inverse_near, inverse_far, y0,
-           y1);
-    const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_);
+    Outline(patch, centre, normal, (axis + 1) % 3, w, half_w, x0, x1);
+    Outline(patch, centre, normal, (axis + 2) % 3, w, half_w, y0, y1);
+    const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_, *seen_);
     if (range.isEmpty()) return;
 
-    const std::size_t face_first = std::size_t(face_ * resolution_ * resolution_);
+    if (patch.isRound()) {
+      ForEachRay(range, [&](std::size_t pixel, const glm::vec3& ray) HWY_ATTR {
+        CoverTraced(pixel, hn::IfThenElseZero(traced, SphereAmount(patch, ray, centre, centre_sq)),
+                    cover);
+      });
+      return;
+    }
+    TraceDisk(patch, centre, normal, traced, c_n, centre_sq, range, cover);
+  }
+
+  // Pixels along an axis of the face whose middles the disk may reach: of the lines across that
+  // axis, at u on the face, those touch the outline that are as far from the centre as the disk
+  // extends across them, (c_u - u c_w)^2 = s_uu - 2 u s_uw + u^2 s_ww with s = radius^2 (I - n
+  // n^T). Of disks that reach behind the receiver those of the box around them.
+  void Outline(const Patch& patch, const V3& centre, const Normal& normal, int u_axis, V w,
+               V half_w, V& begin, V& end) const {
+    const V zero = hn::Zero(D()), one = Splat(1), size = Splat(float(resolution_));
+    const V u = Axis(centre, u_axis), half_u = HalfSide(patch, normal, u_axis);
+    V across = zero;
+    if (!patch.isRound()) {
+      const float scale = (face_ % 2 == 0 ? -1.f : 1.f) * patch.radius * patch.radius;
+      across = hn::Mul(Splat(scale), hn::Mul(Axis(normal, u_axis), Axis(normal, face_ / 2)));
+    }
+    const V near = hn::Sub(w, half_w), far = hn::Add(w, half_w);
+    const M in_front = hn::Gt(near, hn::Mul(Splat(kLeastInFront), far));
+    const V a = hn::IfThenElse(in_front, hn::Mul(near, far), one);
+    const V b = hn::MulSub(u, w, across);
+    const V c = hn::NegMulAdd(half_u, half_u, hn::Mul(u, u));
+    const V root = hn::Sqrt(hn::Max(zero, hn::MulSub(b, b, hn::Mul(a, c))));
+    const V inverse = Reciprocal(a);
+    V low = hn::Mul(hn::Sub(b, root), inverse), high = hn::Mul(hn::Add(b, root), inverse);
+    if (!hn::AllTrue(D(), in_front)) {
+      const V inverse_far = Reciprocal(hn::Max(far, Splat(1e-30f)));
+      const V inverse_near = hn::Mul(inverse_far, Splat(1 / kLeastInFront));
+      const V left = hn::Sub(u, half_u), right = hn::Add(u, half_u);
+      const V box_low =
+          hn::Mul(left, hn::IfThenElse(hn::Lt(left, zero), inverse_near, inverse_far));
+      const V box_high =
+          hn::Mul(right, hn::IfThenElse(hn::Lt(right, zero), inverse_far, inverse_near));
+      low = hn::IfThenElse(in_front, low, box_low);
+      high = hn::IfThenElse(in_front, high, box_high);
+    }
+    // What lies there is seen from the middle of a pixel; and some to spare
+    constexpr float kSpare = 0.02f;
+    const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
+    begin = hn::Add(hn::MulAdd(low, scale, middle), Splat(0.5f - kSpare));
+    end = hn::Add(hn::MulAdd(high, scale, middle), Splat(kSpare - 0.5f));
+    begin = hn::Min(size, hn::Max(zero, begin));
+    end = hn::Min(size, hn::Max(zero, end));
+  }
+
+  void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
+    if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
+    CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
+  }
+
+  template <typename Visit>
+  void ForEachRay(const PixelRange& range, const Visit& visit) const {
+    const RasterGeometry::Pixel* const pixels =
+        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
     for (int row = range.row_begin; row < range.row_end; ++row) {
-      for (int column = range.column_begin; column < range.column_end; ++column) {
-        const std::size_t in_face = std::size_t(row * resolution_ + column);
-        const glm::vec3& ray = canvas_.geometry->pixels()[face_first + in_face].direction;
-        const V amount = hn::IfThenElseZero(
-            traced, patch.isRound() ? SphereAmount(patch, ray, centre, centre_sq)
-                                    : DiskAmount(patch, normal, ray, centre, c_n, centre_sq));
-        if (hn::AllFalse(d, hn::Gt(amount, hn::Zero(d)))) continue;
-        CoverPixel<Kind>(pixels_ + in_face * kPixelFloats, amount, cover);
+      const auto [begin, end] = ColumnsOf(range, row, *seen_);
+      for (int column = begin; column < end; ++column) {
+        const std::size_t pixel = std::size_t(row * resolution_ + column);
+        visit(pixel, pixels[pixel].direction);
       }
     }
   }
 
-  // Pixel coordinates between which directions to [x - half, x + half] lie, one to spare.
-  void Slopes(V x, V half, V inverse_near, V inverse_far, V& begin, V& end) const {
-    const V zero = hn::Zero(D()), size = Splat(float(resolution_));
-    const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
-    const V low = hn::Sub(x, half), high = hn::Add(x, half);
-    const V slope_low = hn::Mul(low, hn::IfThenElse(hn::Lt(low, zero), inverse_near, inverse_far));
-    const V slope_high =
-        hn::Mul(high, hn::IfThenElse(hn::Lt(high, zero), inverse_far, inverse_near));
-    const V spare = Splat(0.01f);
-    begin = hn::Min(size, hn::Max(zero, hn::Sub(hn::MulAdd(slope_low, scale, middle), spare)));
-    end = hn::Min(size, hn::Max(zero, hn::Add(hn::MulAdd(slope_high, scale, middle), spare)));
+  // Most rays of the box miss the disk. With q = (u, v, 1) on the face, the ray meets the disk's
+  // plane at t q with t = c.n / q.n, within the disk where |t q - c|^2 < radius^2, that is where
+  //
+  //   (c.n)^2 q.q - 2 c.n (q.n) (q.c) + (c.c - radius^2) (q.n)^2 < 0,
+  //
+  // along a row a polynomial of second degree.
+  void TraceDisk(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
+                 V centre_sq, const PixelRange& range, const Cover& cover) {
+    const D d;
+    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    const V sign = Splat(face_ % 2 == 0 ? 1.f : -1.f), minus_2 = Splat(-2);
+    const V n_u = Axis(normal, u_axis), n_v = Axis(normal, v_axis);
+    const V n_w = hn::Mul(sign, Axis(normal, axis));
+    const V c_u = Axis(centre, u_axis), c_v = Axis(centre, v_axis);
+    const V c_w = hn::Mul(sign, Axis(centre, axis));
+    const V power = hn::Sub(centre_sq, Splat(patch.radius * patch.radius));
+    const V plane_sq = hn::Mul(c_n, c_n);
+    // Of (q.n) (power q.n - 2 c.n q.c), factor by factor
+    const V m_u = hn::MulAdd(power, n_u, hn::Mul(minus_2, hn::Mul(c_n, c_u)));
+    const V m_v = hn::MulAdd(power, n_v, hn::Mul(minus_2, hn::Mul(c_n, c_v)));
+    const V m_w = hn::MulAdd(power, n_w, hn::Mul(minus_2, hn::Mul(c_n, c_w)));
+    const V square = hn::MulAdd(n_u, m_u, plane_sq);
+    const RasterGeometry::Pixel* const pixels =
+        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
+    const float slope = 1 / scale_, first = 0.5f * (1 - float(resolution_));
+    for (int row = range.row_begin; row < range.row_end; ++row) {
+      const V v = Splat(slope * (float(row) + first));
+      const V n_row = hn::MulAdd(n_v, v, n_w), m_row = hn::MulAdd(m_v, v, m_w);
+      const V linear = hn::MulAdd(n_u, m_row, hn::Mul(m_u, n_row));
+      const V constant = hn::MulAdd(n_row, m_row, hn::Mul(plane_sq, hn::MulAdd(v, v, Splat(1))));
+      const auto [begin, end] = ColumnsOf(range, row, *seen_);
+      for (int column = begin; column < end; ++column) {
+        const V u = Splat(slope * (float(column) + first));
+        const V outside = hn::MulAdd(hn::MulAdd(square, u, linear), u, constant);
+        const M hit = hn::And(traced, hn::Lt(outside, hn::Zero(d)));
+        if (hn::AllFalse(d, hit)) continue;
+        const std::size_t pixel = std::size_t(row * resolution_ + column);
+        const glm::vec3& ray = pixels[pixel].direction;
+        CoverTraced(pixel,
+                    hn::IfThenElseZero(hit, DiskAmount(patch, normal, ray, centre, c_n, centre_sq)),
+                    cover);
+      }
+    }
   }
 
   static V SphereAmount(const Patch& patch, const glm::vec3& ray, const V3& centre, V centre_sq) {
@@ -419,6 +429,7 @@ class Brush {
   const Receivers receivers_;
   const Frames frames_;
   int face_ = 0;
+  const SeenPixels::Face* seen_ = nullptr;
   float* pixels_ = nullptr;  // of the face, from the first of our lanes
 };
 

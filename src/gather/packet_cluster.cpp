@@ -22,10 +22,6 @@ constexpr float kMostPacketWidth = 4;
 // from different sides: its packets look by themselves. (Likewise: .0201 without this.)
 constexpr float kMostSpread = 0.5f;
 
-// Receivers whose normals lie farther from their mean (cosine) have no horizon in common: nothing
-// of their far field may be dropped for lying below it.
-constexpr float kOneHorizon = 0.99f;
-
 using Places = std::span<std::uint16_t>;
 
 // Position and weighted normal.

@@ -35,6 +35,11 @@ inline constexpr float kNormalWeight = 0.5f;
 
 class PacketCluster {
  public:
+  // Receivers whose normals lie farther from their mean (cosine) have no horizon in common: nothing
+  // of their far field may be dropped for lying below it. The horizons of others differ by an angle
+  // of this sine at most.
+  static constexpr float kOneHorizon = 0.99f, kHorizonSlack = 0.1415f;
+
   // `receivers`: 1 to kClusterReceivers. They are divided into packets again and again where they
   // lie farthest apart, in space or by their normals: the curve jumps, and packets need not.
   PacketCluster(std::span<const Receiver> receivers, const GatherRules& rules);
@@ -70,9 +75,7 @@ class PacketCluster {
   std::size_t packetSize(std::size_t i) const {
     return std::min(kPacketReceivers, receiver_count_ - i * kPacketReceivers);
   }
-  CutRegion region(CutRegion::Part part) const {
-    return {part, view_.centre, view_.radius, limit_};
-  }
+  CutRegion region(CutRegion::Part part) const { return {part, view_, limit_}; }
 
   std::size_t receiver_count_, packet_count_ = 0;
   std::array<Receiver, kClusterReceivers> receivers_;  // packet by packet

@@ -20,11 +20,14 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-// The coverages of one face for kStep receivers from `lane` on, in the canvas' scratch space.
+// The coverages of one face for kStep receivers from `lane` on, in the canvas' scratch space: of
+// the rows that count.
 class SurfaceFill {
  public:
-  SurfaceFill(const PacketCanvas& canvas, std::size_t lane)
-      : size_(canvas.geometry->resolution()),
+  SurfaceFill(const PacketCanvas& canvas, std::size_t lane, const SeenPixels::Face& seen)
+      : row_begin_(seen.row_begin),
+        row_end_(seen.row_end),
+        size_(canvas.geometry->resolution()),
         coverage_(canvas.fill_scratch + lane),
         rows_(coverage_ + std::size_t(size_) * std::size_t(size_) * kPacketReceivers) {}
 
@@ -37,8 +40,8 @@ class SurfaceFill {
 
   void Run() const {
     for (const FillPass& pass : kFillPasses) {
-      for (int row = 0; row < size_; ++row) SumRow(row);
-      for (int row = 0; row < size_; ++row) FillRow(row, pass);
+      for (int row = row_begin_; row < row_end_; ++row) SumRow(row);
+      for (int row = row_begin_; row < row_end_; ++row) FillRow(row, pass);
     }
   }
 
@@ -63,7 +66,7 @@ class SurfaceFill {
   void FillRow(int row, const FillPass& pass) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
-    const bool has_above = row > 0, has_below = row + 1 < size_;
+    const bool has_above = row > row_begin_, has_below = row + 1 < row_end_;
     const float part_scale = 1 / (pass.end - pass.begin);
     constexpr float kSeenScale = 1 / (kFilledWhole - kFilledFrom);
     for (int column = 0; column < size_; ++column) {
@@ -83,7 +86,7 @@ class SurfaceFill {
     }
   }
 
-  const int size_;
+  const int row_begin_, row_end_, size_;
   float *const coverage_, *const rows_;
 };
 

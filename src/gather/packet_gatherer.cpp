@@ -38,7 +38,8 @@ void PacketGatherer::endPhase(double& seconds) {
 Status PacketGatherer::draw(const PacketView& view, const CutRegion& region,
                             std::span<const Receiver> receivers, PagedOctree::Reader& octree,
                             PacketRaster& raster) {
-  raster.begin(receivers, view);
+  const bool is_shared = region.part == CutRegion::Part::kFar;
+  raster.begin(receivers, view, is_shared ? PacketCluster::kHorizonSlack : 0);
   SURFEIT_RETURN_IF_ERROR(cut_.walk(view, region, octree, DrawCut{raster, region}));
   work_.nodes_visited += cut_.nodesVisited();
   work_.surfels_visited += cut_.surfelsVisited();

@@ -27,19 +27,25 @@ namespace {
 void FinishFarField(const PacketCanvas& canvas) {
   const D d;
   const V one = Splat(1);
-  const std::size_t pixel_count = canvas.geometry->pixels().size();
-  const std::size_t face_pixels = pixel_count / std::size_t(canvas.geometry->faceCount());
+  const auto size = std::size_t(canvas.geometry->resolution());
   const std::size_t pixel_floats = PacketCanvas::pixelFloats(*canvas.rules);
-  for (std::size_t i = 0; i < pixel_count; ++i) {
-    if (!(*canvas.is_face_used)[i / face_pixels]) continue;
-    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-      float* const pixel = canvas.pixels + i * pixel_floats + lane;
-      const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
-      const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
-      hn::Store(total, d, pixel);
-      const V inverse = hn::Div(one, hn::Max(total, Splat(1e-20f)));
-      for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats; c += kPacketReceivers) {
-        hn::Store(hn::Mul(hn::Load(d, pixel + c), inverse), d, pixel + c);
+  const auto finish = [&](float* pixel) HWY_ATTR {
+    const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
+    const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
+    hn::Store(total, d, pixel);
+    const V inverse = hn::Div(one, hn::Max(total, Splat(1e-20f)));
+    for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats; c += kPacketReceivers) {
+      hn::Store(hn::Mul(hn::Load(d, pixel + c), inverse), d, pixel + c);
+    }
+  };
+  for (std::size_t i = 0; i < std::size_t(canvas.geometry->faceCount()); ++i) {
+    if (!(*canvas.is_face_used)[i]) continue;
+    const SeenPixels::Face& face = canvas.seen->faces[i];
+    for (auto row = std::size_t(face.row_begin); row < std::size_t(face.row_end); ++row) {
+      for (std::size_t column = face.rows[row].begin; column < face.rows[row].end; ++column) {
+        for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+          finish(canvas.pixels + ((i * size + row) * size + column) * pixel_floats + lane);
+        }
       }
     }
   }
@@ -66,25 +72,32 @@ class Integral {
     weight_sum_ = covered_ = radiosity_.x = radiosity_.y = radiosity_.z = hn::Zero(D());
   }
 
-  void AddFace(std::size_t face, std::size_t first, std::size_t end) {
+  void AddFace(std::size_t face) {
+    const SeenPixels::Face& seen = canvas_.seen->faces[face];
+    if (seen.isEmpty()) return;
     const bool has_near = (*canvas_.is_face_used)[face];
     const bool has_far = far_ != nullptr && (*far_->canvas->is_face_used)[face];
     const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
-    const SurfaceFill fill(canvas_, lane_);
-    if (has_near || has_far) ResolveFace(first, end, has_near, has_far, fill);
-    for (std::size_t i = first; i < end; ++i) {
-      const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
-      const V direction_weight = WeightOf(pixel.direction);
-      const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
-      weight_sum_ = hn::Add(weight_sum_, weight);
-      if (!has_near && !has_far && !has_more) continue;
-      const PixelSight sight =
-          has_near || has_far ? Resolved(i, fill.Coverage(i - first)) : NothingSeen();
-      covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
-      radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
-      radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
-      radiosity_.z = hn::MulAdd(weight, sight.radiosity.z, radiosity_.z);
-      if (has_more) AddMore(i, direction_weight, weight, sight);
+    const SurfaceFill fill(canvas_, lane_, seen);
+    const auto size = std::size_t(canvas_.geometry->resolution());
+    const std::size_t first = face * size * size;
+    if (has_near || has_far) ResolveFace(first, has_near, has_far, seen, fill);
+    for (auto row = std::size_t(seen.row_begin); row < std::size_t(seen.row_end); ++row) {
+      for (std::size_t column = seen.rows[row].begin; column < seen.rows[row].end; ++column) {
+        const std::size_t in_face = row * size + column, i = first + in_face;
+        const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
+        const V direction_weight = WeightOf(pixel.direction);
+        const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
+        weight_sum_ = hn::Add(weight_sum_, weight);
+        if (!has_near && !has_far && !has_more) continue;
+        const PixelSight sight =
+            has_near || has_far ? Resolved(i, fill.Coverage(in_face)) : NothingSeen();
+        covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
+        radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
+        radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
+        radiosity_.z = hn::MulAdd(weight, sight.radiosity.z, radiosity_.z);
+        if (has_more) AddMore(i, direction_weight, weight, sight);
+      }
     }
   }
 
@@ -191,22 +204,34 @@ class Integral {
 
   // Puts what is seen into the pixels of a face: the coverage in the place of the room, radiosities
   // and faded coverage in theirs.
-  void ResolveFace(std::size_t first, std::size_t end, bool has_near, bool has_far,
+  void ResolveFace(std::size_t first, bool has_near, bool has_far, const SeenPixels::Face& seen,
                    const SurfaceFill& fill) {
-    const D d;
-    for (std::size_t i = first; i < end; ++i) {
-      const PixelSight sight = Look(i, has_near, has_far);
-      float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
-      hn::Store(sight.coverage, d, pixel);
-      fill.SetCoverage(i - first, sight.coverage);
-      if (rules_.hasLight()) {
-        hn::Store(sight.radiosity.x, d, pixel + 3 * kPacketReceivers);
-        hn::Store(sight.radiosity.y, d, pixel + 4 * kPacketReceivers);
-        hn::Store(sight.radiosity.z, d, pixel + 5 * kPacketReceivers);
+    const auto size = std::size_t(canvas_.geometry->resolution());
+    for (auto row = std::size_t(seen.row_begin); row < std::size_t(seen.row_end); ++row) {
+      for (std::size_t column = 0; column < size; ++column) {
+        const std::size_t in_face = row * size + column;
+        const auto [begin, end] = seen.rows[row];
+        if (column < begin || column >= end) {
+          fill.SetCoverage(in_face, hn::Zero(D()));
+        } else {
+          fill.SetCoverage(in_face, ResolvePixel(first + in_face, has_near, has_far));
+        }
       }
-      if (rules_.fades()) hn::Store(sight.occlusion, d, pixel + fade_at_);
     }
     fill.Run();
+  }
+  V ResolvePixel(std::size_t i, bool has_near, bool has_far) {
+    const D d;
+    const PixelSight sight = Look(i, has_near, has_far);
+    float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
+    hn::Store(sight.coverage, d, pixel);
+    if (rules_.hasLight()) {
+      hn::Store(sight.radiosity.x, d, pixel + 3 * kPacketReceivers);
+      hn::Store(sight.radiosity.y, d, pixel + 4 * kPacketReceivers);
+      hn::Store(sight.radiosity.z, d, pixel + 5 * kPacketReceivers);
+    }
+    if (rules_.fades()) hn::Store(sight.occlusion, d, pixel + fade_at_);
+    return sight.coverage;
   }
 
   static PixelSight NothingSeen() {
@@ -308,13 +333,10 @@ class Integral {
 void Integrate(const PacketCanvas& canvas, const SharedFarField* far,
                std::span<GatherResult> results) {
   const auto faces = static_cast<std::size_t>(canvas.geometry->faceCount());
-  const std::size_t face_pixels = canvas.geometry->pixels().size() / faces;
   std::array<float, kPacketReceivers> weights;
   for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
     Integral integral(canvas, far, lane);
-    for (std::size_t face = 0; face < faces; ++face) {
-      integral.AddFace(face, face * face_pixels, (face + 1) * face_pixels);
-    }
+    for (std::size_t face = 0; face < faces; ++face) integral.AddFace(face);
     integral.Store(results, weights);
   }
   for (std::size_t i = 0; i < results.size(); ++i) {

@@ -15,6 +15,7 @@ namespace HWY_NAMESPACE {
 
 PacketKernel Kernel() {
   return {.name = hwy::TargetName(HWY_TARGET),
+          .findSeenPixels = FindSeenPixels,
           .isSeen = IsSeen,
           .seeRoughNode = SeeRoughNode,
           .draw = Draw,

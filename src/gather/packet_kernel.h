@@ -58,6 +58,20 @@ struct alignas(64) PacketLanes {
   std::array<std::array<float, kPacketReceivers>, 9> frame;
 };
 
+// The pixels that count: those that some receiver has above its horizon, and two more around them,
+// which filling looks at (kFillPasses). Nothing else is drawn, or looked at.
+struct SeenPixels {
+  struct Columns {
+    std::uint8_t begin = 0, end = 0;
+  };
+  struct Face {
+    int row_begin = 0, row_end = 0;
+    std::array<Columns, RasterGeometry::kMaxResolution> rows;
+    bool isEmpty() const { return row_begin == row_end; }
+  };
+  std::array<Face, RasterGeometry::kFaces> faces;
+};
+
 // Where a packet is drawn: 16 rasters interleaved by pixel. A pixel has 16 lanes each of room,
 // layer and the layer's end (RasterCube::Coverage); with color of red, green and blue; and of the
 // faded coverage, when occlusion fades.
@@ -81,6 +95,7 @@ struct PacketCanvas {
   float* fill_scratch;
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
+  const SeenPixels* seen;
 };
 
 // The far field of a packet: a lane of a canvas that was drawn for many packets and finished.
@@ -110,6 +125,8 @@ inline std::uint32_t index(std::uint64_t key) { return static_cast<std::uint32_t
 
 struct PacketKernel {
   const char* name;  // of the instruction set
+  // What counts for receivers of which the horizons may be off by `slack`, the sine of an angle.
+  void (*findSeenPixels)(const PacketCanvas& canvas, float slack, SeenPixels& seen);
   // Whether any receiver sees something of the patch, which stands for a surfel.
   bool (*isSeen)(const PacketCanvas& canvas, const Patch& patch);
   // What the receivers see of a rough node in unit direction `direction` from them; as facingAreas

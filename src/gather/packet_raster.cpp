@@ -69,7 +69,8 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
   order_scratch_.resize(kReservedEntries);
 }
 
-void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& view) {
+void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& view,
+                         float horizon_slack) {
   SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kPacketReceivers);
   view_ = view;
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
@@ -88,6 +89,7 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
       lanes_.frame[std::size_t(6 + axis)][i] = frame.z[axis];
     }
   }
+  kernel_.findSeenPixels(canvas(), horizon_slack, seen_);
   is_face_used_.fill(false);
   patches_.clear();
   order_count_ = 0;
@@ -118,10 +120,11 @@ void PacketRaster::orderLastPatch() {
   std::size_t count = order_count_;
   for (int axis = 0; axis < 3; ++axis) {
     const bool is_wide = size[axis] + reach >= largest;
+    const SeenPixels::Face* const faces = &seen_.faces[std::size_t(2 * axis)];
     order[count] = draw_order::key(2 * axis, distance_sq, index);
-    count += (is_wide & (middle[axis] + reach >= 0)) ? 1 : 0;
+    count += (is_wide & !faces[0].isEmpty() & (middle[axis] + reach >= 0)) ? 1 : 0;
     order[count] = draw_order::key(2 * axis + 1, distance_sq, index);
-    count += (is_wide & (reach - middle[axis] >= 0)) ? 1 : 0;
+    count += (is_wide & !faces[1].isEmpty() & (reach - middle[axis] >= 0)) ? 1 : 0;
   }
   order_count_ = count;
 }
@@ -249,7 +252,8 @@ PacketCanvas PacketRaster::canvas() const {
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
           .fill_scratch = fill_scratch_.get(),
-          .is_face_used = &is_face_used_};
+          .is_face_used = &is_face_used_,
+          .seen = &seen_};
 }
 
 void PacketRaster::sort() { sortByUpperHalf(order_, order_count_, order_scratch_); }

@@ -39,8 +39,9 @@ class PacketRaster {
   PacketRaster(const PacketRaster&) = delete;
   PacketRaster& operator=(const PacketRaster&) = delete;
 
-  // Starts over for 1 to kPacketReceivers receivers.
-  void begin(std::span<const Receiver> receivers, const PacketView& view);
+  // Starts over for 1 to kPacketReceivers receivers. What they see is looked at as well from places
+  // of which the horizon differs by `horizon_slack`, the sine of an angle.
+  void begin(std::span<const Receiver> receivers, const PacketView& view, float horizon_slack = 0);
   // Adds a node as a whole. All receivers must lie outside its radius.
   void addNode(const Node& node);
   // Adds those of the surfels that are of the region and that some receiver may see.
@@ -79,6 +80,7 @@ class PacketRaster {
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;
+  SeenPixels seen_;
   PacketView view_;
   std::vector<Patch> patches_;
   std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling

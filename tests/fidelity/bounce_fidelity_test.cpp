@@ -134,7 +134,7 @@ TEST_F(BounceFidelity, CornellBoxWithSpheres) {
       ReferenceScene::load({path("cornell.obj")}, {}, 2, progress_);
   ASSERT_TRUE(reference.ok()) << reference.status().message();
 
-  constexpr double kRmseLimits[] = {.06, .055}, kBiasLimits[] = {.018, .018};
+  constexpr double kRmseLimits[] = {.06, .055}, kBiasLimits[] = {.019, .018};
   for (const int bounces : {1, 3}) {
     BounceOptions options;
     options.bounces = bounces;

@@ -71,12 +71,13 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
       receivers.push_back(
           {.05f * randomDirection(random), glm::normalize(axis + .2f * randomDirection(random))});
     }
-    const CutRules rules = {trial % 7 == 0 ? 0.f : .1f, trial % 3 == 0 ? 2.f : 1e30f,
-                            float(trial % 3 - 1),
-                            trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups};
+    const CutRules rules = {
+        trial % 7 == 0 ? 0.f : .1f, trial % 3 == 0 ? 2.f : 1e30f, float(trial % 3 - 1),
+        trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups, trial % 2 == 0};
     CutRegion region;
     region.part = CutRegion::Part(trial % 3);
-    region.radius = .2f;
+    region.cluster = viewPacket(receivers);
+    region.cluster.radius = .2f;
     region.limit = 1;
     GatherRules gather(GatherMode::kBleeding, {});
     if (trial % 4 == 0) gather.weights.cone_angle = .1f + .001f * float(trial % 1000);
@@ -150,6 +151,38 @@ void expectEverySurfelOnce(Scene& scene, std::uint64_t groups) {
 TEST(Cut, NearAndFarWalkTakeEverySurfelOnce) {
   Scene scene(boxWithSphere(20'000));
   expectEverySurfelOnce(scene, kAllGroups);
+}
+
+// What is low may look larger, by the packet's horizon or the cluster's: nothing may be taken twice
+// or left out for that. A few walls around receivers that face up, everything above their horizon.
+TEST(Cut, NearAndFarWalkTakeWhatIsLowOnce) {
+  std::vector<Surfel> cloud;
+  for (const Surfel& surfel : boxWithSphere(40'000)) {
+    if (surfel.position.z > -1.5f && std::abs(surfel.position.z) < 2) cloud.push_back(surfel);
+  }
+  Scene scene(cloud);
+  GatherQuality quality;
+  quality.sides = GatherSides::kBoth;
+  quality.far_field_parallax = .5f;
+  std::mt19937 random(9);
+  std::vector<Receiver> receivers(kClusterReceivers);
+  for (Receiver& receiver : receivers) {
+    receiver = {glm::vec3(1, .5f, -1.9f) + .05f * randomDirection(random), {0, 0, 1}};
+  }
+  const GatherRules rules(GatherMode::kBleeding, quality);
+  const PacketCluster cluster(receivers, rules);
+  ASSERT_TRUE(cluster.shares());
+  CutWalk walk(rules);
+  const CutRegion far_region = cluster.farRegion();
+  CountSurfels far{far_region};
+  ASSERT_TRUE(walk.walk(cluster.view(), far_region, scene.reader(), far).ok());
+  EXPECT_GT(far.count, 0u);
+  for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
+    const CutRegion region = cluster.regionOf(i);
+    CountSurfels near{region};
+    ASSERT_TRUE(walk.walk(cluster.packet(i), region, scene.reader(), near).ok());
+    EXPECT_EQ(near.count + (cluster.shares(i) ? far.count : 0), cloud.size()) << i;
+  }
 }
 
 TEST(Cut, NearAndFarWalkTakeEverySurfelOfTheGroupsSeenOnce) {

@@ -1,0 +1,170 @@
+// Pixels of a packet's rasters: which of them count, and how one is covered; for one instruction
+// set (see packet_kernel-inl.h).
+#if defined(SURFEIT_PACKET_COVER_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_COVER_INL_H_
+#undef SURFEIT_PACKET_COVER_INL_H_
+#else
+#define SURFEIT_PACKET_COVER_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <iterator>
+#include <utility>
+
+#include "gather/coverage_rules.h"
+#include "gather/packet_kernel.h"
+#include "gather/packet_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+// How some of the receivers' pixels are covered.
+struct Cover {
+  V depth_begin, depth_end;
+  M is_lit;
+  bool is_all_lit;
+  float overlap;
+  glm::vec3 radiosity;
+  V fade;  // only when something fades
+};
+
+// What a kernel for one kind of raster draws.
+template <bool kHasColor, bool kHasFade, bool kHasFrame>
+struct BrushKind {
+  static constexpr bool kColor = kHasColor, kFade = kHasFade;
+  static constexpr bool kFrame = kHasFrame;  // the raster of a cone, in a frame of each lane
+  static constexpr std::size_t kChannels = (kColor ? 3 : 0) + (kFade ? 1 : 0);
+};
+
+// As RasterCube::coverPixel, where `amount` is positive.
+template <typename Kind>
+inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
+  const D d;
+  const V zero = hn::Zero(d), one = Splat(1);
+  float* const room_at = pixel;
+  float* const layer_at = pixel + kPacketReceivers;
+  float* const end_at = pixel + 2 * kPacketReceivers;
+  const V end = hn::Load(d, end_at);
+  V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
+
+  // A gap in depth begins a new layer
+  const M touched = hn::Gt(amount, zero);
+  const M is_new = hn::And(touched, hn::Gt(cover.depth_begin, end));
+  room = hn::IfThenElse(is_new, hn::NegMulAdd(room, before, room), room);
+  before = hn::IfThenZeroElse(is_new, before);
+  hn::Store(room, d, room_at);
+  hn::Store(hn::IfThenElse(touched, hn::Max(end, cover.depth_end), end), d, end_at);
+
+  const V middle = hn::Min(one, hn::MulAdd(Splat(0.5f), amount, before));
+  const V slope = hn::NegMulAdd(middle, Splat(cover.overlap), one);
+  const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
+  hn::Store(layer, d, layer_at);
+  if constexpr (Kind::kChannels > 0) {
+    V added = hn::Mul(room, hn::Sub(layer, before));
+    float* at = pixel + PacketCanvas::kCoverageChannels * kPacketReceivers;
+    if constexpr (Kind::kFade) {
+      float* const fade_at = at + (Kind::kChannels - 1) * kPacketReceivers;
+      hn::Store(hn::MulAdd(added, cover.fade, hn::Load(d, fade_at)), d, fade_at);
+    }
+    if constexpr (Kind::kColor) {
+      if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
+      for (int c = 0; c < 3; ++c) {
+        hn::Store(hn::MulAdd(added, Splat(cover.radiosity[c]), hn::Load(d, at)), d, at);
+        at += kPacketReceivers;
+      }
+    }
+  }
+}
+
+// Pixels of a face, half open.
+struct PixelRange {
+  int column_begin, column_end, row_begin, row_end;
+  bool isEmpty() const { return column_begin >= column_end || row_begin >= row_end; }
+};
+
+// The pixels that rectangles [x0, x1] x [y0, y1], in pixels within the face, reach in lanes of
+// `active`, in rows that count.
+inline PixelRange RangeOf(M active, V x0, V x1, V y0, V y1, int resolution,
+                          const SeenPixels::Face& seen) {
+  const D d;
+  const V far_away = Splat(float(resolution));
+  PixelRange range;
+  range.column_begin = int(hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(active, x0, far_away))));
+  range.row_begin = int(hn::GetLane(hn::MinOfLanes(d, hn::IfThenElse(active, y0, far_away))));
+  const float x_end = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(active, x1)));
+  const float y_end = hn::GetLane(hn::MaxOfLanes(d, hn::IfThenElseZero(active, y1)));
+  range.column_end = std::min(resolution, int(x_end) + 1);
+  range.row_begin = std::max(range.row_begin, seen.row_begin);
+  range.row_end = std::min(seen.row_end, int(y_end) + 1);
+  return range;
+}
+
+// Those of its columns that count in a row.
+inline std::pair<int, int> ColumnsOf(const PixelRange& range, int row,
+                                     const SeenPixels::Face& seen) {
+  const SeenPixels::Columns& columns = seen.rows[std::size_t(row)];
+  return {std::max(range.column_begin, int(columns.begin)),
+          std::min(range.column_end, int(columns.end))};
+}
+
+// So many rows and columns around a pixel have a say in how it is filled.
+constexpr int kFillReach = int(std::size(kFillPasses));
+
+void FindSeenPixels(const PacketCanvas& canvas, float slack, SeenPixels& seen) {
+  const RasterGeometry& geometry = *canvas.geometry;
+  const int size = geometry.resolution();
+  const bool is_all_seen = canvas.rules->hasConeRaster();  // not a half space of the world
+  const auto isSeen = [&](const glm::vec3& direction) HWY_ATTR {
+    if (is_all_seen) return true;
+    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+      const Receivers receivers(*canvas.lanes, lane);
+      const M above = hn::Gt(Dot(receivers.normal, direction), Splat(-slack));
+      if (!hn::AllFalse(D(), hn::Or(receivers.spherical, above))) return true;
+    }
+    return false;
+  };
+  for (int i = 0; i < geometry.faceCount(); ++i) {
+    SeenPixels::Face& face = seen.faces[std::size_t(i)];
+    face.row_begin = face.row_end = 0;
+    // What half spaces have of a row, and pixels between
+    std::array<SeenPixels::Columns, RasterGeometry::kMaxResolution> runs{};
+    const RasterGeometry::Pixel* row = geometry.pixels().data() + i * size * size;
+    bool is_any = false;
+    for (int y = 0; y < size; ++y, row += size) {
+      int begin = 0, end = size;
+      while (begin < size && !isSeen(row[begin].direction)) ++begin;
+      if (begin == size) continue;
+      while (!isSeen(row[end - 1].direction)) --end;
+      const auto at = std::size_t(y);
+      runs[at].begin = std::uint8_t(std::max(0, begin - kFillReach));
+      runs[at].end = std::uint8_t(std::min(size, end + kFillReach));
+      if (!is_any) face.row_begin = std::max(0, y - kFillReach);
+      face.row_end = std::min(size, y + 1 + kFillReach);
+      is_any = true;
+    }
+    for (int y = face.row_begin; y < face.row_end; ++y) {
+      SeenPixels::Columns& columns = face.rows[std::size_t(y)];
+      columns = {std::uint8_t(size), 0};
+      for (int k = std::max(0, y - kFillReach); k < std::min(size, y + 1 + kFillReach); ++k) {
+        const SeenPixels::Columns& run = runs[std::size_t(k)];
+        if (run.end == 0) continue;
+        columns.begin = std::min(columns.begin, run.begin);
+        columns.end = std::max(columns.end, run.end);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target guard
