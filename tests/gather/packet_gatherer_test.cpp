@@ -143,6 +143,22 @@ TEST(PacketGatherer, ScatteredReceiversAreDividedAndComeCloseToWhatEachGathersAl
   EXPECT_LT(found.largest, .04);
 }
 
+// Only pixels that count are cleared: what others hold from before must not be looked at.
+TEST(PacketGatherer, WhatWasGatheredBeforeLeavesNothing) {
+  Scene scene(mixedCloud());
+  for (const std::vector<Receiver>& receivers : {denseReceivers(), scatteredReceivers()}) {
+    PacketGatherer fresh(GatherMode::kBleeding, {}), used(GatherMode::kBleeding, {});
+    std::vector<Receiver> others = receivers;
+    for (Receiver& receiver : others) receiver.normal = -receiver.normal;
+    gatherPacket(used, scene, others);
+    const std::vector<GatherResult> expected = gatherPacket(fresh, scene, receivers);
+    const std::vector<GatherResult> found = gatherPacket(used, scene, receivers);
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      ASSERT_EQ(difference(found[i], expected[i]), 0) << i;
+    }
+  }
+}
+
 TEST(PacketGatherer, DenseReceiversAreNotDivided) {
   Scene scene(fineCloud());
   for (const float parallax : {0.f, .3f}) {
