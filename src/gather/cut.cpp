@@ -36,18 +36,11 @@ constexpr float kMostTurnedAway = 0.5f;
 // lion on a plane with .4, .7, 1: 2.4, 2.1, 2.3 %.)
 constexpr float kRoughShare = 0.6f;
 
-// What is seen at a cosine to the normal below kWholeCosine weighs less: nodes may look larger by
-// as much, at most this much. Not flat ones: tiles of a surface leave gaps when they are large.
-// (City at scattered receivers, nodes and patches: .74 of what it takes without; covered of a
-// closed shell of 200,000 disks .9954 with and without, and .9927 if flat ones are larger as well.)
-constexpr float kWholeCosine = 0.8f, kMostCoarser = 4;
-// And not beyond this: of what looks larger, a footprint on the raster is no image.
-constexpr float kMostLowSolidAngle = 0.4f;
-
-float mostCoarser(const CutRules& rules) {
-  const float whole = std::max(rules.max_solid_angle, kMostLowSolidAngle / kMostCoarser);
-  return std::max(1.f, kMostLowSolidAngle / whole);
-}
+// What is seen at a cosine to the normal below this weighs less: nodes may look larger by as much,
+// up to mostCoarser. Not flat ones: tiles of a surface leave gaps when they are large. (Covered of
+// a closed shell of 200,000 disks .9954 with and without, and .9927 if flat ones are larger as
+// well.)
+constexpr float kWholeCosine = 0.8f;
 
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 
@@ -143,7 +136,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     const auto coarser = [&](auto from_nearest, auto top) HWY_ATTR {
       const auto gain = hn::Div(hn::Mul(hn::Set(d, kWholeCosine), from_nearest),
                                 hn::Max(top, hn::Set(d, std::numeric_limits<float>::min())));
-      const auto most = hn::IfThenElse(is_flat, one, hn::Set(d, mostCoarser(rules)));
+      const auto most = hn::IfThenElse(is_flat, one, hn::Set(d, rules.most_coarser));
       return hn::Min(most, hn::Max(one, gain));
     };
 
@@ -156,7 +149,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
       const auto top = highest(view, x, y, z, distance_sq, distance);
       const auto reach = hn::Max(zero, hn::Sub(nearest, radius));
       seen = hn::And(seen, hn::Gt(top, hn::Mul(reach, hn::Set(d, horizonSlope(rules)))));
-      if (rules.weighs_by_cosine) {
+      if (rules.most_coarser > 1) {
         most_solid_angle = hn::Mul(most_solid_angle, coarser(nearest, top));
       }
     }
@@ -189,7 +182,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
       const auto from_centre = hn::Sqrt(centre_sq);
       const auto from_cluster = hn::Sub(from_centre, hn::Set(d, cluster.radius));
       auto most = most_from_cluster;
-      if (cluster.has_horizon && rules.weighs_by_cosine) {
+      if (cluster.has_horizon && rules.most_coarser > 1) {
         const auto top = highest(cluster, cx, cy, cz, centre_sq, from_centre);
         most = hn::Mul(most, coarser(from_cluster, top));
       }
@@ -265,9 +258,9 @@ float highestPoint(const Node& node, const glm::vec3& to_node, float distance, f
 // How much larger than others a node may look, whose highest point is this high.
 float coarser(const Node& node, float nearest, float highest, const PacketView& view,
               const CutRules& rules) {
-  if (node.isFlat() || !view.has_horizon || !rules.weighs_by_cosine) return 1;
+  if (node.isFlat() || !view.has_horizon) return 1;
   const float gain = kWholeCosine * nearest / std::max(highest, std::numeric_limits<float>::min());
-  return std::clamp(gain, 1.f, mostCoarser(rules));
+  return std::clamp(gain, 1.f, rules.most_coarser);
 }
 
 // A node may stand in for its surfels when its bounding sphere looks smaller than twice the max

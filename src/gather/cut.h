@@ -63,7 +63,7 @@ struct CutRules {
   float max_distance = 0;
   float facing = 1;                   // 1: only fronts are seen, -1: only backs, 0: both
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
-  bool weighs_by_cosine = false;      // of the angle to the normal: what is low may be coarser
+  float most_coarser = 1;             // what is low may look so many times as large
 
   bool approximates() const { return max_solid_angle > 0; }
   bool seesAllGroups() const { return groups == kAllGroups; }
@@ -99,7 +99,7 @@ class CutWalk {
   explicit CutWalk(const GatherRules& rules,
                    SiblingClassifier classify = fastestSiblingClassifier())
       : rules_{maxSolidAngle(rules), rules.quality.max_distance, facingOf(rules.quality.sides),
-               rules.groups, weighsByCosine(rules)},
+               rules.groups, mostCoarser(rules)},
         classify_(classify) {}
 
   template <typename Reader, typename Visit>

@@ -118,10 +118,15 @@ inline float maxSolidAngle(const GatherRules& rules) {
   const float share = std::min(1.f, kConeShare * (1 - std::cos(rules.weights.cone_angle)));
   return rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1);
 }
-// Whether directions weigh by the cosine of their angle to the normal.
-inline bool weighsByCosine(const GatherRules& rules) {
-  return !rules.isGlossy() && !rules.hasCone() &&
-         rules.weights.distribution == GatherWeights::Distribution::kCosine;
+// Where directions weigh by the cosine of their angle to the normal, what is low may look this many
+// times as large, and no larger than a limit: of what exceeds it, a footprint on the raster is no
+// image.
+inline constexpr float kMostCoarser = 4, kMostLowSolidAngle = 0.4f;
+inline float mostCoarser(const GatherRules& rules) {
+  const bool weighs_by_cosine = !rules.isGlossy() && !rules.hasCone() &&
+                                rules.weights.distribution == GatherWeights::Distribution::kCosine;
+  const float whole = std::max(maxSolidAngle(rules), kMostLowSolidAngle / kMostCoarser);
+  return weighs_by_cosine ? std::max(1.f, kMostLowSolidAngle / whole) : 1;
 }
 inline float nearFieldRadii(const GatherRules& rules) {
   const float slope = rules.hasConeRaster() ? std::tan(rules.weights.cone_angle) : 1;

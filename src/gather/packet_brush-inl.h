@@ -104,15 +104,12 @@ class Brush {
   // For all lanes.
   void ClearFace() {
     const D d;
-    for (int row = seen_->row_begin; row < seen_->row_end; ++row) {
-      const auto [begin, end] = seen_->rows[std::size_t(row)];
-      float* at = pixels_ + std::size_t(row * resolution_ + begin) * kPixelFloats;
-      for (int column = begin; column < end; ++column, at += kPixelFloats) {
-        for (std::size_t lane = 0; lane < kPixelFloats; lane += kStep) {
-          hn::Store(Splat(lane < kPacketReceivers ? 1.f : 0.f), d, at + lane);
-        }
+    seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
+      float* const at = pixels_ + pixel * kPixelFloats;
+      for (std::size_t lane = 0; lane < kPixelFloats; lane += kStep) {
+        hn::Store(Splat(lane < kPacketReceivers ? 1.f : 0.f), d, at + lane);
       }
-    }
+    });
     (*canvas_.is_face_used)[std::size_t(face_)] = true;
   }
 
@@ -282,13 +279,7 @@ class Brush {
     const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_, *seen_);
     if (range.isEmpty()) return;
 
-    if (patch.isRound()) {
-      ForEachRay(range, [&](std::size_t pixel, const glm::vec3& ray) HWY_ATTR {
-        CoverTraced(pixel, hn::IfThenElseZero(traced, SphereAmount(patch, ray, centre, centre_sq)),
-                    cover);
-      });
-      return;
-    }
+    if (patch.isRound()) return TraceSphere(patch, centre, traced, centre_sq, range, cover);
     TraceDisk(patch, centre, normal, traced, c_n, centre_sq, range, cover);
   }
 
@@ -338,15 +329,16 @@ class Brush {
     CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
   }
 
-  template <typename Visit>
-  void ForEachRay(const PixelRange& range, const Visit& visit) const {
+  void TraceSphere(const Patch& patch, const V3& centre, M traced, V centre_sq,
+                   const PixelRange& range, const Cover& cover) {
     const RasterGeometry::Pixel* const pixels =
         canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
     for (int row = range.row_begin; row < range.row_end; ++row) {
       const auto [begin, end] = ColumnsOf(range, row, *seen_);
       for (int column = begin; column < end; ++column) {
         const std::size_t pixel = std::size_t(row * resolution_ + column);
-        visit(pixel, pixels[pixel].direction);
+        const V amount = SphereAmount(patch, pixels[pixel].direction, centre, centre_sq);
+        CoverTraced(pixel, hn::IfThenElseZero(traced, amount), cover);
       }
     }
   }

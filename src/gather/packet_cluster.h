@@ -39,6 +39,7 @@ class PacketCluster {
   // of their far field may be dropped for lying below it. The horizons of others differ by an angle
   // of this sine at most.
   static constexpr float kOneHorizon = 0.99f, kHorizonSlack = 0.1415f;
+  static_assert(kOneHorizon * kOneHorizon + kHorizonSlack * kHorizonSlack > 1);
 
   // `receivers`: 1 to kClusterReceivers. They are divided into packets again and again where they
   // lie farthest apart, in space or by their normals: the curve jumps, and packets need not.

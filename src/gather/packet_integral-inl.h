@@ -40,14 +40,11 @@ void FinishFarField(const PacketCanvas& canvas) {
   };
   for (std::size_t i = 0; i < std::size_t(canvas.geometry->faceCount()); ++i) {
     if (!(*canvas.is_face_used)[i]) continue;
-    const SeenPixels::Face& face = canvas.seen->faces[i];
-    for (auto row = std::size_t(face.row_begin); row < std::size_t(face.row_end); ++row) {
-      for (std::size_t column = face.rows[row].begin; column < face.rows[row].end; ++column) {
-        for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-          finish(canvas.pixels + ((i * size + row) * size + column) * pixel_floats + lane);
-        }
+    canvas.seen->faces[i].forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
+      for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+        finish(canvas.pixels + (i * size * size + in_face) * pixel_floats + lane);
       }
-    }
+    });
   }
 }
 
@@ -82,23 +79,21 @@ class Integral {
     const auto size = std::size_t(canvas_.geometry->resolution());
     const std::size_t first = face * size * size;
     if (has_near || has_far) ResolveFace(first, has_near, has_far, seen, fill);
-    for (auto row = std::size_t(seen.row_begin); row < std::size_t(seen.row_end); ++row) {
-      for (std::size_t column = seen.rows[row].begin; column < seen.rows[row].end; ++column) {
-        const std::size_t in_face = row * size + column, i = first + in_face;
-        const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
-        const V direction_weight = WeightOf(pixel.direction);
-        const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
-        weight_sum_ = hn::Add(weight_sum_, weight);
-        if (!has_near && !has_far && !has_more) continue;
-        const PixelSight sight =
-            has_near || has_far ? Resolved(i, fill.Coverage(in_face)) : NothingSeen();
-        covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
-        radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
-        radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
-        radiosity_.z = hn::MulAdd(weight, sight.radiosity.z, radiosity_.z);
-        if (has_more) AddMore(i, direction_weight, weight, sight);
-      }
-    }
+    seen.forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
+      const std::size_t i = first + in_face;
+      const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
+      const V direction_weight = WeightOf(pixel.direction);
+      const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
+      weight_sum_ = hn::Add(weight_sum_, weight);
+      if (!has_near && !has_far && !has_more) return;
+      const PixelSight sight =
+          has_near || has_far ? Resolved(i, fill.Coverage(in_face)) : NothingSeen();
+      covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
+      radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
+      radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
+      radiosity_.z = hn::MulAdd(weight, sight.radiosity.z, radiosity_.z);
+      if (has_more) AddMore(i, direction_weight, weight, sight);
+    });
   }
 
   // Sums of the lanes, and of their weights.

@@ -68,6 +68,14 @@ struct SeenPixels {
     int row_begin = 0, row_end = 0;
     std::array<Columns, RasterGeometry::kMaxResolution> rows;
     bool isEmpty() const { return row_begin == row_end; }
+    // Calls visit(pixel) with their places on a face of this resolution.
+    template <typename Visit>
+    void forEachPixel(std::size_t resolution, const Visit& visit) const {
+      for (auto row = std::size_t(row_begin); row < std::size_t(row_end); ++row) {
+        const auto [begin, end] = rows[row];
+        for (std::size_t column = begin; column < end; ++column) visit(row * resolution + column);
+      }
+    }
   };
   std::array<Face, RasterGeometry::kFaces> faces;
 };

@@ -73,7 +73,7 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
     }
     const CutRules rules = {
         trial % 7 == 0 ? 0.f : .1f, trial % 3 == 0 ? 2.f : 1e30f, float(trial % 3 - 1),
-        trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups, trial % 2 == 0};
+        trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups, trial % 2 == 0 ? 4.f : 1.f};
     CutRegion region;
     region.part = CutRegion::Part(trial % 3);
     region.cluster = viewPacket(receivers);
