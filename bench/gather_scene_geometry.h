@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <random>
 #include <span>
 #include <string>
 #include <vector>
@@ -35,6 +36,21 @@ struct SceneGeometry {
   std::uint64_t surfels = 0;   // default
 };
 
+// Numbers by chance, the same on every machine.
+class SceneRandom {
+ public:
+  explicit SceneRandom(std::uint64_t seed) : engine_(seed) {}
+  double next() { return double(engine_() >> 11) * 0x1p-53; }  // in [0, 1)
+  double next(double begin, double end) { return begin + (end - begin) * next(); }
+  glm::vec3 nextColor() {
+    const double red = next(), green = next(), blue = next();
+    return {red, green, blue};
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
 // The radiosity of a place on the geometry: the emission of its material, or where a wavelength is
 // given, three waves along the axes. Nothing is lit and nothing casts shadows, so that errors of
 // colour are those of the gather and not of edges that no surfel can have.
@@ -55,6 +71,10 @@ Status sendSpheresSurfels(const SceneGeometry& geometry, std::uint64_t count,
 // have no triangles: ground, buildings, domes and spheres. Surfels are those of the generator.
 SceneGeometry makeCity();
 Status sendCitySurfels(const SceneGeometry& geometry, std::uint64_t count, const SurfelSink& sink);
+
+// A 10 x 10 ground with 40 crowns of trees over it, balls of two-sided leaves that face anywhere:
+// 64,000 or so, each of about .035 by .02. Surfels are those of the sampler of meshes.
+SceneGeometry makeLeaves();
 
 // Bunny and lion on a ground, Sponza, hair: from files in `data`. kIoError where one is missing.
 bool isMeshScene(const std::string& name);

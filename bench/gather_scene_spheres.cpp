@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
-#include <random>
 #include <vector>
 
 #include "bench/gather_scene_geometry.h"
@@ -20,19 +19,6 @@ constexpr double kSmallest = 0.05, kLargest = 0.5, kHeight = 4;
 // Disk radius over that of a disk of the surfel's area: overlaps enough to leave no gaps.
 constexpr double kOverlap = 1.4;
 
-class Random {
- public:
-  double next() { return double(engine_() >> 11) * 0x1p-53; }  // in [0, 1)
-  double next(double begin, double end) { return begin + (end - begin) * next(); }
-  glm::vec3 nextColor() {
-    const double red = next(), green = next(), blue = next();
-    return {red, green, blue};
-  }
-
- private:
-  std::mt19937_64 engine_{7};
-};
-
 double sphereArea(const TrueSphere& sphere) {
   return 4 * kPiDouble * double(sphere.radius) * double(sphere.radius);
 }
@@ -44,7 +30,8 @@ bool overlapsAny(const TrueSphere& sphere, const std::vector<TrueSphere>& others
 }
 
 // Places the largest first, while there is room.
-void placeSpheres(int count, bool are_resting, Random& random, std::vector<TrueSphere>& spheres) {
+void placeSpheres(int count, bool are_resting, SceneRandom& random,
+                  std::vector<TrueSphere>& spheres) {
   std::vector<float> radii;
   for (int i = 0; i < count; ++i) radii.push_back(float(random.next(kSmallest, kLargest)));
   std::sort(radii.begin(), radii.end(), std::greater<>());
@@ -72,7 +59,7 @@ std::uint32_t tileAt(const glm::vec3& position) {
 
 // Rows of a hexagonal lattice that fills the ground exactly, every second one shifted by half.
 Status sendGround(const SceneGeometry& geometry, double surfel_area, const SurfelSink& sink) {
-  Random random;
+  SceneRandom random(7);
   const double spacing = std::sqrt(surfel_area * 2 / std::sqrt(3.0));
   const int columns = int(std::round(kGroundEdge / spacing));
   const int rows = int(std::round(kGroundEdge * kGroundEdge / surfel_area / columns));
@@ -119,7 +106,7 @@ Status sendSphere(const SceneGeometry& geometry, const TrueSphere& sphere, doubl
 }  // namespace
 
 SceneGeometry makeSpheres() {
-  Random random;
+  SceneRandom random(7);
   SceneGeometry geometry;
   geometry.surfels = 1'000'000;
   geometry.ray_offset = 1e-4f;

@@ -73,8 +73,8 @@ void chooseJudged(ReceiverSet& set) {
 }  // namespace
 
 const std::vector<std::string>& gatherSceneNames() {
-  static const std::vector<std::string> names = {"spheres", "city",   "bunny",
-                                                 "lion",    "sponza", "hair"};
+  static const std::vector<std::string> names = {"spheres", "city",   "bunny", "lion",
+                                                 "sponza",  "leaves", "hair"};
   return names;
 }
 
@@ -118,7 +118,7 @@ Result<GatherScene> GatherScene::open(const std::string& name, const SceneOption
   if (isMeshScene(name)) {
     SURFEIT_ASSIGN_OR_RETURN(scene.geometry_, loadMeshScene(name, options.data, progress));
   } else {
-    scene.geometry_ = name == "city" ? makeCity() : makeSpheres();
+    scene.geometry_ = name == "city" ? makeCity() : name == "leaves" ? makeLeaves() : makeSpheres();
   }
   const std::uint64_t count = options.surfels > 0 ? options.surfels : scene.geometry_.surfels;
   scene.octree_path_ =
@@ -137,7 +137,7 @@ Status GatherScene::makeOctree(std::uint64_t count, int threads, Progress& progr
   channels.two_sided = geometry_.is_two_sided;
   SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(cloud_path, channels));
   const SurfelSink sink = [&](std::span<const Surfel> surfels) { return writer.write(surfels); };
-  if (isMeshScene(name_)) {
+  if (isMeshScene(name_) || name_ == "leaves") {
     SURFEIT_RETURN_IF_ERROR(sendMeshSurfels(geometry_, count, directory_.path(), threads, sink));
   } else if (name_ == "city") {
     SURFEIT_RETURN_IF_ERROR(sendCitySurfels(geometry_, count, sink));

@@ -12,9 +12,11 @@ namespace surfeit {
 inline constexpr int kShCount = 9;
 using ShCoefficients = std::array<float, kShCount>;
 
+inline constexpr float kShY00 = 0.282094792f;
+
 // Values of the 9 basis functions in unit direction d.
 inline ShCoefficients shBasis(const glm::vec3& d) {
-  return {0.282094792f,
+  return {kShY00,
           0.488602512f * d.y,
           0.488602512f * d.z,
           0.488602512f * d.x,

@@ -188,8 +188,12 @@ GatherWork Bouncer::gatherWork() const {
 std::uint64_t Bouncer::bytesBesideGather() const {
   const auto threads = static_cast<std::uint64_t>(gather_options_.threads);
   const std::uint64_t directory = scene_->pages().pageCount() * sizeof(PageEntry);
-  // Pages of another bounce may be a little larger: colors where there were none
-  const std::uint64_t page_growth = 2 * scene_->header().surfel_group_capacity * sizeof(glm::vec3);
+  // Pages of another bounce may be a little larger, stored and decompressed: colors where there
+  // were none, of surfels or of nodes and their facets
+  const SceneHeader& header = scene_->header();
+  const std::uint64_t most_colors = std::max<std::uint64_t>(
+      header.surfel_group_capacity, std::uint64_t{header.node_group_capacity} * (1 + kMostFacets));
+  const std::uint64_t page_growth = 2 * most_colors * sizeof(glm::vec3);
   return 2 * directory + BounceRadiosity::memoryBytes(scene_->surfelPageCount()) +
          threads * (BounceCrew::threadBytes(*scene_, options_.surfels_per_receiver) + page_growth) +
          BlockWriter::kDefaultBlocks * BlockWriter::kBlockBytes +

@@ -111,8 +111,8 @@ FacingAreas facingAreas(const Facet& facet, const glm::vec3& to_receiver) {
 }
 
 Facet facetOf(const Node& node) {
-  return {node.position, node.radius,    node.flatness * node.normal,
-          node.area,     node.radiosity, node.covariance};
+  return {node.position,  node.radius,     node.flatness * node.normal, node.area,
+          node.radiosity, node.covariance, node.isTwoSided(),           false};
 }
 
 // Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,
@@ -162,6 +162,15 @@ float mostVisibleArea(const Facet& facet) {
   return std::min(facet.area, kPi * facet.radius * facet.radius);
 }
 
+float reachOf(const Facet& facet, const glm::vec3& direction) {
+  const float reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+  return facet.is_thicket ? kThicketReach * reach : reach;
+}
+
+float thicketPart(const Node& node) {
+  return thicketPart(4 * kShY00 * node.rough.sh[0][kAreaKind], node.area);
+}
+
 SymmetricMatrix shapeOf(const SymmetricMatrix& covariance) {
   const float trace = covariance.trace();
   // Of the smallest surfels it may be zero
@@ -189,20 +198,23 @@ bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const Contr
   if (!(distance_sq > 0)) return false;
   const glm::vec3 direction = to_facet / std::sqrt(distance_sq);
   const FacingAreas facing = facingAreas(facet, -direction);
-  const float area = shownArea(facing, rules.sides);
+  const float area = shownArea(facing, facet.is_two_sided ? GatherSides::kBoth : rules.sides);
   if (!(area > 0)) return false;
 
   contribution.distance_sq = distance_sq;
-  contribution.reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+  contribution.reach = reachOf(facet, direction);
   contribution.direction = direction;
   contribution.solid_angle = std::min(area, mostVisibleArea(facet)) / distance_sq;
   contribution.spread = facet.area / distance_sq;
   contribution.overlap = 0;
+  contribution.thicket = facet.is_thicket ? 1 : 0;
   contribution.normal = facet.normal;
   contribution.shape = shapeOf(facet.covariance);
-  contribution.radiosity = rules.has_color && rules.sides != GatherSides::kBack
-                               ? (facing.front / area) * facet.radiosity
-                               : glm::vec3(0);
+  contribution.radiosity = glm::vec3(0);
+  if (rules.has_color && rules.sides != GatherSides::kBack) {
+    contribution.radiosity =
+        facet.is_two_sided ? facet.radiosity : (facing.front / area) * facet.radiosity;
+  }
   return contribution.solid_angle > 0;
 }
 
@@ -234,6 +246,8 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   } else if (rules.sides == GatherSides::kBack) {
     contribution.overlap = overlapOf(facing.back, facing.front);
   }
+  contribution.thicket = thicketPart(node);
+  contribution.overlap = std::max(contribution.overlap, kThicketOverlap * contribution.thicket);
   contribution.normal = node.flatness * node.normal;
   contribution.shape = shapeOf(node.covariance);
   contribution.radiosity = glm::vec3(0);
@@ -259,7 +273,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.direction = direction;
   contribution.solid_angle = surfel.area * std::abs(cosine) / distance_sq;
   contribution.spread = surfel.area / distance_sq;
-  contribution.overlap = 0;
+  contribution.overlap = contribution.thicket = 0;
   contribution.normal = surfel.normal;
   contribution.shape = withoutDirection(surfel.normal);
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);

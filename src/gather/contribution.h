@@ -23,11 +23,12 @@ struct Contribution {
   float solid_angle;      // steradians, > 0
   float spread;           // area / distance^2: the solid angle that it would have head-on
   float overlap;          // of its parts with those of its layer, 0..1; see RasterCube::Patch
+  float thicket;          // how much of it is leaves or hair, 0..1; likewise
   glm::vec3 normal;       // unit length for a disk, zero for a sphere, in between when partly flat
   SymmetricMatrix shape;  // how it spreads; see RasterCube::Patch
   glm::vec3 radiosity;    // of what covers; back sides are black. Zero when color is not asked for.
 };
-static_assert(sizeof(Contribution) == 20 * sizeof(float));
+static_assert(sizeof(Contribution) == 21 * sizeof(float));
 
 // How contributions are to be made.
 struct ContributionRules {
@@ -84,6 +85,11 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 // a facet in any.
 float mostVisibleArea(const Node& node, const glm::vec3& direction);
 float mostVisibleArea(const Facet& facet);
+
+// How far before and behind its middle a facet meets others of its layer, seen in this direction.
+float reachOf(const Facet& facet, const glm::vec3& direction);
+// How much of a rough node is leaves or hair, 0..1.
+float thicketPart(const Node& node);
 
 // How what has this covariance spreads, for RasterCube::Patch.
 SymmetricMatrix shapeOf(const SymmetricMatrix& covariance);

@@ -36,15 +36,31 @@ struct FillPass {
 };
 inline constexpr FillPass kFillPasses[] = {{0.86f, 0.93f}, {0.87f, 0.93f}};
 
+// Two-sided surfels that no plane holds together, rough nodes of them and nodes of several facets,
+// are thickets: leaves, or hair. They lie before and behind each other anywhere, so they overlap
+// within their layer, their layers reach this part as far, and gaps between them are open. (AO RMSE
+// and bias with it, without reaching less, without overlap, and filled: leaves ; hair .)
+inline constexpr float kThicketReach = 0.15f, kThicketOverlap = 0.9f;
+
+// How much of a rough node is two-sided: 4 times its band 0 is the area of one-sided disks, twice
+// that of two-sided ones, and four times that of spheres, which are a surface. Codes round: what is
+// about none is none.
+inline float thicketPart(float band_0, float area) {
+  constexpr float kNone = 0.05f;
+  const float twice = band_0 / area - 1, part = std::min(twice, 0.5f * (3 - twice));
+  return std::clamp((part - kNone) / (1 - 2 * kNone), 0.f, 1.f);
+}
+
 // A pixel is filled by a part that grows from 0 to 1 between these coverages of its own: what
 // covers little of it is a thing of its own, or an edge.
 inline constexpr float kFilledFrom = 0.15f, kFilledWhole = 0.6f;
 
-// Coverage of a pixel after a pass. `around`: the mean of the neighbours.
-inline float filledCoverage(float coverage, float around, const FillPass& pass) {
+// Coverage of a pixel after a pass. `around`: the mean of the neighbours. `surface`: the part of
+// what covers it that is no thicket.
+inline float filledCoverage(float coverage, float around, float surface, const FillPass& pass) {
   const float part = std::clamp((around - pass.begin) / (pass.end - pass.begin), 0.f, 1.f);
   const float seen = std::clamp((coverage - kFilledFrom) / (kFilledWhole - kFilledFrom), 0.f, 1.f);
-  return coverage + part * seen * (1 - coverage);
+  return coverage + part * seen * surface * (1 - coverage);
 }
 
 // A receiver without a normal is itself a sphere of a cloud without normals. Spheres of its own

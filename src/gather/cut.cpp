@@ -42,6 +42,11 @@ constexpr float kRoughShare = 0.6f;
 // well.)
 constexpr float kWholeCosine = 0.8f;
 
+// A flat node of two-sided surfels turns its back on nobody.
+float facingOf(const Node& node, const CutRules& rules) {
+  return node.isFlat() && node.isTwoSided() ? 0 : rules.facing;
+}
+
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 
 }  // namespace
@@ -63,6 +68,7 @@ struct alignas(64) Columns {
   float radius[kMostSiblings] = {}, flatness[kMostSiblings] = {};
   float share[kMostSiblings] = {};    // what it may look like, as a part of the max solid angle
   float is_flat[kMostSiblings] = {};  // 1: yes
+  float facing[kMostSiblings] = {};   // CutRules::facing; 0: seen from both sides
 };
 constexpr float kNodeShare = 2, kRoughNodeShare = 2 * kRoughShare;
 
@@ -93,6 +99,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     columns.flatness[i] = node.flatness;
     columns.share[i] = node.isRough() ? kRoughNodeShare : kNodeShare;
     columns.is_flat[i] = node.isFlat() ? 1 : 0;
+    columns.facing[i] = facingOf(node, rules);
   }
   std::uint32_t present = (1u << siblings.size()) - 1;
   if (!rules.seesAllGroups()) present = ChooseGroups(siblings, rules, columns);
@@ -168,7 +175,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     // Small enough
     const auto area = hn::Mul(hn::Set(d, kPi), hn::Mul(radius, radius));
     const auto away =
-        hn::Mul(hn::Set(d, rules.facing), hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz))));
+        hn::Mul(hn::Load(d, columns.facing + at), hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz))));
     const auto limit = hn::Mul(most_solid_angle, hn::Mul(nearest, nearest));
     auto far = hn::And(hn::Gt(nearest, radius), hn::Lt(area, limit));
 
@@ -327,12 +334,12 @@ SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView
 
     // Turned away from all: as one disk, or all the surfels below
     if (rules.facing != 0 && rules.approximates()) {
+      const float away = facingOf(node, rules) * glm::dot(to_node, node.normal);
       const bool is_disk = is_far && node.isFlat();
       const float size = view.radius + (is_disk ? 0 : node.radius);
       const float normals = is_disk ? kFlatSpread / kNormalSpread * spread : spread;
       const float turn = normals * distance + 1.2f * size;
-      if (size < kMostTurnedAway * distance && rules.facing * glm::dot(to_node, node.normal) > turn)
-        continue;
+      if (size < kMostTurnedAway * distance && away > turn) continue;
     }
     (is_far ? classes.far : classes.open) |= 1u << i;
   }

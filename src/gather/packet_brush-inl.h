@@ -50,7 +50,9 @@ class Brush {
   void BeginFace(int face) {
     face_ = face;
     seen_ = &canvas_.seen->faces[std::size_t(face)];
-    pixels_ = canvas_.pixels + std::size_t(face * resolution_ * resolution_) * kPixelFloats;
+    const auto first = std::size_t(face * resolution_ * resolution_);
+    pixels_ = canvas_.pixels + first * kPixelFloats;
+    if (canvas_.thickets != nullptr) thickets_ = canvas_.thickets + first * kPacketReceivers;
     if (!(*canvas_.is_face_used)[std::size_t(face)]) ClearFace();
     pixels_ += lane_;
   }
@@ -109,6 +111,10 @@ class Brush {
       for (std::size_t lane = 0; lane < kPixelFloats; lane += kStep) {
         hn::Store(Splat(lane < kPacketReceivers ? 1.f : 0.f), d, at + lane);
       }
+      if (thickets_ == nullptr) return;
+      for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+        hn::Store(hn::Zero(d), d, thickets_ + pixel * kPacketReceivers + lane);
+      }
     });
     (*canvas_.is_face_used)[std::size_t(face_)] = true;
   }
@@ -120,6 +126,7 @@ class Brush {
     cover.depth_end = hn::Add(distance, reach);
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
+    cover.thicket = patch.thicket;
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
     if constexpr (Kind::kFade) cover.fade = FadeAt(distance);
@@ -224,19 +231,38 @@ class Brush {
     if (range.isEmpty()) return;
 
     const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
-    for (int row = range.row_begin; row < range.row_end; ++row) {
-      const V bottom = hn::Max(y0, Splat(float(row))), top = hn::Min(y1, Splat(float(row + 1)));
+    const Rows rows = {y0, y1, half_x, range};
+    cover.thicket > 0 ? CoverRows<true>(shape, rows, cover) : CoverRows<false>(shape, rows, cover);
+  }
+
+  struct Rows {
+    V begin, end, half_x;
+    PixelRange range;
+  };
+  template <bool kIsThicket>
+  HWY_INLINE void CoverRows(const Parallelogram& shape, const Rows& rows, const Cover& cover) {
+    const V zero = hn::Zero(D());
+    for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
+      const V bottom = hn::Max(rows.begin, Splat(float(row)));
+      const V top = hn::Min(rows.end, Splat(float(row + 1)));
       const V height = hn::Max(zero, hn::Sub(top, bottom));
       const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
       const V x = hn::NegMulAdd(shape.shear, along, shape.x);
-      const V left = hn::Sub(x, half_x), right = hn::Add(x, half_x);
-      const auto [begin, end] = ColumnsOf(range, row, *seen_);
-      float* pixel = pixels_ + std::size_t(row * resolution_ + begin) * kPixelFloats;
+      const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
+      const auto [begin, end] = ColumnsOf(rows.range, row, *seen_);
+      const auto first = std::size_t(row * resolution_ + begin);
+      float* pixel = pixels_ + first * kPixelFloats;
+      float* thicket = kIsThicket ? thickets_ + first * kPacketReceivers + lane_ : nullptr;
       for (int column = begin; column < end; ++column) {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
-        CoverPixel<Kind>(pixel, hn::Mul(width, height), cover);
+        const V added = CoverPixel<Kind>(pixel, hn::Mul(width, height), cover);
         pixel += kPixelFloats;
+        if constexpr (kIsThicket) {
+          const V before = hn::Load(D(), thicket);
+          hn::Store(hn::MulAdd(added, Splat(cover.thicket), before), D(), thicket);
+          thicket += kPacketReceivers;
+        }
       }
     }
   }
@@ -422,7 +448,8 @@ class Brush {
   const Frames frames_;
   int face_ = 0;
   const SeenPixels::Face* seen_ = nullptr;
-  float* pixels_ = nullptr;  // of the face, from the first of our lanes
+  float* pixels_ = nullptr;    // of the face, from the first of our lanes
+  float* thickets_ = nullptr;  // of the face; null: none
 };
 
 }  // namespace

@@ -30,7 +30,7 @@ struct Cover {
   V depth_begin, depth_end;
   M is_lit;
   bool is_all_lit;
-  float overlap;
+  float overlap, thicket;
   glm::vec3 radiosity;
   V fade;  // only when something fades
 };
@@ -43,9 +43,10 @@ struct BrushKind {
   static constexpr std::size_t kChannels = (kColor ? 3 : 0) + (kFade ? 1 : 0);
 };
 
-// As RasterCube::coverPixel, where `amount` is positive.
+// As RasterCube::coverPixel, where `amount` is positive; but for what thickets have. Returns what
+// is newly covered.
 template <typename Kind>
-inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
+inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
   float* const room_at = pixel;
@@ -66,8 +67,9 @@ inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
   const V slope = hn::NegMulAdd(middle, Splat(cover.overlap), one);
   const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
   hn::Store(layer, d, layer_at);
+  const V covered = hn::Mul(room, hn::Sub(layer, before));
   if constexpr (Kind::kChannels > 0) {
-    V added = hn::Mul(room, hn::Sub(layer, before));
+    V added = covered;
     float* at = pixel + PacketCanvas::kCoverageChannels * kPacketReceivers;
     if constexpr (Kind::kFade) {
       float* const fade_at = at + (Kind::kChannels - 1) * kPacketReceivers;
@@ -81,6 +83,7 @@ inline void CoverPixel(float* pixel, V amount, const Cover& cover) {
       }
     }
   }
+  return covered;
 }
 
 // Pixels of a face, half open.

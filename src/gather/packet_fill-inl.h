@@ -24,18 +24,27 @@ namespace {
 // the rows that count.
 class SurfaceFill {
  public:
-  SurfaceFill(const PacketCanvas& canvas, std::size_t lane, const SeenPixels::Face& seen)
+  SurfaceFill(const PacketCanvas& canvas, std::size_t lane, const SeenPixels::Face& seen,
+              bool has_thickets)
       : row_begin_(seen.row_begin),
         row_end_(seen.row_end),
         size_(canvas.geometry->resolution()),
+        has_thickets_(has_thickets),
         coverage_(canvas.fill_scratch + lane),
-        rows_(coverage_ + std::size_t(size_) * std::size_t(size_) * kPacketReceivers) {}
+        rows_(coverage_ + planeFloats()),
+        surface_(rows_ + planeFloats()) {}
 
   void SetCoverage(std::size_t pixel, V coverage) const {
     hn::Store(coverage, D(), coverage_ + pixel * kPacketReceivers);
   }
   V Coverage(std::size_t pixel) const {
     return hn::Load(D(), coverage_ + pixel * kPacketReceivers);
+  }
+
+  bool hasThickets() const { return has_thickets_; }
+  // The part of what covers a pixel that is no thicket; with thickets, for all pixels.
+  void SetSurface(std::size_t pixel, V part) const {
+    hn::Store(part, D(), surface_ + pixel * kPacketReceivers);
   }
 
   void Run() const {
@@ -46,6 +55,9 @@ class SurfaceFill {
   }
 
  private:
+  std::size_t planeFloats() const {
+    return std::size_t(size_) * std::size_t(size_) * kPacketReceivers;
+  }
   float* At(float* values, int row, int column) const {
     return values + std::size_t(row * size_ + column) * kPacketReceivers;
   }
@@ -79,15 +91,16 @@ class SurfaceFill {
       const V around = hn::Mul(hn::Sub(box, coverage), Splat(1 / float(count)));
       const V part = hn::Mul(hn::Sub(around, Splat(pass.begin)), Splat(part_scale));
       const V seen = hn::Mul(hn::Sub(coverage, Splat(kFilledFrom)), Splat(kSeenScale));
-      const V filled =
-          hn::Mul(hn::Min(one, hn::Max(zero, part)), hn::Min(one, hn::Max(zero, seen)));
+      V filled = hn::Mul(hn::Min(one, hn::Max(zero, part)), hn::Min(one, hn::Max(zero, seen)));
+      if (has_thickets_) filled = hn::Mul(filled, hn::Load(d, At(surface_, row, column)));
       hn::Store(hn::MulAdd(filled, hn::Sub(one, coverage), coverage), d,
                 At(coverage_, row, column));
     }
   }
 
   const int row_begin_, row_end_, size_;
-  float *const coverage_, *const rows_;
+  const bool has_thickets_;
+  float *const coverage_, *const rows_, *const surface_;
 };
 
 }  // namespace

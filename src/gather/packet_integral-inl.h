@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <span>
 
 #include "gather/packet_fill-inl.h"
@@ -37,12 +38,17 @@ void FinishFarField(const PacketCanvas& canvas) {
     for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats; c += kPacketReceivers) {
       hn::Store(hn::Mul(hn::Load(d, pixel + c), inverse), d, pixel + c);
     }
+    return inverse;
   };
   for (std::size_t i = 0; i < std::size_t(canvas.geometry->faceCount()); ++i) {
     if (!(*canvas.is_face_used)[i]) continue;
     canvas.seen->faces[i].forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
       for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-        finish(canvas.pixels + (i * size * size + in_face) * pixel_floats + lane);
+        const std::size_t at = i * size * size + in_face;
+        const V inverse = finish(canvas.pixels + at * pixel_floats + lane);
+        if (canvas.thickets == nullptr) continue;
+        float* const thicket = canvas.thickets + at * kPacketReceivers + lane;
+        hn::Store(hn::Mul(hn::Load(d, thicket), inverse), d, thicket);
       }
     });
   }
@@ -52,6 +58,7 @@ void FinishFarField(const PacketCanvas& canvas) {
 struct PixelSight {
   V coverage, occlusion;
   V3 radiosity;  // times the coverage
+  V thicket;     // likewise
 };
 
 // Sums over the pixels for some of the receivers, as ResultSums.
@@ -75,7 +82,9 @@ class Integral {
     const bool has_near = (*canvas_.is_face_used)[face];
     const bool has_far = far_ != nullptr && (*far_->canvas->is_face_used)[face];
     const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
-    const SurfaceFill fill(canvas_, lane_, seen);
+    const bool has_thickets =
+        (has_near && canvas_.thickets != nullptr) || (has_far && far_->canvas->thickets != nullptr);
+    const SurfaceFill fill(canvas_, lane_, seen, has_thickets);
     const auto size = std::size_t(canvas_.geometry->resolution());
     const std::size_t first = face * size * size;
     if (has_near || has_far) ResolveFace(first, has_near, has_far, seen, fill);
@@ -161,7 +170,7 @@ class Integral {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
     const bool has_light = rules_.hasLight(), fades = rules_.fades();
-    V room = one, layer = zero, end = zero, faded = zero;
+    V room = one, layer = zero, end = zero, faded = zero, thicket = zero;
     V3 radiosity = {zero, zero, zero};
     if (has_near) {
       const float* const near = canvas_.pixels + i * pixel_floats_ + lane_;
@@ -174,6 +183,9 @@ class Integral {
                      hn::Load(d, near + 5 * kPacketReceivers)};
       }
       if (fades) faded = hn::Load(d, near + fade_at_);
+      if (canvas_.thickets != nullptr) {
+        thicket = hn::Load(d, canvas_.thickets + i * kPacketReceivers + lane_);
+      }
     }
     // The far field comes last, as one contribution: a surface that reaches it goes on there
     const float* far = nullptr;
@@ -191,10 +203,13 @@ class Integral {
         radiosity.z = hn::MulAdd(added, Splat(far[5 * kPacketReceivers]), radiosity.z);
       }
       if (fades) faded = hn::MulAdd(added, Splat(far[fade_at_]), faded);
+      if (const float* const thickets = far_->canvas->thickets) {
+        thicket = hn::MulAdd(added, Splat(thickets[i * kPacketReceivers + far_->lane]), thicket);
+      }
       layer = after;
     }
     const V coverage = hn::Sub(one, hn::NegMulAdd(room, layer, room));
-    return {coverage, fades ? faded : coverage, radiosity};
+    return {coverage, fades ? faded : coverage, radiosity, thicket};
   }
 
   // Puts what is seen into the pixels of a face: the coverage in the place of the room, radiosities
@@ -208,14 +223,21 @@ class Integral {
         const auto [begin, end] = seen.rows[row];
         if (column < begin || column >= end) {
           fill.SetCoverage(in_face, hn::Zero(D()));
-        } else {
-          fill.SetCoverage(in_face, ResolvePixel(first + in_face, has_near, has_far));
+          if (fill.hasThickets()) fill.SetSurface(in_face, hn::Zero(D()));
+          continue;
         }
+        const PixelSight sight = ResolvePixel(first + in_face, has_near, has_far);
+        fill.SetCoverage(in_face, sight.coverage);
+        if (fill.hasThickets()) fill.SetSurface(in_face, SurfacePart(sight));
       }
     }
     fill.Run();
   }
-  V ResolvePixel(std::size_t i, bool has_near, bool has_far) {
+  static V SurfacePart(const PixelSight& sight) {
+    const V least = Splat(std::numeric_limits<float>::min());
+    return hn::Sub(Splat(1), hn::Div(sight.thicket, hn::Max(sight.coverage, least)));
+  }
+  PixelSight ResolvePixel(std::size_t i, bool has_near, bool has_far) {
     const D d;
     const PixelSight sight = Look(i, has_near, has_far);
     float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
@@ -226,12 +248,12 @@ class Integral {
       hn::Store(sight.radiosity.z, d, pixel + 5 * kPacketReceivers);
     }
     if (rules_.fades()) hn::Store(sight.occlusion, d, pixel + fade_at_);
-    return sight.coverage;
+    return sight;
   }
 
   static PixelSight NothingSeen() {
     const V zero = hn::Zero(D());
-    return {zero, zero, {zero, zero, zero}};
+    return {zero, zero, {zero, zero, zero}, zero};
   }
 
   // What is seen of a pixel that was resolved, once its gaps are filled to `coverage`.

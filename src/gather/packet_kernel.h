@@ -35,7 +35,7 @@ struct Patch {
   float most_area = 0;  // and no more than this
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
-  float overlap = 0;  // RasterCube::Patch
+  float overlap = 0, thicket = 0;  // RasterCube::Patch
   glm::vec3 radiosity{0};
   // It is seen where offset . normal, from the receiver, is below this: kFrontOnly, kBothSides, or
   // kDarkBack, when it is seen from both sides and sends light from its front
@@ -99,7 +99,10 @@ struct PacketCanvas {
   glm::vec3 centre;       // of the packet
   float packet_radius;
   float* pixels;  // aligned to 64 bytes
-  // Room for two values per pixel of a face and lane, aligned likewise.
+  // What thickets have of the coverage, 16 lanes of a pixel, aligned likewise; null when there are
+  // none among what is drawn.
+  float* thickets;
+  // Room for three values per pixel of a face and lane, aligned likewise.
   float* fill_scratch;
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;

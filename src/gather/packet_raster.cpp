@@ -22,7 +22,7 @@ constexpr float kDiagonal = 1.415f;
 
 std::size_t fillFloats(const GatherRules& rules) {
   const auto resolution = static_cast<std::size_t>(rules.quality.raster_resolution);
-  return 2 * resolution * resolution * kPacketReceivers;
+  return 3 * resolution * resolution * kPacketReceivers;
 }
 
 // Sorts by the upper 32 bits of keys, stable: a radix sort of 11 bits a pass.
@@ -62,8 +62,10 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
       weights_(rules, 1 / geometry_.pixelsPerSlope()),
       pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() *
                                           PacketCanvas::pixelFloats(rules_))),
+      thickets_(hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers)),
       fill_scratch_(hwy::AllocateAligned<float>(fillFloats(rules_))) {
-  if (pixels_ == nullptr || fill_scratch_ == nullptr) throw std::bad_alloc();
+  if (pixels_ == nullptr || thickets_ == nullptr || fill_scratch_ == nullptr)
+    throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
   order_.resize(kReservedEntries);
   order_scratch_.resize(kReservedEntries);
@@ -92,6 +94,7 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
   kernel_.findSeenPixels(canvas(), horizon_slack, seen_);
   is_face_used_.fill(false);
   patches_.clear();
+  has_thickets_ = false;
   order_count_ = 0;
 }
 
@@ -135,7 +138,7 @@ void PacketRaster::addNode(const Node& node) {
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
-    if (!turnsAway(position, codes.meanNormal())) addFacet(node.facet(i));
+    if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) addFacet(node.facet(i));
   }
 }
 
@@ -159,24 +162,30 @@ void PacketRaster::addFacet(const Facet& facet) {
   Patch& patch = patches_.emplace_back();
   patch.position = facet.position;
   patch.radius = facet.radius;
-  patch.normal = side * facet.normal;
-  patch.reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+  patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
+  patch.reach = reachOf(facet, direction);
+  patch.thicket = facet.is_thicket ? 1 : 0;
+  has_thickets_ |= facet.is_thicket;
   patch.shape = shapeOf(facet.covariance);
   patch.area = facet.area;
   patch.most_area = mostVisibleArea(facet);
   if (sides != GatherSides::kBack) patch.radiosity = facet.radiosity;
   patch.disk_area = facet.area;
-  if (!(std::abs(cosine) < range + view_.radius / distance)) {
-    patch.facing_limit = sides == GatherSides::kBoth ? Patch::kDarkBack : Patch::kFrontOnly;
-  } else if (sides != GatherSides::kBoth) {
+  const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
+  const bool is_rim = std::abs(cosine) < range + view_.radius / distance;
+  if (!is_rim || (shows_both && !(range > 0))) {
+    patch.facing_limit = facet.is_two_sided ? Patch::kBothSides
+                         : shows_both       ? Patch::kDarkBack
+                                            : Patch::kFrontOnly;
+  } else if (!shows_both) {
     patch.range = range;
     patch.facing_limit = range > 0 ? Patch::kBothSides : Patch::kFrontOnly;
   } else {
     // From both sides, at the rim of something curved all lanes see as much as the centre
     patch.disk_area = 0;
     const FacingAreas facing = facingAreas(facet, -direction);
-    patch.round_area = shownArea(facing, sides);
-    patch.radiosity *= facing.front / patch.round_area;
+    patch.round_area = facing.front + facing.back;
+    if (!facet.is_two_sided) patch.radiosity *= facing.front / patch.round_area;
     patch.facing_limit = Patch::kBothSides;
   }
   orderLastPatch();
@@ -203,6 +212,9 @@ void PacketRaster::addRoughNode(const Node& node) {
   if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
+  patch.thicket = thicketPart(node);
+  patch.overlap = std::max(patch.overlap, kThicketOverlap * patch.thicket);
+  has_thickets_ |= patch.thicket > 0;
   patch.facing_limit = Patch::kBothSides;
   orderLastPatch();
 }
@@ -251,6 +263,7 @@ PacketCanvas PacketRaster::canvas() const {
           .centre = view_.centre,
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
+          .thickets = has_thickets_ ? thickets_.get() : nullptr,
           .fill_scratch = fill_scratch_.get(),
           .is_face_used = &is_face_used_,
           .seen = &seen_};
@@ -277,7 +290,8 @@ void PacketRaster::integrate(std::span<GatherResult> results, const PacketRaster
 
 std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
   const std::size_t pixel_bytes =
-      sizeof(RasterGeometry::Pixel) + PacketCanvas::pixelFloats(rules) * sizeof(float);
+      sizeof(RasterGeometry::Pixel) +
+      (PacketCanvas::pixelFloats(rules) + kPacketReceivers) * sizeof(float);
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
          fillFloats(rules) * sizeof(float) + kReservedPatches * sizeof(Patch) +

@@ -76,13 +76,14 @@ class PacketRaster {
   float max_distance_sq_;
   RasterGeometry geometry_;
   DirectionWeights weights_;
-  hwy::AlignedFreeUniquePtr<float[]> pixels_, fill_scratch_;
+  hwy::AlignedFreeUniquePtr<float[]> pixels_, thickets_, fill_scratch_;
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;
   SeenPixels seen_;
   PacketView view_;
   std::vector<Patch> patches_;
+  bool has_thickets_ = false;                         // among patches_
   std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling
   std::size_t order_count_ = 0;
 };

@@ -98,7 +98,7 @@ void RasterCube::clear() {
 }
 
 // A layer with less room than `amount` ends at exactly 1, and the pixel is exactly 1 then.
-inline void RasterCube::coverPixel(std::size_t pixel, float amount, float overlap,
+inline void RasterCube::coverPixel(std::size_t pixel, float amount, const Texture& texture,
                                    const DepthRange& depth, const glm::vec3& radiosity) {
   Coverage& coverage = coverage_[pixel];
   if (coverage.total >= 1) return;
@@ -112,13 +112,14 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float overla
 
   // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer
   const float middle = std::min(1.f, coverage.layer + 0.5f * amount);
-  const float slope = 1 - middle * overlap;
+  const float slope = 1 - middle * texture.overlap;
   coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
   coverage.total =
       coverage.layer >= 1
           ? 1
           : std::clamp(1 - coverage.room + coverage.layer * coverage.room, before, 1.f);
+  coverage.thicket += (coverage.total - before) * texture.thicket;
   if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
   if (!faded_.empty()) faded_[pixel] += (coverage.total - before) * depth.fade;
 }
@@ -129,7 +130,7 @@ void RasterCube::fill() {
   std::vector<float>& filled = fill_scratch_;
   for (std::size_t first = 0; first < coverage_.size(); first += face_pixels) {
     for (std::size_t i = 0; i < face_pixels; ++i) filled[i] = coverage_[first + i].total;
-    for (const FillPass& pass : kFillPasses) fillFace(pass);
+    for (const FillPass& pass : kFillPasses) fillFace(first, pass);
     for (std::size_t i = 0; i < face_pixels; ++i) {
       float& total = coverage_[first + i].total;
       if (!(filled[i] > total)) continue;
@@ -141,9 +142,9 @@ void RasterCube::fill() {
   }
 }
 
-// One pass over a face, whose coverages are at the front of fill_scratch_; the sums of three of a
-// row behind them. Neighbours on other faces do not count.
-void RasterCube::fillFace(const FillPass& pass) {
+// One pass over a face, which begins with pixel `first` and whose coverages are at the front of
+// fill_scratch_; the sums of three of a row behind them. Neighbours on other faces do not count.
+void RasterCube::fillFace(std::size_t first, const FillPass& pass) {
   const int size = geometry_->resolution();
   float* const coverage = fill_scratch_.data();
   float* const rows = coverage + size * size;
@@ -156,12 +157,14 @@ void RasterCube::fillFace(const FillPass& pass) {
     const float box = rows[i] + (y > 0 ? rows[i - size] : 0) + (y + 1 < size ? rows[i + size] : 0);
     const int columns = 1 + (x > 0) + (x + 1 < size), lines = 1 + (y > 0) + (y + 1 < size);
     const float around = (box - coverage[i]) / float(columns * lines - 1);
-    coverage[i] = filledCoverage(coverage[i], around, pass);
+    const Coverage& found = coverage_[first + std::size_t(i)];
+    const float surface = found.total > 0 ? 1 - found.thicket / found.total : 1;
+    coverage[i] = filledCoverage(coverage[i], around, surface, pass);
   }
 }
 
 // Covers pixels by the part of them that lies in the shape, row by row.
-void RasterCube::coverParallelogram(int face, const Parallelogram& shape, float overlap,
+void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const Texture& texture,
                                     const DepthRange& depth, const glm::vec3& radiosity) {
   // From face coordinates to pixels
   const int resolution = geometry_->resolution();
@@ -182,7 +185,7 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, float 
     const std::size_t row_first = std::size_t((face * resolution + row) * resolution);
     for (int column = int(x_begin); column <= column_last; ++column) {
       const float width = std::min(x_end, float(column + 1)) - std::max(x_begin, float(column));
-      coverPixel(row_first + std::size_t(column), width * (top - bottom), overlap, depth,
+      coverPixel(row_first + std::size_t(column), width * (top - bottom), texture, depth,
                  radiosity);
     }
   }
@@ -233,7 +236,7 @@ void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::v
     if (!(std::abs(patch.direction[axis]) > kLeastAxis)) continue;
     const int face = 2 * axis + (patch.direction[axis] < 0 ? 1 : 0);
     if (face >= geometry_->faceCount()) return;
-    coverParallelogram(face, onFace(patch, axis), patch.overlap, depth, radiosity);
+    coverParallelogram(face, onFace(patch, axis), {patch.overlap, patch.thicket}, depth, radiosity);
   }
 }
 
@@ -262,7 +265,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthR
       for (int column = column_begin; column < column_end; ++column) {
         const std::size_t pixel = row_first + std::size_t(column);
         const float amount = amountOf(pixels[pixel].direction);
-        if (amount > 0) coverPixel(pixel, amount, 0, depth, radiosity);
+        if (amount > 0) coverPixel(pixel, amount, {0, 0}, depth, radiosity);
       }
     }
   }

@@ -107,6 +107,7 @@ class RasterCube {
     // How far it hides behind its own layer, 0..1: 0 for a tile beside the others, 1 for what lies
     // anywhere before or behind them.
     float overlap = 0;
+    float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
   };
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
   // image, to first order, of a parallelogram that spreads as the patch does and whose sides follow
@@ -139,7 +140,7 @@ class RasterCube {
 
   // Bytes that a cube with color that fades holds for each pixel, with its part of the scratch
   // space of a face.
-  static constexpr std::size_t kPixelBytes = 6 * sizeof(float) + sizeof(glm::vec3);
+  static constexpr std::size_t kPixelBytes = 7 * sizeof(float) + sizeof(glm::vec3);
 
  private:
   struct Coverage {
@@ -147,16 +148,21 @@ class RasterCube {
     float room = 1;       // what the layers before the last one leave uncovered
     float layer = 0;      // of the last layer by itself
     float layer_end = 0;  // where the depth ranges of the last layer end
+    float thicket = 0;    // what thickets have of the total
+  };
+  // How a patch covers its pixels; Patch has what they mean.
+  struct Texture {
+    float overlap, thicket;
   };
   // On a face: rows of width 2 half_u around the line u + shear (row - v).
   struct Parallelogram {
     float u, v, half_u, half_v, shear;
   };
   static Parallelogram onFace(const Patch& patch, int axis);
-  void fillFace(const FillPass& pass);
-  void coverPixel(std::size_t pixel, float amount, float overlap, const DepthRange& depth,
+  void fillFace(std::size_t first, const FillPass& pass);
+  void coverPixel(std::size_t pixel, float amount, const Texture& texture, const DepthRange& depth,
                   const glm::vec3& radiosity);
-  void coverParallelogram(int face, const Parallelogram& shape, float overlap,
+  void coverParallelogram(int face, const Parallelogram& shape, const Texture& texture,
                           const DepthRange& depth, const glm::vec3& radiosity);
   template <typename AmountOf>
   void tracePixels(const glm::vec3& centre, float radius, const DepthRange& depth,

@@ -177,7 +177,7 @@ GatherResult ReceiverRaster::finish() {
       trace(near_surfels_[std::size_t(entry.near_index)], depth);
     } else {
       cube_.splat({inRaster(patch.direction), inRaster(patch.normal), inRaster(patch.shape),
-                   patch.solid_angle, patch.spread, patch.overlap},
+                   patch.solid_angle, patch.spread, patch.overlap, patch.thicket},
                   depth, patch.radiosity);
     }
   }

@@ -17,6 +17,9 @@ enum NodeFlags : std::uint8_t {
   // Flat: |sum A n| / sum A above the file's flatness limit. Drawn as one disk (mean normal, summed
   // area). Order-2 harmonics ring on flat clusters, one disk is wrong for rough ones.
   kNodeFlat = 1u << 0,
+  // Bit 1 + i: facet i is of two-sided surfels, and its normal is one of two; with i = 0, all of a
+  // flat node.
+  kNodeTwoSided = 1u << 1,
 };
 
 // A node that is neither flat nor made of a few facets is rough: it is drawn as what its harmonics
@@ -47,16 +50,18 @@ struct RoughNode {
 
 // A cluster of surfels: one octree cell, single-child levels skipped.
 struct Node {
-  glm::vec3 position;   // area-weighted mean of the surfel positions
-  float radius;         // of a sphere around position that holds every surfel's disk
-  glm::vec3 normal;     // unit mean normal, direction of sum A n; zero when that sum is zero
+  glm::vec3 position;  // area-weighted mean of the surfel positions
+  float radius;        // of a sphere around position that holds every surfel's disk
+  // Unit mean normal, direction of sum A n; zero when that sum is zero. Two-sided surfels do not
+  // add to it, but where all are two-sided and flat: then their normals are turned to one side.
+  glm::vec3 normal;
   float area;           // sum of the surfel areas
   glm::vec3 radiosity;  // area-weighted mean
   float flatness;       // |sum A n| / sum A, 0..1
   std::uint32_t page;  // interior: node page of the children; leaf: surfel page of its first surfel
   std::uint16_t first;         // index of the first child or surfel in that page
   std::uint8_t child_count;    // 0: a leaf
-  std::uint8_t flags;          // NodeFlags
+  std::uint8_t flags;          // set of NodeFlags
   std::uint64_t surfel_count;  // below this node; those of a leaf may run on into following pages
   std::uint64_t
       groups;  // set of those of the surfels below; group 0 alone in scenes without groups
@@ -73,7 +78,13 @@ struct Node {
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
   bool hasFacets() const { return facet_count > 0; }
   bool isRough() const { return !isFlat() && !hasFacets(); }
-  Facet facet(std::size_t i) const { return facets[i].decode(position, radius, area); }
+  // Of facet i, or of a flat node.
+  bool isTwoSided(std::size_t i = 0) const { return (flags & (kNodeTwoSided << i)) != 0; }
+  Facet facet(std::size_t i) const {
+    Facet facet = facets[i].decode(position, radius, area);
+    facet.is_two_sided = facet.is_thicket = isTwoSided(i);
+    return facet;
+  }
 };
 static_assert(sizeof(Node) == 320);
 

@@ -24,6 +24,8 @@ struct Facet {
   float area;
   glm::vec3 radiosity;         // area-weighted mean
   SymmetricMatrix covariance;  // Node::covariance
+  bool is_two_sided = false;   // seen from both sides; the normal is one of two
+  bool is_thicket = false;     // two-sided, and one of several: leaves, or hair
 };
 
 // A facet in codes, relative to its node, as pages hold it in either precision: six take less room

@@ -205,10 +205,19 @@ Status decodeReferences(PayloadReader& reader, const PageForm& form, const Colum
 Status checkNodes(std::span<const Node> nodes) {
   for (const Node& node : nodes) {
     if (!(node.flatness >= 0 && node.flatness <= 1)) return damaged("flatness");
-    if ((node.flags & ~kNodeFlat) != 0) return damaged("flags");
     const float largest = std::max({node.radiosity.x, node.radiosity.y, node.radiosity.z});
     // Twice: the largest code is a little more than the limit
     if (!std::isfinite(node.area * largest * (2 * kCoefficientLimit))) return damaged("radiosity");
+  }
+  return {};
+}
+
+// Needs flags and counts of facets.
+Status checkFlags(std::span<const Node> nodes) {
+  for (const Node& node : nodes) {
+    const std::size_t pieces = node.isFlat() ? 1 : node.facet_count;
+    const std::uint32_t two_sided = kNodeTwoSided * ((1u << pieces) - 1);
+    if ((node.flags & ~(kNodeFlat | two_sided)) != 0) return damaged("flags");
   }
   return {};
 }
@@ -370,6 +379,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
                                              columns.first[i], out[i]));
   }
   if (!FacetColumns::get(reader, out)) return damaged("facets");
+  SURFEIT_RETURN_IF_ERROR(checkFlags(out));
   SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
   SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
   if (reader.remaining() != 0) {

@@ -16,6 +16,14 @@ const ZonalFactors& lobeOf(const Surfel& surfel) {
   return surfel.isTwoSided() ? kAbsoluteCosine : kClampedCosine;
 }
 
+void setNormal(const AreaSums& sums, Node& node) {
+  const double length = sums.normalLength();
+  node.flatness = float(std::min(length / sums.area, 1.0));
+  for (int axis = 0; axis < 3; ++axis) {
+    node.normal[axis] = length > 0 ? float(sums.normal[axis] / length) : 0;
+  }
+}
+
 }  // namespace
 
 void NodeSums::add(const Surfel& surfel) {
@@ -25,7 +33,7 @@ void NodeSums::add(const Surfel& surfel) {
   const AreaSums one(surfel, origin);
   AreaSums::add(one);
   const bool has_one_front = !surfel.isSphere() && !surfel.isTwoSided();
-  has_one_front ? facets.add(one) : facets.giveUp();
+  surfel.isSphere() ? facets.giveUp() : facets.add({one, surfel});
   for (int row = 0; row < 3 && has_one_front; ++row) {
     for (int column = 0; column < 3; ++column) {
       front_moment[row][column] += one.position[row] * double(surfel.normal[column]);
@@ -124,11 +132,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   node.area = all.area;
   node.radiosity = all.radiosity;
   node.covariance = all.covariance;
-  const double length = normalLength();
-  node.flatness = float(std::min(length / area, 1.0));
-  for (int axis = 0; axis < 3; ++axis) {
-    node.normal[axis] = length > 0 ? float(normal[axis] / length) : 0;
-  }
+  setNormal(*this, node);
   if (node.flatness > flatness_limit) {
     node.flags = kNodeFlat;
     return node;
@@ -138,8 +142,14 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
     node.rough = toRough();
     return node;
   }
+  if (fewest.groups().size() == 1 && fewest.groups().front().is_two_sided) {
+    setNormal(fewest.groups().front(), node);
+    node.flags = kNodeFlat | kNodeTwoSided;
+    return node;
+  }
   node.facets = {};
-  for (const AreaSums& group : fewest.groups()) {
+  for (const FacetGroup& group : fewest.groups()) {
+    if (group.is_two_sided) node.flags |= std::uint8_t(kNodeTwoSided << node.facet_count);
     node.facets[node.facet_count++] =
         NodeFacet::encode(toFacet(group), node.position, node.radius, node.area);
   }

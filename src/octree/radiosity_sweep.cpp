@@ -18,17 +18,19 @@ int levelOf(const SceneHeader& header, std::uint32_t node_page) {
          1;
 }
 
-// The facet of a node that faces most as a group of surfels does.
-std::size_t nearestFacet(std::span<const NodeFacet> facets, const AreaSums& group) {
+// The facet of a node that faces most as a group of surfels does, of those of its kind.
+std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
   std::size_t nearest = 0;
   double most = -std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < facets.size(); ++k) {
+  for (std::size_t k = 0; k < node.facet_count; ++k) {
+    if (node.isTwoSided(k) != group.is_two_sided) continue;
     double dot = 0, length_sq = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double n = double(facets[k].normal[axis]);
+      const double n = double(node.facets[k].normal[axis]);
       dot += n * group.normal[axis];
       length_sq += n * n;
     }
+    if (group.is_two_sided) dot = std::abs(dot);
     if (dot / std::sqrt(length_sq) > most) {
       most = dot / std::sqrt(length_sq);
       nearest = k;
@@ -46,8 +48,8 @@ void setFacetRadiosity(const FacetSums& sums, float flatness_limit, Node& node) 
   std::array<Light, kMostFacets> lights;
   const std::span<NodeFacet> facets = std::span(node.facets).first(node.facet_count);
   const FacetSums fewest = sums.fewest(flatness_limit);
-  for (const AreaSums& group : fewest.groups().empty() ? sums.groups() : fewest.groups()) {
-    Light& light = lights[nearestFacet(facets, group)];
+  for (const FacetGroup& group : fewest.groups().empty() ? sums.groups() : fewest.groups()) {
+    Light& light = lights[nearestFacet(node, group)];
     light.area += group.area;
     for (int c = 0; c < 3; ++c) light.power[c] += group.radiosity[c];
   }

@@ -342,6 +342,31 @@ TEST(Facet, ThatCurvesShowsWhatOfItFacesTheReceiver) {
   EXPECT_EQ(facingAreas(facet, glm::normalize(glm::vec3(1, 0, -.01f))).front, 0);
 }
 
+TEST(Facet, OfTwoSidedSurfelsShowsAndLightsBothSides) {
+  Facet facet{};
+  facet.normal = {0, 0, 1};
+  facet.area = facet.radius = 1;
+  facet.covariance = withoutDirection(facet.normal);
+  facet.radiosity = {1, 2, 3};
+  facet.is_two_sided = true;
+  Contribution front, back, thicket;
+  ASSERT_TRUE(makeContribution(facet, {0, 0, -10}, {}, front));
+  ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {}, back));
+  EXPECT_EQ(front.solid_angle, .01f);
+  EXPECT_EQ(back.solid_angle, .01f);
+  EXPECT_EQ(back.radiosity, facet.radiosity);
+  EXPECT_EQ(back.thicket, 0);
+  // Backs alone cover as much, and are dark
+  ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {.sides = GatherSides::kBack}, back));
+  EXPECT_EQ(back.solid_angle, .01f);
+  EXPECT_EQ(back.radiosity, glm::vec3(0));
+  // One of several stands apart from what is before and behind it
+  facet.is_thicket = true;
+  ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {}, thicket));
+  EXPECT_EQ(thicket.thicket, 1);
+  EXPECT_LT(thicket.reach, .2f * front.reach);
+}
+
 TEST(RoughNode, TheMiddleOfWhatIsSeenStaysWithinTheRadius) {
   const std::vector<glm::vec3> all = evenDirections(200);
   Node node = nodeOf(all, all);

@@ -55,6 +55,7 @@ Node randomNode(std::mt19937& random) {
   node.radius = .5f * uniform(random) * uniform(random);
   node.flatness = 1 - uniform(random) * uniform(random);
   node.flags = node.flatness > .97f ? kNodeFlat : 0;
+  if (node.isFlat() && random() % 2 == 0) node.flags |= kNodeTwoSided;
   node.groups = 1 + random() % 7;  // some of three
   return node;
 }
@@ -146,6 +147,23 @@ void expectEverySurfelOnce(Scene& scene, std::uint64_t groups) {
     }
   }
   EXPECT_GT(all_far, 0u);
+}
+
+TEST(Cut, FlatNodesOfTwoSidedSurfelsTurnTheirBackOnNobody) {
+  Node node{};
+  node.position = {0, 0, 5};
+  node.normal = {0, 0, 1};  // as the receiver looks
+  node.radius = .1f;
+  node.flatness = 1;
+  node.groups = 1;
+  const PacketView view = viewPacket(std::vector<Receiver>{{{0, 0, 0}, {0, 0, 1}}});
+  for (const bool is_two_sided : {false, true}) {
+    node.flags = std::uint8_t(kNodeFlat | (is_two_sided ? kNodeTwoSided : 0));
+    const auto siblings = std::span<const Node>(&node, 1);
+    EXPECT_EQ(classifySiblings(siblings, view, {}, {.1f, 1e30f}).far, is_two_sided ? 1u : 0u);
+    EXPECT_EQ(fastestSiblingClassifier()(siblings, view, {}, {.1f, 1e30f}).far,
+              is_two_sided ? 1u : 0u);
+  }
 }
 
 TEST(Cut, NearAndFarWalkTakeEverySurfelOnce) {

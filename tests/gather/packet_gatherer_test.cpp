@@ -22,27 +22,50 @@ double difference(const GatherResult& a, const GatherResult& b) {
   return double(std::max({std::abs(a.occlusion - b.occlusion), color.x, color.y, color.z}));
 }
 
+// Leaves around the origin, at distances of 2 to 4, that face anywhere: along every ray as many
+// meet it, 1 in the mean, wherever they are.
+Cloud foliage(std::size_t count) {
+  std::mt19937 random(7);
+  std::normal_distribution<float> normal;
+  std::uniform_real_distribution<float> uniform(2, 4);
+  const auto direction = [&] {
+    return glm::normalize(glm::vec3(normal(random), normal(random), normal(random)));
+  };
+  Cloud leaves(count);
+  for (Surfel& leaf : leaves) {
+    leaf.position = uniform(random) * direction();
+    leaf.normal = direction();
+    leaf.flags = kSurfelTwoSided;
+    // A / 2 of each is seen: count A / 2 / (4 pi 2) times the integral of 1 / r^2 from 2 to 4
+    leaf.area = 64 * kPi / float(count);
+    leaf.radius = std::sqrt(leaf.area / kPi);
+    leaf.radiosity = {1, 1, 1};
+  }
+  return leaves;
+}
+
 // 16 times the same receiver: cut and order are those of the scalar gather.
 TEST(PacketGatherer, EqualReceiversGiveWhatTheScalarGatherGives) {
-  const Cloud cloud = mixedCloud();
-  Scene scene(cloud);
-  for (const float max_solid_angle : {.02f, .1f, .4f}) {
-    for (const GatherSides sides : {GatherSides::kFront, GatherSides::kBoth}) {
-      GatherQuality quality;
-      quality.max_solid_angle = max_solid_angle;
-      quality.sides = sides;
-      PacketGatherer gatherer(GatherMode::kBleeding, quality);
-      double worst = 0;
-      for (std::size_t run = 0; run < kRuns; ++run) {
-        const Surfel& surfel = cloud[run * cloud.size() / kRuns];
-        const Receiver receiver = {surfel.position, surfel.normal};
-        const GatherResult expected = scene.gather(receiver, quality);
-        for (const GatherResult& result :
-             gatherPacket(gatherer, scene, std::vector<Receiver>(kPacketReceivers, receiver))) {
-          worst = std::max(worst, difference(result, expected));
+  for (const Cloud& cloud : {mixedCloud(), foliage(20'000)}) {
+    Scene scene(cloud);
+    for (const float max_solid_angle : {.02f, .1f, .4f}) {
+      for (const GatherSides sides : {GatherSides::kFront, GatherSides::kBoth}) {
+        GatherQuality quality;
+        quality.max_solid_angle = max_solid_angle;
+        quality.sides = sides;
+        PacketGatherer gatherer(GatherMode::kBleeding, quality);
+        double worst = 0;
+        for (std::size_t run = 0; run < kRuns; ++run) {
+          const Surfel& surfel = cloud[run * cloud.size() / kRuns];
+          const Receiver receiver = {surfel.position, surfel.normal};
+          const GatherResult expected = scene.gather(receiver, quality);
+          for (const GatherResult& result :
+               gatherPacket(gatherer, scene, std::vector<Receiver>(kPacketReceivers, receiver))) {
+            worst = std::max(worst, difference(result, expected));
+          }
         }
+        EXPECT_LT(worst, 1e-3) << max_solid_angle << ' ' << int(sides);
       }
-      EXPECT_LT(worst, 1e-3) << max_solid_angle << ' ' << int(sides);
     }
   }
 }
@@ -156,6 +179,34 @@ TEST(PacketGatherer, WhatWasGatheredBeforeLeavesNothing) {
     for (std::size_t i = 0; i < expected.size(); ++i) {
       ASSERT_EQ(difference(found[i], expected[i]), 0) << i;
     }
+  }
+}
+
+// What lies anywhere is not met by exp(-1) of the rays.
+TEST(PacketGatherer, LeavesCoverAsMuchAsWhatIsSpreadAtRandom) {
+  const float expected = 1 - std::exp(-1.f);
+  for (const std::size_t count : {20'000u, 200'000u}) {
+    Scene scene(foliage(count));
+    const GatherQuality quality;
+    PacketGatherer gatherer(GatherMode::kBleeding, quality);
+    std::vector<Receiver> receivers;
+    for (std::size_t i = 0; i < kPacketReceivers; ++i) {
+      const float z = 1 - (2 * float(i) + 1) / kPacketReceivers, across = std::sqrt(1 - z * z);
+      receivers.push_back(
+          {{.01f * float(i), 0, 0},
+           {across * std::cos(2.4f * float(i)), across * std::sin(2.4f * float(i)), z}});
+    }
+    double packet = 0, scalar = 0, light = 0;
+    for (const GatherResult& result : gatherPacket(gatherer, scene, receivers)) {
+      packet += double(result.occlusion) / kPacketReceivers;
+      light += double(result.irradiance.x) / kPacketReceivers;
+    }
+    for (const Receiver& receiver : receivers) {
+      scalar += double(scene.gather(receiver, quality).occlusion) / kPacketReceivers;
+    }
+    EXPECT_NEAR(packet, expected, .03) << count;
+    EXPECT_NEAR(scalar, expected, .03) << count;
+    EXPECT_NEAR(light, packet, 1e-4) << count;  // leaves shine to both sides
   }
 }
 

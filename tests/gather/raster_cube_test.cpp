@@ -194,13 +194,15 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
 // Covers pixels of the face +x of a cube of 12 pixels one by one.
 class FilledCube : public ::testing::Test {
  protected:
-  void cover(int column, int row, float amount) {
+  void cover(int column, int row, float amount, float thicket = 0) {
     const std::size_t pixel = at(column, row);
     const RasterGeometry::Pixel& shape = geometry_.pixels()[pixel];
     const float axis = shape.direction.x;
     // As much of the face as a pixel takes, but for a rim, lest neighbours be touched
     const float area = amount * 4 / 144.f;
-    cube_.splat(diskPatch(shape.direction, kRound, area * axis * axis * axis), {1, 2}, kWhite);
+    RasterCube::Patch patch = diskPatch(shape.direction, kRound, area * axis * axis * axis);
+    patch.thicket = thicket;
+    cube_.splat(patch, {1, 2}, kWhite);
   }
   static std::size_t at(int column, int row) { return std::size_t(row * 12 + column); }
 
@@ -220,6 +222,26 @@ TEST_F(FilledCube, GapsWithinASurfaceAreClosed) {
   cube_.fill();
   EXPECT_NEAR(cube_.coverage(at(6, 6)), 1, 1e-5);
   EXPECT_NEAR(cube_.radiosity(at(6, 6)).x, 1, 1e-5);
+}
+
+TEST_F(FilledCube, GapsWithinThicketsStayOpen) {
+  const auto filledPart = [&](float thicket) {
+    cube_.clear();
+    for (int row = 0; row < 12; ++row) {
+      for (int column = 0; column < 12; ++column) {
+        for (int i = 0; i < 8; ++i) {
+          cover(column, row, column == 6 && row == 6 ? .0875f : .5f, thicket);
+        }
+      }
+    }
+    const float open = 1 - cube_.coverage(at(6, 6));
+    cube_.fill();
+    return (cube_.coverage(at(6, 6)) - (1 - open)) / open;
+  };
+  EXPECT_NEAR(filledPart(0), 1, 1e-4);
+  EXPECT_NEAR(filledPart(1), 0, 1e-4);
+  EXPECT_GT(filledPart(.5f), .4f);
+  EXPECT_LT(filledPart(.5f), .9f);
 }
 
 TEST_F(FilledCube, EdgesAndThinThingsStayAsTheyAre) {

@@ -237,6 +237,7 @@ TEST_F(IndexTest, NodesAreTheSumsOfTheirSurfels) {
     for (const auto& [node, first] : scene->nodes) {
       double area = 0, position[3] = {}, normal[3] = {}, radiosity[3] = {};
       double area_sh[kShCount] = {}, power_sh[kShCount] = {};
+      const bool turns = node.isFlat() && node.isTwoSided();  // all of them to one side
       for (std::size_t i = first; i < first + node.surfel_count; ++i) {
         const Surfel& surfel = scene->surfels[i];
         const double a = double(surfel.area);
@@ -248,7 +249,8 @@ TEST_F(IndexTest, NodesAreTheSumsOfTheirSurfels) {
         for (int axis = 0; axis < 3; ++axis) {
           position[axis] += a * double(surfel.position[axis]);
           radiosity[axis] += a * double(surfel.radiosity[axis]);
-          if (surfel.flags == 0) normal[axis] += a * double(surfel.normal[axis]);
+          const double side = turns && glm::dot(surfel.normal, node.normal) < 0 ? -1 : 1;
+          if (surfel.flags == 0 || turns) normal[axis] += side * a * double(surfel.normal[axis]);
         }
         for (int k = 0; k < (surfel.isSphere() ? 1 : kShCount); ++k) {
           const double lobe = a * double(factors[kShBand[k]]) * double(basis[k]);

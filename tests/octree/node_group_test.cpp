@@ -200,6 +200,27 @@ TEST_F(NodeGroupTest, DecodeRejectsFacetsOfNoSuchNode) {
   }
 }
 
+TEST_F(NodeGroupTest, FlagsOfTwoSidedPiecesAreKeptAndThoseOfOthersRejected) {
+  for (const bool is_last : {true, false}) {
+    for (const std::size_t i : {0u, 1u, 3u}) {
+      std::vector<LevelNode> nodes = someNodes(5);
+      Node& node = nodes[i].node;
+      const std::size_t pieces = node.isFlat() ? 1 : node.facet_count;
+      if (is_last && pieces == 0) continue;
+      node.flags |= std::uint8_t(kNodeTwoSided << (is_last ? pieces - 1 : pieces));
+      const Status status = storeAndRead(nodes, kFull).status();
+      if (is_last) {
+        ASSERT_TRUE(status.ok()) << status.message();
+        EXPECT_TRUE(found_[i].isTwoSided(pieces - 1));
+        EXPECT_EQ(found_[i].flags, node.flags);
+      } else {
+        EXPECT_EQ(status.code(), StatusCode::kCorruption);
+        EXPECT_NE(status.message().find("field flags"), std::string::npos) << status.message();
+      }
+    }
+  }
+}
+
 TEST_F(NodeGroupTest, GroupsAreExactOrTheFirstAlone) {
   std::vector<LevelNode> nodes = someNodes(40);
   TestRandom random(23);

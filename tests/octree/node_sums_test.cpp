@@ -137,7 +137,7 @@ TEST(NodeSums, ABoxHasItsFacesAsFacets) {
   }
 }
 
-TEST(NodeSums, WhatCurvesSlowlyHasFewFacetsAndWhatIsSeenFromBothSidesNone) {
+TEST(NodeSums, WhatCurvesSlowlyHasFewFacetsAndWhatFacesManyWaysNone) {
   // A quarter of a cylinder: three pieces of 30 degrees are flat enough, two of 45 are not
   std::vector<Surfel> cloud;
   for (const Surfel& flat : planeCloud(30, .1f)) {
@@ -154,6 +154,42 @@ TEST(NodeSums, WhatCurvesSlowlyHasFewFacetsAndWhatIsSeenFromBothSidesNone) {
   cloud = boxCloud(4, .1f);
   cloud[50].flags = kSurfelTwoSided;
   EXPECT_TRUE(sumsOf(cloud).toNode(.97f, 2).isRough());
+}
+
+// Two-sided surfels of a plane are flat whichever way each is turned; opposite walls stay apart,
+// and what faces one way stays apart from what faces both.
+TEST(NodeSums, TwoSidedSurfelsHaveFacetsOfTheirOwn) {
+  std::vector<Surfel> cloud = planeCloud(8, .1f);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud[i].flags = kSurfelTwoSided;
+    if (i % 3 == 0) cloud[i].normal = -cloud[i].normal;
+  }
+  Node node = sumsOf(cloud).toNode(.97f, 1);
+  ASSERT_TRUE(node.isFlat() && node.isTwoSided());
+  EXPECT_NEAR(std::abs(node.normal.z), 1, 1e-6f);
+  EXPECT_NEAR(node.flatness, 1, 1e-6f);
+
+  cloud = boxCloud(8, .1f);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (i % 64 < 32) cloud[i].normal = -cloud[i].normal;  // half of each wall
+    cloud[i].flags = kSurfelTwoSided;
+  }
+  NodeSums sums = sumsOf(cloud);
+  node = sums.toNode(.97f, radiusOfBox(sums.centre(), sums.disk_bounds));
+  ASSERT_EQ(node.facet_count, 6);
+  for (std::size_t k = 0; k < node.facet_count; ++k) {
+    EXPECT_TRUE(node.facet(k).is_two_sided && node.facet(k).is_thicket);
+    EXPECT_NEAR(node.facet(k).area, node.area / 6, 1e-4f * node.area);
+    EXPECT_NEAR(glm::length(node.facet(k).normal), 1, 1e-4f);
+  }
+
+  cloud = planeCloud(8, .1f);
+  for (std::size_t i = 0; i < 16; ++i) cloud[i].flags = kSurfelTwoSided;
+  node = sumsOf(cloud).toNode(.97f, 1);
+  ASSERT_EQ(node.facet_count, 2);
+  EXPECT_NE(node.facet(0).is_two_sided, node.facet(1).is_two_sided);
+  const Facet two_sided = node.facet(node.facet(0).is_two_sided ? 0 : 1);
+  EXPECT_NEAR(two_sided.area, node.area / 4, 1e-4f * node.area);
 }
 
 TEST(NodeSums, AFlatNodeHasNoFrontMoment) {
