@@ -174,8 +174,8 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
 
     // Small enough
     const auto area = hn::Mul(hn::Set(d, kPi), hn::Mul(radius, radius));
-    const auto away =
-        hn::Mul(hn::Load(d, columns.facing + at), hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz))));
+    const auto away = hn::Mul(hn::Load(d, columns.facing + at),
+                              hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz))));
     const auto limit = hn::Mul(most_solid_angle, hn::Mul(nearest, nearest));
     auto far = hn::And(hn::Gt(nearest, radius), hn::Lt(area, limit));
 

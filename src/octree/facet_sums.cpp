@@ -85,7 +85,7 @@ std::optional<FacetSums::Pair> FacetSums::closest() const {
       const double both_sq =
           lengths[i] * lengths[i] + lengths[j] * lengths[j] + 2 * facingDot(groups_[i], groups_[j]);
       const double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
-      if (loss < least) {
+      if (!closest || loss < least) {
         least = loss;
         closest = Pair{i, j};
       }
