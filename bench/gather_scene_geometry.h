@@ -73,7 +73,7 @@ SceneGeometry makeCity();
 Status sendCitySurfels(const SceneGeometry& geometry, std::uint64_t count, const SurfelSink& sink);
 
 // A 10 x 10 ground with 40 crowns of trees over it, balls of two-sided leaves that face anywhere:
-// 64,000 or so, each of about .035 by .02. Surfels are those of the sampler of meshes.
+// 64,000 or so, each of about .065 by .037. Surfels are those of the sampler of meshes.
 SceneGeometry makeLeaves();
 
 // Bunny and lion on a ground, Sponza, hair: from files in `data`. kIoError where one is missing.

@@ -167,8 +167,13 @@ float reachOf(const Facet& facet, const glm::vec3& direction) {
   return facet.is_thicket ? kThicketReach * reach : reach;
 }
 
+// Four times band 0 is the area of one-sided disks, twice that of two-sided ones, and four times
+// that of spheres, which are a surface. Codes round: what is about none is none.
 float thicketPart(const Node& node) {
-  return thicketPart(4 * kShY00 * node.rough.sh[0][kAreaKind], node.area);
+  constexpr float kNone = 0.05f;
+  const float more = 4 * kShY00 * node.rough.sh[0][kAreaKind] / node.area - 1;
+  const float part = std::min(more, 0.5f * (3 - more));
+  return std::clamp((part - kNone) / (1 - 2 * kNone), 0.f, 1.f);
 }
 
 SymmetricMatrix shapeOf(const SymmetricMatrix& covariance) {

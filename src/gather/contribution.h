@@ -88,7 +88,7 @@ float mostVisibleArea(const Facet& facet);
 
 // How far before and behind its middle a facet meets others of its layer, seen in this direction.
 float reachOf(const Facet& facet, const glm::vec3& direction);
-// How much of a rough node is leaves or hair, 0..1.
+// How much of a rough node is leaves or hair, 0..1: what of it is two-sided.
 float thicketPart(const Node& node);
 
 // How what has this covariance spreads, for RasterCube::Patch.

@@ -43,15 +43,6 @@ inline constexpr FillPass kFillPasses[] = {{0.86f, 0.93f}, {0.87f, 0.93f}};
 // .0364 and .0297, filled .0156 and .0311, all three .0470 and .0447. docs/benchmarks.md.)
 inline constexpr float kThicketReach = 0.15f, kThicketOverlap = 0.9f;
 
-// How much of a rough node is two-sided: 4 times its band 0 is the area of one-sided disks, twice
-// that of two-sided ones, and four times that of spheres, which are a surface. Codes round: what is
-// about none is none.
-inline float thicketPart(float band_0, float area) {
-  constexpr float kNone = 0.05f;
-  const float twice = band_0 / area - 1, part = std::min(twice, 0.5f * (3 - twice));
-  return std::clamp((part - kNone) / (1 - 2 * kNone), 0.f, 1.f);
-}
-
 // A pixel is filled by a part that grows from 0 to 1 between these coverages of its own: what
 // covers little of it is a thing of its own, or an edge.
 inline constexpr float kFilledFrom = 0.15f, kFilledWhole = 0.6f;

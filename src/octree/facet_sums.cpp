@@ -45,10 +45,9 @@ FacetGroup::FacetGroup(const AreaSums& sums, const Surfel& surfel)
 }
 
 void FacetGroup::add(const FacetGroup& other) {
+  if (!areTurned(*this, other)) return AreaSums::add(other);
   AreaSums turned = other;
-  if (areTurned(*this, other)) {
-    for (double& n : turned.normal) n = -n;
-  }
+  for (double& n : turned.normal) n = -n;
   AreaSums::add(turned);
 }
 
