@@ -167,6 +167,14 @@ float reachOf(const Facet& facet, const glm::vec3& direction) {
   return facet.is_thicket ? kThicketReach * reach : reach;
 }
 
+float thicketPart(const Surfel& surfel) {
+  return surfel.isTwoSided() && isRibbon(surfel.radius, surfel.area) ? 1 : 0;
+}
+
+float reachOf(const Surfel& surfel, float radius, float cosine) {
+  return (thicketPart(surfel) > 0 ? kThicketReach : 1) * layerReachOfDisk(radius, cosine);
+}
+
 // Four times band 0 is the area of one-sided disks, twice that of two-sided ones, and four times
 // that of spheres, which are a surface. Codes round: what is about none is none.
 float thicketPart(const Node& node) {
@@ -274,11 +282,12 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   if (!sends_light && rules.sides != GatherSides::kBoth) return false;
 
   contribution.distance_sq = distance_sq;
-  contribution.reach = layerReachOfDisk(surfel.radius, surfel.isSphere() ? 0 : cosine);
+  contribution.reach = reachOf(surfel, surfel.radius, surfel.isSphere() ? 0 : cosine);
   contribution.direction = direction;
   contribution.solid_angle = surfel.area * std::abs(cosine) / distance_sq;
   contribution.spread = surfel.area / distance_sq;
-  contribution.overlap = contribution.thicket = 0;
+  contribution.overlap = 0;
+  contribution.thicket = thicketPart(surfel);
   contribution.normal = surfel.normal;
   contribution.shape = withoutDirection(surfel.normal);
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);

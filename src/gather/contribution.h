@@ -88,6 +88,11 @@ float mostVisibleArea(const Facet& facet);
 
 // How far before and behind its middle a facet meets others of its layer, seen in this direction.
 float reachOf(const Facet& facet, const glm::vec3& direction);
+// How far before and behind its middle a surfel meets others of its layer, seen at an angle with
+// this cosine. `radius`: effectiveRadius.
+float reachOf(const Surfel& surfel, float radius, float cosine);
+// How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
+float thicketPart(const Surfel& surfel);
 // How much of a rough node is leaves or hair, 0..1: what of it is two-sided.
 float thicketPart(const Node& node);
 

@@ -352,7 +352,12 @@ class Brush {
 
   void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
     if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
-    CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
+    const V added = CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
+    if (cover.thicket > 0) AddThicket(pixel, added, cover);
+  }
+  void AddThicket(std::size_t pixel, V added, const Cover& cover) {
+    float* const thicket = thickets_ + pixel * kPacketReceivers + lane_;
+    hn::Store(hn::MulAdd(added, Splat(cover.thicket), hn::Load(D(), thicket)), D(), thicket);
   }
 
   void TraceSphere(const Patch& patch, const V3& centre, M traced, V centre_sq,

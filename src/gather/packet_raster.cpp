@@ -239,12 +239,14 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach =
-        layerReachOfDisk(patch.radius, glm::dot(to_surfel, surfel.normal) / std::sqrt(distance_sq));
+        reachOf(surfel, patch.radius, glm::dot(to_surfel, surfel.normal) / std::sqrt(distance_sq));
+    patch.thicket = thicketPart(surfel);
     patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =
         std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
     if (kernel_.isSeen(canvas, patch)) {
+      has_thickets_ |= patch.thicket > 0;
       orderLastPatch();
     } else {
       patches_.pop_back();

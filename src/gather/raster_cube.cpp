@@ -242,8 +242,9 @@ void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::v
 
 // Asks amountOf(direction) for the pixels that may see the sphere around `centre`.
 template <typename AmountOf>
-void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthRange& depth,
-                             const glm::vec3& radiosity, const AmountOf& amountOf) {
+void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Texture& texture,
+                             const DepthRange& depth, const glm::vec3& radiosity,
+                             const AmountOf& amountOf) {
   const int resolution = geometry_->resolution();
   const float size = float(resolution), middle = 0.5f * size, scale = geometry_->pixelsPerSlope();
   const std::span<const RasterGeometry::Pixel> pixels = geometry_->pixels();
@@ -265,7 +266,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthR
       for (int column = column_begin; column < column_end; ++column) {
         const std::size_t pixel = row_first + std::size_t(column);
         const float amount = amountOf(pixels[pixel].direction);
-        if (amount > 0) coverPixel(pixel, amount, {0, 0}, depth, radiosity);
+        if (amount > 0) coverPixel(pixel, amount, texture, depth, radiosity);
       }
     }
   }
@@ -273,10 +274,11 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const DepthR
 
 // The ray t d meets the plane of the disk at t = c.n / d.n, and the disk when |t d - c| <= r.
 void RasterCube::traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius,
-                           float peak, const DepthRange& depth, const glm::vec3& radiosity) {
+                           float peak, float thicket, const DepthRange& depth,
+                           const glm::vec3& radiosity) {
   const float c_n = glm::dot(centre, normal), c_c = glm::dot(centre, centre);
   const float inverse_sq = 1 / (radius * radius);
-  tracePixels(centre, radius, depth, radiosity, [&](const glm::vec3& d) {
+  tracePixels(centre, radius, {0, thicket}, depth, radiosity, [&](const glm::vec3& d) {
     const float d_n = glm::dot(d, normal);
     if (!(c_n * d_n > 0)) return 0.f;
     const float t = c_n / d_n;
@@ -289,7 +291,7 @@ void RasterCube::traceDisk(const glm::vec3& centre, const glm::vec3& normal, flo
 void RasterCube::traceSphere(const glm::vec3& centre, float radius, const DepthRange& depth,
                              const glm::vec3& radiosity) {
   const float power = glm::dot(centre, centre) - radius * radius;
-  tracePixels(centre, radius, depth, radiosity, [&](const glm::vec3& d) {
+  tracePixels(centre, radius, {0, 0}, depth, radiosity, [&](const glm::vec3& d) {
     const float d_c = glm::dot(d, centre);
     return d_c > 0 && d_c * d_c >= power ? 1.f : 0.f;
   });

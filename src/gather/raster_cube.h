@@ -118,9 +118,9 @@ class RasterCube {
   static constexpr float kHardDisk = 1e6f;
   // Covers the pixels whose rays hit the disk: the near field (memo 3.4.1). Coverage falls off from
   // the middle as peak (1 - (distance / radius)^2), limited to 1. `centre` is relative to the
-  // origin of the rays. Both sides are hit: facing is the caller's business.
+  // origin of the rays, `thicket` as in Patch. Both sides are hit: facing is the caller's business.
   void traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius, float peak,
-                 const DepthRange& depth, const glm::vec3& radiosity);
+                 float thicket, const DepthRange& depth, const glm::vec3& radiosity);
   // The same with a sphere, which must not contain the origin.
   void traceSphere(const glm::vec3& centre, float radius, const DepthRange& depth,
                    const glm::vec3& radiosity);
@@ -165,8 +165,8 @@ class RasterCube {
   void coverParallelogram(int face, const Parallelogram& shape, const Texture& texture,
                           const DepthRange& depth, const glm::vec3& radiosity);
   template <typename AmountOf>
-  void tracePixels(const glm::vec3& centre, float radius, const DepthRange& depth,
-                   const glm::vec3& radiosity, const AmountOf& amountOf);
+  void tracePixels(const glm::vec3& centre, float radius, const Texture& texture,
+                   const DepthRange& depth, const glm::vec3& radiosity, const AmountOf& amountOf);
 
   const RasterGeometry* geometry_;
   std::vector<Coverage> coverage_;

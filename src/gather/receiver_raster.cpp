@@ -90,7 +90,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored) {
   entry.contribution.distance_sq = distance_sq;
   const float cosine_of_view = glm::dot(to_surfel, surfel.normal) /
                                std::sqrt(std::max(distance_sq, std::numeric_limits<float>::min()));
-  entry.contribution.reach = layerReachOfDisk(surfel.radius, cosine_of_view);
+  entry.contribution.reach = reachOf(surfel, surfel.radius, cosine_of_view);
   entry.near_index = std::int32_t(near_surfels_.size());
   near_surfels_.push_back(surfel);
   contributions_.push_back(entry);
@@ -160,8 +160,8 @@ void ReceiverRaster::trace(const Surfel& surfel, const DepthRange& depth) {
   }
   const bool sends_light = surfel.isTwoSided() || glm::dot(centre, surfel.normal) < 0;
   cube_.traceDisk(inRaster(centre), inRaster(surfel.normal), surfel.radius,
-                  softDiskPeak(surfel.radius, surfel.area, surfel.isTwoSided()), depth,
-                  sends_light ? surfel.radiosity : glm::vec3(0));
+                  softDiskPeak(surfel.radius, surfel.area, surfel.isTwoSided()),
+                  thicketPart(surfel), depth, sends_light ? surfel.radiosity : glm::vec3(0));
 }
 
 GatherResult ReceiverRaster::finish() {

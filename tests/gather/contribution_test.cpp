@@ -425,6 +425,27 @@ TEST(SurfelContribution, IsItsProjectedArea) {
   EXPECT_EQ(patch.radiosity, surfel.radiosity);
 }
 
+// A two-sided surfel that has little of its disk is of hair or grass.
+TEST(SurfelContribution, PiecesOfRibbonsAreThickets) {
+  Surfel surfel;
+  surfel.position = {0, 0, 2};
+  surfel.normal = {0, 0, -1};
+  surfel.radius = .2f;
+  surfel.area = .1f * kPi * surfel.radius * surfel.radius;
+  Contribution surface, ribbon, leaf;
+  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, surface));
+  EXPECT_EQ(surface.thicket, 0);
+  surfel.flags = kSurfelTwoSided;
+  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, ribbon));
+  EXPECT_EQ(ribbon.thicket, 1);
+  EXPECT_EQ(ribbon.overlap, 0);
+  EXPECT_LT(ribbon.reach, .2f * surface.reach);
+  surfel.area *= 2;
+  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, leaf));
+  EXPECT_EQ(leaf.thicket, 0);
+  EXPECT_EQ(leaf.reach, surface.reach);
+}
+
 TEST(SurfelContribution, SphereLooksTheSameFromEverywhere) {
   Surfel surfel;
   surfel.radius = .2f;

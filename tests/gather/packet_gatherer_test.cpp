@@ -23,8 +23,8 @@ double difference(const GatherResult& a, const GatherResult& b) {
 }
 
 // Leaves around the origin, at distances of 2 to 4, that face anywhere: along every ray as many
-// meet it, 1 in the mean, wherever they are.
-Cloud foliage(std::size_t count) {
+// meet it, 1 in the mean, wherever they are. Each has `disk_part` of its disk.
+Cloud foliage(std::size_t count, float disk_part) {
   std::mt19937 random(7);
   std::normal_distribution<float> normal;
   std::uniform_real_distribution<float> uniform(2, 4);
@@ -38,15 +38,17 @@ Cloud foliage(std::size_t count) {
     leaf.flags = kSurfelTwoSided;
     // A / 2 of each is seen: count A / 2 / (4 pi 2) times the integral of 1 / r^2 from 2 to 4
     leaf.area = 64 * kPi / float(count);
-    leaf.radius = std::sqrt(leaf.area / kPi);
+    leaf.radius = std::sqrt(leaf.area / (kPi * disk_part));
     leaf.radiosity = {1, 1, 1};
   }
   return leaves;
 }
 
+constexpr float kLeaf = 1, kRibbon = .1f;
+
 // 16 times the same receiver: cut and order are those of the scalar gather.
 TEST(PacketGatherer, EqualReceiversGiveWhatTheScalarGatherGives) {
-  for (const Cloud& cloud : {mixedCloud(), foliage(20'000)}) {
+  for (const Cloud& cloud : {mixedCloud(), foliage(20'000, kLeaf), foliage(20'000, kRibbon)}) {
     Scene scene(cloud);
     for (const float max_solid_angle : {.02f, .1f, .4f}) {
       for (const GatherSides sides : {GatherSides::kFront, GatherSides::kBoth}) {
@@ -183,10 +185,15 @@ TEST(PacketGatherer, WhatWasGatheredBeforeLeavesNothing) {
 }
 
 // What lies anywhere is not met by exp(-1) of the rays.
-TEST(PacketGatherer, LeavesCoverAsMuchAsWhatIsSpreadAtRandom) {
+TEST(PacketGatherer, LeavesAndRibbonsCoverAsMuchAsWhatIsSpreadAtRandom) {
   const float expected = 1 - std::exp(-1.f);
-  for (const std::size_t count : {20'000u, 200'000u}) {
-    Scene scene(foliage(count));
+  struct Case {
+    std::size_t count;
+    float disk_part;
+  };
+  for (const auto& [count, disk_part] :
+       {Case{20'000, kLeaf}, {200'000, kLeaf}, {3'000, kRibbon}, {20'000, kRibbon}}) {
+    Scene scene(foliage(count, disk_part));
     const GatherQuality quality;
     PacketGatherer gatherer(GatherMode::kBleeding, quality);
     std::vector<Receiver> receivers;
@@ -204,6 +211,7 @@ TEST(PacketGatherer, LeavesCoverAsMuchAsWhatIsSpreadAtRandom) {
     for (const Receiver& receiver : receivers) {
       scalar += double(scene.gather(receiver, quality).occlusion) / kPacketReceivers;
     }
+    SCOPED_TRACE(testing::Message() << count << " of " << disk_part);
     EXPECT_NEAR(packet, expected, .03) << count;
     EXPECT_NEAR(scalar, expected, .03) << count;
     EXPECT_NEAR(light, packet, 1e-4) << count;  // leaves shine to both sides
