@@ -301,7 +301,7 @@ optionsOfTheirOwnWinOverThePreset() {
   differentBytes draft.ply default.ply
   gatherPatch final --quality final
   jsonIs final.json max_solid_angle 0.015 raster_resolution 32 near_field_radii 16 \
-    far_field_parallax 0.05
+    far_field_parallax 0
 
   # One, all, before and after; what is not given comes from the preset
   local own=(--max-solid-angle 0.2 --raster-resolution 8 --near-field 5 --far-parallax 0.4)
