@@ -37,10 +37,11 @@ struct FillPass {
 inline constexpr FillPass kFillPasses[] = {{0.86f, 0.93f}, {0.87f, 0.93f}};
 
 // Two-sided surfels that no plane holds together, rough nodes of them and nodes of several facets,
-// are thickets: leaves, or hair. They lie before and behind each other anywhere, so they overlap
-// within their layer, their layers reach this part as far, and gaps between them are open. (AO RMSE
-// of leaves and hair .0120 and .0237; reaching as far as others .0164 and .0322, without overlap
-// .0364 and .0259, filled .0156 and .0302, all three .0470 and .0447. docs/benchmarks.md.)
+// are thickets: leaves, or hair. They lie before and behind each other anywhere, so rough nodes
+// overlap within their layer, layers of facets and of pieces of ribbons reach this part as far, and
+// gaps between all of them are open. (AO RMSE of leaves and hair .0120 and .0237; reaching as far
+// as others .0164 and .0322, without overlap .0364 and .0259, filled .0156 and .0302, all three
+// .0470 and .0447. docs/benchmarks.md.)
 inline constexpr float kThicketReach = 0.15f, kThicketOverlap = 0.9f;
 
 // A pixel is filled by a part that grows from 0 to 1 between these coverages of its own: what

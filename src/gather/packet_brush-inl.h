@@ -259,8 +259,7 @@ class Brush {
         const V added = CoverPixel<Kind>(pixel, hn::Mul(width, height), cover);
         pixel += kPixelFloats;
         if constexpr (kIsThicket) {
-          const V before = hn::Load(D(), thicket);
-          hn::Store(hn::MulAdd(added, Splat(cover.thicket), before), D(), thicket);
+          AddTo(thicket, added, cover);
           thicket += kPacketReceivers;
         }
       }
@@ -353,10 +352,10 @@ class Brush {
   void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
     if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
     const V added = CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
-    if (cover.thicket > 0) AddThicket(pixel, added, cover);
+    if (cover.thicket > 0) AddTo(thickets_ + pixel * kPacketReceivers + lane_, added, cover);
   }
-  void AddThicket(std::size_t pixel, V added, const Cover& cover) {
-    float* const thicket = thickets_ + pixel * kPacketReceivers + lane_;
+  // What thickets have of a pixel, when so much is newly covered.
+  static void AddTo(float* thicket, V added, const Cover& cover) {
     hn::Store(hn::MulAdd(added, Splat(cover.thicket), hn::Load(D(), thicket)), D(), thicket);
   }
 
