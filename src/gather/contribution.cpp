@@ -144,18 +144,36 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
   return {middle, 1 + std::clamp(turn, -kMostTurn, kMostTurn)};
 }
 
-// No more than the outline of the sphere that holds all disks; of what is rough, no more than a
-// part of the ellipse that spreads as the node does, projected along the direction: what lies
-// behind each other shows once. The covariance is stored in steps of 1/255 of its trace: that much
-// is added, lest a thin wire has no outline.
-float mostVisibleArea(const Node& node, const glm::vec3& direction) {
+namespace {
+// The ellipse that spreads as the node does, projected along the direction. The covariance is
+// stored in steps of 1/255 of its trace: that much is added, lest a thin wire has no outline.
+float outlineArea(const Node& node, const glm::vec3& direction) {
   constexpr float kStep = 1.f / 255;
-  const float most = std::min(node.area, kPi * node.radius * node.radius);
   SymmetricMatrix spread = node.covariance;
   for (std::size_t i = 0; i < 3; ++i) spread.entries[i] += kStep * node.covariance.trace();
   const float determinant = quadraticForm(adjugate(spread), direction);
-  const float ellipse = 4 * kPi * std::sqrt(std::max(0.f, determinant));
-  return std::min(most, kFilledOutline * ellipse);
+  return 4 * kPi * std::sqrt(std::max(0.f, determinant));
+}
+}  // namespace
+
+// No more than the outline of the sphere that holds all disks; of what is rough, no more than a
+// part of its outline: what lies behind each other shows once.
+float mostVisibleArea(const Node& node, const glm::vec3& direction) {
+  const float most = std::min(node.area, kPi * node.radius * node.radius);
+  return std::min(most, kFilledOutline * outlineArea(node, direction));
+}
+
+// What exceeds the limit of a surface hides behind the rest. (Spheres and two-sided surfels count
+// twice in front plus back, which the limit of the area takes back head-on.)
+RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket) {
+  const float most = mostVisibleArea(node, direction), surface = std::min(shown, most);
+  if (!(thicket > 0)) return {surface, 1, most};
+  const float outline =
+      std::min(kPi * node.radius * node.radius, kThicketOutline * outlineArea(node, direction));
+  if (!(outline > 0)) return {surface, 1, most};
+  const float hidden = outline * thicketOpacity(std::min(shown, node.area), outline);
+  const float area = surface + thicket * (outline - surface);
+  return {area, (surface + thicket * (hidden - surface)) / area, std::max(area, most)};
 }
 
 float mostVisibleArea(const Facet& facet) {
@@ -219,8 +237,8 @@ bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const Contr
   contribution.direction = direction;
   contribution.solid_angle = std::min(area, mostVisibleArea(facet)) / distance_sq;
   contribution.spread = facet.area / distance_sq;
-  contribution.overlap = 0;
-  contribution.thicket = facet.is_thicket ? 1 : 0;
+  contribution.overlap = contribution.thicket = facet.is_thicket ? 1 : 0;
+  contribution.opacity = 1;
   contribution.normal = facet.normal;
   contribution.shape = shapeOf(facet.covariance);
   contribution.radiosity = glm::vec3(0);
@@ -245,13 +263,14 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   const float distance_sq = glm::dot(to_seen, to_seen);
   if (!(distance_sq > 0)) return false;
 
-  // What exceeds the limit hides behind the rest. (Spheres and two-sided surfels count twice in
-  // front plus back, which the limit of the area takes back head-on.)
-  const float visible_area = std::min(seen.perspective * area, mostVisibleArea(node, direction));
+  contribution.thicket = thicketPart(node);
+  const RoughCover cover =
+      roughCover(node, direction, seen.perspective * area, contribution.thicket);
   contribution.distance_sq = distance_sq;
   contribution.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   contribution.direction = to_seen / std::sqrt(distance_sq);
-  contribution.solid_angle = visible_area / distance_sq;
+  contribution.solid_angle = cover.area / distance_sq;
+  contribution.opacity = cover.opacity;
   contribution.spread = node.area / distance_sq;
   contribution.overlap = 0;
   if (rules.sides == GatherSides::kFront) {
@@ -259,8 +278,7 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   } else if (rules.sides == GatherSides::kBack) {
     contribution.overlap = overlapOf(facing.back, facing.front);
   }
-  contribution.thicket = thicketPart(node);
-  contribution.overlap = std::max(contribution.overlap, kThicketOverlap * contribution.thicket);
+  contribution.overlap = std::max(contribution.overlap, contribution.thicket);
   contribution.normal = node.flatness * node.normal;
   contribution.shape = shapeOf(node.covariance);
   contribution.radiosity = glm::vec3(0);
@@ -288,6 +306,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.spread = surfel.area / distance_sq;
   contribution.overlap = 0;
   contribution.thicket = thicketPart(surfel);
+  contribution.opacity = 1;
   contribution.normal = surfel.normal;
   contribution.shape = withoutDirection(surfel.normal);
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);

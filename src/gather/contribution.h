@@ -24,11 +24,12 @@ struct Contribution {
   float spread;           // area / distance^2: the solid angle that it would have head-on
   float overlap;          // of its parts with those of its layer, 0..1; see RasterCube::Patch
   float thicket;          // how much of it is leaves or hair, 0..1; likewise
+  float opacity;          // what it hides of its solid angle, 0..1; 1 but for thickets
   glm::vec3 normal;       // unit length for a disk, zero for a sphere, in between when partly flat
   SymmetricMatrix shape;  // how it spreads; see RasterCube::Patch
   glm::vec3 radiosity;    // of what covers; back sides are black. Zero when color is not asked for.
 };
-static_assert(sizeof(Contribution) == 21 * sizeof(float));
+static_assert(sizeof(Contribution) == 22 * sizeof(float));
 
 // How contributions are to be made.
 struct ContributionRules {
@@ -85,6 +86,14 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 // a facet in any.
 float mostVisibleArea(const Node& node, const glm::vec3& direction);
 float mostVisibleArea(const Facet& facet);
+
+// What a rough node covers that shows `shown` of its area in this direction: an outline, and what
+// it hides of that. A surface fills what it shows, a thicket is spread over its outline.
+struct RoughCover {
+  float area, opacity;
+  float most;  // what `area` might be, however much is shown
+};
+RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket);
 
 // How far before and behind its middle a facet meets others of its layer, seen in this direction.
 float reachOf(const Facet& facet, const glm::vec3& direction);

@@ -127,6 +127,8 @@ class Brush {
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
     cover.thicket = patch.thicket;
+    cover.opacity = patch.opacity;
+    cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
     if constexpr (Kind::kFade) cover.fade = FadeAt(distance);
@@ -245,7 +247,8 @@ class Brush {
     for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
       const V bottom = hn::Max(rows.begin, Splat(float(row)));
       const V top = hn::Min(rows.end, Splat(float(row + 1)));
-      const V height = hn::Max(zero, hn::Sub(top, bottom));
+      V height = hn::Max(zero, hn::Sub(top, bottom));
+      if constexpr (kIsThicket) height = hn::Mul(height, Splat(cover.opacity));
       const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
       const V x = hn::NegMulAdd(shape.shear, along, shape.x);
       const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);

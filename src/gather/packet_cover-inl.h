@@ -30,7 +30,8 @@ struct Cover {
   V depth_begin, depth_end;
   M is_lit;
   bool is_all_lit;
-  float overlap, thicket;
+  float overlap, thicket, opacity;
+  float own;  // the part of its own that overlaps
   glm::vec3 radiosity;
   V fade;  // only when something fades
 };
@@ -63,7 +64,7 @@ inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   hn::Store(room, d, room_at);
   hn::Store(hn::IfThenElse(touched, hn::Max(end, cover.depth_end), end), d, end_at);
 
-  const V middle = hn::Min(one, hn::MulAdd(Splat(0.5f), amount, before));
+  const V middle = hn::Min(one, hn::MulAdd(Splat(cover.own), amount, before));
   const V slope = hn::NegMulAdd(middle, Splat(cover.overlap), one);
   const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
   hn::Store(layer, d, layer_at);

@@ -187,7 +187,8 @@ class Integral {
         thicket = hn::Load(d, canvas_.thickets + i * kPacketReceivers + lane_);
       }
     }
-    // The far field comes last, as one contribution: a surface that reaches it goes on there
+    // The far field comes last, as one contribution: a surface that reaches it goes on there, a
+    // thicket hides in part behind what reaches it
     const float* far = nullptr;
     if (has_far) far = far_->canvas->pixels + i * pixel_floats_ + far_->lane;
     if (has_far && *far > 0) {
@@ -195,7 +196,11 @@ class Integral {
       const M is_new = hn::Gt(Splat(far_->distance), end);
       room = hn::IfThenElse(is_new, hn::NegMulAdd(room, layer, room), room);
       layer = hn::IfThenZeroElse(is_new, layer);
-      const V after = hn::Min(hn::Add(layer, amount), one);
+      const float* const thickets = far_->canvas->thickets;
+      const float far_thicket =
+          thickets != nullptr ? thickets[i * kPacketReceivers + far_->lane] : 0;
+      const V slope = hn::NegMulAdd(layer, Splat(far_thicket), one);
+      const V after = hn::Min(hn::MulAdd(amount, slope, layer), one);
       const V added = hn::Mul(room, hn::Sub(after, layer));
       if (has_light) {
         radiosity.x = hn::MulAdd(added, Splat(far[3 * kPacketReceivers]), radiosity.x);
@@ -203,9 +208,7 @@ class Integral {
         radiosity.z = hn::MulAdd(added, Splat(far[5 * kPacketReceivers]), radiosity.z);
       }
       if (fades) faded = hn::MulAdd(added, Splat(far[fade_at_]), faded);
-      if (const float* const thickets = far_->canvas->thickets) {
-        thicket = hn::MulAdd(added, Splat(thickets[i * kPacketReceivers + far_->lane]), thicket);
-      }
+      thicket = hn::MulAdd(added, Splat(far_thicket), thicket);
       layer = after;
     }
     const V coverage = hn::Sub(one, hn::NegMulAdd(room, layer, room));

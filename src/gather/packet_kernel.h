@@ -35,7 +35,7 @@ struct Patch {
   float most_area = 0;  // and no more than this
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
-  float overlap = 0, thicket = 0;  // RasterCube::Patch
+  float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
   glm::vec3 radiosity{0};
   // It is seen where offset . normal, from the receiver, is below this: kFrontOnly, kBothSides, or
   // kDarkBack, when it is seen from both sides and sends light from its front

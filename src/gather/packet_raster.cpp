@@ -18,6 +18,8 @@ namespace {
 // How far from its middle a patch may be drawn, in halves of its side: at the edge of a face, where
 // it matters, everything shows larger by the root of 2, and sides need not be equal.
 constexpr float kReach = 1.8f;
+// Of thickets, in radii of the node: with outlines as long as the node, and a sheared image.
+constexpr float kThicketExtent = 1.5f;
 constexpr float kDiagonal = 1.415f;
 
 std::size_t fillFloats(const GatherRules& rules) {
@@ -113,7 +115,11 @@ void PacketRaster::orderLastPatch() {
   const glm::vec3 size = glm::abs(middle);
   const float largest = std::max({size.x, size.y, size.z});
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
-  const float half = patch.near_distance > 0 ? std::max(0.5f * side, patch.radius) : 0.5f * side;
+  // Thickets fill their outlines however long these are
+  const float least = patch.near_distance > 0 ? patch.radius
+                      : patch.thicket > 0     ? kThicketExtent * patch.radius
+                                              : 0;
+  const float half = std::max(0.5f * side, least);
   const float shift = std::min(patch.area / (2 * largest), largest / 2);
   const float reach = kReach * half + shift + kDiagonal * view_.radius;
 
@@ -164,7 +170,7 @@ void PacketRaster::addFacet(const Facet& facet) {
   patch.radius = facet.radius;
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
   patch.reach = reachOf(facet, direction);
-  patch.thicket = facet.is_thicket ? 1 : 0;
+  patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
   has_thickets_ |= facet.is_thicket;
   patch.shape = shapeOf(facet.covariance);
   patch.area = facet.area;
@@ -206,14 +212,17 @@ void PacketRaster::addRoughNode(const Node& node) {
   patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   patch.shape = shapeOf(node.covariance);
   patch.area = node.area;
-  patch.most_area = mostVisibleArea(node, direction);
-  patch.round_area = std::min(part.perspective * round_area, patch.most_area);
+  patch.thicket = thicketPart(node);
+  const RoughCover cover =
+      roughCover(node, direction, part.perspective * round_area, patch.thicket);
+  patch.round_area = cover.area;
+  patch.most_area = cover.most;
+  patch.opacity = cover.opacity;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
-  patch.thicket = thicketPart(node);
-  patch.overlap = std::max(patch.overlap, kThicketOverlap * patch.thicket);
+  patch.overlap = std::max(patch.overlap, patch.thicket);
   has_thickets_ |= patch.thicket > 0;
   patch.facing_limit = Patch::kBothSides;
   orderLastPatch();

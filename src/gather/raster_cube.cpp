@@ -110,8 +110,9 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, const Textur
   }
   coverage.layer_end = std::max(coverage.layer_end, depth.end);
 
-  // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer
-  const float middle = std::min(1.f, coverage.layer + 0.5f * amount);
+  // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer;
+  // what of a thicket hides behind itself is left out of its opacity
+  const float middle = std::min(1.f, coverage.layer + 0.5f * (1 - texture.thicket) * amount);
   const float slope = 1 - middle * texture.overlap;
   coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
@@ -185,8 +186,8 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
     const std::size_t row_first = std::size_t((face * resolution + row) * resolution);
     for (int column = int(x_begin); column <= column_last; ++column) {
       const float width = std::min(x_end, float(column + 1)) - std::max(x_begin, float(column));
-      coverPixel(row_first + std::size_t(column), width * (top - bottom), texture, depth,
-                 radiosity);
+      coverPixel(row_first + std::size_t(column), texture.opacity * width * (top - bottom), texture,
+                 depth, radiosity);
     }
   }
 }
@@ -236,7 +237,8 @@ void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::v
     if (!(std::abs(patch.direction[axis]) > kLeastAxis)) continue;
     const int face = 2 * axis + (patch.direction[axis] < 0 ? 1 : 0);
     if (face >= geometry_->faceCount()) return;
-    coverParallelogram(face, onFace(patch, axis), {patch.overlap, patch.thicket}, depth, radiosity);
+    const Texture texture = {patch.overlap, patch.thicket, patch.opacity};
+    coverParallelogram(face, onFace(patch, axis), texture, depth, radiosity);
   }
 }
 

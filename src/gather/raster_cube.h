@@ -108,6 +108,7 @@ class RasterCube {
     // anywhere before or behind them.
     float overlap = 0;
     float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
+    float opacity = 1;  // what it hides of the solid angle, itself behind itself left out: 0..1
   };
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
   // image, to first order, of a parallelogram that spreads as the patch does and whose sides follow
@@ -152,7 +153,7 @@ class RasterCube {
   };
   // How a patch covers its pixels; Patch has what they mean.
   struct Texture {
-    float overlap, thicket;
+    float overlap, thicket, opacity = 1;
   };
   // On a face: rows of width 2 half_u around the line u + shear (row - v).
   struct Parallelogram {

@@ -364,6 +364,7 @@ TEST(Facet, OfTwoSidedSurfelsShowsAndLightsBothSides) {
   facet.is_thicket = true;
   ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {}, thicket));
   EXPECT_EQ(thicket.thicket, 1);
+  EXPECT_EQ(thicket.overlap, 1);
   EXPECT_LT(thicket.reach, .2f * front.reach);
 }
 
@@ -402,6 +403,27 @@ TEST(RoughNode, OfAWireShowsAllThatFacesTheReceiver) {
   node.area = 2 * kPi * .005f;
   node.covariance = {{1 / 12.f, 0, 0, 0, 0, 0}};
   EXPECT_GT(mostVisibleArea(node, {0, 0, 1}), .01f);
+}
+
+// A ball of radius 1 that is full of leaves is as wide as the ball, and hides what is spread in
+// that at random; half of it being surface, it is half way to what a surface covers.
+TEST(RoughNode, OfAThicketCoversItsOutlineInPart) {
+  Node node{};
+  node.radius = 1;
+  node.area = 4 * kPi;
+  node.covariance = {{.2f, .2f, .2f, 0, 0, 0}};
+  const glm::vec3 direction = {0, 0, 1};
+  for (const float shown : {.1f, 1.f, 10.f}) {
+    const RoughCover leaves = roughCover(node, direction, shown, 1);
+    EXPECT_NEAR(leaves.area, kPi, .02f);
+    EXPECT_NEAR(leaves.opacity, 1 - std::exp(-shown / kPi), .01f);
+    const RoughCover surface = roughCover(node, direction, shown, 0);
+    EXPECT_EQ(surface.area, std::min(shown, mostVisibleArea(node, direction)));
+    EXPECT_EQ(surface.opacity, 1);
+    const RoughCover half = roughCover(node, direction, shown, .5f);
+    EXPECT_NEAR(half.area, (leaves.area + surface.area) / 2, 1e-5f);
+    EXPECT_NEAR(half.area * half.opacity, (leaves.area * leaves.opacity + surface.area) / 2, 1e-5f);
+  }
 }
 
 TEST(SurfelContribution, IsItsProjectedArea) {

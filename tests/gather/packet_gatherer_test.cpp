@@ -184,6 +184,54 @@ TEST(PacketGatherer, WhatWasGatheredBeforeLeavesNothing) {
   }
 }
 
+// Leaves before and behind the border of the shared far field hide each other as any do.
+TEST(PacketGatherer, SharingTheFarFieldOfLeavesAddsNothing) {
+  Scene scene(foliage(20'000, kLeaf));
+  std::vector<Receiver> receivers;
+  for (int i = 0; i < int(kClusterReceivers); ++i) {
+    receivers.push_back({{.04f * float(i % 16), .04f * float(i / 16), 0}, {0, 0, 1}});
+  }
+  const auto meanOcclusion = [&](float parallax) {
+    GatherQuality quality;
+    quality.far_field_parallax = parallax;
+    PacketGatherer gatherer(GatherMode::kOcclusion, quality);
+    double sum = 0;
+    for (const GatherResult& result : gatherPacket(gatherer, scene, receivers)) {
+      sum += double(result.occlusion) / kClusterReceivers;
+    }
+    EXPECT_EQ(gatherer.work().shared_patches > 0, parallax > 0);
+    return sum;
+  };
+  EXPECT_NEAR(meanOcclusion(.25f), meanOcclusion(0), .01);  // .06 more if they added up
+}
+
+// A two-sided sheet that leans over the receiver by 45 degrees and meets its plane a fiftieth of a
+// radius away: rays that began the bias above the receiver would begin behind it.
+TEST(PacketGatherer, WhatHangsOverAReceiverIsNotLookedThrough) {
+  constexpr float kSide = .05f, kAway = .0007f, kFirstRow = .1f;
+  const glm::vec3 up = glm::normalize(glm::vec3(-1, 0, 1)), normal(up.z, 0, -up.x);
+  Cloud sheet;
+  for (int row = 0; row < 120; ++row) {
+    for (int column = -120; column <= 120; ++column) {
+      Surfel& piece = sheet.emplace_back();
+      piece.position =
+          glm::vec3(kAway, float(column) * kSide, 0) + (float(row) + kFirstRow) * kSide * up;
+      piece.normal = normal;
+      piece.area = kSide * kSide;
+      piece.radius = std::sqrt(.5f) * kSide;
+      piece.flags = kSurfelTwoSided;
+    }
+  }
+  Scene scene(sheet);
+  const GatherQuality quality;
+  const Receiver receiver = {{0, 0, 0}, {0, 0, 1}};
+  PacketGatherer gatherer(GatherMode::kOcclusion, quality);
+  const std::vector<Receiver> packet(kPacketReceivers, receiver);
+  const double expected = (1 + std::sqrt(.5)) / 2;
+  EXPECT_NEAR(double(scene.gather(receiver, quality).occlusion), expected, .05);
+  EXPECT_NEAR(double(gatherPacket(gatherer, scene, packet)[0].occlusion), expected, .05);
+}
+
 // What lies anywhere is not met by exp(-1) of the rays.
 TEST(PacketGatherer, LeavesAndRibbonsCoverAsMuchAsWhatIsSpreadAtRandom) {
   const float expected = 1 - std::exp(-1.f);
