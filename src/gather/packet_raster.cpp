@@ -117,7 +117,7 @@ void PacketRaster::orderLastPatch() {
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
   // Thickets fill their outlines however long these are
   const float least = patch.near_distance > 0 ? patch.radius
-                      : patch.thicket > 0     ? kThicketExtent * patch.radius
+                      : patch.opacity < 1     ? kThicketExtent * patch.radius
                                               : 0;
   const float half = std::max(0.5f * side, least);
   const float shift = std::min(patch.area / (2 * largest), largest / 2);
