@@ -136,7 +136,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
   sight.bias = hn::Mul(Splat(canvas.bias * patch.radius),
                        hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
-  if (!patch.isRound()) {
+  if (patch.facing_limit == Patch::kBothSides && !patch.isRound()) {
     const float inverse = 1 / (kBiasHeight * patch.radius);
     const V part = hn::NegMulAdd(sight.height, Splat(inverse), one);
     sight.bias = hn::Mul(sight.bias, hn::Min(one, hn::Max(zero, part)));

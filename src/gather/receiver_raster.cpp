@@ -140,12 +140,12 @@ void ReceiverRaster::sortByDistance() {
 }
 
 // The bias keeps disks of the receiver's own surface from covering it. What faces the receiver
-// closely, or rises above its plane, is none of those: a wall closer than the bias would be looked
-// through otherwise. So the bias fades out with the normal and with the height. (A dragon on a
-// plane: AO RMSE .0254 with a constant bias, .0218 fading with the normal.)
+// closely is none of those, nor what rises above its plane and is seen from both sides: either
+// would be looked through. So the bias fades out with the normal, and of two-sided surfels with the
+// height. (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 fading with the normal.)
 float ReceiverRaster::rayBias(const Surfel& surfel) const {
   float bias = rules_.quality.bias * surfel.radius;
-  if (!surfel.isSphere()) {
+  if (surfel.isTwoSided()) {
     const glm::vec3 to_surfel = surfel.position - receiver_.position;
     bias *= biasPart(heightAboveHorizon(receiver_, to_surfel) / surfel.radius);
   }
