@@ -82,8 +82,8 @@ inline constexpr float kMostExtent = 1;
 // the horizon of the receiver: disks of the receiver's own surface have their middles in its plane,
 // or beneath. What rises higher crosses it or hangs over it, and would be looked through; what is
 // one-sided turns its back then, and has the whole bias (without, color of the lion on a plane at
-// final quality 1.03 instead of .95 %). (AO RMSE and
-// color of leaves .0081 and 1.7 %, with a full bias .0110 and 2.4 %; .02 to .1 radii do the same.)
+// final quality 1.03 instead of .95 %). AO RMSE and color of leaves .0081 and 1.7 %, with a full
+// bias .0110 and 2.4 %; .02 to .1 radii do the same.
 inline constexpr float kBiasHeight = 0.05f;
 inline float biasPart(float height_in_radii) {
   return std::clamp(1 - height_in_radii / kBiasHeight, 0.f, 1.f);
