@@ -63,7 +63,11 @@ void CommandContext::run(const std::function<Status()>& body) {
   try {
     status = body();
   } catch (const std::bad_alloc&) {
-    status = Status::failed("out of memory; give the job more, or --memory a smaller budget");
+    // Told without a Status, whose text would take some
+    progress_->clear();
+    std::fputs("surfeit: out of memory; give the job more, or --memory a smaller budget\n", stderr);
+    exit_status = exitStatus(StatusCode::kFailed);
+    return;
   } catch (const CLI::Error&) {
     throw;
   } catch (const std::exception& error) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include "surfeit/status.h"
 
@@ -19,11 +20,11 @@ class FirstFailure {
 
   // Keeps `status` unless it is ok or there is one of this or a lower place. Without a place the
   // first in time wins.
-  void note(const Status& status, std::uint64_t place = 0) {
+  void note(Status status, std::uint64_t place = 0) {
     if (status.ok()) return;
     const std::lock_guard lock(mutex_);
     if (place >= place_.load(std::memory_order_relaxed)) return;
-    status_ = status;
+    status_ = std::move(status);
     place_.store(place, std::memory_order_release);
   }
 

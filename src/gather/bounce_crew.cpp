@@ -6,7 +6,7 @@
 #include <array>
 #include <memory>
 
-#include "gather/crew_threads.h"
+#include "core/worker_threads.h"
 #include "io/surfel_mapping.h"
 
 namespace surfeit {
@@ -46,7 +46,7 @@ std::uint64_t BounceCrew::threadBytes(const SceneFile& scene, int surfels_per_re
 }
 
 Status BounceCrew::run() {
-  return runOnThreads(setup_.threads, failure_, [this] { return gatherStretches(); });
+  return runOnThreads(setup_.threads, failure_, "gather", [this] { return gatherStretches(); });
 }
 
 Status BounceCrew::gatherStretches() {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "gather/crew_threads.h"
+#include "core/worker_threads.h"
 #include "gather/interpolating_gatherer.h"
 #include "gather/packet_gatherer.h"
 
@@ -19,7 +19,7 @@ GatherCrew::GatherCrew(const Setup& setup, Sink sink)
                   setup_.prefetch_threads) {}
 
 Status GatherCrew::run() {
-  return runOnThreads(setup_.threads, failure_, [this] { return gatherRuns(); });
+  return runOnThreads(setup_.threads, failure_, "gather", [this] { return gatherRuns(); });
 }
 
 Status GatherCrew::gatherRuns() {

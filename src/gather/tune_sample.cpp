@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <exception>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -17,6 +16,7 @@
 #include <vector>
 
 #include "core/first_failure.h"
+#include "core/worker_threads.h"
 #include "gather/gather_options.h"
 #include "gather/look_up_trace.h"
 #include "gather/sample_curve.h"
@@ -216,11 +216,7 @@ Status Sampling::followPieces(const Pieces& stretches, const Pieces& spread, dou
     return {};
   };
   const auto guarded = [&](bool takes_spread) {
-    try {
-      failure.note(work(takes_spread));
-    } catch (const std::exception& exception) {
-      failure.note(Status::failed(std::string("cannot sample: ") + exception.what()));
-    }
+    failure.note(catchAll("sample", [&] { return work(takes_spread); }));
   };
   {
     std::vector<std::jthread> threads;

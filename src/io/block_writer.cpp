@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <new>
 #include <system_error>
 #include <utility>
 
@@ -14,6 +15,9 @@ namespace surfeit {
 BlockWriter::BlockWriter(PositionalFile& file, std::size_t blocks)
     : file_(file), max_blocks_(blocks) {
   SURFEIT_CHECK(blocks >= 2);
+  // Once and for all: no exception may leave the thread, and no block may be lost
+  queue_.reserve(blocks);
+  free_blocks_.reserve(blocks);
 }
 
 BlockWriter::~BlockWriter() {
@@ -89,11 +93,11 @@ void BlockWriter::runThread() {
 // Writes the first block of the queue, without holding the lock; after a failure drops it.
 void BlockWriter::writeNext(std::unique_lock<std::mutex>& lock) {
   FullBlock full = std::move(queue_.front());
-  queue_.pop_front();
+  queue_.erase(queue_.begin());
   if (failure_.ok()) {
     is_writing_ = true;
     lock.unlock();
-    Status status = file_.writeAligned(full.offset, {full.block.data(), kBlockBytes});
+    Status status = write(full);
     lock.lock();
     is_writing_ = false;
     if (!status.ok()) {
@@ -103,6 +107,14 @@ void BlockWriter::writeNext(std::unique_lock<std::mutex>& lock) {
   }
   free_blocks_.push_back(std::move(full.block));
   block_written_.notify_all();
+}
+
+Status BlockWriter::write(const FullBlock& full) const noexcept {
+  try {
+    return file_.writeAligned(full.offset, {full.block.data(), kBlockBytes});
+  } catch (const std::bad_alloc&) {
+    return Status::failed("out of memory");  // so short a text takes none
+  }
 }
 
 Status BlockWriter::drainQueue() {

@@ -10,7 +10,6 @@
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -61,6 +60,7 @@ class BlockWriter {
   void startThread();
   void runThread();
   void writeNext(std::unique_lock<std::mutex>& lock);
+  Status write(const FullBlock& full) const noexcept;
   Status drainQueue();
   Status failure();
   Status fail(Status status);
@@ -81,7 +81,7 @@ class BlockWriter {
   // What appenders and the thread share; taken after append_mutex_
   std::mutex queue_mutex_;
   std::condition_variable block_queued_, block_written_;
-  std::deque<FullBlock> queue_;
+  std::vector<FullBlock> queue_;  // oldest first
   std::vector<AlignedBuffer> free_blocks_;
   bool is_writing_ = false;
   bool is_stopping_ = false;

@@ -1,15 +1,17 @@
 #include "io/temporary_name.h"
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/random.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <filesystem>
+#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -19,14 +21,16 @@
 namespace surfeit {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr std::string_view kInfix = ".surfeit-";
 constexpr std::string_view kSuffix = ".tmp";
 constexpr std::size_t kRandomChars = 6;
 constexpr std::string_view kAlphabet = "0123456789abcdefghijklmnopqrstuvwxyz";
 constexpr std::size_t kMaxNameBytes = 255;  // NAME_MAX of every file system of note
 constexpr int kAttempts = 100;
+
+struct CloseDirectory {
+  void operator()(DIR* entries) const { ::closedir(entries); }
+};
 
 std::uint64_t randomNumber() {
   std::uint64_t number = 0;
@@ -100,19 +104,22 @@ Result<std::string> nameTemporary(int descriptor, const std::string& path) {
   return systemError(path, "give the finished file a name");
 }
 
+// The system's own reading: that of the standard library ends the program when memory runs out.
 void removeStaleTemporaries(const std::string& path) {
-  const std::string prefix = namePrefix(path);
-  std::error_code error;
-  fs::directory_iterator entry(directoryOf(path), error);
-  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    if (!isTemporaryName(entry->path().filename().native(), prefix)) continue;
-    std::error_code type_error;
-    if (entry->symlink_status(type_error).type() != fs::file_type::regular) continue;
+  const std::string directory = directoryOf(path), prefix = namePrefix(path);
+  const std::unique_ptr<DIR, CloseDirectory> entries(::opendir(directory.c_str()));
+  if (entries == nullptr) return;
+  while (const dirent* const entry = ::readdir(entries.get())) {
+    if (!isTemporaryName(entry->d_name, prefix)) continue;
+    const std::string temporary = directory + '/' + entry->d_name;
     // Locks on network file systems want the file open for writing
     const FileDescriptor file(
-        system_calls::open(entry->path().c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-    if (!file.isOpen() || system_calls::flock(file.get(), LOCK_EX | LOCK_NB) != 0) continue;
-    system_calls::unlink(entry->path().c_str());
+        system_calls::open(temporary.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    struct ::stat found {};
+    if (!file.isOpen() || system_calls::fstat(file.get(), &found) != 0) continue;
+    if (!S_ISREG(found.st_mode)) continue;
+    if (system_calls::flock(file.get(), LOCK_EX | LOCK_NB) != 0) continue;
+    system_calls::unlink(temporary.c_str());
   }
 }
 

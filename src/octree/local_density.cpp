@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <exception>
 #include <glm/geometric.hpp>
 #include <thread>
+
+#include "core/worker_threads.h"
 
 namespace surfeit {
 namespace {
@@ -181,11 +182,9 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const auto search_slice = [&](std::size_t r) {
     const std::size_t begin = surfels_.size() * r / searchers_.size();
     const std::size_t end = surfels_.size() * (r + 1) / searchers_.size();
-    try {
-      statuses[r] = fillSizes(searchers_[r], std::span(surfels_).subspan(begin, end - begin));
-    } catch (const std::exception& error) {
-      statuses[r] = Status::failed(error.what());  // none may leave a thread
-    }
+    statuses[r] = catchAll("find neighbours", [&] {
+      return fillSizes(searchers_[r], std::span(surfels_).subspan(begin, end - begin));
+    });
   };
   {
     // Threads for a batch, which takes them tens of milliseconds: they join here

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <mutex>
-#include <thread>
 
+#include "core/first_failure.h"
 #include "core/job_limits.h"
+#include "core/worker_threads.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
 #include "surfeit/scene.h"
@@ -245,31 +246,24 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
   std::atomic<std::uint32_t> next_page{0};
   std::atomic<std::uint64_t> nodes{0}, surfels{0};
   std::atomic<std::uint64_t> node_balance{0}, surfel_balance{0};
-  std::atomic<bool> stop{false};
-  std::vector<Status> statuses(static_cast<std::size_t>(threads));
-  const auto work = [&](std::size_t worker) {
+  FirstFailure failure;
+  const auto work = [&]() -> Status {
     PageChecker checker(file, *octree, findings);
-    while (!stop && !progress.isCancelled()) {
+    while (!failure.happened() && !progress.isCancelled()) {
       const std::uint32_t page = next_page++;
       if (page >= pages) break;
       const bool is_node_page = page < node_pages;
-      const Result<std::uint64_t> count =
-          is_node_page ? checker.checkNodePage(page) : checker.checkSurfelPage(page - node_pages);
-      if (!count.ok()) {
-        statuses[worker] = count.status();
-        stop = true;
-        return;
-      }
-      (is_node_page ? nodes : surfels) += *count;
+      SURFEIT_ASSIGN_OR_RETURN(
+          const std::uint64_t count,
+          is_node_page ? checker.checkNodePage(page) : checker.checkSurfelPage(page - node_pages));
+      (is_node_page ? nodes : surfels) += count;
       progress.advance(1);
     }
     node_balance += checker.nodeBalance();
     surfel_balance += checker.surfelBalance();
+    return {};
   };
-  std::vector<std::thread> workers;
-  for (std::size_t i = 0; i < statuses.size(); ++i) workers.emplace_back(work, i);
-  for (std::thread& worker : workers) worker.join();
-  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
+  SURFEIT_RETURN_IF_ERROR(runOnThreads(threads, failure, "verify", work));
   if (progress.isCancelled()) return Status::interrupted();
 
   // Sums over the whole file

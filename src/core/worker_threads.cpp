@@ -1,4 +1,4 @@
-#include "gather/crew_threads.h"
+#include "core/worker_threads.h"
 
 #include <fmt/format.h>
 
@@ -11,16 +11,24 @@
 
 namespace surfeit {
 
-Status runOnThreads(int threads, FirstFailure& failure, const std::function<Status()>& work) {
-  // What is thrown ends here: past the border of a thread it would end the process
-  const auto workOrNote = [&] {
+Status catchAll(const char* doing, const std::function<Status()>& work) noexcept {
+  try {
     try {
-      failure.note(work());
+      return work();
     } catch (const std::bad_alloc&) {
-      failure.note(Status::failed("out of memory"));
+      throw;
     } catch (const std::exception& exception) {
-      failure.note(Status::failed(fmt::format("cannot gather: {}", exception.what())));
+      return Status::failed(fmt::format("cannot {}: {}", doing, exception.what()));
     }
+  } catch (...) {
+    return Status::failed("out of memory");  // so short a text takes none
+  }
+}
+
+Status runOnThreads(int threads, FirstFailure& failure, const char* doing,
+                    const std::function<Status()>& work) {
+  const auto workOrNote = [&] {
+    failure.note(catchAll(doing, work));
   };
   {
     std::vector<std::jthread> others;
