@@ -2,7 +2,8 @@
 # Do results step where the cut changes between tree levels? Gathers along straight lines in the
 # Cornell box of the demo, at 10,000 places each, and prints the largest difference of occlusion
 # between neighbours, and that of irradiance over its mean: their true differences are far smaller,
-# those of a level that comes or goes would stand out.
+# those of a level that comes or goes would stand out. Then over the whole floor, as a picture has
+# it: second differences along rows, which a slope has none of, where 10, 1 and .1 % are larger.
 #
 #   bench/line_steps.sh [GATHER OPTIONS ...]     surfeit and cornell_scene from PATH or build/dev
 set -euo pipefail
@@ -46,6 +47,29 @@ line() {
     }' "$work/$1.result.csv"
 }
 
+# second_differences NAME COLUMN, in rows of 500 places; those that the boxes cover are left out
+second_differences() {
+  awk -F, -v name="$2" '
+    NR == 1 { for (i = 1; i <= NF; i++) { if ($i == "occlusion") o = i; if ($i == name) r = i } next }
+    {
+      value = name == "occlusion" ? $r : ($r + $(r + 1) + $(r + 2)) / 3
+      if (place++ % 500 == 0) known = 0
+      if ($o < 0.9) known++
+      else known = 0
+      if (known > 2) {
+        bend = value - 2 * before + before_that
+        print bend < 0 ? -bend : bend
+      }
+      before_that = before
+      before = value
+    }' "$work/floor.result.csv" | sort -g | awk -v name="$1" '
+    { bends[NR] = $1 }
+    END {
+      printf "%-14s %.5f   %.5f   %.5f\n", name, bends[int(NR * .9)], bends[int(NR * .99)],
+             bends[int(NR * .999)]
+    }'
+}
+
 options=("$@")
 cornell_scene "$work" > "$work/log"
 surfeit sample "$work/cornell.obj" -o "$work/cornell.ply" --count 1000000 --quiet
@@ -56,3 +80,14 @@ line diagonal "0.03 0 0.97" "0.97 0 0.55" "0 1 0"
 line wall "0 0.03 0.8" "0 0.97 0.8" "1 0 0"
 line back "0.03 0.7 0" "0.97 0.7 0" "0 0 1"
 line ceiling "0.03 1 0.8" "0.97 1 0.8" "0 -1 0"
+
+awk 'BEGIN {
+  print "x,y,z,nx,ny,nz"
+  for (i = 0; i < 250000; i++)
+    printf "%.6f,0,%.6f,0,1,0\n", .02 + .96 * (i % 500 + .5) / 500, .02 + .96 * (int(i / 500) + .5) / 500
+}' > "$work/floor.csv"
+surfeit gather "$work/cornell.sft" "$work/floor.csv" -o "$work/floor.result.csv" --mode bleeding \
+  --quiet "${options[@]}"
+echo "floor          10 %      1 %       .1 % of second differences"
+second_differences occlusion occlusion
+second_differences irradiance irradiance_r

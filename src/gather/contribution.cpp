@@ -147,7 +147,7 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 namespace {
 // The ellipse that spreads as the node does, projected along the direction. The covariance is
 // stored in steps of 1/255 of its trace: that much is added, lest a thin wire has no outline.
-float outlineArea(const Node& node, const glm::vec3& direction) {
+float ellipseArea(const Node& node, const glm::vec3& direction) {
   constexpr float kStep = 1.f / 255;
   SymmetricMatrix spread = node.covariance;
   for (std::size_t i = 0; i < 3; ++i) spread.entries[i] += kStep * node.covariance.trace();
@@ -156,21 +156,15 @@ float outlineArea(const Node& node, const glm::vec3& direction) {
 }
 }  // namespace
 
-// No more than the outline of the sphere that holds all disks; of what is rough, no more than a
-// part of its outline: what lies behind each other shows once.
-float mostVisibleArea(const Node& node, const glm::vec3& direction) {
-  const float most = std::min(node.area, kPi * node.radius * node.radius);
-  return std::min(most, kFilledOutline * outlineArea(node, direction));
-}
-
-// What exceeds the limit of a surface hides behind the rest. (Spheres and two-sided surfels count
-// twice in front plus back, which the limit of the area takes back head-on.)
+// A surface covers no more than the outline of the sphere that holds all disks, and than a part of
+// its ellipse: what exceeds that hides behind the rest. (Spheres and two-sided surfels count twice
+// in front plus back, which the limit of the area takes back head-on.)
 RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket) {
-  const float most = mostVisibleArea(node, direction), surface = std::min(shown, most);
-  if (!(thicket > 0)) return {surface, 1, most};
-  const float outline =
-      std::min(kPi * node.radius * node.radius, kThicketOutline * outlineArea(node, direction));
-  if (!(outline > 0)) return {surface, 1, most};
+  const float ellipse = ellipseArea(node, direction), sphere = kPi * node.radius * node.radius;
+  const float most = std::min({node.area, sphere, kFilledOutline * ellipse});
+  const float surface = std::min(shown, most);
+  const float outline = std::min(sphere, kThicketOutline * ellipse);
+  if (!(thicket > 0 && outline > 0)) return {surface, 1, most};
   const float hidden = outline * thicketOpacity(std::min(shown, node.area), outline);
   const float area = surface + thicket * (outline - surface);
   return {area, (surface + thicket * (hidden - surface)) / area, std::max(area, most)};

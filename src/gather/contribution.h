@@ -24,7 +24,8 @@ struct Contribution {
   float spread;           // area / distance^2: the solid angle that it would have head-on
   float overlap;          // of its parts with those of its layer, 0..1; see RasterCube::Patch
   float thicket;          // how much of it is leaves or hair, 0..1; likewise
-  float opacity;          // what it hides of its solid angle, 0..1; 1 but for thickets
+  float opacity;          // what it hides of its solid angle, 0..1; 1 but for thickets, and while
+                          // a node fades into what is below it
   glm::vec3 normal;       // unit length for a disk, zero for a sphere, in between when partly flat
   SymmetricMatrix shape;  // how it spreads; see RasterCube::Patch
   glm::vec3 radiosity;    // of what covers; back sides are black. Zero when color is not asked for.
@@ -82,13 +83,12 @@ struct SeenPart {
 SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
                   GatherSides sides);
 
-// The largest area that a rough node may show in unit direction `direction` (or its opposite), and
-// a facet in any.
-float mostVisibleArea(const Node& node, const glm::vec3& direction);
+// The largest area that a facet may show in any direction.
 float mostVisibleArea(const Facet& facet);
 
-// What a rough node covers that shows `shown` of its area in this direction: an outline, and what
-// it hides of that. A surface fills what it shows, a thicket is spread over its outline.
+// What a rough node covers that shows `shown` of its area in unit direction `direction` (or its
+// opposite), and of which `thicket` is leaves or hair: an area, and what it hides of that. A
+// surface fills what it shows, a thicket is spread over its outline.
 struct RoughCover {
   float area, opacity;
   float most;  // what `area` might be, however much is shown

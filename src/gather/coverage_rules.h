@@ -45,8 +45,8 @@ inline constexpr float kThicketReach = 0.15f;
 
 // The outline of a thicket, over that of an ellipse with its covariance: a ball full of leaves has
 // as much, and then what a thicket covers does not depend on how large its nodes are. (AO bias of
-// leaves with nodes of .05, .1 and .4 sr: with 1.25 +.0024, +.0008, -.0002, with 0.95 .0000,
-// -.0028, -.0084.)
+// leaves with nodes of .05, .1 and .4 sr, nothing shared: with 1.25 +.0024, +.0008, -.0002; with
+// 0.95 .0000, -.0028, -.0084.)
 inline constexpr float kThicketOutline = 1.25f;
 
 // What things of this area hide of an outline, spread in it at random (Beer and Lambert).
@@ -123,8 +123,7 @@ inline float softDiskPeak(float radius, float area, bool is_two_sided) {
 
 // A rough node covers at most this part of its outline, which is that of an ellipse with its
 // covariance: a ball covers 3/4 of that, a rectangle 0.95. (AO bias with .8, .87, 1: lion on a
-// plane
-// -.0002, +.0017, +.0029; bunny -.0035, -.0027, -.0024; Sponza -.0039, -.0027, -.0023.)
+// plane -.0002, +.0017, +.0029; bunny -.0035, -.0027, -.0024; Sponza -.0039, -.0027, -.0023.)
 inline constexpr float kFilledOutline = 0.87f;
 
 // What a rough node looks like from close by differs from its projected area by no more than this

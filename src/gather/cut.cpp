@@ -47,6 +47,9 @@ float facingOf(const Node& node, const CutRules& rules) {
   return node.isFlat() && node.isTwoSided() ? 0 : rules.facing;
 }
 
+// Of what is below, over what a node looks like as a part of what it may; without fading a step.
+float fadingSlope(const CutRules& rules) { return 1 / std::max(2 * rules.fading, 1e-6f); }
+
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 
 }  // namespace
@@ -61,7 +64,6 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Siblings as columns.
-constexpr std::size_t kMostSiblings = 8;
 struct alignas(64) Columns {
   float x[kMostSiblings] = {}, y[kMostSiblings] = {}, z[kMostSiblings] = {};
   float normal_x[kMostSiblings] = {}, normal_y[kMostSiblings] = {}, normal_z[kMostSiblings] = {};
@@ -176,8 +178,10 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     const auto area = hn::Mul(hn::Set(d, kPi), hn::Mul(radius, radius));
     const auto away = hn::Mul(hn::Load(d, columns.facing + at),
                               hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz))));
-    const auto limit = hn::Mul(most_solid_angle, hn::Mul(nearest, nearest));
-    auto far = hn::And(hn::Gt(nearest, radius), hn::Lt(area, limit));
+    auto limit = hn::Mul(most_solid_angle, hn::Mul(nearest, nearest));
+    const auto most_faded = hn::Set(d, 1 + rules.fading);
+    auto may_be_far = hn::And(hn::Gt(nearest, radius), hn::Lt(area, hn::Mul(most_faded, limit)));
+    auto far = may_be_far;
 
     // Of the region; all walks of a cluster calculate this alike
     if (region.part != CutRegion::Part::kAll) {
@@ -188,30 +192,42 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
       const auto centre_sq = hn::MulAdd(cx, cx, hn::MulAdd(cy, cy, hn::Mul(cz, cz)));
       const auto from_centre = hn::Sqrt(centre_sq);
       const auto from_cluster = hn::Sub(from_centre, hn::Set(d, cluster.radius));
-      auto most = most_from_cluster;
+      auto cluster_most = most_from_cluster;
       if (cluster.has_horizon && rules.most_coarser > 1) {
         const auto top = highest(cluster, cx, cy, cz, centre_sq, from_centre);
-        most = hn::Mul(most, coarser(from_cluster, top));
+        cluster_most = hn::Mul(cluster_most, coarser(from_cluster, top));
       }
+      const auto cluster_limit = hn::Mul(cluster_most, hn::Mul(from_cluster, from_cluster));
       const auto far_from_cluster =
-          hn::And(hn::Gt(from_cluster, radius),
-                  hn::Lt(area, hn::Mul(most, hn::Mul(from_cluster, from_cluster))));
+          hn::And(hn::Gt(from_cluster, radius), hn::Lt(area, hn::Mul(most_faded, cluster_limit)));
       const auto border = hn::Set(d, region.limit);
       const auto beyond = hn::Ge(hn::Sub(from_centre, radius), border);
       const auto within = hn::Lt(hn::Add(from_centre, radius), border);
       const auto middle_beyond = hn::Ge(from_centre, border);
+      // On the border every walk opens what fades, and one has the node itself
       if (region.part == CutRegion::Part::kNear) {
-        seen = hn::AndNot(hn::Or(beyond, hn::And(middle_beyond, far_from_cluster)), seen);
-        far = hn::Or(hn::And(within, far), hn::AndNot(within, far_from_cluster));
+        seen = hn::AndNot(beyond, seen);
+        limit = hn::IfThenElse(within, limit, cluster_limit);
+        may_be_far = hn::Or(hn::And(within, may_be_far), hn::AndNot(within, far_from_cluster));
+        far = hn::And(may_be_far, hn::Or(within, hn::Not(middle_beyond)));
       } else {
-        seen = hn::AndNot(hn::Or(within, hn::AndNot(middle_beyond, far_from_cluster)), seen);
-        far = far_from_cluster;
+        seen = hn::AndNot(within, seen);
+        limit = cluster_limit;
+        may_be_far = far_from_cluster;
+        far = hn::And(may_be_far, middle_beyond);
       }
     }
 
+    // As fadedPart
+    const auto tiny = hn::Set(d, std::numeric_limits<float>::min());
+    const auto looks = hn::Div(area, hn::Max(limit, tiny));
+    const auto part =
+        hn::Mul(hn::Sub(looks, hn::Set(d, 1 - rules.fading)), hn::Set(d, fadingSlope(rules)));
+    const auto below = hn::IfThenElse(may_be_far, hn::Min(one, hn::Max(zero, part)), one);
+
     // Turned away from all
     if (rules.facing != 0 && rules.approximates()) {
-      const auto is_disk = hn::And(far, is_flat);
+      const auto is_disk = hn::And(hn::Le(below, zero), is_flat);
       const auto size = hn::Add(packet_radius, hn::IfThenZeroElse(is_disk, radius));
       const auto normals =
           hn::IfThenElse(is_disk, hn::Mul(spread, hn::Set(d, kFlatSpread / kNormalSpread)), spread);
@@ -219,7 +235,8 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
       const auto small = hn::Lt(size, hn::Mul(distance, hn::Set(d, kMostTurnedAway)));
       seen = hn::AndNot(hn::And(small, hn::Gt(away, turn)), seen);
     }
-    const auto far_bits = hn::And(seen, far), open_bits = hn::AndNot(far, seen);
+    const auto far_bits = hn::And(seen, far), open_bits = hn::And(seen, hn::Gt(below, zero));
+    hn::StoreU(below, d, classes.below.data() + at);
     std::uint8_t bits[2][8] = {};
     hn::StoreMaskBits(d, far_bits, bits[0]);
     hn::StoreMaskBits(d, open_bits, bits[1]);
@@ -270,36 +287,49 @@ float coarser(const Node& node, float nearest, float highest, const PacketView& 
   return std::clamp(gain, 1.f, rules.most_coarser);
 }
 
+// What becomes of a node: whether it is drawn as a whole, and how much what is below it counts.
+struct Standing {
+  bool is_far = false;
+  float below = 1;
+};
+
+// How much what is below counts of a node that looks so large, as a part of what it may.
+float fadedPart(float size, const CutRules& rules) {
+  return std::clamp((size - (1 - rules.fading)) * fadingSlope(rules), 0.f, 1.f);
+}
+
 // A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
 // solid angle, or that share of it. A flat square of surfels has about 0.6 of its sphere's outline
 // as area, so this is close to the memo's test on the area, but it also opens sparse nodes, whose
 // area says nothing about how far their surfels spread. Never when only some of these are seen.
-bool isFarEnough(const Node& node, float nearest, float coarser, const CutRules& rules) {
-  if (rules.isMixed(node)) return false;
+Standing standingOf(const Node& node, float nearest, float coarser, const CutRules& rules) {
+  if (rules.isMixed(node)) return {};
   const float share = node.isRough() ? kRoughShare * coarser : coarser;
-  const float limit = share * rules.max_solid_angle;
-  return nearest > node.radius && kPi * node.radius * node.radius < 2 * limit * nearest * nearest;
+  const float area = kPi * node.radius * node.radius;
+  const float limit = 2 * share * rules.max_solid_angle * nearest * nearest;
+  if (!(nearest > node.radius && area < (1 + rules.fading) * limit)) return {};
+  return {true, fadedPart(area / limit, rules)};
 }
 
-// Whether the walk takes something of the node, and as a whole only what no other walk opens: a
-// node on the border belongs to where its middle is if it is far enough from the whole cluster, and
-// is opened by all otherwise.
+// Whether the walk takes something of the node. A node on the border is drawn where its middle is
+// if it is far enough from the whole cluster, and opened by all as far as it is not.
 bool isOfRegion(const Node& node, float spread, const CutRegion& region, const CutRules& rules,
-                bool& is_far) {
+                Standing& standing) {
   if (region.part == CutRegion::Part::kAll) return true;
   const PacketView& cluster = region.cluster;
   const glm::vec3 to_node = node.position - cluster.centre;
   const float from_centre = glm::length(to_node), nearest = from_centre - cluster.radius;
   const float highest = highestPoint(node, to_node, from_centre, spread, cluster, rules);
-  const bool far_from_cluster =
-      isFarEnough(node, nearest, coarser(node, nearest, highest, cluster, rules), rules);
+  const Standing from_cluster =
+      standingOf(node, nearest, coarser(node, nearest, highest, cluster, rules), rules);
   const bool middle_beyond = from_centre >= region.limit;
   if (region.part == CutRegion::Part::kNear) {
-    if (!(from_centre + node.radius < region.limit)) is_far = far_from_cluster;
-    return from_centre - node.radius < region.limit && !(middle_beyond && far_from_cluster);
+    if (from_centre + node.radius < region.limit) return true;
+    standing = {from_cluster.is_far && !middle_beyond, from_cluster.below};
+    return from_centre - node.radius < region.limit;
   }
-  is_far = far_from_cluster;
-  return from_centre + node.radius >= region.limit && (middle_beyond || !far_from_cluster);
+  standing = {from_cluster.is_far && middle_beyond, from_cluster.below};
+  return from_centre + node.radius >= region.limit;
 }
 
 }  // namespace
@@ -329,19 +359,22 @@ SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView
       if (aside * view.lobe_cosine - along * view.lobe_sine > node.radius + view.radius) continue;
     }
 
-    bool is_far = isFarEnough(node, nearest, coarser(node, nearest, highest, view, rules), rules);
-    if (!isOfRegion(node, spread, region, rules, is_far)) continue;
+    Standing standing =
+        standingOf(node, nearest, coarser(node, nearest, highest, view, rules), rules);
+    if (!isOfRegion(node, spread, region, rules, standing)) continue;
 
     // Turned away from all: as one disk, or all the surfels below
     if (rules.facing != 0 && rules.approximates()) {
       const float away = facingOf(node, rules) * glm::dot(to_node, node.normal);
-      const bool is_disk = is_far && node.isFlat();
+      const bool is_disk = !(standing.below > 0) && node.isFlat();
       const float size = view.radius + (is_disk ? 0 : node.radius);
       const float normals = is_disk ? kFlatSpread / kNormalSpread * spread : spread;
       const float turn = normals * distance + 1.2f * size;
       if (size < kMostTurnedAway * distance && away > turn) continue;
     }
-    (is_far ? classes.far : classes.open) |= 1u << i;
+    classes.below[i] = standing.below;
+    if (standing.is_far) classes.far |= 1u << i;
+    if (standing.below > 0) classes.open |= 1u << i;
   }
   return classes;
 }

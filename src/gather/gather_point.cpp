@@ -8,10 +8,10 @@ namespace {
 // Hands the cut to the raster.
 struct DrawCut {
   ReceiverRaster& raster;
-  void node(const Node& node) { raster.addNode(node); }
+  void node(const Node& node, float part) { raster.addNode(node, part); }
   void leaf(const Node&) {}
-  void surfels(std::span<const Surfel> run) {
-    for (const Surfel& surfel : run) raster.addSurfel(surfel);
+  void surfels(std::span<const Surfel> run, float part) {
+    for (const Surfel& surfel : run) raster.addSurfel(surfel, part);
   }
 };
 

@@ -55,6 +55,8 @@ class Brush {
     if (canvas_.thickets != nullptr) thickets_ = canvas_.thickets + first * kPacketReceivers;
     if (!(*canvas_.is_face_used)[std::size_t(face)]) ClearFace();
     pixels_ += lane_;
+    begins_ = canvas_.begins;
+    if (begins_ != nullptr) begins_ += first * kPacketReceivers + lane_;
   }
 
   HWY_INLINE void DrawPatch(const Patch& patch) {
@@ -247,8 +249,7 @@ class Brush {
     for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
       const V bottom = hn::Max(rows.begin, Splat(float(row)));
       const V top = hn::Min(rows.end, Splat(float(row + 1)));
-      V height = hn::Max(zero, hn::Sub(top, bottom));
-      if constexpr (kIsThicket) height = hn::Mul(height, Splat(cover.opacity));
+      const V height = hn::Mul(Splat(cover.opacity), hn::Max(zero, hn::Sub(top, bottom)));
       const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
       const V x = hn::NegMulAdd(shape.shear, along, shape.x);
       const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
@@ -259,7 +260,9 @@ class Brush {
       for (int column = begin; column < end; ++column) {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
-        const V added = CoverPixel<Kind>(pixel, hn::Mul(width, height), cover);
+        const V amount = hn::Mul(width, height);
+        if (begins_ != nullptr) NoteBegin(first + std::size_t(column - begin), amount, cover);
+        const V added = CoverPixel<Kind>(pixel, amount, cover);
         pixel += kPixelFloats;
         if constexpr (kIsThicket) {
           AddTo(thicket, added, cover);
@@ -354,8 +357,18 @@ class Brush {
 
   void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
     if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
+    amount = hn::Mul(Splat(cover.opacity), amount);
+    if (begins_ != nullptr) NoteBegin(pixel, amount, cover);
     const V added = CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
     if (cover.thicket > 0) AddTo(thickets_ + pixel * kPacketReceivers + lane_, added, cover);
+  }
+  // Comes before the pixel is covered.
+  void NoteBegin(std::size_t pixel, V amount, const Cover& cover) {
+    const D d;
+    float* const begin = begins_ + pixel * kPacketReceivers;
+    const V end = hn::Load(d, pixels_ + pixel * kPixelFloats + 2 * kPacketReceivers);
+    const M is_first = hn::And(hn::Gt(amount, hn::Zero(d)), hn::Le(end, hn::Zero(d)));
+    hn::Store(hn::IfThenElse(is_first, cover.depth_begin, hn::Load(d, begin)), d, begin);
   }
   // What thickets have of a pixel, when so much is newly covered.
   static void AddTo(float* thicket, V added, const Cover& cover) {
@@ -456,6 +469,7 @@ class Brush {
   int face_ = 0;
   const SeenPixels::Face* seen_ = nullptr;
   float* pixels_ = nullptr;    // of the face, from the first of our lanes
+  float* begins_ = nullptr;    // likewise; null: nobody asks
   float* thickets_ = nullptr;  // of the face; null: none
 };
 

@@ -18,9 +18,11 @@ constexpr float kMostSharingWidth = 1.5f;
 // along lines in a box, bench/line_steps.sh: .0066 without this, .0030 with it.)
 constexpr float kMostPacketWidth = 4;
 
-// A cluster that spreads wider than this part of the distance of its far field sees things there
-// from different sides: its packets look by themselves. (Likewise: .0201 without this.)
-constexpr float kMostSpread = 0.5f;
+// A cluster that spreads wider than this part of the distance of its far field, or than this many
+// times its widest packet (a square of receivers: 5 times, a line: 16), sees things there from
+// different sides: its packets look by themselves. (Likewise: .0201 without the first; of
+// irradiance 3.6 % without the second, 1.7 % with it.)
+constexpr float kMostSpread = 0.5f, kMostPackets = 8;
 
 using Places = std::span<std::uint16_t>;
 
@@ -78,9 +80,8 @@ PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherRu
   std::nth_element(widths.begin(), middle, widths.begin() + std::ptrdiff_t(packet_count_));
   most_packet_radius_ = kMostPacketWidth * *middle;
 
-  // Cones that look elsewhere have no raster in common
+  if (packet_count_ < 2 || !mayShare(rules)) return;
   const GatherQuality& quality = rules.quality;
-  if (packet_count_ < 2 || !(quality.far_field_parallax > 0) || rules.hasConeRaster()) return;
   const float most_width = kMostSharingWidth * *middle;
 
   // Those that share, and the sphere and cone around them
@@ -101,7 +102,7 @@ PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherRu
   // Seen from a packet's centre instead of its rim, what is at distance d moves by width / d
   const float pixel = 2 / float(quality.raster_resolution);
   const float far_distance = width / (quality.far_field_parallax * pixel);
-  if (view_.radius > kMostSpread * far_distance) sharing_ = 0;
+  if (view_.radius > std::min(kMostSpread * far_distance, kMostPackets * width)) sharing_ = 0;
   limit_ = view_.radius + far_distance;
 }
 

@@ -41,6 +41,12 @@ class PacketCluster {
   static constexpr float kOneHorizon = 0.99f, kHorizonSlack = 0.1415f;
   static_assert(kOneHorizon * kOneHorizon + kHorizonSlack * kHorizonSlack > 1);
 
+  // Whether clusters of such gathers may share anything: cones that look elsewhere have no raster
+  // in common.
+  static bool mayShare(const GatherRules& rules) {
+    return rules.quality.far_field_parallax > 0 && !rules.hasConeRaster();
+  }
+
   // `receivers`: 1 to kClusterReceivers. They are divided into packets again and again where they
   // lie farthest apart, in space or by their normals: the curve jumps, and packets need not.
   PacketCluster(std::span<const Receiver> receivers, const GatherRules& rules);

@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include <cstddef>
+#include <limits>
 
 #include "gather/coverage_rules.h"
 #include "gather/packet_kernel.h"
@@ -26,7 +27,8 @@ class SurfaceFill {
  public:
   SurfaceFill(const PacketCanvas& canvas, std::size_t lane, const SeenPixels::Face& seen,
               bool has_thickets)
-      : row_begin_(seen.row_begin),
+      : seen_(seen),
+        row_begin_(seen.row_begin),
         row_end_(seen.row_end),
         size_(canvas.geometry->resolution()),
         has_thickets_(has_thickets),
@@ -34,27 +36,45 @@ class SurfaceFill {
         rows_(coverage_ + planeFloats()),
         surface_(rows_ + planeFloats()) {}
 
-  void SetCoverage(std::size_t pixel, V coverage) const {
-    hn::Store(coverage, D(), coverage_ + pixel * kPacketReceivers);
+  // Takes the pixels that count: look(pixel) answers the coverage and what thickets have of it.
+  // Then fills.
+  template <typename Look>
+  HWY_INLINE void Run(const Look& look) const {
+    const V zero = hn::Zero(D());
+    for (int row = row_begin_; row < row_end_; ++row) {
+      const auto [begin, end] = seen_.rows[std::size_t(row)];
+      for (int column = 0; column < size_; ++column) {
+        const auto pixel = std::size_t(row * size_ + column);
+        Sight sight = {zero, zero};
+        if (column >= begin && column < end) sight = look(pixel);
+        hn::Store(sight.coverage, D(), coverage_ + pixel * kPacketReceivers);
+        if (has_thickets_) hn::Store(SurfacePart(sight), D(), surface_ + pixel * kPacketReceivers);
+      }
+    }
+    FillRows();
   }
+
+  struct Sight {
+    V coverage, thicket;
+  };
   V Coverage(std::size_t pixel) const {
     return hn::Load(D(), coverage_ + pixel * kPacketReceivers);
   }
 
-  bool hasThickets() const { return has_thickets_; }
-  // The part of what covers a pixel that is no thicket; with thickets, for all pixels.
-  void SetSurface(std::size_t pixel, V part) const {
-    hn::Store(part, D(), surface_ + pixel * kPacketReceivers);
+ private:
+  // The part of what covers a pixel that is no thicket.
+  static V SurfacePart(const Sight& sight) {
+    const V least = Splat(std::numeric_limits<float>::min());
+    return hn::Sub(Splat(1), hn::Div(sight.thicket, hn::Max(sight.coverage, least)));
   }
 
-  void Run() const {
+  void FillRows() const {
     for (const FillPass& pass : kFillPasses) {
       for (int row = row_begin_; row < row_end_; ++row) SumRow(row);
       for (int row = row_begin_; row < row_end_; ++row) FillRow(row, pass);
     }
   }
 
- private:
   std::size_t planeFloats() const {
     return std::size_t(size_) * std::size_t(size_) * kPacketReceivers;
   }
@@ -98,6 +118,7 @@ class SurfaceFill {
     }
   }
 
+  const SeenPixels::Face& seen_;
   const int row_begin_, row_end_, size_;
   const bool has_thickets_;
   float *const coverage_, *const rows_, *const surface_;

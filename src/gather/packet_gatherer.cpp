@@ -12,19 +12,17 @@ namespace {
 struct DrawCut {
   PacketRaster& raster;
   const CutRegion& region;
-  void node(const Node& node) { raster.addNode(node); }
+  void node(const Node& node, float part) { raster.addNode(node, part); }
   void leaf(const Node&) {}
-  void surfels(std::span<const Surfel> run) { raster.addSurfels(run, region); }
+  void surfels(std::span<const Surfel> run, float part) { raster.addSurfels(run, region, part); }
 };
 
 }  // namespace
 
 PacketGatherer::PacketGatherer(const GatherRules& rules, const PacketKernel& kernel)
-    : rules_(rules),
-      raster_(rules, kernel),
-      far_raster_(rules, kernel),
-      cut_(rules),
-      cost_(rules) {}
+    : rules_(rules), raster_(rules, kernel), cut_(rules), cost_(rules) {
+  if (PacketCluster::mayShare(rules)) far_field_.emplace(rules, kernel);
+}
 
 // Adds the time since the last call.
 void PacketGatherer::endPhase(double& seconds) {
@@ -56,9 +54,7 @@ struct PacketGatherer::Part {
   std::span<const Receiver> receivers;
   std::span<const std::uint16_t> places;  // of their results
   CutRegion region;
-  const PacketRaster* far = nullptr;
-  std::size_t far_lane = 0;
-  float far_distance = 0;
+  std::optional<SharedFarField> far;
 
   Part of(std::size_t begin, std::size_t count) const {
     Part part = *this;
@@ -76,8 +72,7 @@ Status PacketGatherer::gatherPart(const Part& part, PagedOctree::Reader& octree,
   ++work_.packets;
   const std::size_t count = part.receivers.size();
   std::array<GatherResult, kPacketReceivers> packet_results;
-  raster_.integrate(std::span(packet_results).first(count), part.far, part.far_lane,
-                    part.far_distance);
+  raster_.integrate(std::span(packet_results).first(count), part.far ? &*part.far : nullptr);
   for (std::size_t k = 0; k < count; ++k) results[part.places[k]] = packet_results[k];
   endPhase(work_.integrate_seconds);
   return {};
@@ -93,17 +88,17 @@ Status PacketGatherer::gather(std::span<const Receiver> receivers, PagedOctree::
       cut_.walk(viewPacket(cluster.receivers(0).first(1), rules_), {}, octree, cost_));
   if (cluster.shares()) {
     SURFEIT_RETURN_IF_ERROR(
-        draw(cluster.view(), cluster.farRegion(), cluster.centres(), octree, far_raster_));
-    far_raster_.finishFarField();
-    work_.shared_patches += far_raster_.patchCount();
+        draw(cluster.view(), cluster.farRegion(), cluster.centres(), octree, far_field_->raster()));
+    far_field_->finish(cluster);
+    endPhase(work_.draw_seconds);
+    work_.shared_patches += far_field_->raster().patchCount();
   }
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
-    const Part packet = {.receivers = cluster.receivers(i),
-                         .places = cluster.places(i),
-                         .region = cluster.regionOf(i),
-                         .far = cluster.shares(i) ? &far_raster_ : nullptr,
-                         .far_lane = i,
-                         .far_distance = cluster.farDistance()};
+    Part packet = {.receivers = cluster.receivers(i),
+                   .places = cluster.places(i),
+                   .region = cluster.regionOf(i),
+                   .far = {}};
+    if (cluster.shares(i)) packet.far = far_field_->of(cluster, i);
     SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(
         packet.receivers, cluster.mostPacketRadius(), [&](std::size_t begin, std::size_t count) {
           return gatherPart(packet.of(begin, count), octree, results);

@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 
 #include "gather/cut.h"
+#include "gather/far_field.h"
 #include "gather/packet_cluster.h"
 #include "gather/packet_cost.h"
 #include "gather/packet_raster.h"
@@ -47,8 +49,8 @@ class PacketGatherer {
 
   // Bytes that a gatherer holds from the start.
   static std::size_t memoryBytes(const GatherRules& rules) {
-    return sizeof(PacketGatherer) + PacketCost::memoryBytes() +
-           2 * PacketRaster::memoryBytes(rules);
+    return sizeof(PacketGatherer) + PacketCost::memoryBytes() + PacketRaster::memoryBytes(rules) +
+           (PacketCluster::mayShare(rules) ? FarField::memoryBytes(rules) : 0);
   }
 
  private:
@@ -59,7 +61,8 @@ class PacketGatherer {
   void endPhase(double& seconds);
 
   const GatherRules rules_;
-  PacketRaster raster_, far_raster_;
+  PacketRaster raster_;
+  std::optional<FarField> far_field_;  // where clusters may share one
   CutWalk cut_;
   PacketCost cost_;
   Work work_;

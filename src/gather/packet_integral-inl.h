@@ -25,41 +25,16 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-void FinishFarField(const PacketCanvas& canvas) {
-  const D d;
-  const V one = Splat(1);
-  const auto size = std::size_t(canvas.geometry->resolution());
-  const std::size_t pixel_floats = PacketCanvas::pixelFloats(*canvas.rules);
-  const auto finish = [&](float* pixel) HWY_ATTR {
-    const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
-    const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
-    hn::Store(total, d, pixel);
-    const V inverse = hn::Div(one, hn::Max(total, Splat(1e-20f)));
-    for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats; c += kPacketReceivers) {
-      hn::Store(hn::Mul(hn::Load(d, pixel + c), inverse), d, pixel + c);
-    }
-    return inverse;
-  };
-  for (std::size_t i = 0; i < std::size_t(canvas.geometry->faceCount()); ++i) {
-    if (!(*canvas.is_face_used)[i]) continue;
-    canvas.seen->faces[i].forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
-      for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-        const std::size_t at = i * size * size + in_face;
-        const V inverse = finish(canvas.pixels + at * pixel_floats + lane);
-        if (canvas.thickets == nullptr) continue;
-        float* const thicket = canvas.thickets + at * kPacketReceivers + lane;
-        hn::Store(hn::Mul(hn::Load(d, thicket), inverse), d, thicket);
-      }
-    });
-  }
-}
-
 // What is in a pixel.
 struct PixelSight {
   V coverage, occlusion;
   V3 radiosity;  // times the coverage
   V thicket;     // likewise
 };
+
+// Less of a far field than this sends less light than it covers: how much of either there is comes
+// from different sums.
+constexpr float kLeastFarCoverage = 1.f / 64;
 
 // Sums over the pixels for some of the receivers, as ResultSums.
 class Integral {
@@ -73,6 +48,12 @@ class Integral {
         fade_at_((PacketCanvas::kCoverageChannels + rules_.channels() - 1) * kPacketReceivers),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane) {
+    for (std::size_t a = 0; a < 2; ++a) {
+      from_centre_[a] = hn::Zero(D());
+      if (far == nullptr) continue;
+      const int axis = far->axes[a];
+      from_centre_[a] = hn::Sub(Axis(receivers_.position, axis), Splat(far->centre[axis]));
+    }
     weight_sum_ = covered_ = radiosity_.x = radiosity_.y = radiosity_.z = hn::Zero(D());
   }
 
@@ -80,14 +61,14 @@ class Integral {
     const SeenPixels::Face& seen = canvas_.seen->faces[face];
     if (seen.isEmpty()) return;
     const bool has_near = (*canvas_.is_face_used)[face];
-    const bool has_far = far_ != nullptr && (*far_->canvas->is_face_used)[face];
+    const bool has_far = far_ != nullptr && (*far_->is_face_used)[face];
     const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
     const bool has_thickets =
-        (has_near && canvas_.thickets != nullptr) || (has_far && far_->canvas->thickets != nullptr);
+        (has_near && canvas_.thickets != nullptr) || (has_far && far_->has_thickets);
     const SurfaceFill fill(canvas_, lane_, seen, has_thickets);
     const auto size = std::size_t(canvas_.geometry->resolution());
     const std::size_t first = face * size * size;
-    if (has_near || has_far) ResolveFace(first, has_near, has_far, seen, fill);
+    if (has_near || has_far) ResolveFace(first, has_near, has_far, fill);
     seen.forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
       const std::size_t i = first + in_face;
       const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
@@ -166,6 +147,16 @@ class Integral {
             frames_.ToWorld(direction, 2)};
   }
 
+  // What the receivers see of a far field where its packet sees sight.*of, to first order.
+  template <typename Of>
+  HWY_INLINE V FarValue(const FarPixel& far, const Of& of) const {
+    V value = Splat(of(far.sight));
+    for (std::size_t a = 0; a < 2; ++a) {
+      value = hn::MulAdd(from_centre_[a], Splat(of(far.along[a])), value);
+    }
+    return hn::Max(hn::Zero(D()), value);
+  }
+
   PixelSight Look(std::size_t i, bool has_near, bool has_far) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
@@ -189,26 +180,28 @@ class Integral {
     }
     // The far field comes last, as one contribution: a surface that reaches it goes on there, a
     // thicket hides in part behind what reaches it
-    const float* far = nullptr;
-    if (has_far) far = far_->canvas->pixels + i * pixel_floats_ + far_->lane;
-    if (has_far && *far > 0) {
-      const V amount = Splat(*far);
-      const M is_new = hn::Gt(Splat(far_->distance), end);
+    if (has_far && !far_->pixels[i].isEmpty()) {
+      const FarPixel& far = far_->pixels[i];
+      const V amount =
+          hn::Min(one, FarValue(far, [](const auto& sight) { return sight.coverage; }));
+      const M is_new = hn::Gt(Splat(far.begin), end);
       room = hn::IfThenElse(is_new, hn::NegMulAdd(room, layer, room), room);
       layer = hn::IfThenZeroElse(is_new, layer);
-      const float* const thickets = far_->canvas->thickets;
-      const float far_thicket =
-          thickets != nullptr ? thickets[i * kPacketReceivers + far_->lane] : 0;
-      const V slope = hn::NegMulAdd(layer, Splat(far_thicket), one);
+      const V slope = hn::NegMulAdd(layer, Splat(far.thicket), one);
       const V after = hn::Min(hn::MulAdd(amount, slope, layer), one);
       const V added = hn::Mul(room, hn::Sub(after, layer));
       if (has_light) {
-        radiosity.x = hn::MulAdd(added, Splat(far[3 * kPacketReceivers]), radiosity.x);
-        radiosity.y = hn::MulAdd(added, Splat(far[4 * kPacketReceivers]), radiosity.y);
-        radiosity.z = hn::MulAdd(added, Splat(far[5 * kPacketReceivers]), radiosity.z);
+        const V part = hn::Mul(added, Reciprocal(hn::Max(amount, Splat(kLeastFarCoverage))));
+        const auto add = [&](V& sum, int c) HWY_ATTR {
+          const V all = FarValue(far, [c](const auto& sight) { return sight.radiosity[c]; });
+          sum = hn::MulAdd(part, all, sum);
+        };
+        add(radiosity.x, 0);
+        add(radiosity.y, 1);
+        add(radiosity.z, 2);
       }
-      if (fades) faded = hn::MulAdd(added, Splat(far[fade_at_]), faded);
-      thicket = hn::MulAdd(added, Splat(far_thicket), thicket);
+      if (fades) faded = hn::MulAdd(added, Splat(far.faded), faded);
+      thicket = hn::MulAdd(added, Splat(far.thicket), thicket);
       layer = after;
     }
     const V coverage = hn::Sub(one, hn::NegMulAdd(room, layer, room));
@@ -217,28 +210,11 @@ class Integral {
 
   // Puts what is seen into the pixels of a face: the coverage in the place of the room, radiosities
   // and faded coverage in theirs.
-  void ResolveFace(std::size_t first, bool has_near, bool has_far, const SeenPixels::Face& seen,
-                   const SurfaceFill& fill) {
-    const auto size = std::size_t(canvas_.geometry->resolution());
-    for (auto row = std::size_t(seen.row_begin); row < std::size_t(seen.row_end); ++row) {
-      for (std::size_t column = 0; column < size; ++column) {
-        const std::size_t in_face = row * size + column;
-        const auto [begin, end] = seen.rows[row];
-        if (column < begin || column >= end) {
-          fill.SetCoverage(in_face, hn::Zero(D()));
-          if (fill.hasThickets()) fill.SetSurface(in_face, hn::Zero(D()));
-          continue;
-        }
-        const PixelSight sight = ResolvePixel(first + in_face, has_near, has_far);
-        fill.SetCoverage(in_face, sight.coverage);
-        if (fill.hasThickets()) fill.SetSurface(in_face, SurfacePart(sight));
-      }
-    }
-    fill.Run();
-  }
-  static V SurfacePart(const PixelSight& sight) {
-    const V least = Splat(std::numeric_limits<float>::min());
-    return hn::Sub(Splat(1), hn::Div(sight.thicket, hn::Max(sight.coverage, least)));
+  void ResolveFace(std::size_t first, bool has_near, bool has_far, const SurfaceFill& fill) {
+    fill.Run([&](std::size_t in_face) HWY_ATTR {
+      const PixelSight sight = ResolvePixel(first + in_face, has_near, has_far);
+      return SurfaceFill::Sight{sight.coverage, sight.thicket};
+    });
   }
   PixelSight ResolvePixel(std::size_t i, bool has_near, bool has_far) {
     const D d;
@@ -344,6 +320,7 @@ class Integral {
   const std::size_t lane_, pixel_floats_, fade_at_;
   const Receivers receivers_;
   const Frames frames_;
+  V from_centre_[2];  // where the receivers are, along the axes of the far field
   V weight_sum_, covered_;
   V3 radiosity_;
   std::array<Sum, kMore> more_;

@@ -14,6 +14,7 @@
 
 #include "core/spherical_harmonics.h"
 #include "gather/packet_brush-inl.h"
+#include "gather/packet_far_field-inl.h"
 #include "gather/packet_integral-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"

@@ -102,6 +102,8 @@ struct PacketCanvas {
   // What thickets have of the coverage, 16 lanes of a pixel, aligned likewise; null when there are
   // none among what is drawn.
   float* thickets;
+  // How far away what is first in a pixel begins, aligned likewise; null when nobody asks.
+  float* begins;
   // Room for three values per pixel of a face and lane, aligned likewise.
   float* fill_scratch;
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
@@ -109,11 +111,38 @@ struct PacketCanvas {
   const SeenPixels* seen;
 };
 
-// The far field of a packet: a lane of a canvas that was drawn for many packets and finished.
+// A pixel of a far field: what a packet sees from its centre, and how that changes with the place.
+struct alignas(64) FarPixel {
+  struct Sight {
+    float coverage;
+    float radiosity[3];  // times the coverage
+  };
+  Sight sight;
+  Sight along[2];  // change for each unit along two axes of the world
+  float begin;     // how far away what is first begins
+  float thicket;   // what thickets have of the coverage, as a part
+  float faded;     // what is left of it, as a part, when occlusion fades
+  void clear() { sight.coverage = along[0].coverage = along[1].coverage = 0; }
+  bool isEmpty() const {
+    return !(sight.coverage > 0) && along[0].coverage == 0 && along[1].coverage == 0;
+  }
+};
+
+// How far fields change over a cluster: what packet k sees, times of[a][k][i], summed over k, is
+// the change along axis a at packet i.
+struct FarFieldSlopes {
+  std::array<int, 2> axes{};
+  alignas(64) float of[2][kPacketReceivers][kPacketReceivers] = {};
+  float distance = 0;  // that everything is away, at least
+};
+
+// The far field of a packet.
 struct SharedFarField {
-  const PacketCanvas* canvas;
-  std::size_t lane;
-  float distance;  // that it is away, at least
+  const FarPixel* pixels;  // as those of the raster
+  const std::array<bool, RasterGeometry::kFaces>* is_face_used;
+  bool has_thickets;
+  std::array<int, 2> axes;
+  glm::vec3 centre;
 };
 
 struct RoughSight {
@@ -146,9 +175,9 @@ struct PacketKernel {
   // Draws patches in this order, all of one face after those of another.
   void (*draw)(const PacketCanvas& canvas, const Patch* patches,
                std::span<const std::uint64_t> order);
-  // Makes a drawn canvas a far field: `room` becomes the coverage of a pixel, and the colors are
-  // divided by it.
-  void (*finishFarField)(const PacketCanvas& canvas);
+  // Makes a drawn canvas 16 far fields, that of lane i in the i-th part of `pixels`.
+  void (*finishFarField)(const PacketCanvas& canvas, const FarFieldSlopes& slopes,
+                         FarPixel* pixels);
   // `far`: what is behind everything drawn, or null.
   void (*integrate)(const PacketCanvas& canvas, const SharedFarField* far,
                     std::span<GatherResult> results);

@@ -27,11 +27,11 @@ std::size_t fillFloats(const GatherRules& rules) {
   return 3 * resolution * resolution * kPacketReceivers;
 }
 
-// Sorts by the upper 32 bits of keys, stable: a radix sort of 11 bits a pass.
+// Sorts by the upper 32 bits of keys, stable: a radix sort of 8 bits a pass, for a few thousand
 // The first `count` of `order` are replaced; `scratch` grows to hold as many.
 void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
                      std::vector<std::uint64_t>& scratch) {
-  constexpr int kBits = 11, kPasses = 3;
+  constexpr int kBits = 8, kPasses = 4;
   constexpr std::size_t kBuckets = std::size_t{1} << kBits;
   const auto digit = [](std::uint64_t key, int pass) {
     return std::size_t(key >> (32 + pass * kBits)) & (kBuckets - 1);
@@ -116,9 +116,9 @@ void PacketRaster::orderLastPatch() {
   const float largest = std::max({size.x, size.y, size.z});
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
   // Thickets fill their outlines however long these are
-  const float least = patch.near_distance > 0 ? patch.radius
-                      : patch.opacity < 1     ? kThicketExtent * patch.radius
-                                              : 0;
+  const float least = patch.near_distance > 0                ? patch.radius
+                      : patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius
+                                                             : 0;
   const float half = std::max(0.5f * side, least);
   const float shift = std::min(patch.area / (2 * largest), largest / 2);
   const float reach = kReach * half + shift + kDiagonal * view_.radius;
@@ -138,13 +138,14 @@ void PacketRaster::orderLastPatch() {
   order_count_ = count;
 }
 
-void PacketRaster::addNode(const Node& node) {
-  if (node.isRough()) return addRoughNode(node);
-  if (node.isFlat()) return addFacet(facetOf(node));
+void PacketRaster::addNode(const Node& node, float part) {
+  if (node.isRough()) return addRoughNode(node, part);
+  if (node.isFlat()) return addFacet(facetOf(node), part);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
-    if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) addFacet(node.facet(i));
+    if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal()))
+      addFacet(node.facet(i), part);
   }
 }
 
@@ -153,11 +154,11 @@ bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal)
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = position - view_.centre;
   const float away = glm::dot(to_facet, normal) * (sides == GatherSides::kBack ? -1.f : 1.f);
-  return sides != GatherSides::kBoth &&
-         away > normalRange(normal) * glm::length(to_facet) + view_.radius;
+  if (sides == GatherSides::kBoth || !(away > view_.radius)) return false;
+  return away > normalRange(normal) * glm::length(to_facet) + view_.radius;
 }
 
-void PacketRaster::addFacet(const Facet& facet) {
+void PacketRaster::addFacet(const Facet& facet, float part) {
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - view_.centre;
   const float distance = glm::length(to_facet);
@@ -194,19 +195,20 @@ void PacketRaster::addFacet(const Facet& facet) {
     if (!facet.is_two_sided) patch.radiosity *= facing.front / patch.round_area;
     patch.facing_limit = Patch::kBothSides;
   }
+  patch.opacity = part;
   orderLastPatch();
 }
 
-void PacketRaster::addRoughNode(const Node& node) {
+void PacketRaster::addRoughNode(const Node& node, float part) {
   RoughSight seen;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_node = node.position - view_.centre, direction = glm::normalize(to_node);
   kernel_.seeRoughNode(node, direction, seen);
   const float round_area = shownArea(seen.facing, sides);
   if (!(round_area > kLeastVisiblePart * node.area)) return;
-  const SeenPart part = seenPart(node, to_node, seen.facing, sides);
+  const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
   Patch& patch = patches_.emplace_back();
-  patch.position = node.position + part.middle;
+  patch.position = node.position + visible.middle;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
   patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
@@ -214,10 +216,10 @@ void PacketRaster::addRoughNode(const Node& node) {
   patch.area = node.area;
   patch.thicket = thicketPart(node);
   const RoughCover cover =
-      roughCover(node, direction, part.perspective * round_area, patch.thicket);
+      roughCover(node, direction, visible.perspective * round_area, patch.thicket);
   patch.round_area = cover.area;
   patch.most_area = cover.most;
-  patch.opacity = cover.opacity;
+  patch.opacity = part * cover.opacity;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
@@ -228,7 +230,8 @@ void PacketRaster::addRoughNode(const Node& node) {
   orderLastPatch();
 }
 
-void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region) {
+void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region,
+                              float part) {
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
     if (!region.holds(stored.position)) continue;
@@ -256,6 +259,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
         std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
     if (kernel_.isSeen(canvas, patch)) {
       has_thickets_ |= patch.thicket > 0;
+      patch.opacity = part;
       orderLastPatch();
     } else {
       patches_.pop_back();
@@ -275,6 +279,7 @@ PacketCanvas PacketRaster::canvas() const {
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
           .thickets = has_thickets_ ? thickets_.get() : nullptr,
+          .begins = begins_.get(),
           .fill_scratch = fill_scratch_.get(),
           .is_face_used = &is_face_used_,
           .seen = &seen_};
@@ -286,17 +291,18 @@ void PacketRaster::draw() {
   kernel_.draw(canvas(), patches_.data(), std::span(order_).first(order_count_));
 }
 
-void PacketRaster::finishFarField() { kernel_.finishFarField(canvas()); }
+void PacketRaster::noteBegins() {
+  begins_ = hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers);
+  if (begins_ == nullptr) throw std::bad_alloc();
+}
 
-void PacketRaster::integrate(std::span<GatherResult> results, const PacketRaster* far,
-                             std::size_t far_lane, float far_distance) {
-  if (far == nullptr) {
-    kernel_.integrate(canvas(), nullptr, results);
-    return;
-  }
-  const PacketCanvas far_canvas = far->canvas();
-  const SharedFarField shared = {&far_canvas, far_lane, far_distance};
-  kernel_.integrate(canvas(), &shared, results);
+void PacketRaster::finishFarField(const FarFieldSlopes& slopes, FarPixel* pixels) {
+  SURFEIT_ASSERT(begins_ != nullptr);
+  kernel_.finishFarField(canvas(), slopes, pixels);
+}
+
+void PacketRaster::integrate(std::span<GatherResult> results, const SharedFarField* far) {
+  kernel_.integrate(canvas(), far, results);
 }
 
 std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {

@@ -42,21 +42,27 @@ class PacketRaster {
   // Starts over for 1 to kPacketReceivers receivers. What they see is looked at as well from places
   // of which the horizon differs by `horizon_slack`, the sine of an angle.
   void begin(std::span<const Receiver> receivers, const PacketView& view, float horizon_slack = 0);
-  // Adds a node as a whole. All receivers must lie outside its radius.
-  void addNode(const Node& node);
+  // Adds a node as a whole. All receivers must lie outside its radius. `part`: how much it counts,
+  // 0..1.
+  void addNode(const Node& node, float part = 1);
   // Adds those of the surfels that are of the region and that some receiver may see.
-  void addSurfels(std::span<const Surfel> surfels, const CutRegion& region);
+  void addSurfels(std::span<const Surfel> surfels, const CutRegion& region, float part = 1);
 
   // Sorts what was added, and draws it.
   void sort();
   void draw();
 
-  // Makes what was drawn a far field for others: lane i for a packet around receiver i.
-  void finishFarField();
-  // One result per receiver. `far`: the raster whose lane has what is behind, at least
-  // `far_distance` away; or null.
-  void integrate(std::span<GatherResult> results, const PacketRaster* far = nullptr,
-                 std::size_t far_lane = 0, float far_distance = 0);
+  // From now on, notes how far away what is first in a pixel begins; takes a float for each pixel
+  // and receiver.
+  void noteBegins();
+  // Makes what was drawn far fields for others, see PacketKernel. Requires noteBegins() before.
+  void finishFarField(const FarFieldSlopes& slopes, FarPixel* pixels);
+  // One result per receiver. `far`: what is behind everything, or null.
+  void integrate(std::span<GatherResult> results, const SharedFarField* far = nullptr);
+
+  std::size_t pixelCount() const { return geometry_.pixels().size(); }
+  const std::array<bool, RasterGeometry::kFaces>& isFaceUsed() const { return is_face_used_; }
+  bool hasThickets() const { return has_thickets_; }
 
   std::size_t patchCount() const { return patches_.size(); }
 
@@ -65,8 +71,8 @@ class PacketRaster {
 
  private:
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
-  void addFacet(const Facet& facet);
-  void addRoughNode(const Node& node);
+  void addFacet(const Facet& facet, float part);
+  void addRoughNode(const Node& node, float part);
   void orderLastPatch();
   PacketCanvas canvas() const;
 
@@ -76,7 +82,7 @@ class PacketRaster {
   float max_distance_sq_;
   RasterGeometry geometry_;
   DirectionWeights weights_;
-  hwy::AlignedFreeUniquePtr<float[]> pixels_, thickets_, fill_scratch_;
+  hwy::AlignedFreeUniquePtr<float[]> pixels_, thickets_, fill_scratch_, begins_;
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;

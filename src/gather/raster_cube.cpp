@@ -184,10 +184,10 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
     if (!(bottom < top && x_begin < x_end)) continue;
     const int column_last = std::min(resolution - 1, int(x_end));
     const std::size_t row_first = std::size_t((face * resolution + row) * resolution);
+    const float height = texture.opacity * (top - bottom);
     for (int column = int(x_begin); column <= column_last; ++column) {
       const float width = std::min(x_end, float(column + 1)) - std::max(x_begin, float(column));
-      coverPixel(row_first + std::size_t(column), texture.opacity * width * (top - bottom), texture,
-                 depth, radiosity);
+      coverPixel(row_first + std::size_t(column), width * height, texture, depth, radiosity);
     }
   }
 }
@@ -237,8 +237,7 @@ void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::v
     if (!(std::abs(patch.direction[axis]) > kLeastAxis)) continue;
     const int face = 2 * axis + (patch.direction[axis] < 0 ? 1 : 0);
     if (face >= geometry_->faceCount()) return;
-    const Texture texture = {patch.overlap, patch.thicket, patch.opacity};
-    coverParallelogram(face, onFace(patch, axis), texture, depth, radiosity);
+    coverParallelogram(face, onFace(patch, axis), patch.texture, depth, radiosity);
   }
 }
 
@@ -267,7 +266,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
       const std::size_t row_first = std::size_t((face * resolution + row) * resolution);
       for (int column = column_begin; column < column_end; ++column) {
         const std::size_t pixel = row_first + std::size_t(column);
-        const float amount = amountOf(pixels[pixel].direction);
+        const float amount = texture.opacity * amountOf(pixels[pixel].direction);
         if (amount > 0) coverPixel(pixel, amount, texture, depth, radiosity);
       }
     }
@@ -276,11 +275,11 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
 
 // The ray t d meets the plane of the disk at t = c.n / d.n, and the disk when |t d - c| <= r.
 void RasterCube::traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius,
-                           float peak, float thicket, const DepthRange& depth,
+                           float peak, const Texture& texture, const DepthRange& depth,
                            const glm::vec3& radiosity) {
   const float c_n = glm::dot(centre, normal), c_c = glm::dot(centre, centre);
   const float inverse_sq = 1 / (radius * radius);
-  tracePixels(centre, radius, {0, thicket}, depth, radiosity, [&](const glm::vec3& d) {
+  tracePixels(centre, radius, texture, depth, radiosity, [&](const glm::vec3& d) {
     const float d_n = glm::dot(d, normal);
     if (!(c_n * d_n > 0)) return 0.f;
     const float t = c_n / d_n;
@@ -290,10 +289,10 @@ void RasterCube::traceDisk(const glm::vec3& centre, const glm::vec3& normal, flo
 }
 
 // The ray t d meets the sphere when it points to its side and passes the centre within r.
-void RasterCube::traceSphere(const glm::vec3& centre, float radius, const DepthRange& depth,
-                             const glm::vec3& radiosity) {
+void RasterCube::traceSphere(const glm::vec3& centre, float radius, const Texture& texture,
+                             const DepthRange& depth, const glm::vec3& radiosity) {
   const float power = glm::dot(centre, centre) - radius * radius;
-  tracePixels(centre, radius, {0, 0}, depth, radiosity, [&](const glm::vec3& d) {
+  tracePixels(centre, radius, texture, depth, radiosity, [&](const glm::vec3& d) {
     const float d_c = glm::dot(d, centre);
     return d_c > 0 && d_c * d_c >= power ? 1.f : 0.f;
   });

@@ -97,6 +97,15 @@ class RasterCube {
   // Uncovers every pixel.
   void clear();
 
+  // How something covers its pixels.
+  struct Texture {
+    // How far it hides behind its own layer, 0..1: 0 for a tile beside the others, 1 for what lies
+    // anywhere before or behind them.
+    float overlap = 0;
+    float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
+    float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
+  };
+
   // Something of the mid or the far field, as the receiver sees it.
   struct Patch {
     glm::vec3 direction;  // unit
@@ -104,11 +113,7 @@ class RasterCube {
     SymmetricMatrix shape;  // covariance of its area, of trace 2; of a sphere the identity
     float solid_angle;
     float spread = 0;  // area / distance^2
-    // How far it hides behind its own layer, 0..1: 0 for a tile beside the others, 1 for what lies
-    // anywhere before or behind them.
-    float overlap = 0;
-    float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
-    float opacity = 1;  // what it hides of the solid angle, itself behind itself left out: 0..1
+    Texture texture{};
   };
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
   // image, to first order, of a parallelogram that spreads as the patch does and whose sides follow
@@ -119,12 +124,12 @@ class RasterCube {
   static constexpr float kHardDisk = 1e6f;
   // Covers the pixels whose rays hit the disk: the near field (memo 3.4.1). Coverage falls off from
   // the middle as peak (1 - (distance / radius)^2), limited to 1. `centre` is relative to the
-  // origin of the rays, `thicket` as in Patch. Both sides are hit: facing is the caller's business.
+  // origin of the rays. Both sides are hit: facing is the caller's business.
   void traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius, float peak,
-                 float thicket, const DepthRange& depth, const glm::vec3& radiosity);
+                 const Texture& texture, const DepthRange& depth, const glm::vec3& radiosity);
   // The same with a sphere, which must not contain the origin.
-  void traceSphere(const glm::vec3& centre, float radius, const DepthRange& depth,
-                   const glm::vec3& radiosity);
+  void traceSphere(const glm::vec3& centre, float radius, const Texture& texture,
+                   const DepthRange& depth, const glm::vec3& radiosity);
 
   // Closes the gaps that patches leave within a surface (coverage_rules.h, kFillPasses). Comes
   // once, after everything has been drawn.
@@ -150,10 +155,6 @@ class RasterCube {
     float layer = 0;      // of the last layer by itself
     float layer_end = 0;  // where the depth ranges of the last layer end
     float thicket = 0;    // what thickets have of the total
-  };
-  // How a patch covers its pixels; Patch has what they mean.
-  struct Texture {
-    float overlap, thicket, opacity = 1;
   };
   // On a face: rows of width 2 half_u around the line u + shear (row - v).
   struct Parallelogram {

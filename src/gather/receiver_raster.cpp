@@ -37,22 +37,23 @@ void ReceiverRaster::begin(const Receiver& receiver) {
   near_surfels_.clear();
 }
 
-void ReceiverRaster::addNode(const Node& node) {
-  if (!node.hasFacets()) return addPatch(node);
-  for (std::size_t i = 0; i < node.facet_count; ++i) addPatch(node.facet(i));
+void ReceiverRaster::addNode(const Node& node, float part) {
+  if (!node.hasFacets()) return addPatch(node, part);
+  for (std::size_t i = 0; i < node.facet_count; ++i) addPatch(node.facet(i), part);
 }
 
 template <typename NodeOrFacet>
-void ReceiverRaster::addPatch(const NodeOrFacet& source) {
+void ReceiverRaster::addPatch(const NodeOrFacet& source, float part) {
   const glm::vec3 to_source = source.position - receiver_.position;
   Entry entry;
   if (!makeContribution(source, to_source, contribution_rules_, entry.contribution)) return;
   if (!(heightAboveHorizon(receiver_, entry.contribution.direction) > 0)) return;
   if (!(entry.contribution.distance_sq <= max_distance_sq_)) return;
+  entry.contribution.opacity *= part;
   contributions_.push_back(entry);
 }
 
-void ReceiverRaster::addSurfel(const Surfel& stored) {
+void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
   Surfel surfel = withSides(stored, contribution_rules_.sides);
   surfel.radius = effectiveRadius(surfel.radius, surfel.area);
   const glm::vec3 to_surfel = surfel.position - receiver_.position;
@@ -71,6 +72,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored) {
     Entry entry;
     if (height > 0 &&
         makeContribution(surfel, to_surfel, contribution_rules_, entry.contribution)) {
+      entry.contribution.opacity = part;
       contributions_.push_back(entry);
     }
     return;
@@ -88,6 +90,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored) {
   Entry entry;
   entry.contribution = {};
   entry.contribution.distance_sq = distance_sq;
+  entry.contribution.opacity = part;
   const float cosine_of_view = glm::dot(to_surfel, surfel.normal) /
                                std::sqrt(std::max(distance_sq, std::numeric_limits<float>::min()));
   entry.contribution.reach = reachOf(surfel, surfel.radius, cosine_of_view);
@@ -156,17 +159,18 @@ float ReceiverRaster::rayBias(const Surfel& surfel) const {
   return bias * std::min(1.f, 1 + cosine);
 }
 
-void ReceiverRaster::trace(const Surfel& surfel, const DepthRange& depth) {
+void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& depth) {
   const glm::vec3 centre =
       surfel.position - receiver_.position - rayBias(surfel) * receiver_.normal;
+  const RasterCube::Texture texture = {0, thicketPart(surfel), part};
   if (surfel.isSphere()) {
-    cube_.traceSphere(inRaster(centre), surfel.radius, depth, surfel.radiosity);
+    cube_.traceSphere(inRaster(centre), surfel.radius, texture, depth, surfel.radiosity);
     return;
   }
   const bool sends_light = surfel.isTwoSided() || glm::dot(centre, surfel.normal) < 0;
   cube_.traceDisk(inRaster(centre), inRaster(surfel.normal), surfel.radius,
-                  softDiskPeak(surfel.radius, surfel.area, surfel.isTwoSided()),
-                  thicketPart(surfel), depth, sends_light ? surfel.radiosity : glm::vec3(0));
+                  softDiskPeak(surfel.radius, surfel.area, surfel.isTwoSided()), texture, depth,
+                  sends_light ? surfel.radiosity : glm::vec3(0));
 }
 
 GatherResult ReceiverRaster::finish() {
@@ -179,10 +183,14 @@ GatherResult ReceiverRaster::finish() {
     const DepthRange depth = {distance - patch.reach, distance + patch.reach,
                               rules_.fades() ? fadeAt(distance, rules_) : 1};
     if (entry.near_index >= 0) {
-      trace(near_surfels_[std::size_t(entry.near_index)], depth);
+      trace(near_surfels_[std::size_t(entry.near_index)], patch.opacity, depth);
     } else {
-      cube_.splat({inRaster(patch.direction), inRaster(patch.normal), inRaster(patch.shape),
-                   patch.solid_angle, patch.spread, patch.overlap, patch.thicket, patch.opacity},
+      cube_.splat({inRaster(patch.direction),
+                   inRaster(patch.normal),
+                   inRaster(patch.shape),
+                   patch.solid_angle,
+                   patch.spread,
+                   {patch.overlap, patch.thicket, patch.opacity}},
                   depth, patch.radiosity);
     }
   }

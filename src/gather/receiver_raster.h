@@ -37,9 +37,9 @@ class ReceiverRaster {
   void begin(const Receiver& receiver);
 
   // Adds a node as a whole: the far field. The receiver must lie outside the node's radius.
-  void addNode(const Node& node);
+  void addNode(const Node& node, float part = 1);
   // Adds a surfel: the mid or the near field, or nothing when it cannot be seen.
-  void addSurfel(const Surfel& stored);
+  void addSurfel(const Surfel& stored, float part = 1);
 
   // Draws everything added since begin() and integrates.
   GatherResult finish();
@@ -58,7 +58,7 @@ class ReceiverRaster {
     std::int32_t near_index = -1;  // in near_surfels_, or -1
   };
   template <typename NodeOrFacet>
-  void addPatch(const NodeOrFacet& source);
+  void addPatch(const NodeOrFacet& source, float part);
   void sortByDistance();
   bool isLessContent(const Entry& a, const Entry& b) const;
   float rayBias(const Surfel& surfel) const;
@@ -68,7 +68,7 @@ class ReceiverRaster {
   T inRaster(const T& v) const {
     return has_frame_ ? frame_.toLocal(v) : v;
   }
-  void trace(const Surfel& surfel, const DepthRange& depth);
+  void trace(const Surfel& surfel, float part, const DepthRange& depth);
   GatherResult integrate() const;
 
   const GatherRules rules_;

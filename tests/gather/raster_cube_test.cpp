@@ -121,7 +121,7 @@ TEST(RasterCube, TracedDiskHasItsAnalyticSolidAngle) {
   for (const glm::vec3& direction : testDirections()) {
     for (const float distance : {.2f, 1.f, 3.f}) {
       cube.clear();
-      cube.traceDisk(distance * direction, direction, 1, RasterCube::kHardDisk, 0, kDepth, kWhite);
+      cube.traceDisk(distance * direction, direction, 1, RasterCube::kHardDisk, {}, kDepth, kWhite);
       const double expected =
           2 * double(kPi) *
           (1 - double(distance) / std::sqrt(1 + double(distance) * double(distance)));
@@ -134,7 +134,7 @@ TEST(RasterCube, TracedDiskAcrossTheOriginCoversHalfTheSphere) {
   const RasterGeometry geometry(16);
   RasterCube cube(geometry, false);
   const glm::vec3 normal = glm::normalize(glm::vec3(1, 2, 3));
-  cube.traceDisk(1e-4f * normal, normal, 100, RasterCube::kHardDisk, 0, kDepth, kWhite);
+  cube.traceDisk(1e-4f * normal, normal, 100, RasterCube::kHardDisk, {}, kDepth, kWhite);
   EXPECT_NEAR(coveredSolidAngle(cube), 2 * double(kPi), .06);
 }
 
@@ -144,7 +144,7 @@ TEST(RasterCube, TracedSphereHasItsAnalyticSolidAngle) {
   for (const glm::vec3& direction : testDirections()) {
     for (const float distance : {1.001f, 1.5f, 4.f}) {
       cube.clear();
-      cube.traceSphere(distance * direction, 1, kDepth, kWhite);
+      cube.traceSphere(distance * direction, 1, {}, kDepth, kWhite);
       const double sine = 1 / double(distance);
       const double expected = 2 * double(kPi) * (1 - std::sqrt(1 - sine * sine));
       EXPECT_NEAR(coveredSolidAngle(cube) / expected, 1, .035);
@@ -201,7 +201,7 @@ class FilledCube : public ::testing::Test {
     // As much of the face as a pixel takes, but for a rim, lest neighbours be touched
     const float area = amount * 4 / 144.f;
     RasterCube::Patch patch = diskPatch(shape.direction, kRound, area * axis * axis * axis);
-    patch.thicket = thicket;
+    patch.texture.thicket = thicket;
     cube_.splat(patch, {1, 2}, kWhite);
   }
   static std::size_t at(int column, int row) { return std::size_t(row * 12 + column); }
@@ -310,18 +310,18 @@ TEST(RasterCube, OblongNeighboursTileWhenTheyAreDrawnByTheirShape) {
 TEST(RasterCube, SoftDiskCoversItsShare) {
   const RasterGeometry geometry(64);
   RasterCube cube(geometry, false);
-  cube.traceDisk({0, 0, 20}, {0, 0, -1}, 2, 1, 0, kDepth, kWhite);
+  cube.traceDisk({0, 0, 20}, {0, 0, -1}, 2, 1, {}, kDepth, kWhite);
   EXPECT_NEAR(coveredSolidAngle(cube) / double(kPi / 100), .5, .03);
 }
 
 TEST(RasterCube, ClearForgetsEverything) {
   const RasterGeometry geometry(4);
   RasterCube cube(geometry, true);
-  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, RasterCube::kHardDisk, 0, {5, 6}, kWhite);
+  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, RasterCube::kHardDisk, {}, {5, 6}, kWhite);
   EXPECT_GT(coveredSolidAngle(cube), 1);
   cube.clear();
   EXPECT_EQ(coveredSolidAngle(cube), 0);
-  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, RasterCube::kHardDisk, 0, {1, 2}, kWhite);
+  cube.traceDisk({0, 0, 1}, {0, 0, -1}, 10, RasterCube::kHardDisk, {}, {1, 2}, kWhite);
   EXPECT_GT(coveredSolidAngle(cube), 1);
 }
 

@@ -1,0 +1,172 @@
+// Makes a drawn canvas the far fields of packets; for one instruction set (see
+// packet_kernel-inl.h).
+#if defined(SURFEIT_PACKET_FAR_FIELD_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_FAR_FIELD_INL_H_
+#undef SURFEIT_PACKET_FAR_FIELD_INL_H_
+#else
+#define SURFEIT_PACKET_FAR_FIELD_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstddef>
+#include <cstring>
+
+#include "gather/packet_fill-inl.h"
+#include "gather/packet_kernel.h"
+#include "gather/packet_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+// One face of them.
+class FarFace {
+ public:
+  FarFace(const PacketCanvas& canvas, std::size_t face)
+      : canvas_(canvas),
+        seen_(canvas.seen->faces[face]),
+        size_(std::size_t(canvas.geometry->resolution())),
+        pixel_floats_(PacketCanvas::pixelFloats(*canvas.rules)),
+        first_(face * size_ * size_),
+        has_light_(canvas.rules->hasLight()) {}
+
+  // Covers gaps, as in what is drawn for a packet: they would change from place to place. The
+  // coverage comes in place of the room, and colors and thickets are scaled by how much it grew.
+  void Fill() const {
+    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) FillLanes(lane);
+  }
+
+  void Store(const FarFieldSlopes& slopes, FarPixel* pixels) const {
+    const std::size_t count = canvas_.geometry->pixels().size();
+    seen_.forEachPixel(size_, [&](std::size_t in_face) HWY_ATTR {
+      StorePixel(in_face, slopes, pixels + first_ + in_face, count);
+    });
+  }
+
+ private:
+  // Of a pixel, FarPixel::Sight lane after lane: of the packets, and its change along two axes.
+  static constexpr std::size_t kSightFloats = sizeof(FarPixel::Sight) / sizeof(float);
+  static_assert(kSightFloats == 4);
+  struct alignas(64) Sights {
+    float of[3][kSightFloats * kPacketReceivers];
+  };
+  static void Copy(const float* lane, FarPixel::Sight& to) { std::memcpy(&to, lane, sizeof(to)); }
+  float* PixelAt(std::size_t in_face) const {
+    return canvas_.pixels + (first_ + in_face) * pixel_floats_;
+  }
+  float* ThicketAt(std::size_t in_face) const {
+    return canvas_.thickets + (first_ + in_face) * kPacketReceivers;
+  }
+
+  void FillLanes(std::size_t lane) const {
+    const D d;
+    const V zero = hn::Zero(d), one = Splat(1), least = Splat(1e-20f);
+    const bool has_thickets = canvas_.thickets != nullptr;
+    const SurfaceFill fill(canvas_, lane, seen_, has_thickets);
+    fill.Run([&](std::size_t i) HWY_ATTR {
+      float* const pixel = PixelAt(i) + lane;
+      const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
+      const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
+      hn::Store(total, d, pixel);
+      return SurfaceFill::Sight{total, has_thickets ? hn::Load(d, ThicketAt(i) + lane) : zero};
+    });
+    seen_.forEachPixel(size_, [&](std::size_t i) HWY_ATTR {
+      float* const pixel = PixelAt(i) + lane;
+      const V total = hn::Load(d, pixel), filled = fill.Coverage(i);
+      const V growth =
+          hn::IfThenElse(hn::Gt(filled, total), hn::Div(filled, hn::Max(total, least)), one);
+      hn::Store(filled, d, pixel);
+      for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats_; c += kPacketReceivers) {
+        hn::Store(hn::Mul(hn::Load(d, pixel + c), growth), d, pixel + c);
+      }
+      if (!has_thickets) return;
+      float* const thicket = ThicketAt(i) + lane;
+      hn::Store(hn::Mul(hn::Load(d, thicket), growth), d, thicket);
+    });
+  }
+
+  void StorePixel(std::size_t in_face, const FarFieldSlopes& slopes, FarPixel* out,
+                  std::size_t stride) const {
+    const float* const pixel = PixelAt(in_face);
+    if (IsUncovered(pixel)) {
+      for (std::size_t i = 0; i < kPacketReceivers; ++i) out[i * stride].clear();
+      return;
+    }
+    Sights sights;
+    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+      has_light_ ? FindSights<4>(pixel, lane, slopes, sights)
+                 : FindSights<1>(pixel, lane, slopes, sights);
+    }
+    const float* const begins = canvas_.begins + (first_ + in_face) * kPacketReceivers;
+    const std::size_t faded_at = pixel_floats_ - kPacketReceivers;
+    for (std::size_t i = 0; i < kPacketReceivers; ++i) {
+      FarPixel& far = out[i * stride];
+      Copy(sights.of[0] + kSightFloats * i, far.sight);
+      Copy(sights.of[1] + kSightFloats * i, far.along[0]);
+      Copy(sights.of[2] + kSightFloats * i, far.along[1]);
+      far.begin = pixel[i] > 0 ? begins[i] : slopes.distance;
+      const float inverse = pixel[i] > 0 ? 1 / pixel[i] : 0;
+      far.thicket = canvas_.thickets != nullptr ? inverse * ThicketAt(in_face)[i] : 0;
+      far.faded = canvas_.rules->fades() ? inverse * pixel[faded_at + i] : 0;
+    }
+  }
+
+  // Of some lanes; of coverage alone, or of radiosities as well.
+  template <std::size_t kChannels>
+  HWY_INLINE static void FindSights(const float* pixel, std::size_t lane,
+                                    const FarFieldSlopes& slopes, Sights& sights) {
+    const D d;
+    const auto channel = [&](std::size_t c) {
+      return pixel + (c == 0 ? 0 : 2 + c) * kPacketReceivers;
+    };
+    V sums[2][4] = {{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)},
+                    {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
+    for (std::size_t k = 0; k < kPacketReceivers; ++k) {
+      const V along_u = hn::Load(d, slopes.of[0][k] + lane);
+      const V along_v = hn::Load(d, slopes.of[1][k] + lane);
+      for (std::size_t c = 0; c < kChannels; ++c) {
+        const V seen = Splat(channel(c)[k]);
+        sums[0][c] = hn::MulAdd(seen, along_u, sums[0][c]);
+        sums[1][c] = hn::MulAdd(seen, along_v, sums[1][c]);
+      }
+    }
+    V values[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    for (std::size_t c = 0; c < kChannels; ++c) values[c] = hn::Load(d, channel(c) + lane);
+    const auto store = [&](const V* v, std::size_t i) HWY_ATTR {
+      hn::StoreInterleaved4(v[0], v[1], v[2], v[3], d, sights.of[i] + kSightFloats * lane);
+    };
+    store(values, 0);
+    store(sums[0], 1);
+    store(sums[1], 2);
+  }
+
+  static bool IsUncovered(const float* pixel) {
+    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+      if (!hn::AllTrue(D(), hn::Le(hn::Load(D(), pixel + lane), hn::Zero(D())))) return false;
+    }
+    return true;
+  }
+
+  const PacketCanvas& canvas_;
+  const SeenPixels::Face& seen_;
+  const std::size_t size_, pixel_floats_, first_;
+  const bool has_light_;
+};
+
+void FinishFarField(const PacketCanvas& canvas, const FarFieldSlopes& slopes, FarPixel* pixels) {
+  for (std::size_t i = 0; i < std::size_t(canvas.geometry->faceCount()); ++i) {
+    if (!(*canvas.is_face_used)[i]) continue;
+    const FarFace face(canvas, i);
+    face.Fill();
+    face.Store(slopes, pixels);
+  }
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target guard
