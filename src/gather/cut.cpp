@@ -50,6 +50,10 @@ float facingOf(const Node& node, const CutRules& rules) {
 // Of what is below, over what a node looks like as a part of what it may; without fading a step.
 float fadingSlope(const CutRules& rules) { return 1 / std::max(2 * rules.fading, 1e-6f); }
 
+float mostFadingSpread(const CutRules& rules) { return rules.fading > 0 ? kMostFadingSpread : 0; }
+// What looks smaller or larger than these parts of what it may fades for nobody.
+constexpr float kLeastFading = 0.8f, kMostFading = 1.25f;
+
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 
 }  // namespace
@@ -86,8 +90,183 @@ std::uint32_t ChooseGroups(std::span<const Node> siblings, const CutRules& rules
   return seen;
 }
 
-SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView& view,
-                                const CutRegion& region, const CutRules& rules) {
+using D = hn::CappedTag<float, kMostSiblings>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+V Splat(float value) { return hn::Set(D(), value); }
+
+struct V3 {
+  V x, y, z;
+};
+V Dot(const V3& a, const V3& b) {
+  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
+}
+V Dot(const V3& a, const glm::vec3& b) {
+  return hn::MulAdd(a.x, Splat(b.x), hn::MulAdd(a.y, Splat(b.y), hn::Mul(a.z, Splat(b.z))));
+}
+
+// Some of the siblings.
+struct Nodes {
+  V3 position, normal;
+  V radius, spread, share, area;
+  M is_flat;
+
+  Nodes(const Columns& columns, std::size_t at) {
+    const D d;
+    position = {hn::Load(d, columns.x + at), hn::Load(d, columns.y + at),
+                hn::Load(d, columns.z + at)};
+    normal = {hn::Load(d, columns.normal_x + at), hn::Load(d, columns.normal_y + at),
+              hn::Load(d, columns.normal_z + at)};
+    radius = hn::Load(d, columns.radius + at);
+    const V flatness = hn::Load(d, columns.flatness + at);
+    spread =
+        hn::Mul(Splat(kNormalSpread), hn::Sqrt(hn::Mul(Splat(2.f), hn::Sub(Splat(1), flatness))));
+    share = hn::Load(d, columns.share + at);
+    area = hn::Mul(Splat(kPi), hn::Mul(radius, radius));
+    is_flat = hn::Gt(hn::Load(d, columns.is_flat + at), hn::Zero(d));
+  }
+};
+
+// Where they are, seen from a packet or a cluster.
+struct Places {
+  V3 offset;
+  V distance_sq, distance;
+  V nearest;  // distance from the closest receiver
+  V highest;  // as highestPoint; without a horizon 0
+
+  Places(const PacketView& from, const Nodes& nodes, const CutRules& rules) {
+    offset = {hn::Sub(nodes.position.x, Splat(from.centre.x)),
+              hn::Sub(nodes.position.y, Splat(from.centre.y)),
+              hn::Sub(nodes.position.z, Splat(from.centre.z))};
+    distance_sq = Dot(offset, offset);
+    distance = hn::Sqrt(distance_sq);
+    nearest = hn::Sub(distance, Splat(from.radius));
+    highest = from.has_horizon ? HighestPoint(from, nodes, rules) : hn::Zero(D());
+  }
+
+ private:
+  V HighestPoint(const PacketView& from, const Nodes& nodes, const CutRules& rules) const {
+    const V zero = hn::Zero(D()), one = Splat(1);
+    const V height = Dot(offset, from.axis);
+    const V aside = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(height, height, distance_sq)));
+    const V cone_cosine = Splat(from.cone_cosine);
+    const V tilted = hn::MulAdd(height, cone_cosine, hn::Mul(aside, Splat(from.cone_sine)));
+    const V top = hn::IfThenElse(hn::Ge(height, hn::Mul(distance, cone_cosine)), distance, tilted);
+    const V cosine = Dot(nodes.normal, from.axis);
+    const V lean = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one)));
+    const V lift = hn::Add(hn::Add(lean, nodes.spread), Splat(from.cone_sine));
+    const V rise = rules.approximates() ? hn::Mul(nodes.radius, hn::Min(one, lift)) : nodes.radius;
+    return hn::Add(hn::Add(top, rise), Splat(from.lift));
+  }
+};
+
+// As Standing. Of what does not fade, the blend is whole or nothing.
+struct Standings {
+  M is_far, is_open;
+  V at_centre;
+  V3 slope;
+
+  Standings(const PacketView& from, const Nodes& nodes, const Places& places,
+            const CutRules& rules) {
+    const D d;
+    const V zero = hn::Zero(d), one = Splat(1);
+    const V shift =
+        hn::Min(Splat(from.radius), hn::Mul(places.distance, Splat(mostFadingSpread(rules))));
+    const V looked_from = hn::Add(places.nearest, shift);
+    V limit = hn::Mul(hn::Mul(nodes.share, Splat(rules.max_solid_angle)),
+                      hn::Mul(looked_from, looked_from));
+    M grows = hn::Gt(zero, zero);
+    if (from.has_horizon && rules.most_coarser > 1) {
+      // As coarser
+      const V tiny = Splat(std::numeric_limits<float>::min());
+      const V gain =
+          hn::Div(hn::Mul(Splat(kWholeCosine), looked_from), hn::Max(places.highest, tiny));
+      const V most = hn::IfThenElse(nodes.is_flat, one, Splat(rules.most_coarser));
+      grows = hn::And(hn::Gt(gain, one), hn::Lt(gain, most));
+      limit = hn::Mul(limit, hn::Min(most, hn::Max(one, gain)));
+    }
+    const V looks = hn::Div(nodes.area, limit);
+    const V steepness = Splat(fadingSlope(rules));
+    at_centre = hn::Mul(hn::Sub(looks, Splat(1 - rules.fading)), steepness);
+    slope = {zero, zero, zero};
+    V differs = zero;  // the blend within the packet, from that at the centre
+    const M may_fade =
+        hn::And(hn::Gt(looks, Splat(kLeastFading)), hn::Lt(looks, Splat(kMostFading)));
+    if (rules.fading > 0 && from.radius > 0 && !hn::AllFalse(d, may_fade)) {
+      const V part = hn::Mul(shift, Splat(1 / from.radius));
+      const V scale = hn::IfThenElseZero(may_fade, hn::Mul(hn::Mul(looks, steepness), part));
+      const V toward =
+          hn::Div(hn::Mul(scale, hn::IfThenElse(grows, Splat(3), Splat(2))), places.distance_sq);
+      const V up = hn::IfThenElseZero(grows, hn::Div(scale, places.highest));
+      slope = {hn::NegMulAdd(up, Splat(from.axis.x), hn::Mul(toward, places.offset.x)),
+               hn::NegMulAdd(up, Splat(from.axis.y), hn::Mul(toward, places.offset.y)),
+               hn::NegMulAdd(up, Splat(from.axis.z), hn::Mul(toward, places.offset.z))};
+      differs = hn::Mul(Splat(from.radius), hn::Sqrt(Dot(slope, slope)));
+    }
+    is_far = hn::And(hn::And(hn::Gt(places.nearest, nodes.radius),
+                             hn::Lt(nodes.area, hn::Mul(Splat(kMostFading), limit))),
+                     hn::Lt(hn::Sub(at_centre, differs), one));
+    is_open = hn::Not(is_far);
+    if (rules.fading > 0) is_open = hn::Or(is_open, hn::Gt(hn::Add(at_centre, differs), zero));
+    const M fades = hn::And(is_far, is_open);
+    at_centre = hn::IfThenElse(fades, at_centre, hn::IfThenElseZero(is_open, one));
+    slope = {hn::IfThenElseZero(fades, slope.x), hn::IfThenElseZero(fades, slope.y),
+             hn::IfThenElseZero(fades, slope.z)};
+  }
+
+  // The same for a packet of which the centre is here from that of the cluster.
+  void MoveTo(const glm::vec3& offset) { at_centre = hn::Add(at_centre, Dot(slope, offset)); }
+};
+
+// As isOfRegion. Returns those of which the walk takes something.
+M TakeRegion(const Nodes& nodes, const PacketView& view, const CutRegion& region,
+             const CutRules& rules, Standings& standings) {
+  const Places places(region.cluster, nodes, rules);
+  Standings from_cluster(region.cluster, nodes, places, rules);
+  from_cluster.MoveTo(view.centre - region.cluster.centre);
+  const V border = Splat(region.limit);
+  const M beyond = hn::Ge(hn::Sub(places.distance, nodes.radius), border);
+  const M within = hn::Lt(hn::Add(places.distance, nodes.radius), border);
+  const M middle_beyond = hn::Ge(places.distance, border);
+  if (region.part == CutRegion::Part::kFar) {
+    standings = from_cluster;
+    standings.is_far = hn::And(standings.is_far, middle_beyond);
+    return hn::Not(within);
+  }
+  const auto choose = [&](V own, V common) HWY_ATTR { return hn::IfThenElse(within, own, common); };
+  standings.is_far = hn::Or(hn::And(within, standings.is_far),
+                            hn::AndNot(hn::Or(within, middle_beyond), from_cluster.is_far));
+  standings.is_open =
+      hn::Or(hn::And(within, standings.is_open), hn::AndNot(within, from_cluster.is_open));
+  standings.at_centre = choose(standings.at_centre, from_cluster.at_centre);
+  standings.slope = {choose(standings.slope.x, from_cluster.slope.x),
+                     choose(standings.slope.y, from_cluster.slope.y),
+                     choose(standings.slope.z, from_cluster.slope.z)};
+  return hn::Not(beyond);
+}
+
+// Outside the cones of all.
+M IsOutsideCones(const PacketView& view, const Nodes& nodes, const Places& places) {
+  const V along = Dot(places.offset, view.lobe_axis);
+  const V aside = hn::Sqrt(hn::Max(hn::Zero(D()), hn::NegMulAdd(along, along, places.distance_sq)));
+  const V outside =
+      hn::Sub(hn::Mul(aside, Splat(view.lobe_cosine)), hn::Mul(along, Splat(view.lobe_sine)));
+  return hn::Gt(outside, hn::Add(nodes.radius, Splat(view.radius)));
+}
+
+// Turned away from all: as one disk, or all the surfels below.
+M TurnsAway(const PacketView& view, const Nodes& nodes, const Places& places, V facing, M is_open) {
+  const V away = hn::Mul(facing, Dot(places.offset, nodes.normal));
+  const M is_disk = hn::AndNot(is_open, nodes.is_flat);
+  const V size = hn::Add(Splat(view.radius), hn::IfThenZeroElse(is_disk, nodes.radius));
+  const V normals = hn::IfThenElse(
+      is_disk, hn::Mul(nodes.spread, Splat(kFlatSpread / kNormalSpread)), nodes.spread);
+  const V turn = hn::MulAdd(normals, places.distance, hn::Mul(Splat(1.2f), size));
+  const M is_small = hn::Lt(size, hn::Mul(places.distance, Splat(kMostTurnedAway)));
+  return hn::And(is_small, hn::Gt(away, turn));
+}
+
+Columns ColumnsOf(std::span<const Node> siblings, const CutRules& rules) {
   Columns columns;
   for (std::size_t i = 0; i < siblings.size(); ++i) {
     const Node& node = siblings[i];
@@ -103,143 +282,41 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     columns.is_flat[i] = node.isFlat() ? 1 : 0;
     columns.facing[i] = facingOf(node, rules);
   }
+  return columns;
+}
+
+SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView& view,
+                                const CutRegion& region, const CutRules& rules) {
+  Columns columns = ColumnsOf(siblings, rules);
   std::uint32_t present = (1u << siblings.size()) - 1;
   if (!rules.seesAllGroups()) present = ChooseGroups(siblings, rules, columns);
 
-  const hn::CappedTag<float, kMostSiblings> d;
-  const auto zero = hn::Zero(d), one = hn::Set(d, 1.f);
-  const auto packet_radius = hn::Set(d, view.radius);
+  const D d;
   SiblingClasses classes;
   for (std::size_t at = 0; at < siblings.size(); at += hn::Lanes(d)) {
-    const auto x = hn::Sub(hn::Load(d, columns.x + at), hn::Set(d, view.centre.x));
-    const auto y = hn::Sub(hn::Load(d, columns.y + at), hn::Set(d, view.centre.y));
-    const auto z = hn::Sub(hn::Load(d, columns.z + at), hn::Set(d, view.centre.z));
-    const auto nx = hn::Load(d, columns.normal_x + at), ny = hn::Load(d, columns.normal_y + at);
-    const auto nz = hn::Load(d, columns.normal_z + at);
-    const auto radius = hn::Load(d, columns.radius + at);
-    const auto flatness = hn::Load(d, columns.flatness + at);
-    const auto distance_sq = hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
-    const auto distance = hn::Sqrt(distance_sq);
-    const auto nearest = hn::Sub(distance, packet_radius);
-    const auto spread = hn::Mul(hn::Set(d, kNormalSpread),
-                                hn::Sqrt(hn::Mul(hn::Set(d, 2.f), hn::Sub(one, flatness))));
-
-    // As highestPoint and coarser
-    const auto highest = [&](const PacketView& from, auto fx, auto fy, auto fz, auto away_sq,
-                             auto away) HWY_ATTR {
-      const auto ax = hn::Set(d, from.axis.x), ay = hn::Set(d, from.axis.y);
-      const auto az = hn::Set(d, from.axis.z);
-      const auto height = hn::MulAdd(fx, ax, hn::MulAdd(fy, ay, hn::Mul(fz, az)));
-      const auto aside = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(height, height, away_sq)));
-      const auto cone_cosine = hn::Set(d, from.cone_cosine);
-      const auto tilted =
-          hn::MulAdd(height, cone_cosine, hn::Mul(aside, hn::Set(d, from.cone_sine)));
-      const auto top = hn::IfThenElse(hn::Ge(height, hn::Mul(away, cone_cosine)), away, tilted);
-      const auto cosine = hn::MulAdd(nx, ax, hn::MulAdd(ny, ay, hn::Mul(nz, az)));
-      const auto lean = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one)));
-      const auto lift = hn::Add(hn::Add(lean, spread), hn::Set(d, from.cone_sine));
-      const auto rise = rules.approximates() ? hn::Mul(radius, hn::Min(one, lift)) : radius;
-      return hn::Add(hn::Add(top, rise), hn::Set(d, from.lift));
-    };
-    const auto is_flat = hn::Gt(hn::Load(d, columns.is_flat + at), zero);
-    const auto coarser = [&](auto from_nearest, auto top) HWY_ATTR {
-      const auto gain = hn::Div(hn::Mul(hn::Set(d, kWholeCosine), from_nearest),
-                                hn::Max(top, hn::Set(d, std::numeric_limits<float>::min())));
-      const auto most = hn::IfThenElse(is_flat, one, hn::Set(d, rules.most_coarser));
-      return hn::Min(most, hn::Max(one, gain));
-    };
-
-    // Below the horizon of all
-    auto seen = hn::Lt(nearest, hn::Add(radius, hn::Set(d, rules.max_distance)));
-    auto most_solid_angle =
-        hn::Mul(hn::Load(d, columns.share + at), hn::Set(d, rules.max_solid_angle));
-    const auto most_from_cluster = most_solid_angle;
+    const Nodes nodes(columns, at);
+    const Places places(view, nodes, rules);
+    M seen = hn::Lt(places.nearest, hn::Add(nodes.radius, Splat(rules.max_distance)));
     if (view.has_horizon) {
-      const auto top = highest(view, x, y, z, distance_sq, distance);
-      const auto reach = hn::Max(zero, hn::Sub(nearest, radius));
-      seen = hn::And(seen, hn::Gt(top, hn::Mul(reach, hn::Set(d, horizonSlope(rules)))));
-      if (rules.most_coarser > 1) {
-        most_solid_angle = hn::Mul(most_solid_angle, coarser(nearest, top));
-      }
+      const V reach = hn::Max(hn::Zero(d), hn::Sub(places.nearest, nodes.radius));
+      seen = hn::And(seen, hn::Gt(places.highest, hn::Mul(reach, Splat(horizonSlope(rules)))));
     }
-
-    // Outside the cones of all
-    if (view.has_cone) {
-      const auto along = hn::MulAdd(
-          x, hn::Set(d, view.lobe_axis.x),
-          hn::MulAdd(y, hn::Set(d, view.lobe_axis.y), hn::Mul(z, hn::Set(d, view.lobe_axis.z))));
-      const auto aside = hn::Sqrt(hn::Max(zero, hn::NegMulAdd(along, along, distance_sq)));
-      const auto outside = hn::Sub(hn::Mul(aside, hn::Set(d, view.lobe_cosine)),
-                                   hn::Mul(along, hn::Set(d, view.lobe_sine)));
-      seen = hn::And(seen, hn::Le(outside, hn::Add(radius, packet_radius)));
-    }
-
-    // Small enough
-    const auto area = hn::Mul(hn::Set(d, kPi), hn::Mul(radius, radius));
-    const auto away = hn::Mul(hn::Load(d, columns.facing + at),
-                              hn::MulAdd(x, nx, hn::MulAdd(y, ny, hn::Mul(z, nz))));
-    auto limit = hn::Mul(most_solid_angle, hn::Mul(nearest, nearest));
-    const auto most_faded = hn::Set(d, 1 + rules.fading);
-    auto may_be_far = hn::And(hn::Gt(nearest, radius), hn::Lt(area, hn::Mul(most_faded, limit)));
-    auto far = may_be_far;
-
-    // Of the region; all walks of a cluster calculate this alike
+    if (view.has_cone) seen = hn::AndNot(IsOutsideCones(view, nodes, places), seen);
+    Standings standings(view, nodes, places, rules);
     if (region.part != CutRegion::Part::kAll) {
-      const PacketView& cluster = region.cluster;
-      const auto cx = hn::Sub(hn::Load(d, columns.x + at), hn::Set(d, cluster.centre.x));
-      const auto cy = hn::Sub(hn::Load(d, columns.y + at), hn::Set(d, cluster.centre.y));
-      const auto cz = hn::Sub(hn::Load(d, columns.z + at), hn::Set(d, cluster.centre.z));
-      const auto centre_sq = hn::MulAdd(cx, cx, hn::MulAdd(cy, cy, hn::Mul(cz, cz)));
-      const auto from_centre = hn::Sqrt(centre_sq);
-      const auto from_cluster = hn::Sub(from_centre, hn::Set(d, cluster.radius));
-      auto cluster_most = most_from_cluster;
-      if (cluster.has_horizon && rules.most_coarser > 1) {
-        const auto top = highest(cluster, cx, cy, cz, centre_sq, from_centre);
-        cluster_most = hn::Mul(cluster_most, coarser(from_cluster, top));
-      }
-      const auto cluster_limit = hn::Mul(cluster_most, hn::Mul(from_cluster, from_cluster));
-      const auto far_from_cluster =
-          hn::And(hn::Gt(from_cluster, radius), hn::Lt(area, hn::Mul(most_faded, cluster_limit)));
-      const auto border = hn::Set(d, region.limit);
-      const auto beyond = hn::Ge(hn::Sub(from_centre, radius), border);
-      const auto within = hn::Lt(hn::Add(from_centre, radius), border);
-      const auto middle_beyond = hn::Ge(from_centre, border);
-      // On the border every walk opens what fades, and one has the node itself
-      if (region.part == CutRegion::Part::kNear) {
-        seen = hn::AndNot(beyond, seen);
-        limit = hn::IfThenElse(within, limit, cluster_limit);
-        may_be_far = hn::Or(hn::And(within, may_be_far), hn::AndNot(within, far_from_cluster));
-        far = hn::And(may_be_far, hn::Or(within, hn::Not(middle_beyond)));
-      } else {
-        seen = hn::AndNot(within, seen);
-        limit = cluster_limit;
-        may_be_far = far_from_cluster;
-        far = hn::And(may_be_far, middle_beyond);
-      }
+      seen = hn::And(seen, TakeRegion(nodes, view, region, rules, standings));
     }
-
-    // As fadedPart
-    const auto tiny = hn::Set(d, std::numeric_limits<float>::min());
-    const auto looks = hn::Div(area, hn::Max(limit, tiny));
-    const auto part =
-        hn::Mul(hn::Sub(looks, hn::Set(d, 1 - rules.fading)), hn::Set(d, fadingSlope(rules)));
-    const auto below = hn::IfThenElse(may_be_far, hn::Min(one, hn::Max(zero, part)), one);
-
-    // Turned away from all
     if (rules.facing != 0 && rules.approximates()) {
-      const auto is_disk = hn::And(hn::Le(below, zero), is_flat);
-      const auto size = hn::Add(packet_radius, hn::IfThenZeroElse(is_disk, radius));
-      const auto normals =
-          hn::IfThenElse(is_disk, hn::Mul(spread, hn::Set(d, kFlatSpread / kNormalSpread)), spread);
-      const auto turn = hn::MulAdd(normals, distance, hn::Mul(hn::Set(d, 1.2f), size));
-      const auto small = hn::Lt(size, hn::Mul(distance, hn::Set(d, kMostTurnedAway)));
-      seen = hn::AndNot(hn::And(small, hn::Gt(away, turn)), seen);
+      const V facing = hn::Load(d, columns.facing + at);
+      seen = hn::AndNot(TurnsAway(view, nodes, places, facing, standings.is_open), seen);
     }
-    const auto far_bits = hn::And(seen, far), open_bits = hn::And(seen, hn::Gt(below, zero));
-    hn::StoreU(below, d, classes.below.data() + at);
+    hn::StoreU(standings.at_centre, d, classes.at_centre.data() + at);
+    hn::StoreU(standings.slope.x, d, classes.slope_x.data() + at);
+    hn::StoreU(standings.slope.y, d, classes.slope_y.data() + at);
+    hn::StoreU(standings.slope.z, d, classes.slope_z.data() + at);
     std::uint8_t bits[2][8] = {};
-    hn::StoreMaskBits(d, far_bits, bits[0]);
-    hn::StoreMaskBits(d, open_bits, bits[1]);
+    hn::StoreMaskBits(d, hn::And(seen, standings.is_far), bits[0]);
+    hn::StoreMaskBits(d, hn::And(seen, standings.is_open), bits[1]);
     classes.far |= std::uint32_t{bits[0][0]} << at;
     classes.open |= std::uint32_t{bits[1][0]} << at;
   }
@@ -287,48 +364,66 @@ float coarser(const Node& node, float nearest, float highest, const PacketView& 
   return std::clamp(gain, 1.f, rules.most_coarser);
 }
 
-// What becomes of a node: whether it is drawn as a whole, and how much what is below it counts.
+// What becomes of a node: whether it is drawn as a whole, whether what is below it is looked at,
+// and how much that counts.
 struct Standing {
-  bool is_far = false;
-  float below = 1;
+  bool is_far = false, is_open = true;
+  Blend below;
 };
-
-// How much what is below counts of a node that looks so large, as a part of what it may.
-float fadedPart(float size, const CutRules& rules) {
-  return std::clamp((size - (1 - rules.fading)) * fadingSlope(rules), 0.f, 1.f);
-}
 
 // A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
 // solid angle, or that share of it. A flat square of surfels has about 0.6 of its sphere's outline
 // as area, so this is close to the memo's test on the area, but it also opens sparse nodes, whose
 // area says nothing about how far their surfels spread. Never when only some of these are seen.
-Standing standingOf(const Node& node, float nearest, float coarser, const CutRules& rules) {
+Standing standingOf(const Node& node, const glm::vec3& to_node, float highest,
+                    const PacketView& view, const CutRules& rules) {
   if (rules.isMixed(node)) return {};
-  const float share = node.isRough() ? kRoughShare * coarser : coarser;
+  const float distance = glm::length(to_node), nearest = distance - view.radius;
+  const float shift = std::min(view.radius, mostFadingSpread(rules) * distance);
+  const float looked_from = nearest + shift;
+  const float gain = coarser(node, looked_from, highest, view, rules);
+  const float share = node.isRough() ? kRoughShare * gain : gain;
   const float area = kPi * node.radius * node.radius;
-  const float limit = 2 * share * rules.max_solid_angle * nearest * nearest;
-  if (!(nearest > node.radius && area < (1 + rules.fading) * limit)) return {};
-  return {true, fadedPart(area / limit, rules)};
+  const float limit = 2 * share * rules.max_solid_angle * looked_from * looked_from;
+  if (!(nearest > node.radius && area < kMostFading * limit)) return {};
+  const float looks = area / limit;
+  Blend below{(looks - (1 - rules.fading)) * fadingSlope(rules), glm::vec3(0)};
+  if (rules.fading > 0 && view.radius > 0 && looks > kLeastFading) {
+    // The limit changes with the distance squared and, for what is low, with the distance over the
+    // height
+    const bool grows = gain > 1 && gain < rules.most_coarser;
+    const glm::vec3 toward = ((grows ? 3.f : 2.f) / (distance * distance)) * to_node;
+    const glm::vec3 change = grows ? toward - view.axis / highest : toward;
+    below.slope = looks * fadingSlope(rules) * (shift / view.radius) * change;
+  }
+  const float differs = view.radius * glm::length(below.slope);
+  if (!(below.at_centre - differs < 1)) return {};
+  if (!(rules.fading > 0 && below.at_centre + differs > 0)) {
+    return {true, false, {0, glm::vec3(0)}};
+  }
+  return {true, true, below};
 }
 
 // Whether the walk takes something of the node. A node on the border is drawn where its middle is
 // if it is far enough from the whole cluster, and opened by all as far as it is not.
-bool isOfRegion(const Node& node, float spread, const CutRegion& region, const CutRules& rules,
-                Standing& standing) {
+bool isOfRegion(const Node& node, float spread, const PacketView& view, const CutRegion& region,
+                const CutRules& rules, Standing& standing) {
   if (region.part == CutRegion::Part::kAll) return true;
   const PacketView& cluster = region.cluster;
   const glm::vec3 to_node = node.position - cluster.centre;
-  const float from_centre = glm::length(to_node), nearest = from_centre - cluster.radius;
+  const float from_centre = glm::length(to_node);
   const float highest = highestPoint(node, to_node, from_centre, spread, cluster, rules);
-  const Standing from_cluster =
-      standingOf(node, nearest, coarser(node, nearest, highest, cluster, rules), rules);
+  Standing from_cluster = standingOf(node, to_node, highest, cluster, rules);
+  from_cluster.below.at_centre += glm::dot(from_cluster.below.slope, view.centre - cluster.centre);
   const bool middle_beyond = from_centre >= region.limit;
   if (region.part == CutRegion::Part::kNear) {
     if (from_centre + node.radius < region.limit) return true;
-    standing = {from_cluster.is_far && !middle_beyond, from_cluster.below};
+    standing = from_cluster;
+    standing.is_far = standing.is_far && !middle_beyond;
     return from_centre - node.radius < region.limit;
   }
-  standing = {from_cluster.is_far && middle_beyond, from_cluster.below};
+  standing = from_cluster;
+  standing.is_far = standing.is_far && middle_beyond;
   return from_centre + node.radius >= region.limit;
 }
 
@@ -359,22 +454,21 @@ SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView
       if (aside * view.lobe_cosine - along * view.lobe_sine > node.radius + view.radius) continue;
     }
 
-    Standing standing =
-        standingOf(node, nearest, coarser(node, nearest, highest, view, rules), rules);
-    if (!isOfRegion(node, spread, region, rules, standing)) continue;
+    Standing standing = standingOf(node, to_node, highest, view, rules);
+    if (!isOfRegion(node, spread, view, region, rules, standing)) continue;
 
     // Turned away from all: as one disk, or all the surfels below
     if (rules.facing != 0 && rules.approximates()) {
       const float away = facingOf(node, rules) * glm::dot(to_node, node.normal);
-      const bool is_disk = !(standing.below > 0) && node.isFlat();
+      const bool is_disk = !standing.is_open && node.isFlat();
       const float size = view.radius + (is_disk ? 0 : node.radius);
       const float normals = is_disk ? kFlatSpread / kNormalSpread * spread : spread;
       const float turn = normals * distance + 1.2f * size;
       if (size < kMostTurnedAway * distance && away > turn) continue;
     }
-    classes.below[i] = standing.below;
+    classes.setBelow(i, standing.below);
     if (standing.is_far) classes.far |= 1u << i;
-    if (standing.below > 0) classes.open |= 1u << i;
+    if (standing.is_open) classes.open |= 1u << i;
   }
   return classes;
 }

@@ -2,6 +2,7 @@
 // Walked by the gather, which draws them, and by whoever wants to know which pages that takes.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -74,6 +75,19 @@ struct CutRules {
   bool isMixed(const Node& node) const { return (node.groups & ~groups) != 0; }
 };
 
+// How much something counts for each receiver of a packet, 0..1, where a node fades into what is
+// below it.
+struct Blend {
+  float at_centre = 1;  // of the packet; beyond 0..1 where only receivers beside it see a change
+  glm::vec3 slope{0};   // for each unit away from there
+  bool isWhole() const { return at_centre >= 1 && slope == glm::vec3(0); }
+  Blend rest() const { return {1 - at_centre, -slope}; }
+  // For a receiver that is here from the centre.
+  float at(const glm::vec3& offset) const {
+    return std::clamp(at_centre + glm::dot(slope, offset), 0.f, 1.f);
+  }
+};
+
 // Of one parent.
 inline constexpr std::size_t kMostSiblings = 8;
 
@@ -81,16 +95,27 @@ inline constexpr std::size_t kMostSiblings = 8;
 struct SiblingClasses {
   std::uint32_t far = 0;   // bit i: node i is drawn as a whole
   std::uint32_t open = 0;  // bit i: its children or surfels are looked at
-  // How much the latter count, 0..1, of nodes in some class; the node itself has the rest
-  std::array<float, kMostSiblings> below{};
+  // How much the latter count, of nodes in some class; the node itself has the rest
+  Blend below(std::size_t i) const { return {at_centre[i], {slope_x[i], slope_y[i], slope_z[i]}}; }
+  void setBelow(std::size_t i, const Blend& blend) {
+    at_centre[i] = blend.at_centre;
+    slope_x[i] = blend.slope.x;
+    slope_y[i] = blend.slope.y;
+    slope_z[i] = blend.slope.z;
+  }
+  std::array<float, kMostSiblings> at_centre, slope_x, slope_y, slope_z;
 };
 
 // From one place to the next, a node would give way to its children at once, and what they show
 // differently would be a step. So it fades into them while it looks by this part smaller to this
-// part larger than it may. (Largest steps of irradiance along lines in a box, of its mean, without
-// anything shared: 2.2, 1.7, .5, .8, .3 % with 0; 1.7, 1.1, .2, .4, .2 with .03, for 3 to 5 % more
-// patches; 1.5, 1.0, .3, .4, .2 with .05. bench/line_steps.sh)
-inline constexpr float kFading = 0.03f;
+// part larger than it may. (Largest steps of irradiance along lines in a box, of its
+// mean: 2.2, 1.7, .5, .8, .3 % with 0; 1.1, 1.0, .2, .4, .2 with .015, .02 and .03, for 3 to 5 %
+// more patches with .02. bench/line_steps.sh)
+inline constexpr float kFading = 0.02f;
+// Each receiver of a packet has its own blend, as long as the packet's radius is no larger than
+// this part of the distance; in one that is larger all have, more and more, that of the closest:
+// too many nodes would fade. (Steps on the floor when all have that: 1.7 %.)
+inline constexpr float kMostFadingSpread = 0.01f;
 
 // Sorts siblings by what the packet makes of them; those in neither class are not seen, and those
 // in both fade. docs/algorithm.md, "Choosing the cut", has the tests. This is the definition.
@@ -102,10 +127,10 @@ using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const Packet
                                              const CutRegion&, const CutRules&);
 SiblingClassifier fastestSiblingClassifier();
 
-// Calls visit.node(const Node&, float part) for the nodes small enough as a whole, and
-// visit.leaf(const Node&) and visit.surfels(std::span<const Surfel>, float part) for leaves too
-// near, of whose surfels the region may not hold all. `part` is how much they count, 0..1: less
-// than 1 where a node fades into what is below. Surfels of groups that are not seen are left out.
+// Calls visit.node(const Node&, const Blend&) for the nodes small enough as a whole, and
+// visit.leaf(const Node&) and visit.surfels(std::span<const Surfel>, const Blend&) for leaves too
+// near, of whose surfels the region may not hold all. The blend says how much they count, where a
+// node fades into what is below. Surfels of groups that are not seen are left out.
 // `Reader` has the functions of PagedOctree::Reader. The order depends on octree and view alone.
 // One thread at a time.
 class CutWalk {
@@ -120,31 +145,31 @@ class CutWalk {
   Status walk(const PacketView& view, const CutRegion& region, Reader& octree, Visit&& visit) {
     nodes_visited_ = surfels_visited_ = 0;
     std::size_t stack_count = 0;
-    stack_[stack_count++] = {kRootRange, 1};
+    stack_[stack_count++] = {kRootRange, {}, false};
     while (stack_count > 0) {
-      const auto [range, part] = stack_[--stack_count];
+      const auto [range, blend, fades] = stack_[--stack_count];
       SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings, octree.nodes(range));
       nodes_visited_ += siblings.size();
       SURFEIT_RETURN_IF_ERROR(octree.checkVisits(nodes_visited_, surfels_visited_));
       // What is below something that fades fades no more by itself
-      rules_.fading = part < 1 ? 0 : kFading;
+      rules_.fading = fades ? 0 : kFading;
       const SiblingClasses classes = classify_(siblings, view, region, rules_);
       for (std::uint32_t far = classes.far; far != 0; far &= far - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(far));
-        visit.node(siblings[i], part * (1 - classes.below[i]));
+        visit.node(siblings[i], fades ? blend : classes.below(i).rest());
       }
       for (std::uint32_t open = classes.open; open != 0; open &= open - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(open));
         const Node& node = siblings[i];
-        const float part_below = part * classes.below[i];
+        const Blend below = fades ? blend : classes.below(i);
         if (node.isLeaf()) {
           visit.leaf(node);
           SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
             surfels_visited_ += run.size();
-            visitSeen(run, part_below, visit);
+            visitSeen(run, below, visit);
           }));
         } else if (stack_count < kStackSize) {
-          stack_[stack_count++] = {childrenOf(node), part_below};
+          stack_[stack_count++] = {childrenOf(node), below, !below.isWhole()};
         } else {
           return Status::corruption("octree: deeper than its curve has levels");
         }
@@ -163,15 +188,15 @@ class CutWalk {
   }
   // Hands over the surfels of groups that are seen, as runs: neighbours are often of one group.
   template <typename Visit>
-  void visitSeen(std::span<const Surfel> surfels, float part, Visit& visit) const {
-    if (rules_.seesAllGroups()) return visit.surfels(surfels, part);
+  void visitSeen(std::span<const Surfel> surfels, const Blend& blend, Visit& visit) const {
+    if (rules_.seesAllGroups()) return visit.surfels(surfels, blend);
     const auto isSeen = [&](std::size_t i) { return rules_.sees(groupBit(surfels[i].group)); };
     for (std::size_t end = 0; end < surfels.size();) {
       std::size_t begin = end;
       while (begin < surfels.size() && !isSeen(begin)) ++begin;
       end = begin;
       while (end < surfels.size() && isSeen(end)) ++end;
-      if (end > begin) visit.surfels(surfels.subspan(begin, end - begin), part);
+      if (end > begin) visit.surfels(surfels.subspan(begin, end - begin), blend);
     }
   }
 
@@ -182,7 +207,8 @@ class CutWalk {
   SiblingClassifier classify_;
   struct Siblings {
     NodeRange range;
-    float part;
+    Blend blend;
+    bool fades;
   };
   std::array<Siblings, kStackSize> stack_;
   std::uint64_t nodes_visited_ = 0, surfels_visited_ = 0;
@@ -190,9 +216,9 @@ class CutWalk {
 
 // For walks that are made for the pages they touch.
 struct IgnoreCut {
-  void node(const Node&, float) {}
+  void node(const Node&, const Blend&) {}
   void leaf(const Node&) {}
-  void surfels(std::span<const Surfel>, float) {}
+  void surfels(std::span<const Surfel>, const Blend&) {}
 };
 
 }  // namespace surfeit

@@ -8,10 +8,10 @@ namespace {
 // Hands the cut to the raster.
 struct DrawCut {
   ReceiverRaster& raster;
-  void node(const Node& node, float part) { raster.addNode(node, part); }
+  void node(const Node& node, const Blend& blend) { raster.addNode(node, blend.at(glm::vec3(0))); }
   void leaf(const Node&) {}
-  void surfels(std::span<const Surfel> run, float part) {
-    for (const Surfel& surfel : run) raster.addSurfel(surfel, part);
+  void surfels(std::span<const Surfel> run, const Blend& blend) {
+    for (const Surfel& surfel : run) raster.addSurfel(surfel, blend.at(glm::vec3(0)));
   }
 };
 

@@ -129,12 +129,23 @@ class Brush {
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
     cover.thicket = patch.thicket;
-    cover.opacity = patch.opacity;
+    cover.opacity = Opacity(patch, sight);
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
     if constexpr (Kind::kFade) cover.fade = FadeAt(distance);
     return cover;
+  }
+
+  // Each receiver has its own while a node fades into what is below it.
+  V Opacity(const Patch& patch, const Sight& sight) const {
+    if (!patch.fades) return Splat(patch.opacity);
+    const glm::vec3& slope = patch.blend.slope;
+    // From the centre: the patch is in the same place for all
+    const glm::vec3 middle = patch.position - canvas_.centre;
+    const V at_centre = Splat(patch.blend.at_centre + glm::dot(slope, middle));
+    const V blend = hn::Sub(at_centre, Dot(sight.offset, slope));
+    return hn::Mul(Splat(patch.opacity), hn::Min(Splat(1), hn::Max(hn::Zero(D()), blend)));
   }
 
   // As fadeAt.
@@ -249,7 +260,7 @@ class Brush {
     for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
       const V bottom = hn::Max(rows.begin, Splat(float(row)));
       const V top = hn::Min(rows.end, Splat(float(row + 1)));
-      const V height = hn::Mul(Splat(cover.opacity), hn::Max(zero, hn::Sub(top, bottom)));
+      const V height = hn::Mul(cover.opacity, hn::Max(zero, hn::Sub(top, bottom)));
       const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
       const V x = hn::NegMulAdd(shape.shear, along, shape.x);
       const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
@@ -357,7 +368,7 @@ class Brush {
 
   void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
     if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
-    amount = hn::Mul(Splat(cover.opacity), amount);
+    amount = hn::Mul(cover.opacity, amount);
     if (begins_ != nullptr) NoteBegin(pixel, amount, cover);
     const V added = CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
     if (cover.thicket > 0) AddTo(thickets_ + pixel * kPacketReceivers + lane_, added, cover);

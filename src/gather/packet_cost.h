@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "gather/cut.h"
 #include "gather/gather_rules.h"
 #include "gather/receiver.h"
 #include "octree/node.h"
@@ -27,9 +28,11 @@ class PacketCost {
 
   // Starts over for a receiver here.
   void begin(const glm::vec3& position);
-  void node(const Node& node, float) { add(node, float(std::max<int>(1, node.facet_count))); }
+  void node(const Node& node, const Blend&) {
+    add(node, float(std::max<int>(1, node.facet_count)));
+  }
   void leaf(const Node& node) { add(node, float(node.surfel_count)); }
-  void surfels(std::span<const Surfel>, float) {}
+  void surfels(std::span<const Surfel>, const Blend&) {}
 
   // What a packet of this radius around the receiver takes, in some unit of time. A node of s
   // surfels at distance d is seen from d - radius at nearest, and gives way to about

@@ -30,7 +30,8 @@ struct Cover {
   V depth_begin, depth_end;
   M is_lit;
   bool is_all_lit;
-  float overlap, thicket, opacity;
+  float overlap, thicket;
+  V opacity;
   float own;  // the part of its own that overlaps
   glm::vec3 radiosity;
   V fade;  // only when something fades

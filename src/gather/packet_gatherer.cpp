@@ -12,9 +12,11 @@ namespace {
 struct DrawCut {
   PacketRaster& raster;
   const CutRegion& region;
-  void node(const Node& node, float part) { raster.addNode(node, part); }
+  void node(const Node& node, const Blend& blend) { raster.addNode(node, blend); }
   void leaf(const Node&) {}
-  void surfels(std::span<const Surfel> run, float part) { raster.addSurfels(run, region, part); }
+  void surfels(std::span<const Surfel> run, const Blend& blend) {
+    raster.addSurfels(run, region, blend);
+  }
 };
 
 }  // namespace

@@ -14,6 +14,7 @@
 
 #include "core/symmetric_matrix.h"
 #include "gather/contribution.h"
+#include "gather/cut.h"
 #include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
 #include "gather/receiver.h"
@@ -36,6 +37,8 @@ struct Patch {
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
   float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
+  Blend blend;                                  // of the opacity
+  bool fades = false;                           // the blend is not whole
   glm::vec3 radiosity{0};
   // It is seen where offset . normal, from the receiver, is below this: kFrontOnly, kBothSides, or
   // kDarkBack, when it is seen from both sides and sends light from its front
@@ -48,6 +51,10 @@ struct Patch {
   static constexpr float kBothSides = std::numeric_limits<float>::infinity();
   static constexpr float kDarkBack = std::numeric_limits<float>::max();
   bool isRound() const { return disk_area == 0; }
+  void setBlend(const Blend& of_opacity) {
+    blend = of_opacity;
+    fades = !blend.isWhole();
+  }
 };
 
 // The receivers as columns, one per lane; lanes without a receiver repeat the last one.

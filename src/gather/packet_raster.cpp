@@ -27,7 +27,7 @@ std::size_t fillFloats(const GatherRules& rules) {
   return 3 * resolution * resolution * kPacketReceivers;
 }
 
-// Sorts by the upper 32 bits of keys, stable: a radix sort of 8 bits a pass, for a few thousand
+// Sorts by the upper 32 bits of keys, stable: a radix sort of 8 bits a pass, for a few thousand.
 // The first `count` of `order` are replaced; `scratch` grows to hold as many.
 void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
                      std::vector<std::uint64_t>& scratch) {
@@ -138,14 +138,14 @@ void PacketRaster::orderLastPatch() {
   order_count_ = count;
 }
 
-void PacketRaster::addNode(const Node& node, float part) {
-  if (node.isRough()) return addRoughNode(node, part);
-  if (node.isFlat()) return addFacet(facetOf(node), part);
+void PacketRaster::addNode(const Node& node, const Blend& blend) {
+  if (node.isRough()) return addRoughNode(node, blend);
+  if (node.isFlat()) return addFacet(facetOf(node), blend);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal()))
-      addFacet(node.facet(i), part);
+      addFacet(node.facet(i), blend);
   }
 }
 
@@ -158,7 +158,7 @@ bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal)
   return away > normalRange(normal) * glm::length(to_facet) + view_.radius;
 }
 
-void PacketRaster::addFacet(const Facet& facet, float part) {
+void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - view_.centre;
   const float distance = glm::length(to_facet);
@@ -195,11 +195,11 @@ void PacketRaster::addFacet(const Facet& facet, float part) {
     if (!facet.is_two_sided) patch.radiosity *= facing.front / patch.round_area;
     patch.facing_limit = Patch::kBothSides;
   }
-  patch.opacity = part;
+  patch.setBlend(blend);
   orderLastPatch();
 }
 
-void PacketRaster::addRoughNode(const Node& node, float part) {
+void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   RoughSight seen;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_node = node.position - view_.centre, direction = glm::normalize(to_node);
@@ -219,7 +219,8 @@ void PacketRaster::addRoughNode(const Node& node, float part) {
       roughCover(node, direction, visible.perspective * round_area, patch.thicket);
   patch.round_area = cover.area;
   patch.most_area = cover.most;
-  patch.opacity = part * cover.opacity;
+  patch.opacity = cover.opacity;
+  patch.setBlend(blend);
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
@@ -231,7 +232,7 @@ void PacketRaster::addRoughNode(const Node& node, float part) {
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region,
-                              float part) {
+                              const Blend& blend) {
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
     if (!region.holds(stored.position)) continue;
@@ -259,7 +260,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
         std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
     if (kernel_.isSeen(canvas, patch)) {
       has_thickets_ |= patch.thicket > 0;
-      patch.opacity = part;
+      patch.setBlend(blend);
       orderLastPatch();
     } else {
       patches_.pop_back();

@@ -42,11 +42,11 @@ class PacketRaster {
   // Starts over for 1 to kPacketReceivers receivers. What they see is looked at as well from places
   // of which the horizon differs by `horizon_slack`, the sine of an angle.
   void begin(std::span<const Receiver> receivers, const PacketView& view, float horizon_slack = 0);
-  // Adds a node as a whole. All receivers must lie outside its radius. `part`: how much it counts,
-  // 0..1.
-  void addNode(const Node& node, float part = 1);
+  // Adds a node as a whole. All receivers must lie outside its radius.
+  void addNode(const Node& node, const Blend& blend = {});
   // Adds those of the surfels that are of the region and that some receiver may see.
-  void addSurfels(std::span<const Surfel> surfels, const CutRegion& region, float part = 1);
+  void addSurfels(std::span<const Surfel> surfels, const CutRegion& region,
+                  const Blend& blend = {});
 
   // Sorts what was added, and draws it.
   void sort();
@@ -71,8 +71,8 @@ class PacketRaster {
 
  private:
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
-  void addFacet(const Facet& facet, float part);
-  void addRoughNode(const Node& node, float part);
+  void addFacet(const Facet& facet, const Blend& blend);
+  void addRoughNode(const Node& node, const Blend& blend);
   void orderLastPatch();
   PacketCanvas canvas() const;
 
