@@ -50,13 +50,13 @@ class Brush {
   void BeginFace(int face) {
     face_ = face;
     seen_ = &canvas_.seen->faces[std::size_t(face)];
-    const auto first = std::size_t(face * resolution_ * resolution_);
-    pixels_ = canvas_.pixels + first * kPixelFloats;
-    if (canvas_.thickets != nullptr) thickets_ = canvas_.thickets + first * kPacketReceivers;
-    if (!(*canvas_.is_face_used)[std::size_t(face)]) ClearFace();
-    pixels_ += lane_;
-    begins_ = canvas_.begins;
-    if (begins_ != nullptr) begins_ += first * kPacketReceivers + lane_;
+    const auto lanesOf = [&](float* values, std::size_t channels) {
+      return FaceLanes(values, canvas_, std::size_t(face), lane_, channels);
+    };
+    pixels_ = lanesOf(canvas_.pixels, kChannels);
+    thickets_ = lanesOf(canvas_.thickets, 1);
+    begins_ = lanesOf(canvas_.begins, 1);
+    ClearFace();
   }
 
   HWY_INLINE void DrawPatch(const Patch& patch) {
@@ -67,8 +67,7 @@ class Brush {
   }
 
  private:
-  static constexpr std::size_t kPixelFloats =
-      (PacketCanvas::kCoverageChannels + Kind::kChannels) * kPacketReceivers;
+  static constexpr std::size_t kChannels = PacketCanvas::kCoverageChannels + Kind::kChannels;
   // Of a patch, in the frame of the raster.
   using Normal = std::conditional_t<Kind::kFrame, V3, glm::vec3>;
   Normal InRaster(const glm::vec3& normal) const {
@@ -105,20 +104,14 @@ class Brush {
     }
   }
 
-  // For all lanes.
   void ClearFace() {
     const D d;
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
-      float* const at = pixels_ + pixel * kPixelFloats;
-      for (std::size_t lane = 0; lane < kPixelFloats; lane += kStep) {
-        hn::Store(Splat(lane < kPacketReceivers ? 1.f : 0.f), d, at + lane);
-      }
-      if (thickets_ == nullptr) return;
-      for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-        hn::Store(hn::Zero(d), d, thickets_ + pixel * kPacketReceivers + lane);
-      }
+      float* const at = pixels_.at(pixel);
+      hn::Store(Splat(1), d, at);
+      for (std::size_t i = 1; i < kChannels; ++i) hn::Store(hn::Zero(d), d, at + i * kStep);
+      if (thickets_) hn::Store(hn::Zero(d), d, thickets_.at(pixel));
     });
-    (*canvas_.is_face_used)[std::size_t(face_)] = true;
   }
 
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance) const {
@@ -139,7 +132,7 @@ class Brush {
 
   // Each receiver has its own while a node fades into what is below it.
   V Opacity(const Patch& patch, const Sight& sight) const {
-    if (!patch.fades) return Splat(patch.opacity);
+    if (patch.blend.isWhole()) return Splat(patch.opacity);
     const glm::vec3& slope = patch.blend.slope;
     // From the centre: the patch is in the same place for all
     const glm::vec3 middle = patch.position - canvas_.centre;
@@ -266,18 +259,18 @@ class Brush {
       const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
       const auto [begin, end] = ColumnsOf(rows.range, row, *seen_);
       const auto first = std::size_t(row * resolution_ + begin);
-      float* pixel = pixels_ + first * kPixelFloats;
-      float* thicket = kIsThicket ? thickets_ + first * kPacketReceivers + lane_ : nullptr;
+      float* pixel = pixels_.at(first);
+      float* thicket = kIsThicket ? thickets_.at(first) : nullptr;
       for (int column = begin; column < end; ++column) {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
         const V amount = hn::Mul(width, height);
-        if (begins_ != nullptr) NoteBegin(first + std::size_t(column - begin), amount, cover);
+        if (begins_) NoteBegin(first + std::size_t(column - begin), amount, cover);
         const V added = CoverPixel<Kind>(pixel, amount, cover);
-        pixel += kPixelFloats;
+        pixel += kChannels * kStep;
         if constexpr (kIsThicket) {
           AddTo(thicket, added, cover);
-          thicket += kPacketReceivers;
+          thicket += kStep;
         }
       }
     }
@@ -369,15 +362,15 @@ class Brush {
   void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
     if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
     amount = hn::Mul(cover.opacity, amount);
-    if (begins_ != nullptr) NoteBegin(pixel, amount, cover);
-    const V added = CoverPixel<Kind>(pixels_ + pixel * kPixelFloats, amount, cover);
-    if (cover.thicket > 0) AddTo(thickets_ + pixel * kPacketReceivers + lane_, added, cover);
+    if (begins_) NoteBegin(pixel, amount, cover);
+    const V added = CoverPixel<Kind>(pixels_.at(pixel), amount, cover);
+    if (cover.thicket > 0) AddTo(thickets_.at(pixel), added, cover);
   }
   // Comes before the pixel is covered.
   void NoteBegin(std::size_t pixel, V amount, const Cover& cover) {
     const D d;
-    float* const begin = begins_ + pixel * kPacketReceivers;
-    const V end = hn::Load(d, pixels_ + pixel * kPixelFloats + 2 * kPacketReceivers);
+    float* const begin = begins_.at(pixel);
+    const V end = hn::Load(d, pixels_.at(pixel) + 2 * kStep);
     const M is_first = hn::And(hn::Gt(amount, hn::Zero(d)), hn::Le(end, hn::Zero(d)));
     hn::Store(hn::IfThenElse(is_first, cover.depth_begin, hn::Load(d, begin)), d, begin);
   }
@@ -479,9 +472,7 @@ class Brush {
   const Frames frames_;
   int face_ = 0;
   const SeenPixels::Face* seen_ = nullptr;
-  float* pixels_ = nullptr;    // of the face, from the first of our lanes
-  float* begins_ = nullptr;    // likewise; null: nobody asks
-  float* thickets_ = nullptr;  // of the face; null: none
+  FaceLanes pixels_, begins_, thickets_;  // of the face, the latter as far as the canvas has them
 };
 
 }  // namespace

@@ -52,8 +52,8 @@ inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
   float* const room_at = pixel;
-  float* const layer_at = pixel + kPacketReceivers;
-  float* const end_at = pixel + 2 * kPacketReceivers;
+  float* const layer_at = pixel + kStep;
+  float* const end_at = pixel + 2 * kStep;
   const V end = hn::Load(d, end_at);
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
@@ -72,16 +72,16 @@ inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const V covered = hn::Mul(room, hn::Sub(layer, before));
   if constexpr (Kind::kChannels > 0) {
     V added = covered;
-    float* at = pixel + PacketCanvas::kCoverageChannels * kPacketReceivers;
+    float* at = pixel + PacketCanvas::kCoverageChannels * kStep;
     if constexpr (Kind::kFade) {
-      float* const fade_at = at + (Kind::kChannels - 1) * kPacketReceivers;
+      float* const fade_at = at + (Kind::kChannels - 1) * kStep;
       hn::Store(hn::MulAdd(added, cover.fade, hn::Load(d, fade_at)), d, fade_at);
     }
     if constexpr (Kind::kColor) {
       if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
       for (int c = 0; c < 3; ++c) {
         hn::Store(hn::MulAdd(added, Splat(cover.radiosity[c]), hn::Load(d, at)), d, at);
-        at += kPacketReceivers;
+        at += kStep;
       }
     }
   }
@@ -128,7 +128,7 @@ void FindSeenPixels(const PacketCanvas& canvas, float slack, SeenPixels& seen) {
   const bool is_all_seen = canvas.rules->hasConeRaster();  // not a half space of the world
   const auto isSeen = [&](const glm::vec3& direction) HWY_ATTR {
     if (is_all_seen) return true;
-    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+    for (std::size_t lane = 0; lane < canvas.receiver_count; lane += kStep) {
       const Receivers receivers(*canvas.lanes, lane);
       const M above = hn::Gt(Dot(receivers.normal, direction), Splat(-slack));
       if (!hn::AllFalse(D(), hn::Or(receivers.spherical, above))) return true;

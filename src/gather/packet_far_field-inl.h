@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <array>
 #include <cstddef>
 #include <cstring>
 
@@ -28,20 +29,26 @@ class FarFace {
       : canvas_(canvas),
         seen_(canvas.seen->faces[face]),
         size_(std::size_t(canvas.geometry->resolution())),
-        pixel_floats_(PacketCanvas::pixelFloats(*canvas.rules)),
-        first_(face * size_ * size_),
-        has_light_(canvas.rules->hasLight()) {}
+        face_(face),
+        channels_(PacketCanvas::channels(*canvas.rules)),
+        has_light_(canvas.rules->hasLight()) {
+    for (std::size_t lane = 0; lane < canvas.receiver_count; lane += kStep) {
+      pixels_[lane / kStep] = FaceLanes(canvas.pixels, canvas, face, lane, channels_);
+      thickets_[lane / kStep] = FaceLanes(canvas.thickets, canvas, face, lane, 1);
+      begins_[lane / kStep] = FaceLanes(canvas.begins, canvas, face, lane, 1);
+    }
+  }
 
   // Covers gaps, as in what is drawn for a packet: they would change from place to place. The
   // coverage comes in place of the room, and colors and thickets are scaled by how much it grew.
   void Fill() const {
-    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) FillLanes(lane);
+    for (std::size_t lane = 0; lane < canvas_.receiver_count; lane += kStep) FillLanes(lane);
   }
 
   void Store(const FarFieldSlopes& slopes, FarPixel* pixels) const {
     const std::size_t count = canvas_.geometry->pixels().size();
     seen_.forEachPixel(size_, [&](std::size_t in_face) HWY_ATTR {
-      StorePixel(in_face, slopes, pixels + first_ + in_face, count);
+      StorePixel(in_face, slopes, pixels + face_ * size_ * size_ + in_face, count);
     });
   }
 
@@ -52,88 +59,88 @@ class FarFace {
   struct alignas(64) Sights {
     float of[3][kSightFloats * kPacketReceivers];
   };
+  using LanesOfAll = std::array<FaceLanes, kPacketReceivers / kStep>;
   static void Copy(const float* lane, FarPixel::Sight& to) { std::memcpy(&to, lane, sizeof(to)); }
-  float* PixelAt(std::size_t in_face) const {
-    return canvas_.pixels + (first_ + in_face) * pixel_floats_;
-  }
-  float* ThicketAt(std::size_t in_face) const {
-    return canvas_.thickets + (first_ + in_face) * kPacketReceivers;
+  // Of one receiver.
+  static float ValueOf(const LanesOfAll& lanes, std::size_t in_face, std::size_t i,
+                       std::size_t channel = 0) {
+    return lanes[i / kStep].at(in_face)[channel * kStep + i % kStep];
   }
 
   void FillLanes(std::size_t lane) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1), least = Splat(1e-20f);
-    const bool has_thickets = canvas_.thickets != nullptr;
-    const SurfaceFill fill(canvas_, lane, seen_, has_thickets);
+    const FaceLanes &pixels = pixels_[lane / kStep], &thickets = thickets_[lane / kStep];
+    const SurfaceFill fill(canvas_, seen_, bool(thickets));
     fill.Run([&](std::size_t i) HWY_ATTR {
-      float* const pixel = PixelAt(i) + lane;
-      const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kPacketReceivers);
+      float* const pixel = pixels.at(i);
+      const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kStep);
       const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
       hn::Store(total, d, pixel);
-      return SurfaceFill::Sight{total, has_thickets ? hn::Load(d, ThicketAt(i) + lane) : zero};
+      return SurfaceFill::Sight{total, thickets ? hn::Load(d, thickets.at(i)) : zero};
     });
     seen_.forEachPixel(size_, [&](std::size_t i) HWY_ATTR {
-      float* const pixel = PixelAt(i) + lane;
+      float* const pixel = pixels.at(i);
       const V total = hn::Load(d, pixel), filled = fill.Coverage(i);
       const V growth =
           hn::IfThenElse(hn::Gt(filled, total), hn::Div(filled, hn::Max(total, least)), one);
       hn::Store(filled, d, pixel);
-      for (std::size_t c = 3 * kPacketReceivers; c < pixel_floats_; c += kPacketReceivers) {
-        hn::Store(hn::Mul(hn::Load(d, pixel + c), growth), d, pixel + c);
+      for (std::size_t c = PacketCanvas::kCoverageChannels; c < channels_; ++c) {
+        hn::Store(hn::Mul(hn::Load(d, pixel + c * kStep), growth), d, pixel + c * kStep);
       }
-      if (!has_thickets) return;
-      float* const thicket = ThicketAt(i) + lane;
+      if (!thickets) return;
+      float* const thicket = thickets.at(i);
       hn::Store(hn::Mul(hn::Load(d, thicket), growth), d, thicket);
     });
   }
 
   void StorePixel(std::size_t in_face, const FarFieldSlopes& slopes, FarPixel* out,
                   std::size_t stride) const {
-    const float* const pixel = PixelAt(in_face);
-    if (IsUncovered(pixel)) {
-      for (std::size_t i = 0; i < kPacketReceivers; ++i) out[i * stride].clear();
+    const std::size_t count = canvas_.receiver_count;
+    if (IsUncovered(in_face)) {
+      for (std::size_t i = 0; i < count; ++i) out[i * stride].clear();
       return;
     }
     Sights sights;
-    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-      has_light_ ? FindSights<4>(pixel, lane, slopes, sights)
-                 : FindSights<1>(pixel, lane, slopes, sights);
+    for (std::size_t lane = 0; lane < count; lane += kStep) {
+      has_light_ ? FindSights<4>(in_face, lane, slopes, sights)
+                 : FindSights<1>(in_face, lane, slopes, sights);
     }
-    const float* const begins = canvas_.begins + (first_ + in_face) * kPacketReceivers;
-    const std::size_t faded_at = pixel_floats_ - kPacketReceivers;
-    for (std::size_t i = 0; i < kPacketReceivers; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       FarPixel& far = out[i * stride];
       Copy(sights.of[0] + kSightFloats * i, far.sight);
       Copy(sights.of[1] + kSightFloats * i, far.along[0]);
       Copy(sights.of[2] + kSightFloats * i, far.along[1]);
-      far.begin = pixel[i] > 0 ? begins[i] : slopes.distance;
-      const float inverse = pixel[i] > 0 ? 1 / pixel[i] : 0;
-      far.thicket = canvas_.thickets != nullptr ? inverse * ThicketAt(in_face)[i] : 0;
-      far.faded = canvas_.rules->fades() ? inverse * pixel[faded_at + i] : 0;
+      const float coverage = ValueOf(pixels_, in_face, i);
+      far.begin = coverage > 0 ? ValueOf(begins_, in_face, i) : slopes.distance;
+      const float inverse = coverage > 0 ? 1 / coverage : 0;
+      far.thicket = thickets_[0] ? inverse * ValueOf(thickets_, in_face, i) : 0;
+      far.faded =
+          canvas_.rules->fades() ? inverse * ValueOf(pixels_, in_face, i, channels_ - 1) : 0;
     }
   }
 
   // Of some lanes; of coverage alone, or of radiosities as well.
   template <std::size_t kChannels>
-  HWY_INLINE static void FindSights(const float* pixel, std::size_t lane,
-                                    const FarFieldSlopes& slopes, Sights& sights) {
+  HWY_INLINE void FindSights(std::size_t in_face, std::size_t lane, const FarFieldSlopes& slopes,
+                             Sights& sights) const {
     const D d;
-    const auto channel = [&](std::size_t c) {
-      return pixel + (c == 0 ? 0 : 2 + c) * kPacketReceivers;
+    const auto channel = [&](std::size_t c, std::size_t i) {
+      return pixels_[i / kStep].at(in_face) + (c == 0 ? 0 : 2 + c) * kStep + i % kStep;
     };
     V sums[2][4] = {{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)},
                     {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
-    for (std::size_t k = 0; k < kPacketReceivers; ++k) {
+    for (std::size_t k = 0; k < canvas_.receiver_count; ++k) {
       const V along_u = hn::Load(d, slopes.of[0][k] + lane);
       const V along_v = hn::Load(d, slopes.of[1][k] + lane);
       for (std::size_t c = 0; c < kChannels; ++c) {
-        const V seen = Splat(channel(c)[k]);
+        const V seen = Splat(*channel(c, k));
         sums[0][c] = hn::MulAdd(seen, along_u, sums[0][c]);
         sums[1][c] = hn::MulAdd(seen, along_v, sums[1][c]);
       }
     }
     V values[4] = {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-    for (std::size_t c = 0; c < kChannels; ++c) values[c] = hn::Load(d, channel(c) + lane);
+    for (std::size_t c = 0; c < kChannels; ++c) values[c] = hn::Load(d, channel(c, lane));
     const auto store = [&](const V* v, std::size_t i) HWY_ATTR {
       hn::StoreInterleaved4(v[0], v[1], v[2], v[3], d, sights.of[i] + kSightFloats * lane);
     };
@@ -142,17 +149,19 @@ class FarFace {
     store(sums[1], 2);
   }
 
-  static bool IsUncovered(const float* pixel) {
-    for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
-      if (!hn::AllTrue(D(), hn::Le(hn::Load(D(), pixel + lane), hn::Zero(D())))) return false;
+  bool IsUncovered(std::size_t in_face) const {
+    for (std::size_t lane = 0; lane < canvas_.receiver_count; lane += kStep) {
+      const V coverage = hn::Load(D(), pixels_[lane / kStep].at(in_face));
+      if (!hn::AllTrue(D(), hn::Le(coverage, hn::Zero(D())))) return false;
     }
     return true;
   }
 
   const PacketCanvas& canvas_;
   const SeenPixels::Face& seen_;
-  const std::size_t size_, pixel_floats_, first_;
+  const std::size_t size_, face_, channels_;
   const bool has_light_;
+  LanesOfAll pixels_, thickets_, begins_;
 };
 
 void FinishFarField(const PacketCanvas& canvas, const FarFieldSlopes& slopes, FarPixel* pixels) {

@@ -21,18 +21,17 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-// The coverages of one face for kStep receivers from `lane` on, in the canvas' scratch space: of
-// the rows that count.
+// The coverages of one face for kStep receivers, in the canvas' scratch space: of the rows that
+// count.
 class SurfaceFill {
  public:
-  SurfaceFill(const PacketCanvas& canvas, std::size_t lane, const SeenPixels::Face& seen,
-              bool has_thickets)
+  SurfaceFill(const PacketCanvas& canvas, const SeenPixels::Face& seen, bool has_thickets)
       : seen_(seen),
         row_begin_(seen.row_begin),
         row_end_(seen.row_end),
         size_(canvas.geometry->resolution()),
         has_thickets_(has_thickets),
-        coverage_(canvas.fill_scratch + lane),
+        coverage_(canvas.fill_scratch),
         rows_(coverage_ + planeFloats()),
         surface_(rows_ + planeFloats()) {}
 
@@ -47,8 +46,8 @@ class SurfaceFill {
         const auto pixel = std::size_t(row * size_ + column);
         Sight sight = {zero, zero};
         if (column >= begin && column < end) sight = look(pixel);
-        hn::Store(sight.coverage, D(), coverage_ + pixel * kPacketReceivers);
-        if (has_thickets_) hn::Store(SurfacePart(sight), D(), surface_ + pixel * kPacketReceivers);
+        hn::Store(sight.coverage, D(), coverage_ + pixel * kStep);
+        if (has_thickets_) hn::Store(SurfacePart(sight), D(), surface_ + pixel * kStep);
       }
     }
     FillRows();
@@ -57,9 +56,7 @@ class SurfaceFill {
   struct Sight {
     V coverage, thicket;
   };
-  V Coverage(std::size_t pixel) const {
-    return hn::Load(D(), coverage_ + pixel * kPacketReceivers);
-  }
+  V Coverage(std::size_t pixel) const { return hn::Load(D(), coverage_ + pixel * kStep); }
 
  private:
   // The part of what covers a pixel that is no thicket.
@@ -75,11 +72,9 @@ class SurfaceFill {
     }
   }
 
-  std::size_t planeFloats() const {
-    return std::size_t(size_) * std::size_t(size_) * kPacketReceivers;
-  }
+  std::size_t planeFloats() const { return std::size_t(size_) * std::size_t(size_) * kStep; }
   float* At(float* values, int row, int column) const {
-    return values + std::size_t(row * size_ + column) * kPacketReceivers;
+    return values + std::size_t(row * size_ + column) * kStep;
   }
 
   // Sums of three neighbours along a row.

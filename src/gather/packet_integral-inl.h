@@ -44,8 +44,7 @@ class Integral {
         rules_(*canvas.rules),
         far_(far),
         lane_(lane),
-        pixel_floats_(PacketCanvas::pixelFloats(rules_)),
-        fade_at_((PacketCanvas::kCoverageChannels + rules_.channels() - 1) * kPacketReceivers),
+        channels_(PacketCanvas::channels(rules_)),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane) {
     for (std::size_t a = 0; a < 2; ++a) {
@@ -65,10 +64,13 @@ class Integral {
     const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
     const bool has_thickets =
         (has_near && canvas_.thickets != nullptr) || (has_far && far_->has_thickets);
-    const SurfaceFill fill(canvas_, lane_, seen, has_thickets);
+    const SurfaceFill fill(canvas_, seen, has_thickets);
+    near_ = FaceLanes(canvas_.pixels, canvas_, face, lane_, channels_);
+    near_thickets_ = FaceLanes(canvas_.thickets, canvas_, face, lane_, 1);
+    far_pixels_ = far_ != nullptr ? far_->pixels + face * canvas_.geometry->facePixels() : nullptr;
     const auto size = std::size_t(canvas_.geometry->resolution());
     const std::size_t first = face * size * size;
-    if (has_near || has_far) ResolveFace(first, has_near, has_far, fill);
+    if (has_near || has_far) ResolveFace(has_near, has_far, fill);
     seen.forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
       const std::size_t i = first + in_face;
       const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
@@ -77,7 +79,7 @@ class Integral {
       weight_sum_ = hn::Add(weight_sum_, weight);
       if (!has_near && !has_far && !has_more) return;
       const PixelSight sight =
-          has_near || has_far ? Resolved(i, fill.Coverage(in_face)) : NothingSeen();
+          has_near || has_far ? Resolved(in_face, fill.Coverage(in_face)) : NothingSeen();
       covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
       radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
       radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
@@ -157,31 +159,35 @@ class Integral {
     return hn::Max(hn::Zero(D()), value);
   }
 
-  PixelSight Look(std::size_t i, bool has_near, bool has_far) const {
+  static V3 LoadRadiosity(const float* pixel) {
+    const D d;
+    return {hn::Load(d, pixel + 3 * kStep), hn::Load(d, pixel + 4 * kStep),
+            hn::Load(d, pixel + 5 * kStep)};
+  }
+  template <typename Float>
+  Float* FadedOf(Float* pixel) const {
+    return pixel + (channels_ - 1) * kStep;
+  }
+
+  PixelSight Look(std::size_t in_face, bool has_near, bool has_far) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
     const bool has_light = rules_.hasLight(), fades = rules_.fades();
     V room = one, layer = zero, end = zero, faded = zero, thicket = zero;
     V3 radiosity = {zero, zero, zero};
     if (has_near) {
-      const float* const near = canvas_.pixels + i * pixel_floats_ + lane_;
+      const float* const near = near_.at(in_face);
       room = hn::Load(d, near);
-      layer = hn::Load(d, near + kPacketReceivers);
-      end = hn::Load(d, near + 2 * kPacketReceivers);
-      if (has_light) {
-        radiosity = {hn::Load(d, near + 3 * kPacketReceivers),
-                     hn::Load(d, near + 4 * kPacketReceivers),
-                     hn::Load(d, near + 5 * kPacketReceivers)};
-      }
-      if (fades) faded = hn::Load(d, near + fade_at_);
-      if (canvas_.thickets != nullptr) {
-        thicket = hn::Load(d, canvas_.thickets + i * kPacketReceivers + lane_);
-      }
+      layer = hn::Load(d, near + kStep);
+      end = hn::Load(d, near + 2 * kStep);
+      if (has_light) radiosity = LoadRadiosity(near);
+      if (fades) faded = hn::Load(d, FadedOf(near));
+      if (near_thickets_) thicket = hn::Load(d, near_thickets_.at(in_face));
     }
     // The far field comes last, as one contribution: a surface that reaches it goes on there, a
     // thicket hides in part behind what reaches it
-    if (has_far && !far_->pixels[i].isEmpty()) {
-      const FarPixel& far = far_->pixels[i];
+    if (has_far && !far_pixels_[in_face].isEmpty()) {
+      const FarPixel& far = far_pixels_[in_face];
       const V amount =
           hn::Min(one, FarValue(far, [](const auto& sight) { return sight.coverage; }));
       const M is_new = hn::Gt(Splat(far.begin), end);
@@ -210,23 +216,23 @@ class Integral {
 
   // Puts what is seen into the pixels of a face: the coverage in the place of the room, radiosities
   // and faded coverage in theirs.
-  void ResolveFace(std::size_t first, bool has_near, bool has_far, const SurfaceFill& fill) {
+  void ResolveFace(bool has_near, bool has_far, const SurfaceFill& fill) {
     fill.Run([&](std::size_t in_face) HWY_ATTR {
-      const PixelSight sight = ResolvePixel(first + in_face, has_near, has_far);
+      const PixelSight sight = ResolvePixel(in_face, has_near, has_far);
       return SurfaceFill::Sight{sight.coverage, sight.thicket};
     });
   }
-  PixelSight ResolvePixel(std::size_t i, bool has_near, bool has_far) {
+  PixelSight ResolvePixel(std::size_t in_face, bool has_near, bool has_far) {
     const D d;
-    const PixelSight sight = Look(i, has_near, has_far);
-    float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
+    const PixelSight sight = Look(in_face, has_near, has_far);
+    float* const pixel = near_.at(in_face);
     hn::Store(sight.coverage, d, pixel);
     if (rules_.hasLight()) {
-      hn::Store(sight.radiosity.x, d, pixel + 3 * kPacketReceivers);
-      hn::Store(sight.radiosity.y, d, pixel + 4 * kPacketReceivers);
-      hn::Store(sight.radiosity.z, d, pixel + 5 * kPacketReceivers);
+      hn::Store(sight.radiosity.x, d, pixel + 3 * kStep);
+      hn::Store(sight.radiosity.y, d, pixel + 4 * kStep);
+      hn::Store(sight.radiosity.z, d, pixel + 5 * kStep);
     }
-    if (rules_.fades()) hn::Store(sight.occlusion, d, pixel + fade_at_);
+    if (rules_.fades()) hn::Store(sight.occlusion, d, FadedOf(pixel));
     return sight;
   }
 
@@ -236,18 +242,18 @@ class Integral {
   }
 
   // What is seen of a pixel that was resolved, once its gaps are filled to `coverage`.
-  PixelSight Resolved(std::size_t i, V coverage) const {
+  PixelSight Resolved(std::size_t in_face, V coverage) const {
     const D d;
-    const float* const pixel = canvas_.pixels + i * pixel_floats_ + lane_;
+    const float* const pixel = near_.at(in_face);
     const V found = hn::Load(d, pixel);
     const V scale = hn::IfThenElse(hn::Gt(coverage, found), hn::Div(coverage, found), Splat(1));
     PixelSight sight = NothingSeen();
     sight.coverage = sight.occlusion = coverage;
-    if (rules_.fades()) sight.occlusion = hn::Mul(scale, hn::Load(d, pixel + fade_at_));
+    if (rules_.fades()) sight.occlusion = hn::Mul(scale, hn::Load(d, FadedOf(pixel)));
     if (rules_.hasLight()) {
-      sight.radiosity = {hn::Mul(scale, hn::Load(d, pixel + 3 * kPacketReceivers)),
-                         hn::Mul(scale, hn::Load(d, pixel + 4 * kPacketReceivers)),
-                         hn::Mul(scale, hn::Load(d, pixel + 5 * kPacketReceivers))};
+      const V3 found_radiosity = LoadRadiosity(pixel);
+      sight.radiosity = {hn::Mul(scale, found_radiosity.x), hn::Mul(scale, found_radiosity.y),
+                         hn::Mul(scale, found_radiosity.z)};
     }
     return sight;
   }
@@ -317,9 +323,11 @@ class Integral {
   const PacketCanvas& canvas_;
   const GatherRules& rules_;
   const SharedFarField* const far_;
-  const std::size_t lane_, pixel_floats_, fade_at_;
+  const std::size_t lane_, channels_;
   const Receivers receivers_;
   const Frames frames_;
+  FaceLanes near_, near_thickets_;        // of the face; the latter if there are any
+  const FarPixel* far_pixels_ = nullptr;  // likewise
   V from_centre_[2];  // where the receivers are, along the axes of the far field
   V weight_sum_, covered_;
   V3 radiosity_;
@@ -331,7 +339,7 @@ void Integrate(const PacketCanvas& canvas, const SharedFarField* far,
                std::span<GatherResult> results) {
   const auto faces = static_cast<std::size_t>(canvas.geometry->faceCount());
   std::array<float, kPacketReceivers> weights;
-  for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+  for (std::size_t lane = 0; lane < results.size(); lane += kStep) {
     Integral integral(canvas, far, lane);
     for (std::size_t face = 0; face < faces; ++face) integral.AddFace(face);
     integral.Store(results, weights);

@@ -8,9 +8,12 @@
 #define SURFEIT_PACKET_KERNEL_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 
 #include "core/spherical_harmonics.h"
 #include "gather/packet_brush-inl.h"
@@ -25,7 +28,7 @@ namespace HWY_NAMESPACE {
 namespace {
 
 HWY_ATTR bool IsSeen(const PacketCanvas& canvas, const Patch& patch) {
-  for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+  for (std::size_t lane = 0; lane < canvas.receiver_count; lane += kStep) {
     const Receivers receivers(*canvas.lanes, lane);
     const Sight sight = See(canvas, patch, receivers);
     if (!hn::AllFalse(D(), hn::Or(sight.traced, SeenAsPatch(patch, receivers, sight)))) return true;
@@ -76,18 +79,27 @@ void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sigh
   }
 }
 
+// Patches are fetched so long before they are drawn: they lie in another order.
+constexpr std::size_t kPatchesAhead = 3;
+
 template <typename Kind>
 void DrawAll(const PacketCanvas& canvas, const Patch* patches,
              std::span<const std::uint64_t> order) {
-  for (std::size_t lane = 0; lane < kPacketReceivers; lane += kStep) {
+  const auto patchOf = [&](std::uint64_t key) { return patches + draw_order::index(key); };
+  for (std::size_t lane = 0; lane < canvas.receiver_count; lane += kStep) {
     Brush<Kind> brush(canvas, lane);
     int face = -1;
-    for (const std::uint64_t key : order) {
-      if (draw_order::face(key) != face) {
-        face = draw_order::face(key);
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const auto* const later = reinterpret_cast<const char*>(
+          patchOf(order[std::min(i + kPatchesAhead, order.size() - 1)]));
+      hwy::Prefetch(later);
+      hwy::Prefetch(later + sizeof(Patch) / 2);
+      if (draw_order::face(order[i]) != face) {
+        face = draw_order::face(order[i]);
         brush.BeginFace(face);
+        (*canvas.is_face_used)[std::size_t(face)] = true;
       }
-      brush.DrawPatch(patches[draw_order::index(key)]);
+      brush.DrawPatch(*patchOf(order[i]));
     }
   }
 }

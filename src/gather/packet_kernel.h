@@ -24,8 +24,9 @@
 
 namespace surfeit {
 
-// A node or surfel of the cut, ready for the lanes.
-struct Patch {
+// A node or surfel of the cut, ready for the lanes. Two lines of a cache: they are drawn in another
+// order than they are made in.
+struct alignas(64) Patch {
   glm::vec3 position{0};
   float radius = 0;
   glm::vec3 normal{0};      // of a node: times its flatness; zero: looks round
@@ -38,7 +39,6 @@ struct Patch {
   float range = 0;
   float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
   Blend blend;                                  // of the opacity
-  bool fades = false;                           // the blend is not whole
   glm::vec3 radiosity{0};
   // It is seen where offset . normal, from the receiver, is below this: kFrontOnly, kBothSides, or
   // kDarkBack, when it is seen from both sides and sends light from its front
@@ -51,11 +51,8 @@ struct Patch {
   static constexpr float kBothSides = std::numeric_limits<float>::infinity();
   static constexpr float kDarkBack = std::numeric_limits<float>::max();
   bool isRound() const { return disk_area == 0; }
-  void setBlend(const Blend& of_opacity) {
-    blend = of_opacity;
-    fades = !blend.isWhole();
-  }
 };
+static_assert(sizeof(Patch) == 128);
 
 // The receivers as columns, one per lane; lanes without a receiver repeat the last one.
 struct alignas(64) PacketLanes {
@@ -87,16 +84,17 @@ struct SeenPixels {
   std::array<Face, RasterGeometry::kFaces> faces;
 };
 
-// Where a packet is drawn: 16 rasters interleaved by pixel. A pixel has 16 lanes each of room,
-// layer and the layer's end (RasterCube::Coverage); with color of red, green and blue; and of the
-// faded coverage, when occlusion fades.
+// Where a packet is drawn: 16 rasters, interleaved by pixel as many at a time as a vector holds
+// (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage); with color red,
+// green and blue; and the faded coverage, when occlusion fades.
 struct PacketCanvas {
   static constexpr std::size_t kCoverageChannels = 3, kColorChannels = 3;
-  static std::size_t pixelFloats(const GatherRules& rules) {
-    return (kCoverageChannels + rules.channels()) * kPacketReceivers;
+  static std::size_t channels(const GatherRules& rules) {
+    return kCoverageChannels + rules.channels();
   }
 
   const PacketLanes* lanes;
+  std::size_t receiver_count;  // vectors of lanes without any are left out
   const GatherRules* rules;
   const RasterGeometry* geometry;
   const DirectionWeights* weights;
@@ -106,12 +104,12 @@ struct PacketCanvas {
   glm::vec3 centre;       // of the packet
   float packet_radius;
   float* pixels;  // aligned to 64 bytes
-  // What thickets have of the coverage, 16 lanes of a pixel, aligned likewise; null when there are
-  // none among what is drawn.
+  // What thickets have of the coverage, aligned likewise; null when there are none among what is
+  // drawn.
   float* thickets;
   // How far away what is first in a pixel begins, aligned likewise; null when nobody asks.
   float* begins;
-  // Room for three values per pixel of a face and lane, aligned likewise.
+  // Room for three values per pixel of a face and lane of a vector, aligned likewise.
   float* fill_scratch;
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;

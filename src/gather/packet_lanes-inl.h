@@ -32,6 +32,27 @@ inline V LoadLanes(const std::array<float, kPacketReceivers>& column, std::size_
   return hn::Load(D(), column.data() + lane);
 }
 
+// Values of the pixels of a face, for the kStep receivers from `lane` on, which lie together: all
+// pixels of these, then all of the next. What one vector draws fits the fastest cache so, as far as
+// it is seen. `channels`: values of a pixel and receiver.
+class FaceLanes {
+ public:
+  FaceLanes() = default;
+  FaceLanes(float* values, const PacketCanvas& canvas, std::size_t face, std::size_t lane,
+            std::size_t channels)
+      : values_(values == nullptr ? nullptr
+                                  : values + (face * kPacketReceivers + lane) * channels *
+                                                 canvas.geometry->facePixels()),
+        pixel_floats_(channels * kStep) {}
+  explicit operator bool() const { return values_ != nullptr; }
+  // Of a pixel of the face; kStep of a channel, then of the next.
+  float* at(std::size_t pixel) const { return values_ + pixel * pixel_floats_; }
+
+ private:
+  float* values_ = nullptr;
+  std::size_t pixel_floats_ = 0;
+};
+
 // One step of Newton's method on the machine's estimate: 22 bits or more everywhere.
 inline V Reciprocal(V x) {
   const V estimate = hn::ApproximateReciprocal(x);

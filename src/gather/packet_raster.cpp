@@ -62,8 +62,8 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
                            : std::numeric_limits<float>::infinity()),
       geometry_(rasterGeometry(rules)),
       weights_(rules, 1 / geometry_.pixelsPerSlope()),
-      pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() *
-                                          PacketCanvas::pixelFloats(rules_))),
+      pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers *
+                                          PacketCanvas::channels(rules_))),
       thickets_(hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers)),
       fill_scratch_(hwy::AllocateAligned<float>(fillFloats(rules_))) {
   if (pixels_ == nullptr || thickets_ == nullptr || fill_scratch_ == nullptr)
@@ -77,6 +77,7 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
                          float horizon_slack) {
   SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kPacketReceivers);
   view_ = view;
+  receiver_count_ = receivers.size();
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
     const Receiver& receiver = receivers[std::min(i, receivers.size() - 1)];
     lanes_.x[i] = receiver.position.x;
@@ -195,7 +196,7 @@ void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
     if (!facet.is_two_sided) patch.radiosity *= facing.front / patch.round_area;
     patch.facing_limit = Patch::kBothSides;
   }
-  patch.setBlend(blend);
+  patch.blend = blend;
   orderLastPatch();
 }
 
@@ -220,7 +221,7 @@ void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   patch.round_area = cover.area;
   patch.most_area = cover.most;
   patch.opacity = cover.opacity;
-  patch.setBlend(blend);
+  patch.blend = blend;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
@@ -260,7 +261,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
         std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
     if (kernel_.isSeen(canvas, patch)) {
       has_thickets_ |= patch.thicket > 0;
-      patch.setBlend(blend);
+      patch.blend = blend;
       orderLastPatch();
     } else {
       patches_.pop_back();
@@ -270,6 +271,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
 
 PacketCanvas PacketRaster::canvas() const {
   return {.lanes = &lanes_,
+          .receiver_count = receiver_count_,
           .rules = &rules_,
           .geometry = &geometry_,
           .weights = &weights_,
@@ -309,7 +311,7 @@ void PacketRaster::integrate(std::span<GatherResult> results, const SharedFarFie
 std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
   const std::size_t pixel_bytes =
       sizeof(RasterGeometry::Pixel) +
-      (PacketCanvas::pixelFloats(rules) + kPacketReceivers) * sizeof(float);
+      (PacketCanvas::channels(rules) + 1) * kPacketReceivers * sizeof(float);
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
          fillFloats(rules) * sizeof(float) + kReservedPatches * sizeof(Patch) +

@@ -86,6 +86,7 @@ class PacketRaster {
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;
+  std::size_t receiver_count_ = 0;
   SeenPixels seen_;
   PacketView view_;
   std::vector<Patch> patches_;

@@ -46,6 +46,7 @@ class RasterGeometry {
 
   int resolution() const { return resolution_; }
   int faceCount() const { return face_count_; }
+  std::size_t facePixels() const { return std::size_t(resolution_) * std::size_t(resolution_); }
   // Pixels along a face for a slope (u or v) of 1.
   float pixelsPerSlope() const { return 0.5f * float(resolution_) / largest_slope_; }
   std::span<const Pixel> pixels() const { return pixels_; }

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <random>
@@ -135,20 +137,23 @@ Differences differences(const std::vector<GatherResult>& a, const std::vector<Ga
 // Most of the scene is shared.
 TEST(PacketGatherer, SharingTheFarFieldChangesLittleButSomething) {
   Scene scene(mixedCloud());
-  const std::vector<Receiver> receivers = denseReceivers();
+  const std::vector<Receiver> dense = denseReceivers();
   GatherQuality quality;
   quality.far_field_parallax = 0;
-  PacketGatherer alone(GatherMode::kBleeding, quality);
-  const std::vector<GatherResult> expected = gatherPacket(alone, scene, receivers);
-  EXPECT_EQ(alone.work().shared_patches, 0u);
-  PacketGatherer sharing(GatherMode::kBleeding, GatherQuality());
-  const std::vector<GatherResult> results = gatherPacket(sharing, scene, receivers);
-  EXPECT_GT(sharing.work().shared_patches, 0u);
-  EXPECT_LT(sharing.work().patches, alone.work().patches / 2);
-  const Differences found = differences(results, expected);
-  EXPECT_GT(found.rms, 0);
-  EXPECT_LT(found.rms, .005);
-  EXPECT_LT(found.largest, .02);
+  PacketGatherer alone(GatherMode::kBleeding, quality), sharing(GatherMode::kBleeding, {});
+  for (const std::size_t count : {dense.size(), std::size_t{5 * kPacketReceivers}}) {
+    const std::vector<Receiver> receivers(dense.begin(), dense.begin() + std::ptrdiff_t(count));
+    const std::uint64_t before = alone.work().patches, shared_before = sharing.work().patches;
+    const std::vector<GatherResult> expected = gatherPacket(alone, scene, receivers);
+    EXPECT_EQ(alone.work().shared_patches, 0u);
+    const std::vector<GatherResult> results = gatherPacket(sharing, scene, receivers);
+    EXPECT_GT(sharing.work().shared_patches, 0u);
+    EXPECT_LT(sharing.work().patches - shared_before, (alone.work().patches - before) / 2);
+    const Differences found = differences(results, expected);
+    EXPECT_GT(found.rms, 0) << count;
+    EXPECT_LT(found.rms, .005) << count;
+    EXPECT_LT(found.largest, .02) << count;
+  }
 }
 
 // What is near to any receiver of a packet is opened for all: scattered ones are better off in less

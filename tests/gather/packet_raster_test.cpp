@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
 #include <vector>
 
 #include "gather/receiver_raster.h"
@@ -63,6 +65,36 @@ TEST(PacketRaster, EveryReceiverSeesItsOwnPartOfWhatIsBent) {
     }
     EXPECT_EQ(least, 0);
     EXPECT_GT(most, .005f);
+  }
+}
+
+// Lanes without receivers are left out, whole vectors of them, and hold what was drawn before.
+TEST(PacketRaster, FewReceiversSeeTheSameAsInAFullPacket) {
+  const Node node = bentNode();
+  std::vector<Receiver> receivers = receiversAlongTheRim();
+  std::reverse(receivers.begin(), receivers.end());
+  const PacketView view = viewPacket(receivers);
+  const GatherRules rules(GatherMode::kBleeding, {});
+  for (const PacketKernel& kernel : packetKernels()) {
+    PacketRaster packet(rules, kernel);
+    const auto gather = [&](std::size_t count) {
+      packet.begin(std::span(receivers).first(count), view);
+      packet.addNode(node);
+      packet.sort();
+      packet.draw();
+      std::vector<GatherResult> results(count);
+      packet.integrate(results);
+      return results;
+    };
+    const std::vector<GatherResult> all = gather(receivers.size());
+    EXPECT_GT(all[0].occlusion, 0);
+    for (const std::size_t count : {1, 4, 5, 8, 9, 15}) {
+      const std::vector<GatherResult> few = gather(count);
+      for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_EQ(few[i].occlusion, all[i].occlusion) << kernel.name << ' ' << count << ' ' << i;
+        EXPECT_EQ(few[i].irradiance, all[i].irradiance) << kernel.name << ' ' << count << ' ' << i;
+      }
+    }
   }
 }
 
