@@ -93,6 +93,7 @@ class Bouncer {
   Status checkScene() const;
   Status checkMemory() const;
   std::uint64_t bytesBesideGather() const;
+  std::uint64_t laterGrowthBytes() const;
   GatherWork gatherWork() const;
   Status gather(int bounce, SceneFile before, BounceRadiosity& radiosity, BouncePass& pass);
   Result<SceneFile> write(int bounce, BounceRadiosity& radiosity, BouncePass& pass);
@@ -188,20 +189,26 @@ GatherWork Bouncer::gatherWork() const {
 std::uint64_t Bouncer::bytesBesideGather() const {
   const auto threads = static_cast<std::uint64_t>(gather_options_.threads);
   const std::uint64_t directory = scene_->pages().pageCount() * sizeof(PageEntry);
-  // Pages of another bounce may be a little larger, stored and decompressed: colors where there
-  // were none, of surfels or of nodes and their facets
-  const SceneHeader& header = scene_->header();
-  const std::uint64_t most_colors = std::max<std::uint64_t>(
-      header.surfel_group_capacity, std::uint64_t{header.node_group_capacity} * (1 + kMostFacets));
-  const std::uint64_t page_growth = 2 * most_colors * sizeof(glm::vec3);
   return 2 * directory + BounceRadiosity::memoryBytes(scene_->surfelPageCount()) +
-         threads * (BounceCrew::threadBytes(*scene_, options_.surfels_per_receiver) + page_growth) +
+         threads * BounceCrew::threadBytes(*scene_, options_.surfels_per_receiver) +
          BlockWriter::kDefaultBlocks * BlockWriter::kBlockBytes +
          rewriteRadiosityBytes(*scene_, gather_options_.threads);
 }
 
+// What a gather of a later bounce may take more than one of the scene: pages may be a little
+// larger, stored and decompressed, by colors where there were none, of surfels or of nodes and
+// their facets.
+std::uint64_t Bouncer::laterGrowthBytes() const {
+  if (options_.bounces == 1) return 0;
+  const SceneHeader& header = scene_->header();
+  const std::uint64_t most_colors = std::max<std::uint64_t>(
+      header.surfel_group_capacity, std::uint64_t{header.node_group_capacity} * (1 + kMostFacets));
+  return static_cast<std::uint64_t>(gather_options_.threads) * 2 * most_colors * sizeof(glm::vec3);
+}
+
 Status Bouncer::checkMemory() const {
-  const std::uint64_t least = leastGatherMemory(*scene_, gatherWork()) + bytesBesideGather();
+  const std::uint64_t least =
+      leastGatherMemory(*scene_, gatherWork()) + bytesBesideGather() + laterGrowthBytes();
   if (gather_options_.memory_bytes >= least) return {};
   return Status::budgetTooSmall(fmt::format(
       "a memory budget of {:.1f} MiB is too small for {} with {} {}: {} is the least that works",

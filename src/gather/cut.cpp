@@ -11,6 +11,8 @@
 // Highway's own headers come after
 #include <hwy/highway.h>
 
+#include "gather/vectors_of_3-inl.h"
+
 #ifndef SURFEIT_CUT_CONSTANTS
 #define SURFEIT_CUT_CONSTANTS
 namespace surfeit {
@@ -53,6 +55,7 @@ float fadingSlope(const CutRules& rules) { return 1 / std::max(2 * rules.fading,
 float mostFadingSpread(const CutRules& rules) { return rules.fading > 0 ? kMostFadingSpread : 0; }
 // What looks smaller or larger than these parts of what it may fades for nobody.
 constexpr float kLeastFading = 0.8f, kMostFading = 1.25f;
+static_assert(1 - kFading > kLeastFading && 1 + kFading < kMostFading);
 
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 
@@ -95,15 +98,7 @@ using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 V Splat(float value) { return hn::Set(D(), value); }
 
-struct V3 {
-  V x, y, z;
-};
-V Dot(const V3& a, const V3& b) {
-  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-V Dot(const V3& a, const glm::vec3& b) {
-  return hn::MulAdd(a.x, Splat(b.x), hn::MulAdd(a.y, Splat(b.y), hn::Mul(a.z, Splat(b.z))));
-}
+using V3 = VectorsOf3<V>;
 
 // Some of the siblings.
 struct Nodes {

@@ -145,9 +145,10 @@ class CutWalk {
   Status walk(const PacketView& view, const CutRegion& region, Reader& octree, Visit&& visit) {
     nodes_visited_ = surfels_visited_ = 0;
     std::size_t stack_count = 0;
-    stack_[stack_count++] = {kRootRange, {}, false};
+    stack_[stack_count++] = {kRootRange, {}};
     while (stack_count > 0) {
-      const auto [range, blend, fades] = stack_[--stack_count];
+      const auto [range, blend] = stack_[--stack_count];
+      const bool fades = !blend.isWhole();
       SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings, octree.nodes(range));
       nodes_visited_ += siblings.size();
       SURFEIT_RETURN_IF_ERROR(octree.checkVisits(nodes_visited_, surfels_visited_));
@@ -169,7 +170,7 @@ class CutWalk {
             visitSeen(run, below, visit);
           }));
         } else if (stack_count < kStackSize) {
-          stack_[stack_count++] = {childrenOf(node), below, !below.isWhole()};
+          stack_[stack_count++] = {childrenOf(node), below};
         } else {
           return Status::corruption("octree: deeper than its curve has levels");
         }
@@ -208,7 +209,6 @@ class CutWalk {
   struct Siblings {
     NodeRange range;
     Blend blend;
-    bool fades;
   };
   std::array<Siblings, kStackSize> stack_;
   std::uint64_t nodes_visited_ = 0, surfels_visited_ = 0;

@@ -14,6 +14,7 @@
 
 #include "gather/coverage_rules.h"
 #include "gather/packet_kernel.h"
+#include "gather/vectors_of_3-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {
@@ -64,15 +65,7 @@ inline V InverseSqrt(V x) {
   return hn::Mul(estimate, hn::NegMulAdd(hn::Mul(half, estimate), estimate, Splat(1.5f)));
 }
 
-struct V3 {
-  V x, y, z;
-};
-inline V Dot(const V3& a, const V3& b) {
-  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-inline V Dot(const V3& a, const glm::vec3& b) {
-  return hn::MulAdd(a.x, Splat(b.x), hn::MulAdd(a.y, Splat(b.y), hn::Mul(a.z, Splat(b.z))));
-}
+using V3 = VectorsOf3<V>;
 inline V Axis(const V3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 inline V Axis(const glm::vec3& v, int axis) { return Splat(v[axis]); }
 

@@ -10,8 +10,6 @@
 #include <memory>
 #include <mutex>
 #include <span>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -201,9 +199,12 @@ Status Sampling::followPieces(const Pieces& stretches, const Pieces& spread, dou
   std::mutex misses_mutex;
   std::atomic<std::uint64_t> next_stretch{0};
   FirstFailure failure;
-  const auto work = [&](bool takes_spread) -> Status {
+  std::atomic<bool> spread_is_taken{false};
+  const auto work = [&]() -> Status {
     LookUpTrace trace(*octree_, GatherRules(options_, nullptr), threads_, progress_);
-    if (takes_spread) SURFEIT_RETURN_IF_ERROR(trace.follow(spread.all(), every, &second));
+    if (!spread_is_taken.exchange(true)) {
+      SURFEIT_RETURN_IF_ERROR(trace.follow(spread.all(), every, &second));
+    }
     StretchMisses node_part, surfel_part;
     while (!failure.happened()) {
       const std::uint64_t i = next_stretch++;
@@ -215,19 +216,7 @@ Status Sampling::followPieces(const Pieces& stretches, const Pieces& spread, dou
     surfel_misses.add(surfel_part);
     return {};
   };
-  const auto guarded = [&](bool takes_spread) {
-    failure.note(catchAll("sample", [&] { return work(takes_spread); }));
-  };
-  {
-    std::vector<std::jthread> threads;
-    try {
-      for (int i = 1; i < threads_; ++i) threads.emplace_back(guarded, false);
-    } catch (const std::system_error&) {
-      // Fewer do as well
-    }
-    guarded(true);
-  }
-  SURFEIT_RETURN_IF_ERROR(failure.status());
+  SURFEIT_RETURN_IF_ERROR(runOnThreads(threads_, failure, "sample", work));
 
   const auto whole = [&](const StretchMisses& misses, const ReuseDistances& of_every,
                          std::uint64_t every_requests, const ReuseDistances& of_second,

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cstring>
-#include <new>
 #include <system_error>
 #include <utility>
 
 #include "core/assert.h"
+#include "core/worker_threads.h"
 
 namespace surfeit {
 
@@ -97,7 +97,9 @@ void BlockWriter::writeNext(std::unique_lock<std::mutex>& lock) {
   if (failure_.ok()) {
     is_writing_ = true;
     lock.unlock();
-    Status status = write(full);
+    Status status = catchAll("write", [&] {
+      return file_.writeAligned(full.offset, {full.block.data(), kBlockBytes});
+    });
     lock.lock();
     is_writing_ = false;
     if (!status.ok()) {
@@ -107,14 +109,6 @@ void BlockWriter::writeNext(std::unique_lock<std::mutex>& lock) {
   }
   free_blocks_.push_back(std::move(full.block));
   block_written_.notify_all();
-}
-
-Status BlockWriter::write(const FullBlock& full) const noexcept {
-  try {
-    return file_.writeAligned(full.offset, {full.block.data(), kBlockBytes});
-  } catch (const std::bad_alloc&) {
-    return Status::failed("out of memory");  // so short a text takes none
-  }
 }
 
 Status BlockWriter::drainQueue() {

@@ -60,7 +60,6 @@ class BlockWriter {
   void startThread();
   void runThread();
   void writeNext(std::unique_lock<std::mutex>& lock);
-  Status write(const FullBlock& full) const noexcept;
   Status drainQueue();
   Status failure();
   Status fail(Status status);

@@ -375,6 +375,27 @@ TEST_F(BounceTest, ThreadsAndBudgetDoNotChangeTheBytes) {
   }
 }
 
+// Pages of later bounces have more colors than those of the scene: what may be too little for them
+// is refused before any work. Budgets closer to each other than pages grow.
+TEST_F(BounceTest, ABudgetThatIsAcceptedIsEnoughForLaterBounces) {
+  const std::string scene = index(furnishedRoom(40), "room.sft");
+  BounceOptions options = optionsFor(2, 8);
+  options.quality.max_solid_angle = 1;
+  options.quality.raster_resolution = 2;
+  options.surfels_per_receiver = 16;
+  options.memory_bytes = 1;
+  const std::string refused = bounce(scene, "refused.sft", options).status().message();
+  const std::size_t end = refused.find(" MiB is the least that works");
+  ASSERT_NE(end, std::string::npos) << refused;
+  const double least = std::stod(refused.substr(refused.rfind(' ', end - 1) + 1));
+  options.memory_bytes = static_cast<std::uint64_t>(least * (1 << 20)) + 1;
+  Result<BounceStats> result = bounce(scene, "bounced.sft", options);
+  EXPECT_TRUE(result.ok()) << result.status().message();
+  for (; result.ok(); result = bounce(scene, "bounced.sft", options)) options.memory_bytes -= 4096;
+  EXPECT_EQ(result.status().code(), StatusCode::kBudgetTooSmall);
+  EXPECT_NE(result.status().message().find(scene), std::string::npos) << result.status().message();
+}
+
 // So that bounces before the last, which are stored on the way, are as exact as the last.
 TEST_F(BounceTest, TemporaryFilesGoWhereTheyAreWanted) {
   const std::string scene = index(furnishedRoom(), "room.sft");
