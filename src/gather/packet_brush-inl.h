@@ -278,25 +278,11 @@ class Brush {
 
   // As RasterCube::traceDisk and traceSphere.
   void Trace(const Patch& patch, const Sight& sight) {
-    const V3 to_centre = {hn::NegMulAdd(sight.bias, receivers_.normal.x, sight.offset.x),
-                          hn::NegMulAdd(sight.bias, receivers_.normal.y, sight.offset.y),
-                          hn::NegMulAdd(sight.bias, receivers_.normal.z, sight.offset.z)};
+    const V3 to_centre = RayStartTo(sight, receivers_);
     Sight from_ray = sight;
     from_ray.facing = Dot(to_centre, patch.normal);
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
              MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq)));
-  }
-
-  // Half of the side along an axis of the box around the disk.
-  static V HalfSide(const Patch& patch, const V3& normal, int axis) {
-    if (patch.isRound()) return Splat(patch.radius);
-    const V n = Axis(normal, axis);
-    return hn::Mul(Splat(patch.radius),
-                   hn::Sqrt(hn::Max(hn::Zero(D()), hn::NegMulAdd(n, n, Splat(1)))));
-  }
-  static V HalfSide(const Patch& patch, const glm::vec3& normal, int axis) {
-    if (patch.isRound()) return Splat(patch.radius);
-    return Splat(patch.radius * std::sqrt(std::max(0.f, 1 - normal[axis] * normal[axis])));
   }
 
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,

@@ -27,13 +27,60 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-HWY_ATTR bool IsSeen(const PacketCanvas& canvas, const Patch& patch) {
+HWY_ATTR bool IsAbove(const PacketLanes& lanes, std::size_t receiver_count,
+                      const glm::vec3& position) {
+  for (std::size_t lane = 0; lane < receiver_count; lane += kStep) {
+    const Receivers receivers(lanes, lane);
+    const V height = Dot(receivers.To(position), receivers.normal);
+    if (!hn::AllFalse(D(), receivers.SeeAt(height))) return true;
+  }
+  return false;
+}
+
+// The faces that boxes with these half sides around these centres reach, in lanes of `seen`.
+std::uint32_t FacesThatReach(const V3& centre, const V3& half, M seen) {
+  const D d;
+  const V3 far = {hn::Add(hn::Abs(centre.x), half.x), hn::Add(hn::Abs(centre.y), half.y),
+                  hn::Add(hn::Abs(centre.z), half.z)};
+  const V3 near = {hn::Sub(hn::Abs(centre.x), half.x), hn::Sub(hn::Abs(centre.y), half.y),
+                   hn::Sub(hn::Abs(centre.z), half.z)};
+  std::uint32_t faces = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const V c = Axis(centre, axis), h = Axis(half, axis);
+    const M wide = hn::And(seen, hn::Ge(Axis(far, axis), hn::Max(Axis(near, u), Axis(near, v))));
+    const M before = hn::And(wide, hn::Ge(hn::Add(c, h), hn::Zero(d)));
+    const M behind = hn::And(wide, hn::Ge(h, c));
+    faces |= (hn::AllFalse(d, before) ? 0u : 1u) << 2 * axis;
+    faces |= (hn::AllFalse(d, behind) ? 0u : 1u) << (2 * axis + 1);
+  }
+  return faces;
+}
+
+HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& patch) {
+  const D d;
+  std::uint32_t faces = 0;
   for (std::size_t lane = 0; lane < canvas.receiver_count; lane += kStep) {
     const Receivers receivers(*canvas.lanes, lane);
     const Sight sight = See(canvas, patch, receivers);
-    if (!hn::AllFalse(D(), hn::Or(sight.traced, SeenAsPatch(patch, receivers, sight)))) return true;
+    const M splatted = SeenAsPatch(patch, receivers, sight);
+    if (hn::AllFalse(d, hn::Or(splatted, sight.traced))) continue;
+    if (canvas.rules->hasConeRaster()) return 1;
+    if (!hn::AllFalse(d, sight.traced)) {
+      const V3 half = {HalfSide(patch, patch.normal, 0), HalfSide(patch, patch.normal, 1),
+                       HalfSide(patch, patch.normal, 2)};
+      faces |= FacesThatReach(RayStartTo(sight, receivers), half, sight.traced);
+    }
+    if (!hn::AllFalse(d, splatted)) {
+      const V largest = hn::Max(hn::Abs(sight.offset.x),
+                                hn::Max(hn::Abs(sight.offset.y), hn::Abs(sight.offset.z)));
+      const V shift =
+          hn::Min(hn::Div(Splat(0.5f * patch.area), largest), hn::Mul(Splat(0.5f), largest));
+      const V reach = hn::Add(Splat(0.5f * kSplatReach * std::sqrt(patch.most_area)), shift);
+      faces |= FacesThatReach(sight.offset, {reach, reach, reach}, splatted);
+    }
   }
-  return false;
+  return faces;
 }
 
 // All four kinds of coefficients at once, and band 4 of the area.

@@ -16,7 +16,8 @@ namespace HWY_NAMESPACE {
 PacketKernel Kernel() {
   return {.name = hwy::TargetName(HWY_TARGET),
           .findSeenPixels = FindSeenPixels,
-          .isSeen = IsSeen,
+          .isAbove = IsAbove,
+          .facesThatSee = FacesThatSee,
           .seeRoughNode = SeeRoughNode,
           .draw = Draw,
           .finishFarField = FinishFarField,

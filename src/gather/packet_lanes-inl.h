@@ -9,7 +9,9 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/vec3.hpp>
 
 #include "gather/coverage_rules.h"
@@ -107,6 +109,13 @@ struct Receivers {
         normal{LoadLanes(lanes.normal_x, lane), LoadLanes(lanes.normal_y, lane),
                LoadLanes(lanes.normal_z, lane)},
         spherical(hn::Gt(LoadLanes(lanes.spherical, lane), hn::Zero(D()))) {}
+
+  V3 To(const glm::vec3& place) const {
+    return {hn::Sub(Splat(place.x), position.x), hn::Sub(Splat(place.y), position.y),
+            hn::Sub(Splat(place.z), position.z)};
+  }
+  // Those that see what is this high above their horizons.
+  M SeeAt(V height) const { return hn::Or(spherical, hn::Gt(height, hn::Zero(D()))); }
 };
 
 // A patch as some of the receivers see it.
@@ -124,9 +133,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
   Sight sight;
-  sight.offset = {hn::Sub(Splat(patch.position.x), receivers.position.x),
-                  hn::Sub(Splat(patch.position.y), receivers.position.y),
-                  hn::Sub(Splat(patch.position.z), receivers.position.z)};
+  sight.offset = receivers.To(patch.position);
   sight.distance_sq = Dot(sight.offset, sight.offset);
   sight.height = Dot(sight.offset, receivers.normal);
   sight.facing = Dot(sight.offset, patch.normal);
@@ -175,9 +182,28 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 
 // Lanes to which the patch is a patch of solid angle: the mid or the far field.
 HWY_INLINE M SeenAsPatch(const Patch& patch, const Receivers& receivers, const Sight& sight) {
-  const M above = hn::Or(receivers.spherical, hn::Gt(sight.height, hn::Zero(D())));
   const M faces = hn::Lt(sight.facing, Splat(patch.facing_limit));
-  return hn::And(hn::AndNot(sight.is_near, sight.in_reach), hn::And(above, faces));
+  return hn::And(hn::AndNot(sight.is_near, sight.in_reach),
+                 hn::And(receivers.SeeAt(sight.height), faces));
+}
+
+// From where the rays begin.
+HWY_INLINE V3 RayStartTo(const Sight& sight, const Receivers& receivers) {
+  return {hn::NegMulAdd(sight.bias, receivers.normal.x, sight.offset.x),
+          hn::NegMulAdd(sight.bias, receivers.normal.y, sight.offset.y),
+          hn::NegMulAdd(sight.bias, receivers.normal.z, sight.offset.z)};
+}
+
+// Half of the side along an axis of the box around the disk.
+inline V HalfSide(const Patch& patch, const V3& normal, int axis) {
+  if (patch.isRound()) return Splat(patch.radius);
+  const V n = Axis(normal, axis);
+  return hn::Mul(Splat(patch.radius),
+                 hn::Sqrt(hn::Max(hn::Zero(D()), hn::NegMulAdd(n, n, Splat(1)))));
+}
+inline V HalfSide(const Patch& patch, const glm::vec3& normal, int axis) {
+  if (patch.isRound()) return Splat(patch.radius);
+  return Splat(patch.radius * std::sqrt(std::max(0.f, 1 - normal[axis] * normal[axis])));
 }
 
 }  // namespace

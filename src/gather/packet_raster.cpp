@@ -15,9 +15,6 @@
 namespace surfeit {
 namespace {
 
-// How far from its middle a patch may be drawn, in halves of its side: at the edge of a face, where
-// it matters, everything shows larger by the root of 2, and sides need not be equal.
-constexpr float kReach = 1.8f;
 // Of thickets, in radii of the node: with outlines as long as the node, and a sheared image.
 constexpr float kThicketExtent = 1.5f;
 constexpr float kDiagonal = 1.415f;
@@ -95,48 +92,51 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
     }
   }
   kernel_.findSeenPixels(canvas(), horizon_slack, seen_);
+  seen_faces_ = 0;
+  for (std::size_t i = 0; i < RasterGeometry::kFaces; ++i) {
+    seen_faces_ |= (seen_.faces[i].isEmpty() ? 0u : 1u) << i;
+  }
   is_face_used_.fill(false);
   patches_.clear();
   has_thickets_ = false;
   order_count_ = 0;
 }
 
-// Puts the last patch in the order of every face that some receiver may see some of it on.
-void PacketRaster::orderLastPatch() {
-  SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
-  const auto index = static_cast<std::uint32_t>(patches_.size() - 1);
-  const Patch& patch = patches_.back();
+// The faces that some receiver may see some of a node's patch on, as bits.
+std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
+  if (rules_.hasConeRaster()) return 1;
   const glm::vec3 middle = patch.position - view_.centre;
-  const float distance_sq = glm::dot(middle, middle);
-  if (rules_.hasConeRaster()) {
-    order_[order_count_++] = draw_order::key(0, distance_sq, index);
-    if (order_count_ == order_.size()) order_.resize(2 * order_.size());
-    return;
-  }
   const glm::vec3 size = glm::abs(middle);
   const float largest = std::max({size.x, size.y, size.z});
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
   // Thickets fill their outlines however long these are
-  const float least = patch.near_distance > 0                ? patch.radius
-                      : patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius
-                                                             : 0;
+  const float least = patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius : 0;
   const float half = std::max(0.5f * side, least);
   const float shift = std::min(patch.area / (2 * largest), largest / 2);
-  const float reach = kReach * half + shift + kDiagonal * view_.radius;
+  const float reach = kSplatReach * half + shift + kDiagonal * view_.radius;
 
-  // Written in any case and counted if wanted: no branch to be guessed wrong
-  if (order_.size() < order_count_ + RasterGeometry::kFaces) order_.resize(2 * order_.size());
-  std::uint64_t* const order = order_.data();
-  std::size_t count = order_count_;
+  std::uint32_t faces = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const bool is_wide = size[axis] + reach >= largest;
-    const SeenPixels::Face* const faces = &seen_.faces[std::size_t(2 * axis)];
-    order[count] = draw_order::key(2 * axis, distance_sq, index);
-    count += (is_wide & !faces[0].isEmpty() & (middle[axis] + reach >= 0)) ? 1 : 0;
-    order[count] = draw_order::key(2 * axis + 1, distance_sq, index);
-    count += (is_wide & !faces[1].isEmpty() & (reach - middle[axis] >= 0)) ? 1 : 0;
+    const auto bit = [&](bool is_before, int face) {
+      const bool is_wide = size[axis] + reach >= largest;
+      return static_cast<std::uint32_t>(is_wide & is_before) << face;  // no branch to be guessed
+    };
+    faces |= bit(middle[axis] + reach >= 0, 2 * axis);
+    faces |= bit(reach - middle[axis] >= 0, 2 * axis + 1);
   }
-  order_count_ = count;
+  return faces;
+}
+
+// Puts the last patch in the order of faces.
+void PacketRaster::orderLastPatch(std::uint32_t faces) {
+  SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
+  const auto index = static_cast<std::uint32_t>(patches_.size() - 1);
+  const glm::vec3 middle = patches_.back().position - view_.centre;
+  const float distance_sq = glm::dot(middle, middle);
+  if (order_.size() < order_count_ + RasterGeometry::kFaces) order_.resize(2 * order_.size());
+  for (faces &= seen_faces_; faces != 0; faces &= faces - 1) {
+    order_[order_count_++] = draw_order::key(std::countr_zero(faces), distance_sq, index);
+  }
 }
 
 void PacketRaster::addNode(const Node& node, const Blend& blend) {
@@ -160,6 +160,7 @@ bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal)
 }
 
 void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
+  if (!kernel_.isAbove(lanes_, receiver_count_, facet.position)) return;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - view_.centre;
   const float distance = glm::length(to_facet);
@@ -197,7 +198,7 @@ void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
     patch.facing_limit = Patch::kBothSides;
   }
   patch.blend = blend;
-  orderLastPatch();
+  orderLastPatch(facesThatSee(patch));
 }
 
 void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
@@ -208,6 +209,7 @@ void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   const float round_area = shownArea(seen.facing, sides);
   if (!(round_area > kLeastVisiblePart * node.area)) return;
   const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
+  if (!kernel_.isAbove(lanes_, receiver_count_, node.position + visible.middle)) return;
   Patch& patch = patches_.emplace_back();
   patch.position = node.position + visible.middle;
   patch.radius = node.radius;
@@ -229,7 +231,7 @@ void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   patch.overlap = std::max(patch.overlap, patch.thicket);
   has_thickets_ |= patch.thicket > 0;
   patch.facing_limit = Patch::kBothSides;
-  orderLastPatch();
+  orderLastPatch(facesThatSee(patch));
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region,
@@ -259,10 +261,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =
         std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
-    if (kernel_.isSeen(canvas, patch)) {
+    const std::uint32_t faces = kernel_.facesThatSee(canvas, patch) & seen_faces_;
+    if (faces != 0) {
       has_thickets_ |= patch.thicket > 0;
       patch.blend = blend;
-      orderLastPatch();
+      orderLastPatch(faces);
     } else {
       patches_.pop_back();
     }

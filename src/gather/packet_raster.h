@@ -73,7 +73,8 @@ class PacketRaster {
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   void addFacet(const Facet& facet, const Blend& blend);
   void addRoughNode(const Node& node, const Blend& blend);
-  void orderLastPatch();
+  std::uint32_t facesThatSee(const Patch& patch) const;
+  void orderLastPatch(std::uint32_t faces);
   PacketCanvas canvas() const;
 
   const PacketKernel& kernel_;
@@ -88,6 +89,7 @@ class PacketRaster {
   PacketLanes lanes_;
   std::size_t receiver_count_ = 0;
   SeenPixels seen_;
+  std::uint32_t seen_faces_ = 0;  // set of those with pixels that count
   PacketView view_;
   std::vector<Patch> patches_;
   bool has_thickets_ = false;                         // among patches_

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <glm/geometric.hpp>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -95,6 +98,66 @@ TEST(PacketRaster, FewReceiversSeeTheSameAsInAFullPacket) {
         EXPECT_EQ(few[i].irradiance, all[i].irradiance) << kernel.name << ' ' << count << ' ' << i;
       }
     }
+  }
+}
+
+// Surfels of all kinds, sizes and distances, many of them across edges of the faces.
+Surfel surfelAround(std::mt19937& random) {
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  const auto direction = [&] {
+    return glm::normalize(glm::vec3(uniform(random), uniform(random), uniform(random)));
+  };
+  glm::vec3 to_surfel = direction();
+  if (uniform(random) > 0) to_surfel.y = (1 + .2f * uniform(random)) * to_surfel.x;
+  const float distance = std::exp2(3 * uniform(random));
+  const int kind = int(random() % 3);
+  Surfel surfel;
+  surfel.position = distance * to_surfel;
+  surfel.normal = kind == 2 ? glm::vec3(0) : direction();
+  if (kind == 1) surfel.flags = kSurfelTwoSided;
+  if (kind == 2) surfel.flags = kSurfelSphere;
+  surfel.radius = .1f * distance * std::exp2(2 * uniform(random));
+  surfel.area = .5f * kPi * surfel.radius * surfel.radius;
+  surfel.radiosity = {.5f, .6f, .7f};
+  return surfel;
+}
+
+// What some receiver sees something of is drawn on every face it reaches; the rest is not kept.
+TEST(PacketRaster, SurfelsAreKeptForTheFacesThatSeeThem) {
+  for (const bool has_normals : {true, false}) {
+    std::vector<Receiver> receivers;
+    for (int i = 0; i < int(kPacketReceivers); ++i) {
+      const float turn = .1f * float(i - 8);
+      receivers.push_back({{.1f * turn, .02f * float(i % 4), 0}, glm::vec3(0)});
+      if (has_normals) receivers.back().normal = {std::sin(turn), 0, std::cos(turn)};
+    }
+    const GatherRules rules(GatherMode::kBleeding, {});
+    PacketRaster packet(rules);
+    ReceiverRaster alone(rules);
+    std::mt19937 random(5);
+    int kept = 0, seen = 0;
+    for (int i = 0; i < 1000; ++i) {
+      const Surfel surfel = surfelAround(random);
+      packet.begin(receivers, viewPacket(receivers));
+      packet.addSurfels({&surfel, 1}, {});
+      kept += int(packet.patchCount());
+      packet.sort();
+      packet.draw();
+      std::vector<GatherResult> results(receivers.size());
+      packet.integrate(results);
+      bool is_seen = false;
+      for (std::size_t lane = 0; lane < receivers.size(); ++lane) {
+        alone.begin(receivers[lane]);
+        alone.addSurfel(surfel);
+        const GatherResult expected = alone.finish();
+        is_seen |= expected.occlusion > 0;
+        ASSERT_NEAR(results[lane].occlusion, expected.occlusion, 1e-5) << i << ' ' << lane;
+      }
+      seen += is_seen ? 1 : 0;
+    }
+    EXPECT_GT(seen, 500);
+    EXPECT_GE(kept, seen);
+    EXPECT_LT(kept, seen + seen / 16);
   }
 }
 
