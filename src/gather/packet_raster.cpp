@@ -17,6 +17,17 @@ namespace {
 
 // Of thickets, in radii of the node: with outlines as long as the node, and a sheared image.
 constexpr float kThicketExtent = 1.5f;
+// The most that a patch spreads, with lengths 8 times the widths (kLeastSpread), grown by half.
+constexpr float kMostSpread = 24;
+// A parallelogram may reach farther than the rectangle with its spread.
+constexpr float kShear = 1.05f;
+// Areas over the square of the distance from where on patches are large.
+constexpr float kLargeExtent = 0.2f;
+
+// Thickets fill their outlines however long these are.
+float leastHalf(const Patch& patch) {
+  return patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius : 0;
+}
 constexpr float kDiagonal = 1.415f;
 
 std::size_t fillFloats(const GatherRules& rules) {
@@ -108,12 +119,11 @@ std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
   const glm::vec3 middle = patch.position - view_.centre;
   const glm::vec3 size = glm::abs(middle);
   const float largest = std::max({size.x, size.y, size.z});
+  const float extent = std::min(kMostExtent, patch.area / (largest * largest));
+  if (extent > kLargeExtent) return facesThatSeeLarge(patch, extent);
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
-  // Thickets fill their outlines however long these are
-  const float least = patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius : 0;
-  const float half = std::max(0.5f * side, least);
-  const float shift = std::min(patch.area / (2 * largest), largest / 2);
-  const float reach = kSplatReach * half + shift + kDiagonal * view_.radius;
+  const float half = std::max(0.5f * side, leastHalf(patch));
+  const float reach = kSplatReach * half + 0.5f * extent * largest + kDiagonal * view_.radius;
 
   std::uint32_t faces = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -121,8 +131,39 @@ std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
       const bool is_wide = size[axis] + reach >= largest;
       return static_cast<std::uint32_t>(is_wide & is_before) << face;  // no branch to be guessed
     };
-    faces |= bit(middle[axis] + reach >= 0, 2 * axis);
-    faces |= bit(reach - middle[axis] >= 0, 2 * axis + 1);
+    faces |= bit(middle[axis] + view_.radius > 0, 2 * axis);
+    faces |= bit(view_.radius - middle[axis] > 0, 2 * axis + 1);
+  }
+  return faces;
+}
+
+// Of a patch so large that it matters how long it is and what perspective makes of it
+// (RasterCube::onFace), which takes longer to find out.
+std::uint32_t PacketRaster::facesThatSeeLarge(const Patch& patch, float extent) const {
+  const glm::vec3 middle = patch.position - view_.centre;
+  const glm::vec3 size = glm::abs(middle);
+  const float distance = glm::length(middle);
+  const int front = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+  const SymmetricMatrix& shape = patch.shape;
+  const SymmetricMatrix adjoint = adjugate(shape);
+  // Flat ones are longest for their area when seen from above
+  const float determinant =
+      patch.isRound() ? quadraticForm(adjoint, middle / distance) : adjoint.trace();
+  const float half_side = 0.5f * std::sqrt(std::max(patch.most_area, patch.round_area));
+  const float growth = (1 + 0.5f * extent) / std::sqrt(std::max(determinant, 1e-12f));
+  std::uint32_t faces = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    // What it spreads across the edge to the face in front
+    const float along = middle[axis] * middle[front] < 0 ? -2.f : 2.f;
+    const float spread = shape(axis, axis) + shape(front, front) - along * shape(axis, front);
+    const float half = half_side * std::sqrt(std::min(growth * spread, kMostSpread));
+    // On the face it is drawn larger by (distance / w)^(3/2) than at its middle
+    const float w = std::max(size[axis] - view_.radius, kLeastAxis * distance);
+    const float reach = std::max(kShear * half, leastHalf(patch)) * std::sqrt(distance / w) +
+                        0.5f * extent * size[front] + kDiagonal * view_.radius;
+    if (size[axis] + reach < size[front]) continue;
+    faces |= (middle[axis] + view_.radius > 0 ? 1u : 0u) << 2 * axis;
+    faces |= (view_.radius - middle[axis] > 0 ? 1u : 0u) << (2 * axis + 1);
   }
   return faces;
 }

@@ -74,6 +74,7 @@ class PacketRaster {
   void addFacet(const Facet& facet, const Blend& blend);
   void addRoughNode(const Node& node, const Blend& blend);
   std::uint32_t facesThatSee(const Patch& patch) const;
+  std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
   void orderLastPatch(std::uint32_t faces);
   PacketCanvas canvas() const;
 
