@@ -21,6 +21,7 @@ constexpr float kThicketExtent = 1.5f;
 constexpr float kMostSpread = 24;
 // A parallelogram may reach farther than the rectangle with its spread.
 constexpr float kShear = 1.05f;
+constexpr float kDiagonal = 1.415f;
 // Areas over the square of the distance from where on patches are large.
 constexpr float kLargeExtent = 0.2f;
 
@@ -28,7 +29,6 @@ constexpr float kLargeExtent = 0.2f;
 float leastHalf(const Patch& patch) {
   return patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius : 0;
 }
-constexpr float kDiagonal = 1.415f;
 
 std::size_t fillFloats(const GatherRules& rules) {
   const auto resolution = static_cast<std::size_t>(rules.quality.raster_resolution);
