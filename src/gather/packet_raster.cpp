@@ -168,14 +168,17 @@ std::uint32_t PacketRaster::facesThatSeeLarge(const Patch& patch, float extent) 
   return faces;
 }
 
-// Puts the last patch in the order of faces.
+// Puts the last patch in the order of those of the faces that count, or drops it when none does.
 void PacketRaster::orderLastPatch(std::uint32_t faces) {
+  faces &= seen_faces_;
+  if (faces == 0) return patches_.pop_back();
+  has_thickets_ |= patches_.back().thicket > 0;
   SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
   const auto index = static_cast<std::uint32_t>(patches_.size() - 1);
   const glm::vec3 middle = patches_.back().position - view_.centre;
   const float distance_sq = glm::dot(middle, middle);
   if (order_.size() < order_count_ + RasterGeometry::kFaces) order_.resize(2 * order_.size());
-  for (faces &= seen_faces_; faces != 0; faces &= faces - 1) {
+  for (; faces != 0; faces &= faces - 1) {
     order_[order_count_++] = draw_order::key(std::countr_zero(faces), distance_sq, index);
   }
 }
@@ -215,7 +218,6 @@ void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
   patch.reach = reachOf(facet, direction);
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
-  has_thickets_ |= facet.is_thicket;
   patch.shape = shapeOf(facet.covariance);
   patch.area = facet.area;
   patch.most_area = mostVisibleArea(facet);
@@ -270,7 +272,6 @@ void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
   patch.overlap = std::max(patch.overlap, patch.thicket);
-  has_thickets_ |= patch.thicket > 0;
   patch.facing_limit = Patch::kBothSides;
   orderLastPatch(facesThatSee(patch));
 }
@@ -302,14 +303,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     patch.near_distance =
         std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
-    const std::uint32_t faces = kernel_.facesThatSee(canvas, patch) & seen_faces_;
-    if (faces != 0) {
-      has_thickets_ |= patch.thicket > 0;
-      patch.blend = blend;
-      orderLastPatch(faces);
-    } else {
-      patches_.pop_back();
-    }
+    patch.blend = blend;
+    orderLastPatch(kernel_.facesThatSee(canvas, patch));
   }
 }
 
