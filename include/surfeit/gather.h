@@ -72,10 +72,10 @@ enum class GatherSides : std::uint8_t { kFront, kBoth, kBack };
 
 // How the gather approximates. Scene units are the cloud's own.
 struct GatherQuality {
-  // sigma_max, steradians, >= 0; 0 opens every node (memo 5). Rough nodes keep below
-  // 0.6 of it.
-  float max_solid_angle = 0.1f;
-  int raster_resolution = 16;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
+  // sigma_max, steradians, >= 0; 0 opens every node (memo 5). Nodes that are not flat
+  // keep below 2/3 of it.
+  float max_solid_angle = 0.13f;
+  int raster_resolution = 12;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
   // Rays and horizon start this far above the receiver, in radii of the surfel looked at.
   float bias = 0.15f;
   // Surfels closer than this many of their radii are ray traced (memo 3.4.1).

@@ -233,6 +233,7 @@ bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const Contr
   contribution.spread = facet.area / distance_sq;
   contribution.overlap = contribution.thicket = facet.is_thicket ? 1 : 0;
   contribution.opacity = 1;
+  contribution.nested = nestedPart(facet.is_two_sided, contribution.thicket);
   contribution.normal = facet.normal;
   contribution.shape = shapeOf(facet.covariance);
   contribution.radiosity = glm::vec3(0);
@@ -265,6 +266,7 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   contribution.direction = to_seen / std::sqrt(distance_sq);
   contribution.solid_angle = cover.area / distance_sq;
   contribution.opacity = cover.opacity;
+  contribution.nested = nestedPart(false, contribution.thicket);
   contribution.spread = node.area / distance_sq;
   contribution.overlap = 0;
   if (rules.sides == GatherSides::kFront) {
@@ -301,6 +303,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.overlap = 0;
   contribution.thicket = thicketPart(surfel);
   contribution.opacity = 1;
+  contribution.nested = nestedPart(surfel.isTwoSided(), contribution.thicket);
   contribution.normal = surfel.normal;
   contribution.shape = withoutDirection(surfel.normal);
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);

@@ -26,11 +26,12 @@ struct Contribution {
   float thicket;          // how much of it is leaves or hair, 0..1; likewise
   float opacity;          // what it hides of its solid angle, 0..1; 1 but for thickets, and while
                           // a node fades into what is below it
+  float nested;           // how far it hides behind other layers; likewise
   glm::vec3 normal;       // unit length for a disk, zero for a sphere, in between when partly flat
   SymmetricMatrix shape;  // how it spreads; see RasterCube::Patch
   glm::vec3 radiosity;    // of what covers; back sides are black. Zero when color is not asked for.
 };
-static_assert(sizeof(Contribution) == 22 * sizeof(float));
+static_assert(sizeof(Contribution) == 23 * sizeof(float));
 
 // How contributions are to be made.
 struct ContributionRules {

@@ -17,7 +17,7 @@ namespace {
 constexpr float kReach = 2, kSameHorizon = 0.9999f;
 
 // Where packets lie in a line, nothing is known about the directions across.
-constexpr float kLeastSpread = 0.02f;
+constexpr float kLeastAcross = 0.02f;
 
 // The two axes of the world along which the packets spread most.
 std::array<int, 2> widestAxes(const PacketCluster& cluster) {
@@ -84,8 +84,8 @@ void FarField::findSlopes(const PacketCluster& cluster) {
     }
     const float spread = uu + vv;
     if (!(spread > 1e-3f * width * width)) continue;  // nothing near enough to tell
-    uu += kLeastSpread * spread;
-    vv += kLeastSpread * spread;
+    uu += kLeastAcross * spread;
+    vv += kLeastAcross * spread;
     const float inverse = 1 / (uu * vv - uv * uv);
     for (std::size_t k = 0; k < cluster.packetCount(); ++k) {
       const float along_u = inverse * weights[k] * (vv * u[k] - uv * v[k]);

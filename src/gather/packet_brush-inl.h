@@ -108,8 +108,9 @@ class Brush {
     const D d;
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
       float* const at = pixels_.at(pixel);
+      for (std::size_t i = 0; i < kChannels; ++i) hn::Store(hn::Zero(d), d, at + i * kStep);
       hn::Store(Splat(1), d, at);
-      for (std::size_t i = 1; i < kChannels; ++i) hn::Store(hn::Zero(d), d, at + i * kStep);
+      hn::Store(Splat(1), d, at + 3 * kStep);
       if (thickets_) hn::Store(hn::Zero(d), d, thickets_.at(pixel));
     });
   }
@@ -122,6 +123,7 @@ class Brush {
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
     cover.thicket = patch.thicket;
+    cover.nested = patch.nested();
     cover.opacity = Opacity(patch, sight);
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
@@ -240,14 +242,16 @@ class Brush {
 
     const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
     const Rows rows = {y0, y1, half_x, range};
-    cover.thicket > 0 ? CoverRows<true>(shape, rows, cover) : CoverRows<false>(shape, rows, cover);
+    if (cover.thicket > 0) return CoverRows<true, true>(shape, rows, cover);
+    cover.overlap > 0 ? CoverRows<true, false>(shape, rows, cover)
+                      : CoverRows<false, false>(shape, rows, cover);
   }
 
   struct Rows {
     V begin, end, half_x;
     PixelRange range;
   };
-  template <bool kIsThicket>
+  template <bool kOverlaps, bool kIsThicket>
   HWY_INLINE void CoverRows(const Parallelogram& shape, const Rows& rows, const Cover& cover) {
     const V zero = hn::Zero(D());
     for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
@@ -266,7 +270,7 @@ class Brush {
                                               hn::Max(left, Splat(float(column)))));
         const V amount = hn::Mul(width, height);
         if (begins_) NoteBegin(first + std::size_t(column - begin), amount, cover);
-        const V added = CoverPixel<Kind>(pixel, amount, cover);
+        const V added = CoverPixel<Kind, kOverlaps>(pixel, amount, cover);
         pixel += kChannels * kStep;
         if constexpr (kIsThicket) {
           AddTo(thicket, added, cover);
@@ -349,7 +353,7 @@ class Brush {
     if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
     amount = hn::Mul(cover.opacity, amount);
     if (begins_) NoteBegin(pixel, amount, cover);
-    const V added = CoverPixel<Kind>(pixels_.at(pixel), amount, cover);
+    const V added = CoverPixel<Kind, false>(pixels_.at(pixel), amount, cover);
     if (cover.thicket > 0) AddTo(thickets_.at(pixel), added, cover);
   }
   // Comes before the pixel is covered.

@@ -30,7 +30,7 @@ struct Cover {
   V depth_begin, depth_end;
   M is_lit;
   bool is_all_lit;
-  float overlap, thicket;
+  float overlap, thicket, nested;
   V opacity;
   float own;  // the part of its own that overlaps
   glm::vec3 radiosity;
@@ -46,30 +46,36 @@ struct BrushKind {
 };
 
 // As RasterCube::coverPixel, where `amount` is positive; but for what thickets have. Returns what
-// is newly covered.
-template <typename Kind>
+// is newly covered. Little overlaps with its own layer.
+template <typename Kind, bool kOverlaps>
 inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
   float* const room_at = pixel;
   float* const layer_at = pixel + kStep;
   float* const end_at = pixel + 2 * kStep;
-  const V end = hn::Load(d, end_at);
+  float* const open_at = pixel + 3 * kStep;
+  const V end = hn::Load(d, end_at), open = hn::Load(d, open_at);
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
   // A gap in depth begins a new layer
   const M touched = hn::Gt(amount, zero);
   const M is_new = hn::And(touched, hn::Gt(cover.depth_begin, end));
-  room = hn::IfThenElse(is_new, hn::NegMulAdd(room, before, room), room);
+  room = hn::IfThenElse(is_new, open, room);
   before = hn::IfThenZeroElse(is_new, before);
   hn::Store(room, d, room_at);
   hn::Store(hn::IfThenElse(touched, hn::Max(end, cover.depth_end), end), d, end_at);
 
-  const V middle = hn::Min(one, hn::MulAdd(Splat(cover.own), amount, before));
-  const V slope = hn::NegMulAdd(middle, Splat(cover.overlap), one);
-  const V layer = hn::Min(one, hn::MulAdd(amount, slope, before));
+  V counts = amount;
+  if constexpr (kOverlaps) {
+    const V middle = hn::Min(one, hn::MulAdd(Splat(cover.own), amount, before));
+    counts = hn::Mul(amount, hn::NegMulAdd(middle, Splat(cover.overlap), one));
+  }
+  const V layer = hn::Min(one, hn::Add(before, counts));
   hn::Store(layer, d, layer_at);
-  const V covered = hn::Mul(room, hn::Sub(layer, before));
+  const V left = hn::Min(open, OpenBehind(room, layer, Splat(cover.nested)));
+  const V covered = hn::IfThenElseZero(touched, hn::Sub(open, left));
+  hn::Store(hn::Sub(open, covered), d, open_at);
   if constexpr (Kind::kChannels > 0) {
     V added = covered;
     float* at = pixel + PacketCanvas::kCoverageChannels * kStep;

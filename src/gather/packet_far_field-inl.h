@@ -74,8 +74,7 @@ class FarFace {
     const SurfaceFill fill(canvas_, seen_, bool(thickets));
     fill.Run([&](std::size_t i) HWY_ATTR {
       float* const pixel = pixels.at(i);
-      const V room = hn::Load(d, pixel), layer = hn::Load(d, pixel + kStep);
-      const V total = hn::Sub(one, hn::NegMulAdd(room, layer, room));
+      const V total = hn::Sub(one, hn::Load(d, pixel + 3 * kStep));
       hn::Store(total, d, pixel);
       return SurfaceFill::Sight{total, thickets ? hn::Load(d, thickets.at(i)) : zero};
     });
@@ -126,7 +125,8 @@ class FarFace {
                              Sights& sights) const {
     const D d;
     const auto channel = [&](std::size_t c, std::size_t i) {
-      return pixels_[i / kStep].at(in_face) + (c == 0 ? 0 : 2 + c) * kStep + i % kStep;
+      return pixels_[i / kStep].at(in_face) +
+             (c == 0 ? 0 : PacketCanvas::kCoverageChannels - 1 + c) * kStep + i % kStep;
     };
     V sums[2][4] = {{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)},
                     {hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)}};

@@ -161,8 +161,8 @@ class Integral {
 
   static V3 LoadRadiosity(const float* pixel) {
     const D d;
-    return {hn::Load(d, pixel + 3 * kStep), hn::Load(d, pixel + 4 * kStep),
-            hn::Load(d, pixel + 5 * kStep)};
+    const float* const at = pixel + PacketCanvas::kCoverageChannels * kStep;
+    return {hn::Load(d, at), hn::Load(d, at + kStep), hn::Load(d, at + 2 * kStep)};
   }
   template <typename Float>
   Float* FadedOf(Float* pixel) const {
@@ -173,13 +173,14 @@ class Integral {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
     const bool has_light = rules_.hasLight(), fades = rules_.fades();
-    V room = one, layer = zero, end = zero, faded = zero, thicket = zero;
+    V room = one, layer = zero, end = zero, open = one, faded = zero, thicket = zero;
     V3 radiosity = {zero, zero, zero};
     if (has_near) {
       const float* const near = near_.at(in_face);
       room = hn::Load(d, near);
       layer = hn::Load(d, near + kStep);
       end = hn::Load(d, near + 2 * kStep);
+      open = hn::Load(d, near + 3 * kStep);
       if (has_light) radiosity = LoadRadiosity(near);
       if (fades) faded = hn::Load(d, FadedOf(near));
       if (near_thickets_) thicket = hn::Load(d, near_thickets_.at(in_face));
@@ -191,11 +192,13 @@ class Integral {
       const V amount =
           hn::Min(one, FarValue(far, [](const auto& sight) { return sight.coverage; }));
       const M is_new = hn::Gt(Splat(far.begin), end);
-      room = hn::IfThenElse(is_new, hn::NegMulAdd(room, layer, room), room);
+      room = hn::IfThenElse(is_new, open, room);
       layer = hn::IfThenZeroElse(is_new, layer);
       const V slope = hn::NegMulAdd(layer, Splat(far.thicket), one);
       const V after = hn::Min(hn::MulAdd(amount, slope, layer), one);
-      const V added = hn::Mul(room, hn::Sub(after, layer));
+      const V nested = Splat(nestedPart(false, far.thicket));
+      const V left = hn::Min(open, OpenBehind(room, after, nested));
+      const V added = hn::IfThenElseZero(hn::Gt(amount, zero), hn::Sub(open, left));
       if (has_light) {
         const V part = hn::Mul(added, Reciprocal(hn::Max(amount, Splat(kLeastFarCoverage))));
         const auto add = [&](V& sum, int c) HWY_ATTR {
@@ -208,9 +211,9 @@ class Integral {
       }
       if (fades) faded = hn::MulAdd(added, Splat(far.faded), faded);
       thicket = hn::MulAdd(added, Splat(far.thicket), thicket);
-      layer = after;
+      open = hn::Sub(open, added);
     }
-    const V coverage = hn::Sub(one, hn::NegMulAdd(room, layer, room));
+    const V coverage = hn::Sub(one, open);
     return {coverage, fades ? faded : coverage, radiosity, thicket};
   }
 
@@ -228,9 +231,10 @@ class Integral {
     float* const pixel = near_.at(in_face);
     hn::Store(sight.coverage, d, pixel);
     if (rules_.hasLight()) {
-      hn::Store(sight.radiosity.x, d, pixel + 3 * kStep);
-      hn::Store(sight.radiosity.y, d, pixel + 4 * kStep);
-      hn::Store(sight.radiosity.z, d, pixel + 5 * kStep);
+      float* const at = pixel + PacketCanvas::kCoverageChannels * kStep;
+      hn::Store(sight.radiosity.x, d, at);
+      hn::Store(sight.radiosity.y, d, at + kStep);
+      hn::Store(sight.radiosity.z, d, at + 2 * kStep);
     }
     if (rules_.fades()) hn::Store(sight.occlusion, d, FadedOf(pixel));
     return sight;

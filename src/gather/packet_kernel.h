@@ -1,6 +1,6 @@
 // The inner loops of the packet raster, in vectors of whatever width this machine has (Highway).
 // Results of different instruction sets agree within 1e-4 of occlusion and relative irradiance, and
-// within 2e-3 for two of 1000 receivers: sums are rounded differently, and rounding decides whether
+// within 3e-3 for two of 1000 receivers: sums are rounded differently, and rounding decides whether
 // things that hardly meet are of one layer. Of one instruction set they are the same bit for bit.
 #pragma once
 
@@ -14,6 +14,7 @@
 
 #include "core/symmetric_matrix.h"
 #include "gather/contribution.h"
+#include "gather/coverage_rules.h"
 #include "gather/cut.h"
 #include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
@@ -40,8 +41,9 @@ struct alignas(64) Patch {
   float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
   Blend blend;                                  // of the opacity
   glm::vec3 radiosity{0};
-  // It is seen where offset . normal, from the receiver, is below this: kFrontOnly, kBothSides, or
-  // kDarkBack, when it is seen from both sides and sends light from its front
+  // It is seen where offset . normal, from the receiver, is below this: kFrontOnly; kBothSides, of
+  // a two-sided disk or facet; kDarkBack, when it is seen from both sides and sends light from its
+  // front; or kAllAround, when something else says what it shows
   float facing_limit = 0;
   float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
   float reach = 0;          // how far before and behind its middle it meets others of its layer
@@ -50,7 +52,9 @@ struct alignas(64) Patch {
   static constexpr float kFrontOnly = 0;
   static constexpr float kBothSides = std::numeric_limits<float>::infinity();
   static constexpr float kDarkBack = std::numeric_limits<float>::max();
+  static constexpr float kAllAround = kDarkBack / 2;
   bool isRound() const { return disk_area == 0; }
+  float nested() const { return nestedPart(facing_limit == kBothSides, thicket); }
 };
 static_assert(sizeof(Patch) == 128);
 
@@ -85,10 +89,10 @@ struct SeenPixels {
 };
 
 // Where a packet is drawn: 16 rasters, interleaved by pixel as many at a time as a vector holds
-// (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage); with color red,
-// green and blue; and the faded coverage, when occlusion fades.
+// (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage), and what is open
+// of it; with color red, green and blue; and the faded coverage, when occlusion fades.
 struct PacketCanvas {
-  static constexpr std::size_t kCoverageChannels = 3, kColorChannels = 3;
+  static constexpr std::size_t kCoverageChannels = 4, kColorChannels = 3;
   static std::size_t channels(const GatherRules& rules) {
     return kCoverageChannels + rules.channels();
   }

@@ -67,6 +67,12 @@ inline V InverseSqrt(V x) {
   return hn::Mul(estimate, hn::NegMulAdd(hn::Mul(half, estimate), estimate, Splat(1.5f)));
 }
 
+// As openBehind, of coverage_rules.h.
+inline V OpenBehind(V room, V layer, V nested) {
+  const V rest = hn::Sub(Splat(1), layer), apart = hn::Mul(room, rest);
+  return hn::MulAdd(nested, hn::Sub(hn::Min(room, rest), apart), apart);
+}
+
 using V3 = VectorsOf3<V>;
 inline V Axis(const V3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 inline V Axis(const glm::vec3& v, int axis) { return Splat(v[axis]); }
@@ -157,7 +163,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
   sight.bias = hn::Mul(Splat(canvas.bias * patch.radius),
                        hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
-  if (patch.facing_limit == Patch::kBothSides && !patch.isRound()) {
+  if (patch.facing_limit == Patch::kBothSides) {
     const float inverse = 1 / (kBiasHeight * patch.radius);
     const V part = hn::NegMulAdd(sight.height, Splat(inverse), one);
     sight.bias = hn::Mul(sight.bias, hn::Min(one, hn::Max(zero, part)));

@@ -231,14 +231,14 @@ void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
                                             : Patch::kFrontOnly;
   } else if (!shows_both) {
     patch.range = range;
-    patch.facing_limit = range > 0 ? Patch::kBothSides : Patch::kFrontOnly;
+    patch.facing_limit = range > 0 ? Patch::kAllAround : Patch::kFrontOnly;
   } else {
     // From both sides, at the rim of something curved all lanes see as much as the centre
     patch.disk_area = 0;
     const FacingAreas facing = facingAreas(facet, -direction);
     patch.round_area = facing.front + facing.back;
     if (!facet.is_two_sided) patch.radiosity *= facing.front / patch.round_area;
-    patch.facing_limit = Patch::kBothSides;
+    patch.facing_limit = facet.is_two_sided ? Patch::kBothSides : Patch::kAllAround;
   }
   patch.blend = blend;
   orderLastPatch(facesThatSee(patch));
@@ -272,7 +272,7 @@ void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
   patch.overlap = std::max(patch.overlap, patch.thicket);
-  patch.facing_limit = Patch::kBothSides;
+  patch.facing_limit = Patch::kAllAround;
   orderLastPatch(facesThatSee(patch));
 }
 
@@ -290,7 +290,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     patch.area = patch.most_area = surfel.area;
     (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
     patch.radiosity = surfel.radiosity;
-    patch.facing_limit = surfel.isSphere() || surfel.isTwoSided()     ? Patch::kBothSides
+    patch.facing_limit = surfel.isSphere()                            ? Patch::kAllAround
+                         : surfel.isTwoSided()                        ? Patch::kBothSides
                          : rules_.quality.sides == GatherSides::kBoth ? Patch::kDarkBack
                                                                       : Patch::kFrontOnly;
     const glm::vec3 to_surfel = surfel.position - view_.centre;

@@ -116,10 +116,7 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, const Textur
   const float slope = 1 - middle * texture.overlap;
   coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
-  coverage.total =
-      coverage.layer >= 1
-          ? 1
-          : std::clamp(1 - coverage.room + coverage.layer * coverage.room, before, 1.f);
+  coverage.total = std::max(before, 1 - openBehind(coverage.room, coverage.layer, texture.nested));
   coverage.thicket += (coverage.total - before) * texture.thicket;
   if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
   if (!faded_.empty()) faded_[pixel] += (coverage.total - before) * depth.fade;

@@ -162,7 +162,9 @@ float ReceiverRaster::rayBias(const Surfel& surfel) const {
 void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& depth) {
   const glm::vec3 centre =
       surfel.position - receiver_.position - rayBias(surfel) * receiver_.normal;
-  const RasterCube::Texture texture = {0, thicketPart(surfel), part};
+  const RasterCube::Texture texture = {.thicket = thicketPart(surfel),
+                                       .opacity = part,
+                                       .nested = nestedPart(surfel.isTwoSided(), 0)};
   if (surfel.isSphere()) {
     cube_.traceSphere(inRaster(centre), surfel.radius, texture, depth, surfel.radiosity);
     return;
@@ -190,7 +192,7 @@ GatherResult ReceiverRaster::finish() {
                    inRaster(patch.shape),
                    patch.solid_angle,
                    patch.spread,
-                   {patch.overlap, patch.thicket, patch.opacity}},
+                   {patch.overlap, patch.thicket, patch.opacity, patch.nested}},
                   depth, patch.radiosity);
     }
   }

@@ -291,7 +291,7 @@ optionsOfTheirOwnWinOverThePreset() {
   makeScene 5000
   makePatch
   gatherPatch default
-  jsonIs default.json max_solid_angle 0.1 raster_resolution 16 near_field_radii 8 \
+  jsonIs default.json max_solid_angle 0.13 raster_resolution 12 near_field_radii 8 \
     far_field_parallax 0.2
   gatherPatch standard --quality standard
   sameBytes standard.ply default.ply
@@ -300,7 +300,7 @@ optionsOfTheirOwnWinOverThePreset() {
     far_field_parallax 0.5
   differentBytes draft.ply default.ply
   gatherPatch final --quality final
-  jsonIs final.json max_solid_angle 0.015 raster_resolution 32 near_field_radii 16 \
+  jsonIs final.json max_solid_angle 0.02 raster_resolution 24 near_field_radii 16 \
     far_field_parallax 0
 
   # One, all, before and after; what is not given comes from the preset

@@ -191,6 +191,35 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
   EXPECT_NEAR(cube.radiosity(pixel).y, .5f, 1e-5);
 }
 
+TEST(RasterCube, WhatIsNestedHidesBehindTheLargerLayer) {
+  const RasterGeometry geometry(2);
+  RasterCube cube(geometry, false);
+  const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
+  const float axis_cubed = direction.x * direction.x * direction.x;
+  const auto cover = [&](float amount, float depth, float nested) {
+    RasterCube::Patch patch = diskPatch(direction, kRound, amount * axis_cubed);
+    patch.texture.nested = nested;
+    cube.splat(patch, {depth, depth + .5f}, kWhite);
+    return double(cube.coverage(3));
+  };
+  for (const float nested : {0.f, .4f, 1.f}) {
+    const double apart = 1 - double(nested);
+    cube.clear();
+    EXPECT_NEAR(cover(.5f, 1, nested), .5, 1e-5) << "nothing is before the first layer";
+    EXPECT_NEAR(cover(.3f, 2, nested), .5 + apart * .15, 1e-5) << "the smaller lies behind";
+    cube.clear();
+    cover(.3f, 1, nested);
+    EXPECT_NEAR(cover(.5f, 2, nested), .5 + apart * .15, 1e-5) << "the larger rises above";
+    EXPECT_NEAR(cover(1.5f, 3, nested), 1, 1e-6) << "what fills the pixel fills all that was open";
+  }
+  // Of one layer, what is nested adds nothing to more than it would cover with all before it
+  cube.clear();
+  cover(.5f, 1, 0);
+  const double anywhere = cover(.5f, 2, 0);
+  EXPECT_NEAR(anywhere, .75, 1e-5);
+  EXPECT_NEAR(cover(.1f, 2, 1), anywhere, 1e-5);
+}
+
 // Covers pixels of the face +x of a cube of 12 pixels one by one.
 class FilledCube : public ::testing::Test {
  protected:
