@@ -31,7 +31,7 @@ inline float layerReachOfDisk(float radius, float cosine) {
 // +.0024, .0063 and -.0001; lion on a plane .0057 and +.0030, .0043 and +.0012, .0042 and -.0012;
 // spheres .0073 and +.0041, .0055 and -.0017, .0141 and -.0103. Leaves, if they count as well:
 // -.03 of bias.)
-inline constexpr float kNested = 0.45f;
+inline constexpr float kNested = 0.3f;
 inline float nestedPart(bool is_two_sided, float thicket) {
   return is_two_sided ? 0 : kNested * (1 - thicket);
 }
