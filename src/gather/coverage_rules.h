@@ -27,10 +27,10 @@ inline float layerReachOfDisk(float radius, float cosine) {
 // where in the pixel either is. What lies anywhere hides each other at random; but outlines of what
 // stands on the same ground rise from the same side, and the smaller lies behind the larger. This
 // part of surfaces counts as such, the rest as lying anywhere, and so do leaves and hair. (AO RMSE
-// and bias of packets at standard quality with 0, .45 and 1: city .0076 and +.0042, .0065 and
-// +.0024, .0063 and -.0001; lion on a plane .0057 and +.0030, .0043 and +.0012, .0042 and -.0012;
-// spheres .0073 and +.0041, .0055 and -.0017, .0141 and -.0103. Leaves, if they count as well:
-// -.03 of bias.)
+// and bias of packets at standard quality with 0, .3 and 1: city .0059 and +.0028, .0053 and
+// +.0018, .0053 and -.0008; lion on a plane .0044 and +.0014, .0038 and +.0003, .0046 and -.0024;
+// spheres .0055 and +.0025, .0045 and -.0007, .0128 and -.0097. Leaves, if they count as well, with
+// .5: -.03 of bias.)
 inline constexpr float kNested = 0.3f;
 inline float nestedPart(bool is_two_sided, float thicket) {
   return is_two_sided ? 0 : kNested * (1 - thicket);
@@ -48,12 +48,12 @@ inline float openBehind(float room, float layer, float nested) {
 // open where the mean coverage of the pixels around is `begin`, and all of it from `end` on; the
 // second pass sees the pixels around as the first left them. Beginning earlier thickens
 // silhouettes, later leaves gaps. (What is covered of a closed shell of 200,000 disks, and AO bias
-// of the city and of spheres on a plane, with begin .86, end .93: .9954, +.0025, +.0023; .87, .95:
-// .9947, +.0023, +.0014; bench/closed_shell.sh.)
+// of the city and of spheres on a plane, with begin .86, end .93: .9947, +.0018, -.0007; .84, .91:
+// .9953, +.0021, +.0010; bench/closed_shell.sh.)
 struct FillPass {
   float begin, end;
 };
-inline constexpr FillPass kFillPasses[] = {{0.86f, 0.93f}, {0.87f, 0.93f}};
+inline constexpr FillPass kFillPasses[] = {{0.84f, 0.91f}, {0.85f, 0.91f}};
 
 // Two-sided surfels that no plane holds together, rough nodes of them and nodes of several facets,
 // are thickets: leaves, or hair. They lie before and behind each other anywhere, so nodes hide
@@ -151,9 +151,9 @@ inline constexpr float kMostTurn = 0.3f;
 
 // A node that is seen mostly from behind shows fronts that face each other: folds, bumps and
 // leaves, which hide each other instead of lying side by side. Overlap grows from 0 where fronts
-// and backs are equal (anything closed) to 1 where backs are 5/3 of the fronts. (AO bias of packets
-// at standard quality with a gain of 4 and 10: lion on a plane +.0002, -.0014; spheres +.0014,
-// +.0008.)
+// and backs are equal (anything closed) to 1 where backs are 9/5 of the fronts. (AO bias of packets
+// with 0.1 sr and 16 pixels, with a gain of 4 and 10: lion on a plane +.0002, -.0014; spheres
+// +.0014, +.0008.)
 inline float overlapOf(float front_area, float back_area) {
   constexpr float kGain = 3.5f;
   return std::clamp(kGain * (back_area - front_area) / (back_area + front_area), 0.f, 1.f);

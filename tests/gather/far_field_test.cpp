@@ -98,9 +98,8 @@ double meanOcclusion(const std::vector<GatherResult>& results) {
 }
 
 // A dome whose layer reaches beyond where the shared far field begins, before one that is far
-// behind: they hide each other (.65 is covered alone, .69 with what is shared, which adds to the
-// layer that reaches it as a whole), and do not add up, as they would if all that is shared began
-// at once (by .13 and more).
+// behind: they hide each other, and do not add up, as they would if all that is shared began at
+// once. (.65 is covered alone; .69 if a layer is shared in part, for what is shared adds to it.)
 TEST(FarField, HidesBehindWhatEndsAtItsBorder) {
   const std::vector<Receiver> receivers = squareOfReceivers({-.075f, -.075f, 0}, .01f);
   const PacketCluster cluster(receivers, {GatherMode::kBleeding, GatherQuality()});
