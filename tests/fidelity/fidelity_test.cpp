@@ -118,7 +118,7 @@ TEST_F(Fidelity, BunnyOnAPlane) {
   Surroundings surroundings;
   surroundings.ground.enabled = true;
   surroundings.lights.directionals.push_back({{-1, -2, -0.5f}, {3, 3, 3}});
-  measure("bunny", mesh, surroundings, {0.0051, 0.002, 0.062});
+  measure("bunny", mesh, surroundings, {0.0051, 0.002, 0.058});
 }
 
 }  // namespace
