@@ -46,7 +46,7 @@ struct BrushKind {
 };
 
 // As RasterCube::coverPixel, where `amount` is positive; but for what thickets have. Returns what
-// is newly covered. Little overlaps with its own layer.
+// is newly covered. Without kOverlaps, nothing hides behind its own layer.
 template <typename Kind, bool kOverlaps>
 inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const D d;
