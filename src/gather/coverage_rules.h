@@ -29,8 +29,8 @@ inline float layerReachOfDisk(float radius, float cosine) {
 // part of surfaces counts as such, the rest as lying anywhere, and so do leaves and hair. (AO RMSE
 // and bias of packets with .13 sr, 14 pixels and fills from .86 on, with 0, .3 and 1: city .0059
 // and +.0028, .0053 and +.0018, .0053 and -.0008; lion on a plane .0044 and +.0014, .0038 and
-// +.0003, .0046 and -.0024; spheres .0055 and +.0025, .0045 and -.0007, .0128 and -.0097. Leaves, if
-// they count as well, with .5: -.03 of bias.)
+// +.0003, .0046 and -.0024; spheres .0055 and +.0025, .0045 and -.0007, .0128 and -.0097. Leaves,
+// if they count as well, with .5: -.03 of bias.)
 inline constexpr float kNested = 0.3f;
 inline float nestedPart(bool is_two_sided, float thicket) {
   return is_two_sided ? 0 : kNested * (1 - thicket);

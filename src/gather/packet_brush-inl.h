@@ -108,9 +108,10 @@ class Brush {
     const D d;
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
       float* const at = pixels_.at(pixel);
-      for (std::size_t i = 0; i < kChannels; ++i) hn::Store(hn::Zero(d), d, at + i * kStep);
-      hn::Store(Splat(1), d, at);
-      hn::Store(Splat(1), d, at + 3 * kStep);
+      for (std::size_t i = 0; i < kChannels; ++i) {
+        const bool is_open = i == PacketCanvas::kRoom || i == PacketCanvas::kOpen;
+        hn::Store(is_open ? Splat(1) : hn::Zero(d), d, at + i * kStep);
+      }
       if (thickets_) hn::Store(hn::Zero(d), d, thickets_.at(pixel));
     });
   }
@@ -360,7 +361,7 @@ class Brush {
   void NoteBegin(std::size_t pixel, V amount, const Cover& cover) {
     const D d;
     float* const begin = begins_.at(pixel);
-    const V end = hn::Load(d, pixels_.at(pixel) + 2 * kStep);
+    const V end = hn::Load(d, pixels_.at(pixel) + PacketCanvas::kEnd * kStep);
     const M is_first = hn::And(hn::Gt(amount, hn::Zero(d)), hn::Le(end, hn::Zero(d)));
     hn::Store(hn::IfThenElse(is_first, cover.depth_begin, hn::Load(d, begin)), d, begin);
   }

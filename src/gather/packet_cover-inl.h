@@ -51,10 +51,10 @@ template <typename Kind, bool kOverlaps>
 inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
-  float* const room_at = pixel;
-  float* const layer_at = pixel + kStep;
-  float* const end_at = pixel + 2 * kStep;
-  float* const open_at = pixel + 3 * kStep;
+  float* const room_at = pixel + PacketCanvas::kRoom * kStep;
+  float* const layer_at = pixel + PacketCanvas::kLayer * kStep;
+  float* const end_at = pixel + PacketCanvas::kEnd * kStep;
+  float* const open_at = pixel + PacketCanvas::kOpen * kStep;
   const V end = hn::Load(d, end_at), open = hn::Load(d, open_at);
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 

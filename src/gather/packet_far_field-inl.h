@@ -74,7 +74,7 @@ class FarFace {
     const SurfaceFill fill(canvas_, seen_, bool(thickets));
     fill.Run([&](std::size_t i) HWY_ATTR {
       float* const pixel = pixels.at(i);
-      const V total = hn::Sub(one, hn::Load(d, pixel + 3 * kStep));
+      const V total = hn::Sub(one, hn::Load(d, pixel + PacketCanvas::kOpen * kStep));
       hn::Store(total, d, pixel);
       return SurfaceFill::Sight{total, thickets ? hn::Load(d, thickets.at(i)) : zero};
     });

@@ -177,10 +177,10 @@ class Integral {
     V3 radiosity = {zero, zero, zero};
     if (has_near) {
       const float* const near = near_.at(in_face);
-      room = hn::Load(d, near);
-      layer = hn::Load(d, near + kStep);
-      end = hn::Load(d, near + 2 * kStep);
-      open = hn::Load(d, near + 3 * kStep);
+      room = hn::Load(d, near + PacketCanvas::kRoom * kStep);
+      layer = hn::Load(d, near + PacketCanvas::kLayer * kStep);
+      end = hn::Load(d, near + PacketCanvas::kEnd * kStep);
+      open = hn::Load(d, near + PacketCanvas::kOpen * kStep);
       if (has_light) radiosity = LoadRadiosity(near);
       if (fades) faded = hn::Load(d, FadedOf(near));
       if (near_thickets_) thicket = hn::Load(d, near_thickets_.at(in_face));

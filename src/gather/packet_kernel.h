@@ -92,6 +92,7 @@ struct SeenPixels {
 // (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage), and what is open
 // of it; with color red, green and blue; and the faded coverage, when occlusion fades.
 struct PacketCanvas {
+  static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3;  // places in a pixel
   static constexpr std::size_t kCoverageChannels = 4, kColorChannels = 3;
   static std::size_t channels(const GatherRules& rules) {
     return kCoverageChannels + rules.channels();
