@@ -52,7 +52,7 @@ resultsDoNotDependOnThreadsOrMemory() {
   sameBytes cornell.sft other.sft
   run 0 sample cornell.obj -o receivers.ply --count 300 --light-samples 1
   run 0 gather cornell.sft receivers.ply -o one.ply --mode bleeding --threads 1 --memory 1G
-  run 0 gather cornell.sft receivers.ply -o many.ply --mode bleeding --threads 4 --memory 24M
+  run 0 gather cornell.sft receivers.ply -o many.ply --mode bleeding --threads 4 --memory 28M
   sameBytes one.ply many.ply
 }
 
@@ -291,7 +291,7 @@ optionsOfTheirOwnWinOverThePreset() {
   makeScene 5000
   makePatch
   gatherPatch default
-  jsonIs default.json max_solid_angle 0.13 raster_resolution 14 near_field_radii 8 \
+  jsonIs default.json max_solid_angle 0.11 raster_resolution 16 near_field_radii 8 \
     far_field_parallax 0.2
   gatherPatch standard --quality standard
   sameBytes standard.ply default.ply
