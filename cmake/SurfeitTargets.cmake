@@ -25,10 +25,17 @@ function(surfeit_add_layer name)
     PRIVATE $<BUILD_INTERFACE:surfeit_build_options> ${ARG_PRIVATE_LINKS})
 endfunction()
 
+# surfeit_join_sources(<target>): a unity build. Most of the time of small sources goes into headers of CLI11
+# and GoogleTest, so it is worth it for what uses those. Names at file scope must differ within a target.
+function(surfeit_join_sources target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${SURFEIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 8)
+endfunction()
+
 # surfeit_add_test(<layer> SOURCES ... LINKS ...): one GoogleTest program per layer.
 function(surfeit_add_test layer)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${layer}_test ${ARG_SOURCES})
+  surfeit_join_sources(${layer}_test)
   target_include_directories(${layer}_test PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${layer}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main surfeit_build_options)
   target_compile_definitions(${layer}_test PRIVATE

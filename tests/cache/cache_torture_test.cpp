@@ -19,7 +19,7 @@
 namespace surfeit {
 namespace {
 
-constexpr PageNumber kPages = 2000;
+constexpr PageNumber kTorturePages = 2000;
 
 // A loader that sees to it that no page is loaded twice at a time, and fails at random.
 class TortureSource {
@@ -42,7 +42,7 @@ class TortureSource {
 
  private:
   std::atomic<std::uint64_t> loads_{0}, failures_{0}, overlaps_{0};
-  std::vector<std::atomic<int>> loading_ = std::vector<std::atomic<int>>(kPages);
+  std::vector<std::atomic<int>> loading_ = std::vector<std::atomic<int>>(kTorturePages);
 };
 
 struct Torture {
@@ -62,7 +62,7 @@ std::uint64_t tortureThread(PageCache& cache, const Torture& torture, unsigned i
   std::uint64_t wrong = 0;
   for (int i = 0; i < torture.lookups; ++i) {
     // Half of the requests go to few pages, so that threads meet
-    const PageNumber page = random() % 2 == 0 ? random() % 20 : random() % kPages;
+    const PageNumber page = random() % 2 == 0 ? random() % 20 : random() % kTorturePages;
     if (random() % 4 == 0) {
       pin.release();
       auto result = front.pin(page);
@@ -85,7 +85,7 @@ void runTorture(const Torture& torture) {
   SCOPED_TRACE(testing::Message() << torture.frames << " frames, " << torture.threads
                                   << " threads, " << torture.slots << " slots");
   TortureSource source;
-  auto cache = makeCache(kPages, torture.frames, source.loader());
+  auto cache = makeCache(kTorturePages, torture.frames, source.loader());
   std::atomic<std::uint64_t> wrong{0};
   std::vector<std::thread> threads;
   for (unsigned id = 0; id < torture.threads; ++id) {
@@ -102,7 +102,7 @@ void runTorture(const Torture& torture) {
   EXPECT_EQ(counters.bytes_read, (source.loads() - source.failures()) * kTestStoredBytes);
   EXPECT_LE(counters.peak_bytes, frameBytes(torture.frames));
   std::uint64_t loaded = 0;
-  for (PageNumber page = 0; page < kPages; ++page) loaded += cache->isLoaded(page);
+  for (PageNumber page = 0; page < kTorturePages; ++page) loaded += cache->isLoaded(page);
   EXPECT_EQ(loaded, counters.misses - counters.failed_loads - counters.evictions);
 
   // No pin is left: every frame can be pinned

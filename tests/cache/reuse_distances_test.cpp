@@ -17,22 +17,22 @@
 namespace surfeit {
 namespace {
 
-using Trace = std::vector<PageNumber>;
+using PageTrace = std::vector<PageNumber>;
 using NextPage = std::function<PageNumber(std::size_t at)>;
 
-Trace makeTrace(std::size_t lookups, const NextPage& next) {
-  Trace trace(lookups);
+PageTrace makeTrace(std::size_t lookups, const NextPage& next) {
+  PageTrace trace(lookups);
   for (std::size_t at = 0; at < lookups; ++at) trace[at] = next(at);
   return trace;
 }
 
-Trace uniformTrace(PageNumber pages, std::size_t lookups) {
+PageTrace uniformTrace(PageNumber pages, std::size_t lookups) {
   std::mt19937_64 random(1);
   return makeTrace(lookups, [&](std::size_t) { return PageNumber(random() % pages); });
 }
 
 // Pages by popularity, 1 / rank^exponent; which page has which rank is random.
-Trace zipfTrace(PageNumber pages, std::size_t lookups, double exponent) {
+PageTrace zipfTrace(PageNumber pages, std::size_t lookups, double exponent) {
   std::mt19937_64 random(2);
   std::vector<PageNumber> page_of_rank(pages);
   std::iota(page_of_rank.begin(), page_of_rank.end(), PageNumber{0});
@@ -50,13 +50,13 @@ Trace zipfTrace(PageNumber pages, std::size_t lookups, double exponent) {
 }
 
 // The cliff of LRU: no hit below `length` frames, nothing but hits from there on.
-Trace loopTrace(PageNumber length, std::size_t lookups) {
+PageTrace loopTrace(PageNumber length, std::size_t lookups) {
   return makeTrace(lookups, [&](std::size_t at) { return PageNumber(at % length); });
 }
 
 // A window that moves along all pages once, looked up at random within: surfel pages near
 // receivers.
-Trace sweepTrace(PageNumber pages, std::size_t lookups, PageNumber window) {
+PageTrace sweepTrace(PageNumber pages, std::size_t lookups, PageNumber window) {
   std::mt19937_64 random(3);
   return makeTrace(lookups, [&](std::size_t at) {
     const auto begin = PageNumber((pages - window) * std::uint64_t{at} / lookups);
@@ -66,9 +66,9 @@ Trace sweepTrace(PageNumber pages, std::size_t lookups, PageNumber window) {
 
 // Page p has the children 8 p + 1 .. 8 p + 8. Paths from the root to places that move along the
 // deepest level, and now and then far away: node pages in level order.
-Trace treeTrace(PageNumber pages, std::size_t lookups) {
+PageTrace treeTrace(PageNumber pages, std::size_t lookups) {
   std::mt19937_64 random(4);
-  Trace trace;
+  PageTrace trace;
   while (trace.size() < lookups) {
     const double along = double(trace.size()) / double(lookups);
     const bool is_near = random() % 8 != 0;
@@ -88,15 +88,15 @@ Trace treeTrace(PageNumber pages, std::size_t lookups) {
 }
 
 // Three quarters Zipf, the rest a loop over a part of the same pages.
-Trace mixedTrace(PageNumber pages, std::size_t lookups) {
-  Trace trace = zipfTrace(pages, lookups, 0.9);
+PageTrace mixedTrace(PageNumber pages, std::size_t lookups) {
+  PageTrace trace = zipfTrace(pages, lookups, 0.9);
   for (std::size_t at = 0; at < lookups; at += 4) trace[at] = PageNumber(at / 4 % (pages / 10 + 1));
   return trace;
 }
 
 struct NamedTrace {
   std::string name;
-  Trace trace;
+  PageTrace trace;
 };
 
 std::vector<NamedTrace> allTraces(PageNumber pages, std::size_t lookups) {
@@ -110,7 +110,7 @@ std::vector<NamedTrace> allTraces(PageNumber pages, std::size_t lookups) {
 }
 
 // An LRU cache as in a textbook.
-std::uint64_t missesOfLru(const Trace& trace, std::size_t frames) {
+std::uint64_t missesOfLru(const PageTrace& trace, std::size_t frames) {
   std::list<PageNumber> cached;
   std::uint64_t misses = 0;
   for (const PageNumber page : trace) {
@@ -126,13 +126,13 @@ std::uint64_t missesOfLru(const Trace& trace, std::size_t frames) {
   return misses;
 }
 
-void touchAll(ReuseDistances& distances, const Trace& trace) {
+void touchAll(ReuseDistances& distances, const PageTrace& trace) {
   for (const PageNumber page : trace) {
     if (distances.isSampled(page)) distances.touch(page);
   }
 }
 
-MissRatioCurve curveOf(const Trace& trace, PageNumber pages, std::size_t most_tracked) {
+MissRatioCurve curveOf(const PageTrace& trace, PageNumber pages, std::size_t most_tracked) {
   ReuseDistances distances(pages, most_tracked);
   touchAll(distances, trace);
   return distances.curve(trace.size());
@@ -251,7 +251,7 @@ TEST(ReuseDistances, NoStrideEscapesTheSample) {
 }
 
 TEST(ReuseDistances, LookupsThatFrontsAnswerAreHitsOfAnyCache) {
-  const Trace trace = uniformTrace(500, 5000);
+  const PageTrace trace = uniformTrace(500, 5000);
   ReuseDistances distances(500, 500);
   touchAll(distances, trace);
   const MissRatioCurve cache = distances.curve(5000);

@@ -25,15 +25,15 @@
 namespace surfeit {
 namespace {
 
-struct Baked {
+struct Gathered {
   glm::vec3 position, normal, irradiance;
 };
 
 class PhotonMap : public DirectoryTest {
  protected:
   // Irradiance at `receivers` places of the mesh from a photon map of it.
-  std::vector<Baked> gather(const std::string& mesh, std::uint64_t photons,
-                            std::uint64_t receivers) {
+  std::vector<Gathered> gather(const std::string& mesh, std::uint64_t photons,
+                               std::uint64_t receivers) {
     PhotonTracingOptions tracing;
     tracing.photons = photons;
     EXPECT_TRUE(tracePhotons({mesh}, path("photons.ply"), tracing, progress_).ok());
@@ -57,12 +57,12 @@ class PhotonMap : public DirectoryTest {
     return readBaked();
   }
 
-  std::vector<Baked> readBaked() const {
+  std::vector<Gathered> readBaked() const {
     const BakedRows rows = readBakedRows(path("baked.ply"));
     const auto triple = [&](std::size_t row, const char* x, const char* y, const char* z) {
       return glm::vec3(rows.value(row, x), rows.value(row, y), rows.value(row, z));
     };
-    std::vector<Baked> baked(rows.element.count);
+    std::vector<Gathered> baked(rows.element.count);
     for (std::size_t i = 0; i < baked.size(); ++i) {
       baked[i] = {triple(i, "x", "y", "z"), triple(i, "nx", "ny", "nz"),
                   triple(i, "irradiance_r", "irradiance_g", "irradiance_b")};
@@ -81,11 +81,11 @@ TEST_F(PhotonMap, InAClosedBoxIrradianceIsTheGeometricSeries) {
   std::string obj = "mtllib box.mtl\nusemtl m\n";
   for (int i = 0; i < 8; ++i) obj += fmt::format("v {} {} {}\n", i & 1, (i >> 1) & 1, i >> 2);
   write("box.obj", obj + "f 2 4 3 1\nf 7 8 6 5\nf 5 6 2 1\nf 4 8 7 3\nf 3 7 5 1\nf 6 8 4 2\n");
-  const std::vector<Baked> baked = gather(path("box.obj"), 100000, 500);
+  const std::vector<Gathered> baked = gather(path("box.obj"), 100000, 500);
   EXPECT_NEAR(stats_.area, 6, 0.02 * 6);
   const glm::dvec3 expected = {0.5 / 0.5, 0.75 / 0.25, 0.25 / 0.75};
   glm::dvec3 mean(0), rms(0);
-  for (const Baked& receiver : baked) {
+  for (const Gathered& receiver : baked) {
     const glm::dvec3 error = glm::dvec3(receiver.irradiance) / expected - 1.0;
     mean += error / double(baked.size());
     rms += error * error / double(baked.size());
@@ -102,9 +102,9 @@ TEST_F(PhotonMap, InAClosedBoxIrradianceIsTheGeometricSeries) {
 }
 
 // Indirect irradiance by tracing paths: at each hit the direct light, and one more ray.
-class PathTracer {
+class IndirectPaths {
  public:
-  explicit PathTracer(const ReferenceScene& scene) : scene_(scene) {}
+  explicit IndirectPaths(const ReferenceScene& scene) : scene_(scene) {}
 
   glm::dvec3 indirect(const glm::vec3& position, const glm::vec3& normal, int paths) {
     glm::dvec3 sum(0);
@@ -143,13 +143,13 @@ class PathTracer {
 
 TEST_F(PhotonMap, OfTheCornellBoxMatchesTracedPaths) {
   ASSERT_EQ(std::system(fmt::format("'{}' '{}' >/dev/null", CORNELL_SCENE, path("")).c_str()), 0);
-  const std::vector<Baked> baked = gather(path("cornell.obj"), 200000, 200);
+  const std::vector<Gathered> baked = gather(path("cornell.obj"), 200000, 200);
   const Result<ReferenceScene> scene =
       ReferenceScene::load({path("cornell.obj")}, {}, 2, progress_);
   ASSERT_TRUE(scene.ok()) << scene.status().message();
-  PathTracer tracer(*scene);
+  IndirectPaths tracer(*scene);
   glm::dvec3 mean(0), error_sum(0), square_sum(0);
-  for (const Baked& receiver : baked) {
+  for (const Gathered& receiver : baked) {
     const glm::dvec3 truth = tracer.indirect(receiver.position, receiver.normal, 2000);
     const glm::dvec3 error = glm::dvec3(receiver.irradiance) - truth;
     mean += truth / double(baked.size());

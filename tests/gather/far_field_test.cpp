@@ -12,14 +12,15 @@
 namespace surfeit {
 namespace {
 
-constexpr int kSide = 16;  // of a square of receivers
+constexpr int kRowReceivers = 16;  // of a square of receivers
 
 // That look up.
 std::vector<Receiver> squareOfReceivers(const glm::vec3& corner, float step) {
   std::vector<Receiver> receivers;
-  for (int i = 0; i < kSide * kSide; ++i) {
+  for (int i = 0; i < kRowReceivers * kRowReceivers; ++i) {
     receivers.push_back(
-        {corner + step * glm::vec3(float(i % kSide), float(i / kSide), 0), {0, 0, 1}});
+        {corner + step * glm::vec3(float(i % kRowReceivers), float(i / kRowReceivers), 0),
+         {0, 0, 1}});
   }
   return receivers;
 }
@@ -42,9 +43,9 @@ Unevenness unevennessOfSharing(Scene& scene, const std::vector<Receiver>& receiv
   const std::vector<GatherResult> shared = gatherWith(.2f, scene, receivers);
   const std::vector<GatherResult> alone = gatherWith(0, scene, receivers);
   Unevenness sum;
-  const int pairs = kSide * (kSide - 1);
+  const int pairs = kRowReceivers * (kRowReceivers - 1);
   for (std::size_t i = 0; i + 1 < receivers.size(); ++i) {
-    if (i % kSide == kSide - 1) continue;
+    if (i % kRowReceivers == kRowReceivers - 1) continue;
     const auto change = [&](auto value) {
       return double((value(shared[i + 1]) - value(alone[i + 1])) -
                     (value(shared[i]) - value(alone[i])));

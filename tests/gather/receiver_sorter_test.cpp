@@ -11,9 +11,6 @@
 namespace surfeit {
 namespace {
 
-using Options = ReceiverSorter::Options;
-
-constexpr std::uint64_t kPlenty = std::uint64_t{1} << 30;
 constexpr std::size_t kRunReceivers = 17857;  // no less than a run in the least memory has
 
 // Receivers in random order, `ties` to a key on average.
@@ -42,6 +39,8 @@ bool areEqual(std::span<const SortedReceiver> a, std::span<const SortedReceiver>
 
 class ReceiverSorterTest : public SpillTest {
  protected:
+  using Options = ReceiverSorter::Options;
+
   Options optionsFor(std::size_t count, std::uint64_t memory_bytes = 0) const {
     const std::uint64_t least = ReceiverSorter::leastMemoryBytes(count);
     return {.count = count,

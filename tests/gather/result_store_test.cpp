@@ -15,10 +15,8 @@
 namespace surfeit {
 namespace {
 
-using Options = ResultStore::Options;
 using Entry = ResultStore::Entry;
 
-constexpr std::uint64_t kPlenty = std::uint64_t{1} << 30;
 constexpr std::size_t kSpilled = 300'000;  // many buckets in the least memory
 
 GatherResult resultOf(std::uint64_t index) {
@@ -44,6 +42,8 @@ bool isMissing(const GatherResult& result) {
 
 class ResultStoreTest : public SpillTest {
  protected:
+  using Options = ResultStore::Options;
+
   Options optionsFor(std::size_t count, std::uint64_t memory_bytes = 0) const {
     const std::uint64_t least = ResultStore::leastMemoryBytes(count);
     return {.count = count,

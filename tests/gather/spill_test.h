@@ -27,6 +27,9 @@
 
 namespace surfeit {
 
+// Memory in which nothing needs to spill.
+inline constexpr std::uint64_t kPlenty = std::uint64_t{1} << 30;
+
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kHasSanitizer = true;  // whose allocator neither fails nor is counted
 #else

@@ -8,17 +8,14 @@
 #include "io/formats/bgeo_reader.h"
 #include "io/formats/bgeo_writer.h"
 #include "io/row_damage_test.h"
+#include "io/test_bytes.h"
 
 namespace surfeit {
 namespace {
 
 template <typename T>
-std::string le(T value) {
-  return {reinterpret_cast<const char*>(&value), sizeof value};
-}
-template <typename T>
 std::string be(T value) {
-  std::string bytes = le(value);
+  std::string bytes = littleEndian(value);
   std::reverse(bytes.begin(), bytes.end());
   return bytes;
 }
@@ -247,7 +244,7 @@ struct Json {
 
   template <typename T>
   std::string raw(T value) const {
-    return is_big_endian ? be(value) : le(value);
+    return is_big_endian ? be(value) : littleEndian(value);
   }
   std::string length(std::size_t value) const {
     if (value < 0xF1) return {char(value)};
@@ -445,11 +442,12 @@ TEST_F(BgeoTest, RefusesJsonThatDoesNotFit) {
   EXPECT_NE(refusal(openBgeoJson, json.geometry(1, "")).find("no point attributes"),
             std::string::npos);
   // An array that claims to be endless, and lengths that wrap
-  EXPECT_NE(
-      refusal(openBgeoJson, "\x7FNSJb[" + json.text("a") + "@\x19\xF8" + le(std::int64_t{1} << 62))
-          .find("array of"),
-      std::string::npos);
-  EXPECT_NE(refusal(openBgeoJson, "\x7FNSJb[" + json.text("a") + "@\x19\xF8" + le(std::int64_t{-1}))
+  EXPECT_NE(refusal(openBgeoJson, "\x7FNSJb[" + json.text("a") + "@\x19\xF8" +
+                                      littleEndian(std::int64_t{1} << 62))
+                .find("array of"),
+            std::string::npos);
+  EXPECT_NE(refusal(openBgeoJson,
+                    "\x7FNSJb[" + json.text("a") + "@\x19\xF8" + littleEndian(std::int64_t{-1}))
                 .find("length -1"),
             std::string::npos);
   EXPECT_NE(refusal(openBgeoJson, "\x7FNSJb[" + json.text("a") + std::string(100'000, '['))

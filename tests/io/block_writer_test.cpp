@@ -9,14 +9,13 @@
 #include <vector>
 
 #include "io/fault_injector.h"
+#include "io/test_bytes.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
 namespace {
 
 constexpr std::size_t kBlock = BlockWriter::kBlockBytes;
-
-Bytes bytesOf(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 class BlockWriterTest : public DirectoryTest {
  protected:

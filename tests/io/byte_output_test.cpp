@@ -9,14 +9,13 @@
 
 #include "io/compressed_files.h"
 #include "io/fault_injector.h"
+#include "io/test_bytes.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
 namespace {
 
 using testing::HasSubstr;
-
-Bytes bytesOf(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 class ByteOutputTest : public DirectoryTest {
  protected:

@@ -13,6 +13,7 @@
 #include "io/fault_injector.h"
 #include "io/file.h"
 #include "io/page_file.h"
+#include "io/test_bytes.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -21,8 +22,6 @@ namespace {
 using Repeat = FailCall::Repeat;
 
 constexpr int kMostCalls = 200;  // more than any file here takes
-
-Bytes bytesOf(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 // Bytes without a period.
 std::string noise(std::size_t size) {

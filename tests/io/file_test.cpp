@@ -14,14 +14,13 @@
 #include "io/block_writer.h"
 #include "io/fault_injector.h"
 #include "io/page_file.h"
+#include "io/test_bytes.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
 namespace {
 
 namespace fs = std::filesystem;
-
-Bytes bytesOf(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 std::string textOf(Bytes bytes) {
   std::string text(bytes.size(), ' ');

@@ -13,7 +13,7 @@ namespace surfeit {
 namespace {
 
 template <typename T>
-std::string bytesOf(T value, bool is_swapped = false) {
+std::string inOrder(T value, bool is_swapped = false) {
   std::string bytes(reinterpret_cast<const char*>(&value), sizeof value);
   if (is_swapped) std::reverse(bytes.begin(), bytes.end());
   return bytes;
@@ -25,24 +25,24 @@ struct PdbFile {
   std::uint32_t attributes = 0;
   std::string body;
 
-  std::string word(std::uint32_t value) const { return bytesOf(value, is_swapped); }
+  std::string word(std::uint32_t value) const { return inOrder(value, is_swapped); }
 
   void add(const std::string& name, std::uint32_t type, std::uint32_t bytes,
            const std::string& values, std::uint32_t block_rows = 3, std::uint32_t blocks = 1) {
     ++attributes;
-    body += bytesOf(std::uint16_t{0xF663}, is_swapped) + bytesOf(std::uint16_t{1}, is_swapped) +
+    body += inOrder(std::uint16_t{0xF663}, is_swapped) + inOrder(std::uint16_t{1}, is_swapped) +
             std::string(6, '\0') + word(type) + std::string(8, '\0') + word(particles - 1) +
             std::string(16, '\0') + name + '\0' + word(type) + word(bytes) + word(block_rows) +
             word(blocks) + word(0) + values;
   }
   std::string floats(int count, float first) const {
     std::string text;
-    for (int i = 0; i < count; ++i) text += bytesOf(first + float(i), is_swapped);
+    for (int i = 0; i < count; ++i) text += inOrder(first + float(i), is_swapped);
     return text;
   }
   std::string file() const {
-    return word(670) + bytesOf(std::uint16_t{1}, is_swapped) + std::string(2, '\0') +
-           bytesOf(1.0f, is_swapped) + bytesOf(0.0f) + word(particles) + word(attributes) +
+    return word(670) + inOrder(std::uint16_t{1}, is_swapped) + std::string(2, '\0') +
+           inOrder(1.0f, is_swapped) + inOrder(0.0f) + word(particles) + word(attributes) +
            std::string(36, '\0') + body;
   }
 };

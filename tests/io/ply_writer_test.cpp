@@ -20,9 +20,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr PlyEncoding kEncodings[] = {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian,
-                                      PlyEncoding::kBinaryBigEndian};
-
 using PlyWriterTest = DirectoryTest;
 
 PlyProperty scalar(const std::string& name, PlyType type) {
@@ -41,7 +38,8 @@ std::vector<PlyProperty> oneOfEachType() {
 
 TEST_F(PlyWriterTest, RandomRowsOfAllTypesRoundTripBitForBit) {
   constexpr std::size_t kRows = 20000;
-  for (const PlyEncoding encoding : kEncodings) {
+  for (const PlyEncoding encoding :
+       {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
     Result<PlyWriter> writer = PlyWriter::create(path("a.ply"), encoding, oneOfEachType(), {"hi"});
     ASSERT_TRUE(writer.ok()) << writer.status().message();
     const PlyElement element = writer->element();

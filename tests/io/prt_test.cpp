@@ -8,14 +8,10 @@
 #include "io/formats/prt_reader.h"
 #include "io/formats/prt_writer.h"
 #include "io/row_damage_test.h"
+#include "io/test_bytes.h"
 
 namespace surfeit {
 namespace {
-
-template <typename T>
-std::string le(T value) {
-  return {reinterpret_cast<const char*>(&value), sizeof value};
-}
 
 std::string deflated(const std::string& bytes) {
   uLongf size = compressBound(bytes.size());
@@ -36,15 +32,16 @@ std::string prt(const std::vector<Channel>& channels, std::int64_t count,
                 const std::string& records, std::int32_t version = 1,
                 const std::string& metadata = "", std::int32_t channel_bytes = 44) {
   std::string file("\xC0PRT\r\n\x1A\n", 8);
-  file += le(std::int32_t(56 + metadata.size()));
+  file += littleEndian(std::int32_t(56 + metadata.size()));
   std::string signature = "Extensible Particle Format";
   signature.resize(32);
-  file += signature + le(version) + le(count) + metadata + le(std::int32_t{4}) +
-          le(std::int32_t(channels.size())) + le(channel_bytes);
+  file += signature + littleEndian(version) + littleEndian(count) + metadata +
+          littleEndian(std::int32_t{4}) + littleEndian(std::int32_t(channels.size())) +
+          littleEndian(channel_bytes);
   for (const Channel& channel : channels) {
     std::string text = channel.name;
     text.resize(32);
-    text += le(channel.type) + le(channel.arity) + le(channel.offset);
+    text += littleEndian(channel.type) + littleEndian(channel.arity) + littleEndian(channel.offset);
     text.resize(std::size_t(channel_bytes));
     file += text;
   }
@@ -54,7 +51,7 @@ std::string prt(const std::vector<Channel>& channels, std::int64_t count,
 // Three particles of a position.
 std::string positions() {
   std::string records;
-  for (int i = 0; i < 9; ++i) records += le(float(i));
+  for (int i = 0; i < 9; ++i) records += littleEndian(float(i));
   return records;
 }
 
@@ -83,8 +80,9 @@ TEST_F(PrtTest, ChannelsMayBeUnorderedAndLeaveGaps) {
   // [ id u8 | 3 bytes | position | half ], twice
   std::string records;
   for (int i = 0; i < 2; ++i) {
-    records += le(std::uint8_t(40 + i)) + "???" + le(1.0f) + le(2.0f) + le(float(i)) +
-               le(std::uint16_t{0x3C00}) /* 1 as a half */;
+    records += littleEndian(std::uint8_t(40 + i)) + "???" + littleEndian(1.0f) +
+               littleEndian(2.0f) + littleEndian(float(i)) +
+               littleEndian(std::uint16_t{0x3C00}) /* 1 as a half */;
   }
   const auto reader =
       openPrtOf(prt({{"Density", 3, 1, 16}, {"Position", 4, 3, 4}, {"ID", 10, 1, 0}}, 2, records));
@@ -99,17 +97,17 @@ TEST_F(PrtTest, ChannelsMayBeUnorderedAndLeaveGaps) {
 TEST_F(PrtTest, ReadsEveryType) {
   std::vector<Channel> channels{{"Position", 4, 3, 0}};
   std::string record = positions().substr(0, 12);
-  const std::string values[] = {le(std::int16_t{-5}),
-                                le(std::int32_t{-6}),
-                                le(std::int64_t{-7}),
-                                le(std::uint16_t{0xC000}),
-                                le(-1.5f),
-                                le(-2.5),
-                                le(std::uint16_t{9}),
-                                le(std::uint32_t{10}),
-                                le(std::uint64_t{11}),
-                                le(std::int8_t{-12}),
-                                le(std::uint8_t{13})};
+  const std::string values[] = {littleEndian(std::int16_t{-5}),
+                                littleEndian(std::int32_t{-6}),
+                                littleEndian(std::int64_t{-7}),
+                                littleEndian(std::uint16_t{0xC000}),
+                                littleEndian(-1.5f),
+                                littleEndian(-2.5),
+                                littleEndian(std::uint16_t{9}),
+                                littleEndian(std::uint32_t{10}),
+                                littleEndian(std::uint64_t{11}),
+                                littleEndian(std::int8_t{-12}),
+                                littleEndian(std::uint8_t{13})};
   for (int type = 0; type < 11; ++type) {
     channels.push_back({"t" + std::to_string(type), type, 1, std::int32_t(record.size())});
     record += values[type];
@@ -138,10 +136,10 @@ TEST_F(PrtTest, UnstatedCountIsCounted) {
 }
 
 TEST_F(PrtTest, TextsOfMetadataAreComments) {
-  const std::string text = std::string("Position\0Interpretation\0", 24) + le(std::int32_t{-1}) +
-                           std::string("Point\0", 6);
-  const std::string metadata =
-      "Meta" + le(std::int32_t(text.size())) + text + "Stop" + le(std::int32_t{0});
+  const std::string text = std::string("Position\0Interpretation\0", 24) +
+                           littleEndian(std::int32_t{-1}) + std::string("Point\0", 6);
+  const std::string metadata = "Meta" + littleEndian(std::int32_t(text.size())) + text + "Stop" +
+                               littleEndian(std::int32_t{0});
   const auto reader = openPrtOf(prt({{"Position", 4, 3, 0}}, 3, positions(), 2, metadata));
   ASSERT_NE(reader, nullptr);
   EXPECT_EQ(reader->formatName(), "PRT 1.1");
@@ -181,11 +179,11 @@ TEST_F(PrtTest, RefusesBadHeaders) {
   EXPECT_NE(refusalOf(prt(position, 3, positions(), 7)).find("version 7"), std::string::npos);
   // Metadata that would make a reader go backwards, or past the header
   for (const std::int32_t length : {-8, -1, 1, 2'000'000'000}) {
-    const std::string metadata = "Meta" + le(length);
+    const std::string metadata = "Meta" + littleEndian(length);
     EXPECT_NE(refusalOf(prt(position, 3, positions(), 2, metadata)).find("metadata of"),
               std::string::npos);
   }
-  EXPECT_NE(refusalOf(prt(position, 3, positions(), 2, "Meta" + le(0))).find("Stop"),
+  EXPECT_NE(refusalOf(prt(position, 3, positions(), 2, "Meta" + littleEndian(0))).find("Stop"),
             std::string::npos);
 }
 
@@ -212,7 +210,7 @@ TEST_F(PrtTest, FailureStaysUntilRewind) {
 TEST_F(PrtTest, ManyRowsAreReadAtOnce) {
   // More bytes than are given room at first
   std::string records;
-  for (int i = 0; i < 4'500'000; ++i) records += le(float(i / 1000));
+  for (int i = 0; i < 4'500'000; ++i) records += littleEndian(float(i / 1000));
   const auto reader = openPrtOf(prt({{"Position", 4, 3, 0}}, 1'500'000, records));
   ASSERT_NE(reader, nullptr);
   const std::vector<std::byte> rows = readAllRows(*reader, ~std::size_t{0});
@@ -329,12 +327,12 @@ TEST_F(PrtTest, ReadsTheSamples) {
 // --- PRT 2 ---
 
 std::string chunk(const std::string& name, const std::string& data) {
-  return name + le(std::uint64_t(data.size())) + data;
+  return name + littleEndian(std::uint64_t(data.size())) + data;
 }
 std::string text(const std::string& value) { return char(value.size()) + value; }
 
 std::string prt2Head() {
-  return std::string("\xC0PRT2\r\n\x1A", 8) + le(std::uint32_t{3}) +
+  return std::string("\xC0PRT2\r\n\x1A", 8) + littleEndian(std::uint32_t{3}) +
          chunk("Chan", "\x02" + text("Position") + text("3 * float32") + "\x0C" + text("Radius") +
                            text("float16") + "\x02");
 }
@@ -342,12 +340,13 @@ std::string prt2Head() {
 // A stream of `chunks` of `per_chunk` particles; their positions are i, i + 0.25, i + 0.5.
 std::string part(const std::string& name, const std::string& compression, int chunks, int per_chunk,
                  std::int64_t count) {
-  std::string data = text(name) + text(compression) + le(count) + le(std::int64_t{chunks});
+  std::string data =
+      text(name) + text(compression) + littleEndian(count) + littleEndian(std::int64_t{chunks});
   for (int c = 0; c < chunks; ++c) {
     std::string records;
     for (int i = c * per_chunk; i < (c + 1) * per_chunk; ++i) {
-      records +=
-          le(float(i)) + le(float(i) + 0.25f) + le(float(i) + 0.5f) + le(std::uint16_t{0x4000});
+      records += littleEndian(float(i)) + littleEndian(float(i) + 0.25f) +
+                 littleEndian(float(i) + 0.5f) + littleEndian(std::uint16_t{0x4000});
     }
     if (compression.starts_with("transpose")) {
       std::string transposed;
@@ -357,7 +356,8 @@ std::string part(const std::string& name, const std::string& compression, int ch
       records = transposed;
     }
     if (compression.ends_with("zlib")) records = deflated(records);
-    data += le(std::uint32_t(records.size())) + le(std::uint32_t(per_chunk)) + records;
+    data += littleEndian(std::uint32_t(records.size())) + littleEndian(std::uint32_t(per_chunk)) +
+            records;
   }
   return chunk("Part", data);
 }
@@ -415,12 +415,13 @@ TEST_F(PrtTest, RefusesWhatPrt2DoesNotSay) {
 TEST_F(PrtTest, MassiveAndNegativePrt2ChunksAreRefusedAtOnce) {
   for (const std::uint64_t length :
        {~std::uint64_t{0}, ~std::uint64_t{7}, std::uint64_t{1} << 63, std::uint64_t{1} << 40}) {
-    const std::string header = prt2Head() + "Junk" + le(length);
+    const std::string header = prt2Head() + "Junk" + littleEndian(length);
     EXPECT_NE(refusal(openPrt2, header + "tail").find("more than the file has"), std::string::npos);
   }
   // A particle chunk that claims to code 4 GiB
-  const std::string data = text("") + text("zlib") + le(std::int64_t{5}) + le(std::int64_t{1}) +
-                           le(~std::uint32_t{0}) + le(~std::uint32_t{0});
+  const std::string data = text("") + text("zlib") + littleEndian(std::int64_t{5}) +
+                           littleEndian(std::int64_t{1}) + littleEndian(~std::uint32_t{0}) +
+                           littleEndian(~std::uint32_t{0});
   EXPECT_NE(refusal(openPrt2, prt2Head() + chunk("Part", data + std::string(100, 'x')))
                 .find("particle chunk of"),
             std::string::npos);

@@ -12,7 +12,8 @@
 #include "io/square_strata.h"
 #include "io/surfel_source.h"
 #include "io/surfel_writer.h"
-#include "test_directory.h"
+#include "io/test_bytes.h"
+#include "io/test_directory.h"
 
 namespace surfeit {
 namespace {
@@ -35,11 +36,6 @@ std::vector<Surfel> allSurfels(const SceneRecipe& recipe) {
   std::vector<Surfel> surfels(generator.recordCount());
   generator.generate(0, surfels);
   return surfels;
-}
-
-// Surfels have no padding, so that their bytes tell whether they are equal.
-bool areEqual(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Surfel)) == 0;
 }
 
 void sortByContent(std::vector<Surfel>& surfels) {

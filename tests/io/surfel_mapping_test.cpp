@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "io/test_bytes.h"
+
 namespace surfeit {
 namespace {
 
@@ -166,11 +168,6 @@ std::vector<std::byte> randomRows(const PlyElement& element, unsigned hostile_ev
 void expectEqual(const SurfelDefects& a, const SurfelDefects& b) {
   EXPECT_EQ(a.describe(), b.describe());
   EXPECT_EQ(a.total(), b.total());
-}
-
-bool areEqual(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
-  return a.size() == b.size() &&
-         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Surfel)) == 0);
 }
 
 // Of decode, row after row.

@@ -16,6 +16,7 @@
 #include "io/surfel_cloud_test.h"
 #include "io/surfel_source.h"
 #include "io/surfel_writer.h"
+#include "io/test_bytes.h"
 
 namespace surfeit {
 namespace {
@@ -54,11 +55,6 @@ class SurfelRowsTest : public SurfelCloudTest {
       all.resize(before + *valid);
       record += count;
     }
-  }
-
-  static bool areEqual(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
-    return a.size() == b.size() &&
-           (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Surfel)) == 0);
   }
 
   // Reads the file to its end, 10 records at a time.

@@ -8,6 +8,7 @@
 #include <map>
 #include <random>
 
+#include "io/test_bytes.h"
 #include "octree/curve_sort.h"
 #include "octree/test_scenes.h"
 
@@ -73,10 +74,6 @@ class IndexTest : public SceneTest {
 std::vector<Surfel> sortedByContent(std::vector<Surfel> surfels) {
   std::sort(surfels.begin(), surfels.end(), contentLess);
   return surfels;
-}
-
-bool sameBytes(const std::vector<Surfel>& a, const std::vector<Surfel>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Surfel)) == 0;
 }
 
 TEST_F(IndexTest, CloudsOfManyShapesMakeSoundScenes) {
@@ -166,7 +163,7 @@ TEST_F(IndexTest, FullPrecisionKeepsEverySurfelOnceInCurveOrder) {
   const auto source = openSurfelSource(path("scene1.ply"), /* strict= */ true);
   ASSERT_TRUE(source.ok());
   ASSERT_EQ((*source)->read(cloud).value(), cloud.size());
-  EXPECT_TRUE(sameBytes(sortedByContent(scene->surfels), sortedByContent(cloud)));
+  EXPECT_TRUE(areEqual(sortedByContent(scene->surfels), sortedByContent(cloud)));
   CurveKey last = 0;
   for (const Surfel& surfel : scene->surfels) {
     const CurveKey key = curveKey(surfel.position, scene->header.cube);
