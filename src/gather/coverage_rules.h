@@ -58,7 +58,7 @@ inline constexpr FillPass kFillPasses[] = {{0.84f, 0.91f}, {0.85f, 0.91f}};
 // Two-sided surfels that no plane holds together, rough nodes of them and nodes of several facets,
 // are thickets: leaves, or hair. They lie before and behind each other anywhere, so nodes hide
 // behind their own layer as behind others, layers of facets and of pieces of ribbons reach this
-// part as far, and gaps between all of them are open. (docs/benchmarks.md has the errors without
+// part as far, and gaps between all of them are open. (docs/gather_steps.md has the errors without
 // each.)
 inline constexpr float kThicketReach = 0.15f;
 
