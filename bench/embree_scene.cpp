@@ -8,6 +8,7 @@
 #include <cstring>
 #include <utility>
 
+#include "core/seconds_since.h"
 #include "io/square_strata.h"
 
 namespace surfeit {
@@ -110,7 +111,7 @@ void EmbreeScene::addSpheres(std::span<const TrueSphere> spheres) {
 Status EmbreeScene::commit() {
   const auto begin = std::chrono::steady_clock::now();
   rtcCommitScene(scene_);
-  build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  build_seconds_ = secondsSince(begin);
   if (const RTCError error = rtcGetDeviceError(device_); error != RTC_ERROR_NONE) {
     return Status::failed(fmt::format("Embree: no hierarchy: error {}{}", int(error),
                                       error == RTC_ERROR_OUT_OF_MEMORY ? " (out of memory)" : ""));

@@ -20,6 +20,7 @@
 
 #include "bench/error_summary.h"
 #include "core/job_limits.h"
+#include "core/seconds_since.h"
 #include "io/ply_reader.h"
 #include "sample/reference.h"
 #include "tools/sample_options.h"
@@ -151,8 +152,7 @@ template <typename Trace>
 void timeTracing(const char* name, std::size_t count, int rays, int threads, Trace trace) {
   const auto start = std::chrono::steady_clock::now();
   tbb::parallel_for(std::size_t{0}, count, trace);
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = secondsSince(start);
   fmt::print("embree {}: {} rays, {} threads: {:.3g} receivers/s, {:.3g} rays/s, {:.2f} s\n", name,
              rays, threads, double(count) / seconds, double(count) * rays / seconds, seconds);
 }

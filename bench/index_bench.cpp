@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "core/seconds_since.h"
 #include "io/file.h"
 #include "io/page_file.h"
 #include "io/square_strata.h"
@@ -50,10 +51,6 @@ struct BenchOptions {
 
   std::string path(const std::string& name) const { return directory + "/" + name; }
 };
-
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // What a process took from its start to its end, and what it says about its work.
 struct ProcessResult {

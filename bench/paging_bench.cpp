@@ -19,6 +19,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/seconds_since.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
 #include "octree/paged_octree.h"
@@ -104,8 +105,7 @@ Outcome gather(const Arguments& arguments, const Setting& setting) {
   rusage usage{};
   wait4(child, &status, 0, &usage);
   outcome.ok = told && outcome.ok && WIFEXITED(status) && WEXITSTATUS(status) == 0;
-  outcome.wall_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  outcome.wall_seconds = secondsSince(begin);
   const auto seconds = [](const timeval& time) {
     return double(time.tv_sec) + double(time.tv_usec) * 1e-6;
   };

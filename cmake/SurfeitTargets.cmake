@@ -26,7 +26,8 @@ function(surfeit_add_layer name)
 endfunction()
 
 # surfeit_join_sources(<target>): a unity build. Most of the time of small sources goes into headers of CLI11
-# and GoogleTest, so it is worth it for what uses those. Names at file scope must differ within a target.
+# and GoogleTest, so it is worth it for what uses those. Names at file scope must differ within a target, and
+# from those of its headers, which they would hide from the sources after them.
 function(surfeit_join_sources target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${SURFEIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 8)
 endfunction()

@@ -11,6 +11,7 @@
 #include <new>
 
 #include "core/job_limits.h"
+#include "core/seconds_since.h"
 #include "io/file.h"
 
 namespace surfeit {
@@ -100,9 +101,7 @@ Status CommandContext::writeStats(nlohmann::json fields) {
   return writeTextFile(common.stats_path, fields.dump(2) + "\n");
 }
 
-double CommandContext::wallSeconds() const {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-}
+double CommandContext::wallSeconds() const { return secondsSince(start_); }
 
 Status writeTextFile(const std::string& path, const std::string& text) {
   SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));

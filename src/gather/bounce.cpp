@@ -20,6 +20,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/seconds_since.h"
 #include "gather/bounce_crew.h"
 #include "gather/bounce_radiosity.h"
 #include "gather/gather_memory.h"
@@ -41,10 +42,6 @@ constexpr int kMostBounces = 100;
 constexpr int kMostSurfelsPerReceiver = 64;
 // What a bounced scene's provenance holds its bounces under.
 constexpr const char* kProvenanceKey = "bounce";
-
-double secondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 GatherOptions gatherOptions(const BounceOptions& options) {
   GatherOptions gather;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/seconds_since.h"
 #include "core/worker_threads.h"
 #include "gather/interpolating_gatherer.h"
 #include "gather/packet_gatherer.h"
@@ -101,8 +102,7 @@ Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory&
     stats.interpolated_receivers = crew.interpolatedCount();
   }  // the readers go, and with them their last counts reach the caches
   controller.finish();
-  stats.gather_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  stats.gather_seconds = secondsSince(begin);
   stats.node_cache = controller.nodeStats();
   stats.surfel_cache = controller.surfelStats();
   stats.windows = controller.windows();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/seconds_since.h"
 #include "gather/cache_split.h"
 
 namespace surfeit {
@@ -72,9 +73,7 @@ PagingController::PagingController(PagedOctree& octree, const Options& options, 
           }(),
           kTickSeconds) {}
 
-double PagingController::secondsSinceStart() const {
-  return std::chrono::duration<double>(Clock::now() - start_).count();
-}
+double PagingController::secondsSinceStart() const { return secondsSince(start_); }
 
 PagingController::Moment PagingController::now() const {
   return {.seconds = secondsSinceStart(),

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <utility>
 
+#include "core/seconds_since.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_memory.h"
 #include "gather/receiver_queue.h"
@@ -48,7 +49,7 @@ Result<double> SampledGather::gather(std::span<const SortedReceiver> receivers) 
                    .progress = progress_},
                   [](std::span<const ResultStore::Entry>) { return Status(); });
   SURFEIT_RETURN_IF_ERROR(crew.run());
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return secondsSince(begin);
 }
 
 }  // namespace surfeit

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/first_failure.h"
+#include "core/seconds_since.h"
 #include "core/worker_threads.h"
 #include "gather/gather_options.h"
 #include "gather/look_up_trace.h"
@@ -40,10 +41,6 @@ constexpr std::uint64_t kLeastTimed = 4096, kTimedPart = 16;
 constexpr std::uint64_t kLeastSample = 4 * kStretchPart * kClusterReceivers;
 
 using Clock = std::chrono::steady_clock;
-
-double secondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 // Pieces of the order, evenly spread: piece i begins at place i * receivers / count.
 class Pieces {

@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "core/job_limits.h"
+#include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
 #include "io/cloud_formats.h"
@@ -37,10 +38,6 @@ constexpr std::size_t kBatchesInFlightPerThread = 4;
 constexpr std::uint64_t kMostPhotons = std::uint64_t{1} << 40;
 // Paths end also where nothing is absorbed: the powers of those that go on grow instead.
 constexpr float kMostSurvival = 0.97f;
-
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // A photon where it meets a surface: a row of the cloud.
 struct Photon {

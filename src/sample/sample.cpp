@@ -15,6 +15,7 @@
 #include <new>
 
 #include "core/job_limits.h"
+#include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
 #include "io/surfel_writer.h"
 #include "sample/dice.h"
@@ -22,10 +23,6 @@
 
 namespace surfeit {
 namespace {
-
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // Pieces [begin, end) of a triangle.
 struct PieceRange {

@@ -5,23 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "view/non_finite.h"
+
 namespace surfeit {
 namespace {
 
 constexpr int kBandRows = 32;
 constexpr std::size_t kChunkRows = 1024;
 
-// Values that are no numbers cannot hide in this color.
-constexpr glm::vec3 kNonFiniteColor{1, 0, 1};
-
 // The back of a thin wall lies within the front's thickness: a front fragment outweighs it.
 constexpr float kBackWeight = 1e-3f;
 // Weight at the rim of a disk, so that a sample which only rims cover is filled too.
 constexpr float kRimWeight = 1e-3f;
-
-bool isFinite(const glm::vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 glm::vec3 normalColor(const glm::vec3& normal) { return 0.5f * normal + 0.5f; }
 

@@ -16,6 +16,7 @@
 #include "io/cloud_formats.h"
 #include "io/formats/exr_reader.h"
 #include "view/channel.h"
+#include "view/non_finite.h"
 #include "view/picture.h"
 #include "view/picture_file.h"
 #include "view/row_field.h"
@@ -30,13 +31,6 @@ constexpr int kMaxReduce = 16;
 // Per pixel: the picture, the encoder's copy and the file in memory.
 constexpr std::uint64_t kBytesPerPixel = sizeof(Picture::Pixel) + 32;
 constexpr std::uint64_t kStreamBytes = std::uint64_t{64} << 20;
-
-// Values that are no numbers cannot hide in this color.
-constexpr glm::vec3 kNonFiniteColor{1, 0, 1};
-
-bool isFinite(const glm::vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 struct Place {
   std::int32_t y = 0, x = 0;

@@ -10,6 +10,7 @@
 #include <new>
 
 #include "core/job_limits.h"
+#include "core/seconds_since.h"
 #include "io/channels.h"
 #include "io/cloud_formats.h"
 #include "view/brick_rows.h"
@@ -273,8 +274,7 @@ Result<ViewStats> viewCloud(const std::string& input, const std::string& picture
         arena.execute([&] { return draw(input, picture, options, progress); });
     if (!result.ok()) return result;
     result->threads = threads;
-    result->seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result->seconds = secondsSince(start);
     return result;
   } catch (const std::bad_alloc&) {
     return Status::budgetTooSmall(fmt::format("{}: out of memory", picture));

@@ -306,7 +306,7 @@ TEST(Gather, SurfelsBeyondMaxDistanceDoNotCount) {
 }
 
 // A cloud with everything: surfaces, things in front of each other, equal positions.
-Cloud mixedCloud() {
+Cloud cloudOfEverything() {
   Cloud cloud;
   addRectangle(cloud, 100, {-3, -3, 0}, {6, 0, 0}, {0, 6, 0}, {.8f, .7f, .6f});
   addSphere(cloud, 5000, {0, 0, .8f}, .7f, false, {1, .2f, .1f});
@@ -336,7 +336,7 @@ void expectEqual(const GatherResult& a, const GatherResult& b) {
 }
 
 TEST(Gather, ZeroMaxSolidAngleEqualsBruteForceBitForBit) {
-  const Cloud cloud = mixedCloud();
+  const Cloud cloud = cloudOfEverything();
   Scene scene(cloud);
   for (const GatherMode mode : {GatherMode::kBleeding, GatherMode::kOcclusion}) {
     for (const Receiver& receiver : receiversOn(cloud, 1500)) {
@@ -347,7 +347,7 @@ TEST(Gather, ZeroMaxSolidAngleEqualsBruteForceBitForBit) {
 }
 
 TEST(Gather, OrderOfSurfelsDoesNotChangeTheResult) {
-  const Cloud cloud = mixedCloud();
+  const Cloud cloud = cloudOfEverything();
   Cloud shuffled = cloud;
   std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(1));
   for (const Receiver& receiver : receiversOn(cloud, 3000)) {
@@ -356,7 +356,7 @@ TEST(Gather, OrderOfSurfelsDoesNotChangeTheResult) {
 }
 
 TEST(Gather, CutApproachesBruteForce) {
-  const Cloud cloud = mixedCloud();
+  const Cloud cloud = cloudOfEverything();
   Scene scene(cloud);
   double before = 1;
   for (const float max_solid_angle : {.2f, .05f, .0125f}) {
@@ -375,7 +375,7 @@ TEST(Gather, CutApproachesBruteForce) {
 }
 
 TEST(Gather, OcclusionIsTheSameInBothModes) {
-  const Cloud cloud = mixedCloud();
+  const Cloud cloud = cloudOfEverything();
   Scene scene(cloud);
   for (const Receiver& receiver : receiversOn(cloud, 1500)) {
     EXPECT_EQ(scene.gather(receiver, qualityOf(.05f), GatherMode::kBleeding).occlusion,
@@ -384,7 +384,7 @@ TEST(Gather, OcclusionIsTheSameInBothModes) {
 }
 
 TEST(Gather, EarlierReceiversDoNotChangeTheResult) {
-  const Cloud cloud = mixedCloud();
+  const Cloud cloud = cloudOfEverything();
   Scene scene(cloud);
   PointGatherer gatherer(GatherMode::kBleeding, qualityOf(.05f));
   for (const Receiver& receiver : receiversOn(cloud, 1500)) {
@@ -395,7 +395,7 @@ TEST(Gather, EarlierReceiversDoNotChangeTheResult) {
 }
 
 TEST(Gather, EveryResolutionGivesFiniteResultsWithinBounds) {
-  const Cloud cloud = mixedCloud();
+  const Cloud cloud = cloudOfEverything();
   Scene scene(cloud);
   for (int resolution = 2; resolution <= 64; resolution += 2) {
     GatherQuality quality = qualityOf(.3f);

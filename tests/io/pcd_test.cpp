@@ -30,7 +30,7 @@ struct Head {
 };
 
 template <typename... T>
-std::string bytesOf(T... values) {
+std::string bytesOfAll(T... values) {
   std::string bytes;
   (bytes.append(reinterpret_cast<const char*>(&values), sizeof values), ...);
   return bytes;
@@ -80,10 +80,10 @@ TEST_F(PcdTest, AsciiAndBinaryGiveTheSameRows) {
   const std::uint8_t pad = 7;
   const std::string binary =
       head.text() +
-      bytesOf(1.f, 2.f, 3.f, 0x00800001u, 0.f, 0.f, 1.f, pad, pad, pad, std::uint16_t(9),
-              std::int64_t(-5), 0.5f, 0.25f, 1e-3) +
-      bytesOf(float(NAN), 2.f, 3.f, 4.210656e+06f, 1.f, 0.f, 0.f, pad, pad, pad,
-              std::uint16_t(65535), std::int64_t(1) << 53, 1.f, 2.f, 3.0);
+      bytesOfAll(1.f, 2.f, 3.f, 0x00800001u, 0.f, 0.f, 1.f, pad, pad, pad, std::uint16_t(9),
+                 std::int64_t(-5), 0.5f, 0.25f, 1e-3) +
+      bytesOfAll(float(NAN), 2.f, 3.f, 4.210656e+06f, 1.f, 0.f, 0.f, pad, pad, pad,
+                 std::uint16_t(65535), std::int64_t(1) << 53, 1.f, 2.f, 3.0);
   const std::unique_ptr<RowReader> packed = openGood(binary);
   ASSERT_NE(packed, nullptr);
   EXPECT_EQ(packed->formatName(), "PCD 0.7 binary");
@@ -97,7 +97,7 @@ TEST_F(PcdTest, PlainFieldsAreRowsAsTheyStand) {
   Head head;
   head.data = "binary";
   const std::unique_ptr<RowReader> reader =
-      openGood(head.text() + bytesOf(1.f, 2.f, 3.f, 4.f, 5.f, 6.f));
+      openGood(head.text() + bytesOfAll(1.f, 2.f, 3.f, 4.f, 5.f, 6.f));
   EXPECT_EQ(valueOf(*reader, readAllRows(*reader), 1, "y"), 5);
   ASSERT_TRUE(reader->rewind().ok());
   expectReaderKeepsContract(*reader);
@@ -203,7 +203,7 @@ TEST_F(PcdTest, EveryTruncationIsFound) {
     Head head;
     head.data = is_text ? "ascii" : "binary";
     const std::string whole =
-        head.text() + (is_text ? "1 2 3\n4 5 6" : bytesOf(1.f, 2.f, 3.f, 4.f, 5.f, 6.f));
+        head.text() + (is_text ? "1 2 3\n4 5 6" : bytesOfAll(1.f, 2.f, 3.f, 4.f, 5.f, 6.f));
     EXPECT_EQ(readAllRows(*openGood(whole)).size(), 2 * 12u);
     expectEveryTruncationFails(openPcd, whole, whole.size());
     expectDamageIsHarmless(openPcd, whole);
