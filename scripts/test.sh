@@ -22,4 +22,7 @@ scripts/install-deps.sh
 jobs=$(nproc)
 cmake --preset "$preset"
 cmake --build --preset "$preset" --parallel "$jobs"
-ctest --preset "$preset" --parallel "$jobs" "$@"
+# Tests of files wait for the disk most of their time
+tests=$jobs
+[[ $preset == dev ]] && tests=$((2 * jobs))
+ctest --preset "$preset" --parallel "$tests" "$@"
