@@ -66,6 +66,17 @@ inline Cloud spheresOnGround(int ground_side, int sphere_surfels) {
   return cloud;
 }
 
+// The same in a hollow sphere: from the ground, its nodes are long and look large.
+inline Cloud enclosedCloud() {
+  Cloud cloud = spheresOnGround(80, 600), hollow;
+  addSphere(hollow, 2000, {0, 0, 0}, 6);
+  for (Surfel& surfel : hollow) {
+    surfel.normal = -surfel.normal;
+    cloud.push_back(surfel);
+  }
+  return cloud;
+}
+
 inline Cloud mixedCloud() { return spheresOnGround(80, 600); }
 // So fine that it would be a waste to open all of it.
 inline Cloud fineCloud() { return spheresOnGround(200, 2000); }

@@ -50,7 +50,8 @@ constexpr float kLeaf = 1, kRibbon = .1f;
 
 // 16 times the same receiver: cut and order are those of the scalar gather.
 TEST(PacketGatherer, EqualReceiversGiveWhatTheScalarGatherGives) {
-  for (const Cloud& cloud : {mixedCloud(), foliage(20'000, kLeaf), foliage(20'000, kRibbon)}) {
+  for (const Cloud& cloud :
+       {mixedCloud(), enclosedCloud(), foliage(20'000, kLeaf), foliage(20'000, kRibbon)}) {
     Scene scene(cloud);
     for (const float max_solid_angle : {.02f, .1f, .4f}) {
       for (const GatherSides sides : {GatherSides::kFront, GatherSides::kBoth}) {
