@@ -113,6 +113,7 @@ Status sendMeshSurfels(const SceneGeometry& geometry, std::uint64_t count,
   SampleOptions options;
   options.count = count;
   options.threads = threads;
+  options.is_two_sided = geometry.is_two_sided;
   SURFEIT_ASSIGN_OR_RETURN(const SampleStats stats,
                            sampleMeshes({mesh_path}, cloud_path, options, quiet));
   static_cast<void>(stats);
@@ -125,7 +126,6 @@ Status sendMeshSurfels(const SceneGeometry& geometry, std::uint64_t count,
     if (read == 0) break;
     for (Surfel& surfel : std::span(run).first(read)) {
       surfel.radiosity = radiosityAt(geometry, 0, surfel.position);
-      if (geometry.is_two_sided) surfel.flags |= kSurfelTwoSided;
     }
     SURFEIT_RETURN_IF_ERROR(sink(std::span(run).first(read)));
   }

@@ -18,7 +18,7 @@ namespace surfeit {
 namespace {
 
 // Part of the names of scene files that are kept; raise it whenever a scene changes.
-constexpr int kSceneVersion = 1;
+constexpr int kSceneVersion = 2;
 constexpr std::size_t kDenseRuns = 64, kRunLength = 1024;
 constexpr std::size_t kScattered = 50'000;
 constexpr std::size_t kJudged = 2048;
@@ -134,7 +134,7 @@ Status GatherScene::makeOctree(std::uint64_t count, int threads, Progress& progr
   const std::string cloud_path = octree_path_ + ".ply";
   CloudChannels channels;
   channels.normal = channels.radius = channels.area = channels.radiosity = true;
-  channels.two_sided = geometry_.is_two_sided;
+  channels.two_sided = channels.long_side = geometry_.is_two_sided;
   SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(cloud_path, channels));
   const SurfelSink sink = [&](std::span<const Surfel> surfels) { return writer.write(surfels); };
   if (isMeshScene(name_) || name_ == "leaves") {

@@ -37,6 +37,7 @@ std::vector<std::string> channelNames(const CloudChannels& channels) {
   if (channels.albedo) names.emplace_back("albedo");
   if (channels.two_sided) names.emplace_back("two_sided");
   if (channels.group) names.emplace_back("group");
+  if (channels.long_side) names.emplace_back("long_side");
   return names;
 }
 

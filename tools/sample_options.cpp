@@ -130,6 +130,9 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
           ->check(CLI::PositiveNumber)
           ->excludes(count)
           ->excludes(spacing);
+  app.add_flag("--two-sided", arguments.options.is_two_sided,
+               "Both sides of the meshes send and block light: leaves, cloth, hair")
+      ->excludes(photons);
   app.add_option("--seed", arguments.photon_seed, "Another seed, other photons of the same lights")
       ->needs(photons);
   addSurroundingsOptions(app, arguments.options.surroundings);

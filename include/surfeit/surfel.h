@@ -29,7 +29,11 @@ struct Surfel {
   glm::vec3 radiosity{0};   // radiant exitance, scene-linear rgb, >= 0
   std::uint32_t flags = 0;  // SurfelFlags
   glm::vec3 albedo{0};      // diffuse reflectance, scene-linear rgb, for further bounces
-  std::uint32_t group = 0;  // 0 to kMaxGroups - 1; 0 in clouds without groups
+  std::uint8_t group = 0;   // 0 to kMaxGroups - 1; 0 in clouds without groups
+  // Of the micropolygon, as codes (core/long_side.h): how much longer than wide it is, and where
+  // its longer side points; 0: not known. Two-sided surfels that have one are drawn so.
+  std::uint8_t elongation = 0;
+  std::uint16_t long_side = 0;
 
   bool isSphere() const { return (flags & kSurfelSphere) != 0; }
   bool isTwoSided() const { return (flags & kSurfelTwoSided) != 0; }
@@ -45,6 +49,7 @@ struct CloudChannels {
   bool albedo = false;
   bool two_sided = false;
   bool group = false;
+  bool long_side = false;
 };
 
 }  // namespace surfeit

@@ -31,9 +31,9 @@ constexpr std::string_view kGathered[] = {
     "sh5",         "sh6",        "sh7",         "sh8"};
 // What tells of the points themselves.
 constexpr std::string_view kGeometry[] = {
-    "position", "normal",  "radius",    "pscale",      "width",    "area",
-    "view",     "group",   "two_sided", "light_group", "velocity", "id",
-    "opacity",  "voxel_i", "voxel_j",   "voxel_k",     "pixel_x",  "pixel_y"};
+    "position", "normal",    "radius",    "pscale",      "width",    "area", "view",
+    "group",    "two_sided", "long_side", "light_group", "velocity", "id",   "opacity",
+    "voxel_i",  "voxel_j",   "voxel_k",   "pixel_x",     "pixel_y"};
 
 bool contains(std::span<const std::string_view> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "gather/coverage_rules.h"
+#include "gather/ribbon.h"
 
 namespace surfeit {
 float shownArea(const FacingAreas& facing, GatherSides sides) {
@@ -180,7 +181,10 @@ float reachOf(const Facet& facet, const glm::vec3& direction) {
 }
 
 float thicketPart(const Surfel& surfel) {
-  return surfel.isTwoSided() && isRibbon(surfel.radius, surfel.area) ? 1 : 0;
+  if (!surfel.isTwoSided()) return 0;
+  const bool is_ribbon = surfel.long_side != kNoLongSide ? elongationOf(surfel) > kRibbonElongation
+                                                         : isRibbon(surfel.radius, surfel.area);
+  return is_ribbon ? 1 : 0;
 }
 
 float reachOf(const Surfel& surfel, float radius, float cosine) {
@@ -305,7 +309,8 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.opacity = 1;
   contribution.nested = nestedPart(surfel.isTwoSided(), contribution.thicket);
   contribution.normal = surfel.normal;
-  contribution.shape = withoutDirection(surfel.normal);
+  const Ribbon ribbon = Ribbon::of(surfel);
+  contribution.shape = ribbon.isEmpty() ? withoutDirection(surfel.normal) : ribbon.shape();
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);
   return contribution.solid_angle > 0;
 }

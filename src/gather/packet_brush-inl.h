@@ -20,6 +20,7 @@
 #include "gather/packet_cover-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
+#include "gather/packet_ribbon-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {
@@ -281,7 +282,7 @@ class Brush {
     }
   }
 
-  // As RasterCube::traceDisk and traceSphere.
+  // As RasterCube::traceDisk, traceSphere and traceRibbon.
   void Trace(const Patch& patch, const Sight& sight) {
     const V3 to_centre = RayStartTo(sight, receivers_);
     Sight from_ray = sight;
@@ -305,7 +306,19 @@ class Brush {
     const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_, *seen_);
     if (range.isEmpty()) return;
 
-    if (patch.isRound()) return TraceSphere(patch, centre, traced, centre_sq, range, cover);
+    if (patch.isRound()) {
+      return TracePixels(traced, range, cover, [&](const glm::vec3& ray) HWY_ATTR {
+        return SphereAmount(patch, ray, centre, centre_sq);
+      });
+    }
+    if (patch.isRibbon()) {
+      const Ribbon ribbon =
+          Ribbon::ofShape(patch.shape, patch.normal, patch.area, patch.ribbonWidth());
+      const RibbonRays<Normal> rays(centre, c_n, normal, InRaster(ribbon.along),
+                                    InRaster(ribbon.across), ribbon, 0.5f / scale_);
+      return TracePixels(traced, range, cover,
+                         [&](const glm::vec3& ray) HWY_ATTR { return rays.Amount(ray); });
+    }
     TraceDisk(patch, centre, normal, traced, c_n, centre_sq, range, cover);
   }
 
@@ -341,11 +354,13 @@ class Brush {
       low = hn::IfThenElse(in_front, low, box_low);
       high = hn::IfThenElse(in_front, high, box_high);
     }
-    // What lies there is seen from the middle of a pixel; and some to spare
+    // What lies there is seen from the middle of a pixel, of ribbons the parts of all; and some to
+    // spare
     constexpr float kSpare = 0.02f;
+    const float inset = (patch.isRibbon() ? -0.5f : 0.5f) - kSpare;
     const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
-    begin = hn::Add(hn::MulAdd(low, scale, middle), Splat(0.5f - kSpare));
-    end = hn::Add(hn::MulAdd(high, scale, middle), Splat(kSpare - 0.5f));
+    begin = hn::Add(hn::MulAdd(low, scale, middle), Splat(inset));
+    end = hn::Sub(hn::MulAdd(high, scale, middle), Splat(inset));
     begin = hn::Min(size, hn::Max(zero, begin));
     end = hn::Min(size, hn::Max(zero, end));
   }
@@ -370,15 +385,17 @@ class Brush {
     hn::Store(hn::MulAdd(added, Splat(cover.thicket), hn::Load(D(), thicket)), D(), thicket);
   }
 
-  void TraceSphere(const Patch& patch, const V3& centre, M traced, V centre_sq,
-                   const PixelRange& range, const Cover& cover) {
+  // Covers pixels by what amountOf(ray) says.
+  template <typename AmountOf>
+  void TracePixels(M traced, const PixelRange& range, const Cover& cover,
+                   const AmountOf& amountOf) {
     const RasterGeometry::Pixel* const pixels =
         canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
     for (int row = range.row_begin; row < range.row_end; ++row) {
       const auto [begin, end] = ColumnsOf(range, row, *seen_);
       for (int column = begin; column < end; ++column) {
         const std::size_t pixel = std::size_t(row * resolution_ + column);
-        const V amount = SphereAmount(patch, pixels[pixel].direction, centre, centre_sq);
+        const V amount = amountOf(pixels[pixel].direction);
         CoverTraced(pixel, hn::IfThenElseZero(traced, amount), cover);
       }
     }

@@ -47,13 +47,16 @@ struct alignas(64) Patch {
   float facing_limit = 0;
   float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
   float reach = 0;          // how far before and behind its middle it meets others of its layer
-  float soft_peak = 0;      // of the ray traced disk; see softDiskPeak
+  // Of the ray traced disk, see softDiskPeak; or less than 0, of a ribbon: its width times -1
+  float soft_peak = 0;
 
   static constexpr float kFrontOnly = 0;
   static constexpr float kBothSides = std::numeric_limits<float>::infinity();
   static constexpr float kDarkBack = std::numeric_limits<float>::max();
   static constexpr float kAllAround = kDarkBack / 2;
   bool isRound() const { return disk_area == 0; }
+  bool isRibbon() const { return soft_peak < 0; }
+  float ribbonWidth() const { return -soft_peak; }
   float nested() const { return nestedPart(facing_limit == kBothSides, thicket); }
 };
 static_assert(sizeof(Patch) == 128);

@@ -161,10 +161,11 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   // As ReceiverRaster::addSurfel: the disk must rise above the horizon of the rays
   const V cosine = Dot(receivers.normal, patch.normal);
   const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
-  sight.bias = hn::Mul(Splat(canvas.bias * patch.radius),
-                       hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
+  const float size = patch.isRibbon() ? patch.ribbonWidth() : patch.radius;
+  sight.bias =
+      hn::Mul(Splat(canvas.bias * size), hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
   if (patch.facing_limit == Patch::kBothSides) {
-    const float inverse = 1 / (kBiasHeight * patch.radius);
+    const float inverse = 1 / (kBiasHeight * size);
     const V part = hn::NegMulAdd(sight.height, Splat(inverse), one);
     sight.bias = hn::Mul(sight.bias, hn::Min(one, hn::Max(zero, part)));
   }

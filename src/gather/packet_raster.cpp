@@ -11,6 +11,7 @@
 #include "core/assert.h"
 #include "gather/contribution.h"
 #include "gather/coverage_rules.h"
+#include "gather/ribbon.h"
 
 namespace surfeit {
 namespace {
@@ -287,9 +288,17 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     const Surfel surfel = withSides(stored, rules_.quality.sides);
     Patch& patch = patches_.emplace_back();
     patch.position = surfel.position;
-    patch.radius = effectiveRadius(surfel.radius, surfel.area);
     patch.normal = surfel.normal;
-    patch.shape = withoutDirection(surfel.normal);
+    const Ribbon ribbon = Ribbon::of(surfel);
+    if (ribbon.isEmpty()) {
+      patch.radius = effectiveRadius(surfel.radius, surfel.area);
+      patch.shape = withoutDirection(surfel.normal);
+      patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
+    } else {
+      patch.radius = std::max(surfel.radius, ribbon.radius());
+      patch.shape = ribbon.shape();
+      patch.soft_peak = -ribbon.width;
+    }
     patch.area = patch.most_area = surfel.area;
     (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
     patch.radiosity = surfel.radiosity;
@@ -303,10 +312,9 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     patch.reach =
         reachOf(surfel, patch.radius, glm::dot(to_surfel, surfel.normal) / std::sqrt(distance_sq));
     patch.thicket = thicketPart(surfel);
-    patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
     // Positive, for a surfel may be at a receiver; then it is near at any setting
-    patch.near_distance =
-        std::max(near_field_radii_ * patch.radius, std::numeric_limits<float>::min());
+    const float size = ribbon.isEmpty() ? patch.radius : kRibbonRadius * ribbon.length;
+    patch.near_distance = std::max(near_field_radii_ * size, std::numeric_limits<float>::min());
     patch.blend = blend;
     orderLastPatch(kernel_.facesThatSee(canvas, patch));
   }

@@ -9,6 +9,7 @@
 #include "core/assert.h"
 #include "core/tangent_frame.h"
 #include "gather/coverage_rules.h"
+#include "gather/ribbon.h"
 
 namespace surfeit {
 namespace {
@@ -282,6 +283,25 @@ void RasterCube::traceDisk(const glm::vec3& centre, const glm::vec3& normal, flo
     const float t = c_n / d_n;
     const float part_sq = (t * (t - 2 * glm::dot(d, centre)) + c_c) * inverse_sq;
     return std::min(1.f, peak * (1 - part_sq));
+  });
+}
+
+void RasterCube::traceRibbon(const glm::vec3& centre, const glm::vec3& normal, const Ribbon& ribbon,
+                             const Texture& texture, const DepthRange& depth,
+                             const glm::vec3& radiosity) {
+  const float c_n = glm::dot(centre, normal);
+  const float c_along = glm::dot(centre, ribbon.along), c_across = glm::dot(centre, ribbon.across);
+  const float half_length = 0.5f * ribbon.length, half_width = 0.5f * ribbon.width;
+  const float half_pixel = 0.5f / geometry_->pixelsPerSlope();
+  tracePixels(centre, ribbon.radius(), texture, depth, radiosity, [&](const glm::vec3& d) {
+    const float d_n = glm::dot(d, normal);
+    if (!(c_n * d_n > 0)) return 0.f;
+    const float t = c_n / d_n;
+    const auto part = [&](const glm::vec3& axis, float c_axis, float half) {
+      const float cosine = glm::dot(d, axis);
+      return partWithin(t * cosine - c_axis, ribbonFoot(t * half_pixel, cosine), half);
+    };
+    return part(ribbon.along, c_along, half_length) * part(ribbon.across, c_across, half_width);
   });
 }
 

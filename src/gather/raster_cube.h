@@ -19,6 +19,8 @@
 
 namespace surfeit {
 
+struct Ribbon;
+
 // Directions and solid angles of the pixels for one resolution. Immutable, so threads may share it.
 class RasterGeometry {
  public:
@@ -130,6 +132,9 @@ class RasterCube {
   // origin of the rays. Both sides are hit: facing is the caller's business.
   void traceDisk(const glm::vec3& centre, const glm::vec3& normal, float radius, float peak,
                  const Texture& texture, const DepthRange& depth, const glm::vec3& radiosity);
+  // The same with the rectangle of a ribbon: pixels by the part of them that lies within.
+  void traceRibbon(const glm::vec3& centre, const glm::vec3& normal, const Ribbon& ribbon,
+                   const Texture& texture, const DepthRange& depth, const glm::vec3& radiosity);
   // The same with a sphere, which must not contain the origin.
   void traceSphere(const glm::vec3& centre, float radius, const Texture& texture,
                    const DepthRange& depth, const glm::vec3& radiosity);

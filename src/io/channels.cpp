@@ -50,6 +50,7 @@ constexpr KnownChannel kKnownChannels[] = {
     {"view", ChannelKind::kVector, 3, {}},
     {"velocity", ChannelKind::kVector, 3, {}},
     {"bent_normal", ChannelKind::kVector, 3, {}},
+    {"long_side", ChannelKind::kVector, 3, {}},
 };
 
 // What files call these channels, besides their own names.

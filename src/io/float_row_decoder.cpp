@@ -141,7 +141,7 @@ std::uint64_t FloatRowDecoder::copyGroups(const std::byte* rows, std::size_t cou
     std::uint32_t group = std::to_integer<std::uint32_t>(*row);
     if (group_bytes_ == 2) group = loadAs<std::uint16_t>(row);
     if (group_bytes_ == 4) group = loadAs<std::uint32_t>(row);
-    surfels[i].group = group;
+    surfels[i].group = static_cast<std::uint8_t>(group);
     left_over |= std::uint64_t{group >= kMaxGroups} << i;
   }
   return left_over;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/assert.h"
+#include "core/long_side.h"
 #include "io/srgb_curve.h"
 #include "io/surfel_names.h"
 #include "io/surfel_normal.h"
@@ -68,7 +69,7 @@ bool isSurfelProperty(std::string_view name) {
   };
   return holds(kPositionNames) || holds(kNormalNames) || holds(kRadiosityNames) ||
          holds(kAlbedoNames) || holds(kColorNames) || holds(kRadiusNames) || holds(kGroupNames) ||
-         name == "area" || name == "two_sided";
+         holds(kLongSideNames) || name == "area" || name == "two_sided";
 }
 
 std::uint64_t SurfelDefects::total() const {
@@ -194,6 +195,8 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
 
   SURFEIT_ASSIGN_OR_RETURN(mapping.two_sided_, findField(element, "two_sided", path));
   channels.two_sided = mapping.two_sided_.isPresent();
+  SURFEIT_ASSIGN_OR_RETURN(channels.long_side,
+                           findTriple(element, kLongSideNames, path, mapping.long_side_));
 
   // Group by the first of its names
   for (const char* name : kGroupNames) {
@@ -207,10 +210,10 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
 }
 
 // The decoder of rows whose used properties are floats, but for colors of 8 bits and a two_sided of
-// a byte; nothing when there is any other. Its limits are those of decodeRow.
+// a byte; nothing when there is any other, or long sides. Its limits are those of decodeRow.
 std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
   FloatRowDecoder decoder(row_bytes_);
-  bool is_fast = true;
+  bool is_fast = !channels_.long_side;
   const auto add = [&](const Field& field, std::size_t place, float least, float most) {
     if (!field.isPresent()) return;
     const std::size_t offset = static_cast<std::size_t>(field.offset);
@@ -271,12 +274,13 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     }
     return value;
   };
-  double position[3], normal[3], radiosity[3], albedo[3];
+  double position[3], normal[3], radiosity[3], albedo[3], long_side[3];
   for (int i = 0; i < 3; ++i) {
     position[i] = read(position_[i]);
     normal[i] = read(normal_[i]);
     radiosity[i] = read(radiosity_[i]);
     albedo[i] = read(albedo_[i]);
+    long_side[i] = read(long_side_[i]);
   }
   const double radius = radius_scale_ * read(radius_);
   const double area = read(area_);
@@ -313,6 +317,11 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
               normalLength(normal[0], normal[1], normal[2]), "0 or at least 1e-6"};
   }
   if (is_two_sided) surfel.flags |= kSurfelTwoSided;
+  if (surfel.area > 0) {
+    setLongSide({static_cast<float>(long_side[0]), static_cast<float>(long_side[1]),
+                 static_cast<float>(long_side[2])},
+                surfel);
+  }
 
   for (int i = 0; i < 3; ++i) {
     if (radiosity[i] < 0) {
@@ -337,7 +346,7 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
   if (!(group >= 0 && group < kMaxGroups && group == std::floor(group))) {
     return {&SurfelDefects::bad_group, group_.name, group, "0 to 63"};
   }
-  surfel.group = static_cast<std::uint32_t>(group);
+  surfel.group = static_cast<std::uint8_t>(group);
   return {};
 }
 

@@ -63,6 +63,7 @@ bool isSurfelProperty(std::string_view name);
 //                              here, or already linear (float, double): used for whichever of
 //                              radiosity and albedo is absent, whose channel then counts as there
 //   two_sided                  not zero: both sides send and block light
+//   long_side_x _y _z          the longer side of the piece, as a vector; zero: not known
 //   group | light_group        group, a whole number from 0 to 63 of any type
 // What is absent stays 0: radius and area for the indexer's rules, which need the neighbourhood.
 // A record has one defect, the first in the order of SurfelDefects. Immutable; safe from any
@@ -121,6 +122,7 @@ class SurfelMapping {
   CloudChannels channels_;
   std::size_t row_bytes_ = 0;
   Field position_[3], normal_[3], radius_, area_, radiosity_[3], albedo_[3], two_sided_, group_;
+  Field long_side_[3];
   double radius_scale_ = 1;
   std::optional<FloatRowDecoder> fast_decoder_;  // when the types of the properties allow it
 };

@@ -6,6 +6,7 @@ namespace surfeit {
 
 inline constexpr const char* kPositionNames[3] = {"x", "y", "z"};
 inline constexpr const char* kNormalNames[3] = {"nx", "ny", "nz"};
+inline constexpr const char* kLongSideNames[3] = {"long_side_x", "long_side_y", "long_side_z"};
 inline constexpr const char* kRadiosityNames[3] = {"radiosity_r", "radiosity_g", "radiosity_b"};
 inline constexpr const char* kAlbedoNames[3] = {"albedo_r", "albedo_g", "albedo_b"};
 inline constexpr const char* kColorNames[3] = {"red", "green", "blue"};

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "core/long_side.h"
 #include "io/cloud_formats.h"
 #include "io/surfel_names.h"
 
@@ -42,6 +43,7 @@ Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudCh
   if (channels.albedo) addTriple(kAlbedoNames);
   if (channels.two_sided) add("two_sided", PlyType::kUint8);
   if (channels.group) add(kGroupNames[0], PlyType::kUint8);
+  if (channels.long_side) addTriple(kLongSideNames);
 
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> file, createRowWriter(path, options));
   if (options.progress != nullptr) {
@@ -74,7 +76,8 @@ Status SurfelWriter::write(std::span<const Surfel> surfels) {
     if (channels.radiosity) put(surfel.radiosity);
     if (channels.albedo) put(surfel.albedo);
     if (channels.two_sided) put(static_cast<std::uint8_t>(surfel.isTwoSided()));
-    if (channels.group) put(static_cast<std::uint8_t>(surfel.group));
+    if (channels.group) put(surfel.group);
+    if (channels.long_side) put(longSideOf(surfel));
 
     // Hand over a full buffer, and the last
     if (next == end || &surfel == &surfels.back()) {

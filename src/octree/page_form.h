@@ -9,6 +9,7 @@ struct PageForm {
   // Columns that only some files have
   bool has_albedo = false;
   bool has_groups = false;
+  bool has_long_sides = false;
 };
 
 }  // namespace surfeit

@@ -34,7 +34,9 @@ struct SceneHeader {
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 
-  PageForm pageForm() const { return {full_precision, channels.albedo, channels.group}; }
+  PageForm pageForm() const {
+    return {full_precision, channels.albedo, channels.group, channels.long_side};
+  }
 };
 
 // Immutable once open; decode calls are safe from any thread.

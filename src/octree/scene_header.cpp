@@ -19,7 +19,8 @@ enum ChannelBits : std::uint32_t {
   kHasAlbedo = 16,
   kHasTwoSided = 32,
   kHasGroup = 64,
-  kAllChannels = 127,
+  kHasLongSide = 128,
+  kAllChannels = 255,
 };
 
 // Bits of the feature field. A reader refuses bits that it does not know.
@@ -33,7 +34,7 @@ std::uint32_t channelBits(const CloudChannels& channels) {
   return (channels.normal ? kHasNormal : 0u) | (channels.radius ? kHasRadius : 0u) |
          (channels.area ? kHasArea : 0u) | (channels.radiosity ? kHasRadiosity : 0u) |
          (channels.albedo ? kHasAlbedo : 0u) | (channels.two_sided ? kHasTwoSided : 0u) |
-         (channels.group ? kHasGroup : 0u);
+         (channels.group ? kHasGroup : 0u) | (channels.long_side ? kHasLongSide : 0u);
 }
 
 CloudChannels channelsFromBits(std::uint32_t bits) {
@@ -45,6 +46,7 @@ CloudChannels channelsFromBits(std::uint32_t bits) {
   channels.albedo = (bits & kHasAlbedo) != 0;
   channels.two_sided = (bits & kHasTwoSided) != 0;
   channels.group = (bits & kHasGroup) != 0;
+  channels.long_side = (bits & kHasLongSide) != 0;
   return channels;
 }
 

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
+#include "core/long_side.h"
 #include "core/thread_scratch.h"
 #include "octree/column_codec.h"
 #include "octree/local_density.h"
@@ -44,6 +46,9 @@ class Columns {
     area = take();
     flags = std::span(bytes).first(count);
     group = std::span(bytes).subspan(count, count);
+    for (std::size_t k = 0; k < long_side.size(); ++k) {
+      long_side[k] = std::span(bytes).subspan((2 + k) * count, count);
+    }
   }
 
   void gather(std::span<const Surfel> surfels) {
@@ -56,7 +61,10 @@ class Columns {
       radius[i] = surfels[i].radius;
       area[i] = surfels[i].area;
       flags[i] = static_cast<std::uint8_t>(surfels[i].flags);
-      group[i] = static_cast<std::uint8_t>(surfels[i].group);
+      group[i] = surfels[i].group;
+      long_side[0][i] = static_cast<std::uint8_t>(surfels[i].long_side & 0xff);
+      long_side[1][i] = static_cast<std::uint8_t>(surfels[i].long_side >> 8);
+      long_side[2][i] = surfels[i].elongation;
     }
   }
 
@@ -70,7 +78,9 @@ class Columns {
       surfel.radius = radius[i];
       surfel.area = area[i];
       surfel.flags = flags[i];
-      surfel.group = form.has_groups ? group[i] : 0u;
+      surfel.group = form.has_groups ? group[i] : std::uint8_t{0};
+      surfel.long_side = form.has_long_sides ? longSideAt(i) : kNoLongSide;
+      surfel.elongation = form.has_long_sides ? long_side[2][i] : std::uint8_t{0};
       if (surfel.isSphere()) surfel.normal = glm::vec3(0);
       if (!form.has_albedo) surfel.albedo = glm::vec3(0);
     }
@@ -79,9 +89,13 @@ class Columns {
   MutableAxes position, normal, radiosity, albedo;
   std::span<float> radius, area;
   std::span<std::uint8_t> flags, group;
+  std::array<std::span<std::uint8_t>, 3> long_side;  // lower and upper byte, elongation
+  std::uint16_t longSideAt(std::size_t i) const {
+    return static_cast<std::uint16_t>(long_side[0][i] | long_side[1][i] << 8);
+  }
 
  private:
-  static constexpr std::size_t kFloatColumns = 14, kByteColumns = 2;
+  static constexpr std::size_t kFloatColumns = 14, kByteColumns = 5;
 
   static void gatherVectors(std::span<const Surfel> surfels, glm::vec3 Surfel::*field,
                             const MutableAxes& axes) {
@@ -117,10 +131,19 @@ Status decodeGeometry(PayloadReader& reader, const Columns& columns) {
 // The columns after it.
 Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns& columns) {
   if (form.has_albedo && !getReflectances(reader, columns.albedo)) return damaged("albedo");
-  if (!form.has_groups) return {};
-  if (!getBytes8(reader, columns.group)) return damaged("group");
-  for (const std::uint8_t group : columns.group) {
-    if (group >= kMaxGroups) return damaged("group");
+  if (form.has_groups) {
+    if (!getBytes8(reader, columns.group)) return damaged("group");
+    for (const std::uint8_t group : columns.group) {
+      if (group >= kMaxGroups) return damaged("group");
+    }
+  }
+  if (form.has_long_sides) {
+    for (const auto& bytes : columns.long_side) {
+      if (!getBytes8(reader, bytes)) return damaged("long_side");
+    }
+    for (std::size_t i = 0; i < columns.group.size(); ++i) {
+      if (!isLongSide(columns.longSideAt(i), columns.long_side[2][i])) return damaged("long_side");
+    }
   }
   return {};
 }
@@ -143,6 +166,9 @@ std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& f
   putColors(writer, constAxes(columns.radiosity), full);
   if (form.has_albedo) putReflectances(writer, constAxes(columns.albedo), full);
   if (form.has_groups) putBytes8(writer, columns.group);
+  if (form.has_long_sides) {
+    for (const auto& bytes : columns.long_side) putBytes8(writer, bytes);
+  }
   return writer.finish();
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <span>
 #include <utility>
 
 #include "core/assert.h"
@@ -33,6 +34,29 @@ std::pair<Micropolygon, Micropolygon> cut(const Micropolygon& polygon, double ra
   parts.first.corner[b] = parts.second.corner[a] = corner;
   parts.first.weight[b] = parts.second.weight[a] = weight;
   return parts;
+}
+
+// The longer side of the rectangle that has the area of a convex polygon and, along `axis`, its
+// variance.
+glm::dvec3 longSide(std::span<const glm::dvec3> corners, const glm::dvec3& axis) {
+  const glm::dvec3 along = glm::normalize(axis);
+  double sum = 0, moment = 0, square = 0;  // of twice the areas of a fan
+  glm::dvec3 normal(0);
+  for (std::size_t i = 2; i < corners.size(); ++i) {
+    const glm::dvec3 cross = glm::cross(corners[i - 1] - corners[0], corners[i] - corners[0]);
+    const double b = glm::dot(corners[i - 1] - corners[0], along);
+    const double c = glm::dot(corners[i] - corners[0], along), area = glm::length(cross);
+    normal += cross;
+    sum += area;
+    moment += area * (b + c) / 3;
+    square += area * (b * b + c * c + b * c) / 6;
+  }
+  if (!(sum > 0)) return axis;
+  const double mean = moment / sum;
+  const double length = std::sqrt(std::max(0.0, 12 * (square / sum - mean * mean)));
+  const double width = 0.5 * sum / std::max(length, 1e-300);
+  if (length >= width) return length * along;
+  return width * glm::normalize(glm::cross(normal, along));
 }
 
 // Cuts a triangle into slabs across its longest edge a b, in the coordinates of that edge: t runs
@@ -73,11 +97,13 @@ class SlabCutter {
     const glm::dvec3 weights = pieceWeights(moment / area);
     part.centroid = combine(polygon_.corner, weights);
     part.weight = combine(polygon_.weight, weights);
+    glm::dvec3 places[5];
     for (int i = 0; i < count; ++i) {
-      part.radius = std::max(
-          part.radius,
-          glm::distance(combine(polygon_.corner, pieceWeights(corners[i])), part.centroid));
+      places[i] = combine(polygon_.corner, pieceWeights(corners[i]));
+      part.radius = std::max(part.radius, glm::distance(places[i], part.centroid));
     }
+    part.long_side = longSide(std::span(places).first(std::size_t(count)),
+                              polygon_.corner[b_] - polygon_.corner[a_]);
     return part;
   }
 
@@ -159,9 +185,12 @@ void appendParts(const Micropolygon& polygon, double area, double spacing,
                  std::vector<PiecePart>& parts) {
   const double radius = polygon.radius();
   if (radius <= std::max(1.5 * spacing, 2 * std::sqrt(area))) {
+    const int a = longestEdge(polygon);
     parts.push_back({polygon.centroid(),
                      (polygon.weight[0] + polygon.weight[1] + polygon.weight[2]) / 3.0, radius,
                      area});
+    parts.back().long_side =
+        longSide(polygon.corner, polygon.corner[(a + 1) % 3] - polygon.corner[a]);
     return;
   }
   const SlabCutter cutter(polygon, area);

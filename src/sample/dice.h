@@ -36,6 +36,7 @@ struct PiecePart {
   glm::dvec3 weight{0};    // the same as barycentric weights of the mesh triangle
   double radius = 0;       // of the circle around the centroid that holds the corners
   double area = 0;
+  glm::dvec3 long_side{0};  // of the rectangle of that area that spreads as it does
 };
 
 // Appends the piece, of that area, as one part; or when it is a sliver, whose disk would reach far

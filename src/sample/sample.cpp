@@ -15,6 +15,7 @@
 #include <new>
 
 #include "core/job_limits.h"
+#include "core/long_side.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
 #include "io/surfel_writer.h"
@@ -74,8 +75,8 @@ class BatchDealer {
 class SurfelMaker {
  public:
   // `light` is null when nothing emits.
-  SurfelMaker(const Mesh& mesh, const DicePlan& plan, const DirectLight* light)
-      : mesh_(mesh), plan_(plan), light_(light) {}
+  SurfelMaker(const Mesh& mesh, const DicePlan& plan, const DirectLight* light, bool is_two_sided)
+      : mesh_(mesh), plan_(plan), light_(light), is_two_sided_(is_two_sided) {}
 
   void fill(Batch& batch) const {
     for (const PieceRange& range : batch.ranges) addPieces(range, batch.surfels);
@@ -142,7 +143,20 @@ class SurfelMaker {
     surfel.area = std::max(float(part.area), std::numeric_limits<float>::min());  // never 0
     surfel.albedo = point.albedo;
     if (light_ != nullptr) surfel.radiosity = light_->exitance(point, seed, light_->samples());
+    if (is_two_sided_) showBothSides(point, seed, part, surfel);
     return surfel;
+  }
+
+  // What has two sides has one radiosity, the mean of both.
+  void showBothSides(SurfacePoint point, std::uint64_t seed, const PiecePart& part,
+                     Surfel& surfel) const {
+    surfel.flags |= kSurfelTwoSided;
+    setLongSide(glm::vec3(part.long_side), surfel);
+    if (light_ == nullptr) return;
+    point.normal = -point.normal;
+    point.geometric_normal = -point.geometric_normal;
+    const glm::vec3 back = light_->exitance(point, seed, light_->samples());
+    surfel.radiosity = 0.5f * (surfel.radiosity + back);
   }
 
   void addPieces(const PieceRange& range, std::vector<Surfel>& surfels) const {
@@ -166,6 +180,7 @@ class SurfelMaker {
   const Mesh& mesh_;
   const DicePlan& plan_;
   const DirectLight* light_;
+  const bool is_two_sided_;
 };
 
 // Cuts, lights and writes in a pipeline: batches are dealt and written in order, lit in parallel.
@@ -310,9 +325,10 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     CloudChannels channels;
     channels.normal = channels.radius = channels.area = channels.albedo = true;
     channels.radiosity = light.hasLight();
+    channels.two_sided = channels.long_side = options.is_two_sided;
     SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer,
                              SurfelWriter::create(output, channels, {.progress = &progress}));
-    const SurfelMaker maker(mesh, plan, light.hasLight() ? &light : nullptr);
+    const SurfelMaker maker(mesh, plan, light.hasLight() ? &light : nullptr, options.is_two_sided);
     SURFEIT_RETURN_IF_ERROR(writeSurfels(plan, maker, stats.threads, writer, progress, stats));
     SURFEIT_RETURN_IF_ERROR(writer.finish());
     stats.sliver_surfels = stats.surfels - plan.surfelCount();

@@ -30,6 +30,7 @@ struct SampleOptions {
   Surroundings surroundings;
   std::uint64_t count = 1'000'000;  // surfels, in proportion to area; slivers add a few
   double spacing = 0;               // > 0: one surfel per spacing^2 instead of a count
+  bool is_two_sided = false;        // both sides send and block light, and pieces have longer sides
   int threads = 0;                  // 0: all that the job may use
 };
 
@@ -45,11 +46,12 @@ struct SampleStats {
   int threads = 0;
 };
 
-// Writes a cloud of the format that its name tells, with normals, radii, areas, albedo, and when
-// anything emits, radiosity. The cloud depends on meshes and options alone, not on the threads.
-// Memory: the meshes, Embree's hierarchy (less than 100 bytes per triangle) and a few batches of
-// surfels, whatever the count. Errors: kIoError, kCorruption (bad mesh), kInvalidArgument
-// (options), kInterrupted, kFailed.
+// Writes a cloud of the format that its name tells, with normals, radii, areas, albedo, when
+// anything emits, radiosity, and of two-sided meshes two_sided and longer
+// sides. The cloud depends on
+// meshes and options alone, not on the threads. Memory: the meshes, Embree's hierarchy (less than
+// 100 bytes per triangle) and a few batches of surfels, whatever the count. Errors: kIoError,
+// kCorruption (bad mesh), kInvalidArgument (options), kInterrupted, kFailed.
 Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const std::string& output,
                                  const SampleOptions& options, Progress& progress);
 

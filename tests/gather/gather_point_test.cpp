@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/long_side.h"
 #include "gather/brute_force.h"
 #include "gather/test_clouds.h"
 #include "gather/test_scene.h"
@@ -241,6 +242,30 @@ TEST(Gather, TwoSidedSurfelsCoverAndSendFromBehind) {
   const GatherResult result = bruteForce(cloud, {{0, 0, 0}, {0, 0, 1}});
   EXPECT_NEAR(result.occlusion, .5, .015);
   EXPECT_NEAR(result.irradiance.x, 1, .03);
+}
+
+// Long and narrow, near and far, and turned in every way.
+TEST(Gather, PieceOfARibbonHasItsFormFactor) {
+  for (const float distance : {.3f, 1.f, 3.f, 12.f}) {
+    for (const float turn : {0.f, .3f, .7f, 1.2f}) {
+      Surfel ribbon = makeSurfel({0, 0, distance}, {0, 0, 1}, .8f * .1f);
+      ribbon.radius = .5f * std::hypot(.8f, .1f);
+      ribbon.flags = kSurfelTwoSided;
+      setLongSide(.8f * glm::vec3(std::cos(turn), std::sin(turn), 0), ribbon);
+      Scene scene({ribbon});
+      const GatherResult result = scene.gather({{0, 0, 0}, {0, 0, 1}}, GatherQuality{.bias = 0});
+      // Integral of cos^2 / (pi d^2), at the middles of small squares
+      double expected = 0;
+      for (int i = 0; i < 400; ++i) {
+        for (int k = 0; k < 50; ++k) {
+          const double x = .8 * ((i + .5) / 400 - .5), y = .1 * ((k + .5) / 50 - .5);
+          const double d = double(distance), d_sq = x * x + y * y + d * d;
+          expected += .08 / 20'000 * d * d / (double(kPi) * d_sq * d_sq);
+        }
+      }
+      EXPECT_NEAR(double(result.occlusion), expected, .04 * expected) << distance << ' ' << turn;
+    }
+  }
 }
 
 TEST(Gather, SphereSurfelHasItsFormFactor) {

@@ -13,6 +13,7 @@
 #include <random>
 #include <vector>
 
+#include "core/long_side.h"
 #include "gather/gather_point.h"
 #include "gather/packet_clouds.h"
 
@@ -48,10 +49,21 @@ Cloud foliage(std::size_t count, float disk_part) {
 
 constexpr float kLeaf = 1, kRibbon = .1f;
 
+// Surfels of which the longer side is known.
+Cloud ribbons(int count) {
+  Cloud cloud = foliage(count, kRibbon);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const float turn = float(i), length = 2 * cloud[i].radius / (i % 3 == 0 ? 2.f : 1.f);
+    const glm::vec3 across(std::cos(turn), std::sin(turn), std::cos(2 * turn));
+    setLongSide(length * glm::normalize(glm::cross(cloud[i].normal, across)), cloud[i]);
+  }
+  return cloud;
+}
+
 // 16 times the same receiver: cut and order are those of the scalar gather.
 TEST(PacketGatherer, EqualReceiversGiveWhatTheScalarGatherGives) {
-  for (const Cloud& cloud :
-       {mixedCloud(), enclosedCloud(), foliage(20'000, kLeaf), foliage(20'000, kRibbon)}) {
+  for (const Cloud& cloud : {mixedCloud(), enclosedCloud(), foliage(20'000, kLeaf),
+                             foliage(20'000, kRibbon), ribbons(20'000)}) {
     Scene scene(cloud);
     for (const float max_solid_angle : {.02f, .1f, .4f}) {
       for (const GatherSides sides : {GatherSides::kFront, GatherSides::kBoth}) {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/long_side.h"
 #include "gather/gather_point.h"
 #include "gather/test_clouds.h"
 #include "io/surfel_source.h"
@@ -26,6 +27,9 @@ class Scene {
     CloudChannels channels;
     channels.normal = channels.radius = channels.area = channels.radiosity = true;
     channels.two_sided = true;
+    channels.long_side = std::any_of(cloud.begin(), cloud.end(), [](const Surfel& surfel) {
+      return surfel.long_side != kNoLongSide;
+    });
     channels.group = std::any_of(cloud.begin(), cloud.end(),
                                  [](const Surfel& surfel) { return surfel.group != 0; });
     const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file("c.sft");

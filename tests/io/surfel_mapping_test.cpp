@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/long_side.h"
 #include "io/test_bytes.h"
 
 namespace surfeit {
@@ -247,6 +248,32 @@ TEST(SurfelMapping, NormalsOfAllLengthsDecodeAsOneByOne) {
   expectEqual(defects, expected_defects);
   EXPECT_GT(defects.short_normal.count, 100u);
   EXPECT_LT(defects.short_normal.count, 3000u);
+}
+
+TEST(SurfelMapping, LongSidesAreVectorsAndNeedAnArea) {
+  for (const char* size : {"area", "radius"}) {
+    const PlyElement element = elementOf({{kFloat, "x"},
+                                          {kFloat, "y"},
+                                          {kFloat, "z"},
+                                          {kFloat, size},
+                                          {kFloat, "long_side_x"},
+                                          {kFloat, "long_side_y"},
+                                          {kFloat, "long_side_z"}},
+                                         3);
+    const SurfelMapping mapping = mappingOf(element);
+    EXPECT_TRUE(mapping.channels().long_side);
+    const float rows[3][7] = {{0, 0, 0, .5f, 0, -2, 0},
+                              {0, 0, 0, .5f, 0, 0, 0},
+                              {0, 0, 0, .5f, std::numeric_limits<float>::quiet_NaN(), 0, 0}};
+    std::vector<Surfel> surfels(3);
+    SurfelDefects defects;
+    ASSERT_EQ(mapping.decodeRows(std::as_bytes(std::span(rows)), 0, surfels, defects), 2u);
+    const bool has_area = std::string(size) == "area";
+    EXPECT_EQ(directionOf(surfels[0].long_side), glm::vec3(0, has_area ? -1 : 0, 0));
+    EXPECT_NEAR(elongationOf(surfels[0]), has_area ? 8 : 1, 1e-3f);
+    EXPECT_EQ(surfels[1].long_side, kNoLongSide);
+    EXPECT_EQ(defects.non_finite.count, 1u);
+  }
 }
 
 TEST(SurfelMapping, GroupsAreIntegersFromZeroTo63) {

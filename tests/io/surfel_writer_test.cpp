@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/long_side.h"
 #include "io/surfel_cloud_test.h"
 
 namespace surfeit {
@@ -17,12 +18,14 @@ using SurfelWriterTest = SurfelCloudTest;
 TEST_F(SurfelWriterTest, SurfelsRoundTripInEveryEncoding) {
   std::vector<Surfel> surfels = randomSurfels(20001);
   for (std::size_t i = 0; i < surfels.size(); ++i) {
-    surfels[i].group = static_cast<std::uint32_t>(i % kMaxGroups);
+    surfels[i].group = static_cast<std::uint8_t>(i % kMaxGroups);
+    const float step = float(i % 100);
+    if (i % 3 == 0) setLongSide(glm::vec3(.1f, -.002f, .01f) * step, surfels[i]);
   }
   for (const PlyEncoding encoding :
        {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
     Result<SurfelWriter> writer =
-        SurfelWriter::create(path("a.ply"), {true, true, true, true, true, true, true},
+        SurfelWriter::create(path("a.ply"), {true, true, true, true, true, true, true, true},
                              {.comments = {"a comment"}, .ply_encoding = encoding});
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE(writer->write(std::span(surfels).first(1)).ok());
@@ -50,7 +53,8 @@ TEST_F(SurfelWriterTest, FileHasOnlyTheChannelsAskedFor) {
   EXPECT_TRUE(source->channels().area);
   EXPECT_FALSE(source->channels().normal || source->channels().radius ||
                source->channels().radiosity || source->channels().albedo ||
-               source->channels().two_sided || source->channels().group);
+               source->channels().two_sided || source->channels().group ||
+               source->channels().long_side);
   EXPECT_EQ(readAll(*source)[2].area, surfels[2].area);
 }
 

@@ -19,22 +19,25 @@ namespace {
 struct Golden {
   const char* name;
   std::uint64_t surfel_hash, node_hash;
-  bool has_groups;
+  bool has_groups, has_long_sides;
 
   std::string path() const { return SURFEIT_TEST_SOURCE_DIR "/golden/" + std::string(name); }
-  CloudChannels channels() const { return has_groups ? kAllAndGroups : kAllChannels; }
+  CloudChannels channels() const {
+    return has_groups ? kAllAndGroups : has_long_sides ? kAllAndLongSides : kAllChannels;
+  }
   // For the names of the tests
   friend void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
 };
 constexpr Golden kGoldens[] = {
-    {"v1.sft", 12531938469041694647ull, 8557694847862354260ull, false},
-    {"v1_groups.sft", 12687918996693723113ull, 11431106272069044126ull, true},
+    {"v1.sft", 12531938469041694647ull, 8557694847862354260ull, false, false},
+    {"v1_groups.sft", 12687918996693723113ull, 11431106272069044126ull, true, false},
+    {"v1_long_sides.sft", 16580172462110769372ull, 8557694847862354260ull, false, true},
 };
 // The zstd that compressed them: another one may store the same payloads in other bytes.
 constexpr unsigned kZstdVersion = 10504;
 
 // Surfels of all kinds by operations that IEEE 754 defines to the last bit.
-std::vector<Surfel> goldenCloud(bool has_groups) {
+std::vector<Surfel> goldenCloud(const Golden& golden) {
   std::vector<Surfel> cloud;
   for (int i = 0; i < 300; ++i) {
     const float t = float(i) / 300;
@@ -51,10 +54,10 @@ std::vector<Surfel> goldenCloud(bool has_groups) {
       surfel.flags = kSurfelSphere;
       surfel.normal = glm::vec3(0);
     }
-    if (has_groups) surfel.group = static_cast<std::uint32_t>(i / 50 * 11);
+    if (golden.has_groups) surfel.group = static_cast<std::uint8_t>(i / 50 * 11);
     cloud.push_back(surfel);
   }
-  return cloud;
+  return golden.has_long_sides ? withLongSides(cloud) : cloud;
 }
 
 class GoldenTest : public SceneTest, public testing::WithParamInterface<Golden> {};
@@ -63,13 +66,14 @@ TEST_P(GoldenTest, VersionOneDecodesToTheSameContents) {
   const Golden& golden = GetParam();
   const char* update = std::getenv("SURFEIT_UPDATE_GOLDEN");
   if (update != nullptr && std::string(update) == "1") {
-    writeBytes(golden.path(), bytesOf(index(goldenCloud(golden.has_groups), golden.channels())));
+    writeBytes(golden.path(), bytesOf(index(goldenCloud(golden), golden.channels())));
   }
   EXPECT_THAT(findingsOf(golden.path()), testing::IsEmpty());
   const Result<ReadScene> scene = readScene(golden.path());
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   ASSERT_EQ(scene->surfels.size(), 300u);
   EXPECT_EQ(scene->header.channels.group, golden.has_groups);
+  EXPECT_EQ(scene->header.channels.long_side, golden.has_long_sides);
   std::uint64_t node_hash = 0;
   for (const auto& [node, first] : scene->nodes) {
     const auto add = [&](const void* values, std::size_t bytes) {
@@ -90,7 +94,7 @@ TEST_P(GoldenTest, VersionOneDecodesToTheSameContents) {
 
 TEST_P(GoldenTest, IndexingWritesTheSameFile) {
   const Golden& golden = GetParam();
-  const std::string scene = index(goldenCloud(golden.has_groups), golden.channels());
+  const std::string scene = index(goldenCloud(golden), golden.channels());
   if (ZSTD_versionNumber() != kZstdVersion) {
     GTEST_SKIP() << "zstd " << ZSTD_versionNumber() << " may compress otherwise than "
                  << kZstdVersion;
@@ -99,7 +103,9 @@ TEST_P(GoldenTest, IndexingWritesTheSameFile) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, GoldenTest, testing::ValuesIn(kGoldens), [](const auto& golden) {
-  return std::string(golden.param.has_groups ? "Groups" : "Plain");
+  return std::string(golden.param.has_groups       ? "Groups"
+                     : golden.param.has_long_sides ? "LongSides"
+                                                   : "Plain");
 });
 
 }  // namespace

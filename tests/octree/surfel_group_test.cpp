@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <utility>
 
 #include "io/page_codec.h"
 #include "octree/test_scenes.h"
@@ -10,15 +11,21 @@
 namespace surfeit {
 namespace {
 
-constexpr PageForm kForms[] = {{},           {false, true},        {true, false},
-                               {true, true}, {false, false, true}, {true, true, true}};
+constexpr PageForm kForms[] = {{},
+                               {false, true},
+                               {true, false},
+                               {true, true},
+                               {false, false, true},
+                               {true, true, true},
+                               {false, true, false, true}};
 
 TEST(SurfelGroup, FullPrecisionIsExact) {
-  const std::vector<Surfel> cloud = inGroups(randomCloud(300), kMaxGroups);
+  const std::vector<Surfel> cloud = withLongSides(inGroups(randomCloud(300), kMaxGroups));
   std::vector<std::byte> payload;
-  encodeSurfelGroup(cloud, {true, true, true}, payload);
+  const PageForm all = {true, true, true, true};
+  encodeSurfelGroup(cloud, all, payload);
   std::vector<Surfel> found(512);
-  const Result<std::uint32_t> count = decodeSurfelGroup(payload, {true, true, true}, found);
+  const Result<std::uint32_t> count = decodeSurfelGroup(payload, all, found);
   ASSERT_TRUE(count.ok()) << count.status().message();
   ASSERT_EQ(*count, cloud.size());
   EXPECT_EQ(std::memcmp(found.data(), cloud.data(), cloud.size() * sizeof(Surfel)), 0);
@@ -53,6 +60,32 @@ TEST(SurfelGroup, GroupsAreExactInEveryForm) {
       ASSERT_TRUE(decodeSurfelGroup(payload, form, found).ok());
       for (std::size_t i = 0; i < cloud.size(); ++i) ASSERT_EQ(found[i].group, cloud[i].group);
     }
+  }
+}
+
+TEST(SurfelGroup, LongSidesAreExactWhenQuantized) {
+  const std::vector<Surfel> cloud = withLongSides(randomCloud(300));
+  std::vector<std::byte> payload;
+  encodeSurfelGroup(cloud, {false, true, false, true}, payload);
+  std::vector<Surfel> found(300);
+  ASSERT_TRUE(decodeSurfelGroup(payload, {false, true, false, true}, found).ok());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    ASSERT_EQ(found[i].long_side, cloud[i].long_side);
+    ASSERT_EQ(found[i].elongation, cloud[i].elongation);
+  }
+}
+
+TEST(SurfelGroup, DecodeRejectsLongSidesThatThereAreNot) {
+  const PageForm form = {false, false, false, true};
+  for (const auto& [direction, elongation] : {std::pair{0x0100, 0}, {0x0007, 3}, {0, 1}}) {
+    std::vector<Surfel> cloud = withLongSides(randomCloud(20));
+    cloud[7].long_side = static_cast<std::uint16_t>(direction);
+    cloud[7].elongation = static_cast<std::uint8_t>(elongation);
+    std::vector<std::byte> payload;
+    encodeSurfelGroup(cloud, form, payload);
+    std::vector<Surfel> found(20);
+    EXPECT_EQ(decodeSurfelGroup(payload, form, found).status().message(),
+              "surfel group: damaged field long_side");
   }
 }
 

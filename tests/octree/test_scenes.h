@@ -35,6 +35,13 @@ constexpr bool isThreadSanitized() {
 
 inline constexpr CloudChannels kAllChannels = {true, true, true, true, true, true};
 inline constexpr CloudChannels kAllAndGroups = {true, true, true, true, true, true, true};
+inline constexpr CloudChannels kAllAndLongSides = {.normal = true,
+                                                   .radius = true,
+                                                   .area = true,
+                                                   .radiosity = true,
+                                                   .albedo = true,
+                                                   .two_sided = true,
+                                                   .long_side = true};
 inline constexpr CloudChannels kPositionsOnly = {};
 
 // A generator whose numbers are the same everywhere, unlike those of the standard distributions.
@@ -88,11 +95,21 @@ inline std::vector<Surfel> randomCloud(std::size_t count, std::uint32_t seed = 1
   return cloud;
 }
 
+// Gives surfels longer sides, but every fourth.
+inline std::vector<Surfel> withLongSides(std::vector<Surfel> cloud) {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (i % 4 == 3) continue;
+    cloud[i].long_side = static_cast<std::uint16_t>((1 + i % 255) | (1 + i * 7 % 255) << 8);
+    cloud[i].elongation = static_cast<std::uint8_t>(i * 5);
+  }
+  return cloud;
+}
+
 // Gives every surfel a group by its place, so that neighbours often share one; `count` in all.
 inline std::vector<Surfel> inGroups(std::vector<Surfel> cloud, std::uint32_t count) {
   for (Surfel& surfel : cloud) {
-    surfel.group =
-        std::min(static_cast<std::uint32_t>(surfel.position.x * float(count)), count - 1);
+    surfel.group = static_cast<std::uint8_t>(
+        std::min(static_cast<std::uint32_t>(surfel.position.x * float(count)), count - 1));
   }
   return cloud;
 }

@@ -85,6 +85,34 @@ TEST(Dice, SliversAreCutUntilTheirDisksAreSmall) {
   }
 }
 
+// A rectangle of two needles: pieces lie along it, and none is longer than wide by more than it is.
+TEST(Dice, LongSidesLieAlongARibbon) {
+  const Mesh mesh = triangleMesh({{0, 0, 0}, {4, 0, 0}, {4, 0.1f, 0}});
+  std::vector<PiecePart> parts;
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    const Micropolygon needle = piece(wholeTriangle(mesh, 0), 4, i);
+    appendParts(needle, area(needle), 0.1, parts);
+  }
+  ASSERT_GT(parts.size(), 10u);
+  for (const PiecePart& part : parts) {
+    const double length = glm::length(part.long_side);
+    EXPECT_GE(length * length, part.area * (1 - 1e-9));
+    EXPECT_LT(length, 2 * part.radius);
+    if (length * length < 2 * part.area) continue;
+    EXPECT_GT(std::abs(part.long_side.x), 0.99 * length);
+  }
+}
+
+TEST(Dice, LongSideOfARightTriangleSpreadsAsItDoes) {
+  const Mesh mesh = triangleMesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  std::vector<PiecePart> parts;
+  appendParts(wholeTriangle(mesh, 0), 0.5, 1, parts);
+  ASSERT_EQ(parts.size(), 1u);
+  // Along the hypotenuse h its variance is h^2 / 24, that of a rectangle length^2 / 12
+  EXPECT_NEAR(glm::length(parts[0].long_side), 1, 1e-12);
+  EXPECT_NEAR(parts[0].long_side.x, -parts[0].long_side.y, 1e-12);
+}
+
 TEST(Dice, NoSliverGivesUnboundedParts) {
   const Mesh mesh = triangleMesh({{0, 0, 0}, {1e6f, 0, 0}, {5, 0.01f, 0}});
   std::vector<PiecePart> parts;

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 
+#include "core/long_side.h"
 #include "sample/scene_files.h"
 
 namespace surfeit {
@@ -161,6 +162,29 @@ TEST_F(Sampling, RadiosityIsAlbedoTimesIrradiance) {
     ASSERT_NEAR(surfel.radiosity.z, 0.8f * irradiance, 1e-5f);
     ASSERT_EQ(surfel.albedo, options.surroundings.default_albedo);
     ASSERT_NEAR(glm::distance(surfel.normal, glm::vec3(0, 1, 0)), 0, 1e-6f);
+  }
+}
+
+TEST_F(Sampling, TwoSidedMeshesShowBothSidesAndHaveLongSides) {
+  const std::string grid = write("grid.ply", gridPly(8));
+  SampleOptions options;
+  options.count = 2000;
+  options.surroundings.lights.directionals = {{{0, -1, 0}, glm::vec3(2)}};
+  const std::vector<Surfel> front = sample(grid, options);
+  options.surroundings.lights.directionals = {{{0, 1, 0}, glm::vec3(2)}};
+  const std::vector<Surfel> back = sample(grid, options);
+  options.is_two_sided = true;
+  const std::vector<Surfel> both = sample(grid, options);
+  ASSERT_EQ(both.size(), front.size());
+  for (std::size_t i = 0; i < both.size(); ++i) {
+    ASSERT_TRUE(both[i].isTwoSided() && !front[i].isTwoSided());
+    ASSERT_NE(both[i].long_side, kNoLongSide);
+    ASSERT_EQ(front[i].long_side, kNoLongSide);
+    ASSERT_NEAR(std::abs(glm::dot(directionOf(both[i].long_side), both[i].normal)), 0, .1f);
+    // One of the two is lit, and the mean is half of that
+    const float lit = std::max(front[i].radiosity.x, back[i].radiosity.x);
+    ASSERT_GT(lit, 0);
+    ASSERT_NEAR(both[i].radiosity.x, .5f * lit, .02f);
   }
 }
 

@@ -1,0 +1,88 @@
+// The longer side of the piece of surface that a surfel stands for, in three bytes: where it points
+// (either way), and how much longer than wide the piece is.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// Octahedral, 8 bits for each coordinate (Cigolle et al. 2014, "A Survey of Efficient
+// Representations for Independent Unit Vectors"): half a degree. Both bytes are 1 to 255, 128 is 0.
+inline constexpr std::uint16_t kNoLongSide = 0;
+
+// Whether a page may hold these.
+constexpr bool isLongSide(std::uint16_t direction, std::uint8_t elongation) {
+  if (direction == kNoLongSide) return elongation == 0;
+  return (direction & 0xff) != 0 && direction >> 8 != 0;
+}
+
+// The code of a vector of any length; kNoLongSide of what is zero, or nearly, or not finite.
+inline std::uint16_t directionCode(const glm::vec3& v) {
+  const float sum = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
+  if (!(sum > 1e-30f && sum < 1e30f)) return kNoLongSide;
+  float x = v.x / sum, y = v.y / sum;
+  if (v.z < 0) {
+    const float folded_x = std::copysign(1 - std::abs(y), x);
+    y = std::copysign(1 - std::abs(x), y);
+    x = folded_x;
+  }
+  const auto byte = [](float coordinate) {
+    return static_cast<std::uint32_t>(128 + std::lround(127 * coordinate));
+  };
+  return static_cast<std::uint16_t>(byte(x) | byte(y) << 8);
+}
+
+// Unit; zero of kNoLongSide.
+inline glm::vec3 directionOf(std::uint16_t code) {
+  if (code == kNoLongSide) return glm::vec3(0);
+  const auto coordinate = [](std::uint32_t byte) {
+    return static_cast<float>(static_cast<std::int32_t>(byte) - 128) * (1.0f / 127);
+  };
+  glm::vec3 v(coordinate(code & 0xffu), coordinate(code >> 8u), 0);
+  v.z = 1 - std::abs(v.x) - std::abs(v.y);
+  if (v.z < 0) {
+    const float unfolded_x = std::copysign(1 - std::abs(v.y), v.x);
+    v.y = std::copysign(1 - std::abs(v.x), v.y);
+    v.x = unfolded_x;
+  }
+  return glm::normalize(v);
+}
+
+// Elongations are logarithmic, from 1 (code 0) to 251.
+inline constexpr float kElongationSteps = 32;  // for a factor of 2
+
+// Length over width.
+inline float elongationOf(const Surfel& surfel) {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = std::exp2(float(i) / kElongationSteps);
+    }
+    return values;
+  }();
+  return table[surfel.elongation];
+}
+
+// Gives a surfel, which has its area, the side as a vector as long as it is.
+inline void setLongSide(const glm::vec3& side, Surfel& surfel) {
+  surfel.long_side = directionCode(side);
+  const float elongation = glm::dot(side, side) / surfel.area;
+  if (surfel.long_side == kNoLongSide || !(elongation > 1)) return;
+  const float code = std::round(kElongationSteps * std::log2(elongation));
+  surfel.elongation = static_cast<std::uint8_t>(std::min(code, 255.f));
+}
+
+// The side as a vector; zero when it is not known.
+inline glm::vec3 longSideOf(const Surfel& surfel) {
+  return std::sqrt(surfel.area * elongationOf(surfel)) * directionOf(surfel.long_side);
+}
+
+}  // namespace surfeit

@@ -1,0 +1,76 @@
+#include "core/long_side.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+namespace surfeit {
+namespace {
+
+constexpr float kDegree = 0.0175f;
+
+TEST(LongSide, DirectionsAreWithinADegree) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  for (int i = 0; i < 10'000; ++i) {
+    const glm::vec3 v(normal(random), normal(random), normal(random));
+    const glm::vec3 found = directionOf(directionCode(1000.f * v));
+    ASSERT_NEAR(glm::length(found), 1, 1e-6f);
+    ASSERT_GT(glm::dot(found, glm::normalize(v)), std::cos(kDegree));
+  }
+  for (const glm::vec3& axis : {glm::vec3(1, 0, 0), glm::vec3(0, -1, 0), glm::vec3(0, 0, -1)}) {
+    EXPECT_EQ(directionOf(directionCode(axis)), axis);
+  }
+}
+
+TEST(LongSide, WhatIsNoDirectionHasNoCode) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(directionCode(glm::vec3(0)), kNoLongSide);
+  EXPECT_EQ(directionCode({infinity, 0, 0}), kNoLongSide);
+  EXPECT_EQ(directionCode({0, std::numeric_limits<float>::quiet_NaN(), 1}), kNoLongSide);
+  EXPECT_EQ(directionOf(kNoLongSide), glm::vec3(0));
+}
+
+// What is written to a cloud and read again stays as it is.
+TEST(LongSide, EveryCodeThatAPageMayHoldComesBack) {
+  Surfel surfel;
+  surfel.area = 0.37f;
+  int count = 0;
+  for (std::uint32_t code = 0; code < 0x10000; ++code) {
+    const auto direction = static_cast<std::uint16_t>(code);
+    const auto elongation = static_cast<std::uint8_t>(code * 7 >> 3);
+    if (!isLongSide(direction, elongation)) continue;
+    surfel.long_side = direction;
+    surfel.elongation = elongation;
+    Surfel again;
+    again.area = surfel.area;
+    setLongSide(longSideOf(surfel), again);
+    const glm::vec3 off = directionOf(again.long_side) - directionOf(direction);
+    ASSERT_LT(glm::length(off), 1e-6f) << code;
+    ASSERT_EQ(again.elongation, elongation) << code;
+    ++count;
+  }
+  EXPECT_EQ(count, 255 * 255 + 1);
+}
+
+TEST(LongSide, ElongationIsLengthOverWidth) {
+  Surfel surfel;
+  surfel.area = 2 * 0.1f;
+  setLongSide({0, 2, 0}, surfel);
+  EXPECT_NEAR(elongationOf(surfel), 20, 0.25f);
+  EXPECT_NEAR(longSideOf(surfel).y, 2, 0.025f);
+  setLongSide({0, 0.1f, 0}, surfel = Surfel{.area = 0.2f});  // shorter than wide: as a square
+  EXPECT_EQ(elongationOf(surfel), 1);
+}
+
+TEST(LongSide, PagesHoldNoHalfDirections) {
+  EXPECT_TRUE(isLongSide(kNoLongSide, 0));
+  EXPECT_FALSE(isLongSide(kNoLongSide, 1));
+  EXPECT_FALSE(isLongSide(0x0100, 0));
+  EXPECT_FALSE(isLongSide(0x0001, 0));
+  EXPECT_TRUE(isLongSide(0x0101, 255));
+}
+
+}  // namespace
+}  // namespace surfeit
