@@ -76,9 +76,11 @@ struct GatherQuality {
   // keep below 2/3 of it.
   float max_solid_angle = 0.11f;
   int raster_resolution = 16;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
-  // Rays and horizon start this far above the receiver, in radii of the surfel looked at.
+  // Rays and horizon start this far above the receiver, in radii of the surfel looked at, or where
+  // its longer side is known (two-sided surfels only) in widths.
   float bias = 0.15f;
-  // Surfels closer than this many of their radii are ray traced (memo 3.4.1).
+  // Surfels closer than this many of their radii are ray traced (memo 3.4.1), or of eighths of
+  // their longer side.
   float near_field_radii = 8;
   // The far field is seen from the middle of 16 neighbouring receivers where that moves it by less
   // than this part of a raster pixel; 0: by every receiver for itself.
