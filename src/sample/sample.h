@@ -47,9 +47,8 @@ struct SampleStats {
 };
 
 // Writes a cloud of the format that its name tells, with normals, radii, areas, albedo, when
-// anything emits, radiosity, and of two-sided meshes two_sided and longer
-// sides. The cloud depends on
-// meshes and options alone, not on the threads. Memory: the meshes, Embree's hierarchy (less than
+// anything emits, radiosity, and of two-sided meshes two_sided and longer sides. The cloud depends
+// on meshes and options alone, not on the threads. Memory: the meshes, Embree's hierarchy (less than
 // 100 bytes per triangle) and a few batches of surfels, whatever the count. Errors: kIoError,
 // kCorruption (bad mesh), kInvalidArgument (options), kInterrupted, kFailed.
 Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const std::string& output,
