@@ -74,6 +74,7 @@ inline float elongationOf(const Surfel& surfel) {
 // Gives a surfel, which has its area, the side as a vector as long as it is.
 inline void setLongSide(const glm::vec3& side, Surfel& surfel) {
   surfel.long_side = directionCode(side);
+  surfel.elongation = 0;
   const float elongation = glm::dot(side, side) / surfel.area;
   if (surfel.long_side == kNoLongSide || !(elongation > 1)) return;
   const float code = std::round(kElongationSteps * std::log2(elongation));

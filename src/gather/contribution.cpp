@@ -182,8 +182,9 @@ float reachOf(const Facet& facet, const glm::vec3& direction) {
 
 float thicketPart(const Surfel& surfel) {
   if (!surfel.isTwoSided()) return 0;
-  const bool is_ribbon = surfel.long_side != kNoLongSide ? elongationOf(surfel) > kRibbonElongation
-                                                         : isRibbon(surfel.radius, surfel.area);
+  const bool is_ribbon = surfel.long_side != kNoLongSide
+                             ? elongationOf(surfel) > kRibbonElongation
+                             : looksLikeRibbon(surfel.radius, surfel.area);
   return is_ribbon ? 1 : 0;
 }
 

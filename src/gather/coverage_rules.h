@@ -121,7 +121,7 @@ inline float effectiveRadius(float radius, float area) {
 inline constexpr float kRibbonPart = 0.15f;
 static_assert(kRibbonPart * kPi * kLargestRadius * kLargestRadius > 1,
               "effective radii tell the same");
-inline bool isRibbon(float radius, float area) {
+inline bool looksLikeRibbon(float radius, float area) {
   return area < kRibbonPart * kPi * radius * radius;
 }
 // Where the longer side is known, it is one when so many times as long as wide. (Hair, with 2, 4,

@@ -290,12 +290,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     patch.position = surfel.position;
     patch.normal = surfel.normal;
     const Ribbon ribbon = Ribbon::of(surfel);
+    patch.radius = drawnRadius(surfel, ribbon);
     if (ribbon.isEmpty()) {
-      patch.radius = effectiveRadius(surfel.radius, surfel.area);
       patch.shape = withoutDirection(surfel.normal);
       patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
     } else {
-      patch.radius = std::max(surfel.radius, ribbon.radius());
       patch.shape = ribbon.shape();
       patch.soft_peak = -ribbon.width;
     }
@@ -313,7 +312,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
         reachOf(surfel, patch.radius, glm::dot(to_surfel, surfel.normal) / std::sqrt(distance_sq));
     patch.thicket = thicketPart(surfel);
     // Positive, for a surfel may be at a receiver; then it is near at any setting
-    const float size = ribbon.isEmpty() ? patch.radius : kRibbonRadius * ribbon.length;
+    const float size = nearFieldSize(patch.radius, ribbon);
     patch.near_distance = std::max(near_field_radii_ * size, std::numeric_limits<float>::min());
     patch.blend = blend;
     orderLastPatch(kernel_.facesThatSee(canvas, patch));

@@ -57,8 +57,7 @@ void ReceiverRaster::addPatch(const NodeOrFacet& source, float part) {
 void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
   Surfel surfel = withSides(stored, contribution_rules_.sides);
   const Ribbon ribbon = Ribbon::of(surfel);
-  surfel.radius = ribbon.isEmpty() ? effectiveRadius(surfel.radius, surfel.area)
-                                   : std::max(surfel.radius, ribbon.radius());
+  surfel.radius = drawnRadius(surfel, ribbon);
   const glm::vec3 to_surfel = surfel.position - receiver_.position;
   const float distance_sq = glm::dot(to_surfel, to_surfel);
   if (!(distance_sq <= max_distance_sq_)) return;
@@ -70,8 +69,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
 
   // Mid field: a patch, when its middle is above the horizon
   const float height = heightAboveHorizon(receiver_, to_surfel);
-  const float near_distance =
-      near_field_radii_ * (ribbon.isEmpty() ? surfel.radius : kRibbonRadius * ribbon.length);
+  const float near_distance = near_field_radii_ * nearFieldSize(surfel.radius, ribbon);
   if (distance_sq >= near_distance * near_distance) {
     Entry entry;
     if (height > 0 &&

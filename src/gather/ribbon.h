@@ -9,6 +9,7 @@
 
 #include "core/long_side.h"
 #include "core/symmetric_matrix.h"
+#include "gather/coverage_rules.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
@@ -77,6 +78,17 @@ struct Ribbon {
 // Closer than this part of its length for each radius of the near field a ribbon is ray traced.
 // (AO RMSE of hair with twice and half as much: .0087, .0096.)
 inline constexpr float kRibbonRadius = 1.f / 8;
+
+// Of the circle that a surfel is drawn within, as the ribbon that it is, if it is one.
+inline float drawnRadius(const Surfel& surfel, const Ribbon& ribbon) {
+  if (ribbon.isEmpty()) return effectiveRadius(surfel.radius, surfel.area);
+  return std::max(surfel.radius, ribbon.radius());
+}
+
+// Closer than this, for each radius of the near field, it is ray traced.
+inline float nearFieldSize(float drawn_radius, const Ribbon& ribbon) {
+  return ribbon.isEmpty() ? drawn_radius : kRibbonRadius * ribbon.length;
+}
 
 // How much of a pixel lies between -half and half, which reaches from x - foot to x + foot.
 inline float partWithin(float x, float foot, float half) {

@@ -60,7 +60,7 @@ TEST(LongSide, ElongationIsLengthOverWidth) {
   setLongSide({0, 2, 0}, surfel);
   EXPECT_NEAR(elongationOf(surfel), 20, 0.25f);
   EXPECT_NEAR(longSideOf(surfel).y, 2, 0.025f);
-  setLongSide({0, 0.1f, 0}, surfel = Surfel{.area = 0.2f});  // shorter than wide: as a square
+  setLongSide({0, 0.1f, 0}, surfel);  // again, now shorter than wide: as a square
   EXPECT_EQ(elongationOf(surfel), 1);
 }
 
