@@ -30,7 +30,7 @@ constexpr std::array kMeshScenes = {
     MeshScene{"bunny", "meshes/bunny.ply", 1, false, 1e-4f, 0.25f},
     MeshScene{"lion", "meshes/lion_reconstruction.ply", 2, false, 1e-4f, 0.25f},
     MeshScene{"sponza", "scenes/sponza/sponza.obj", -1, false, 3e-5f, 0.1f},
-    MeshScene{"hair", "hair/straight_ribbons.ply", -1, true, 1e-5f, 0.1f},
+    MeshScene{"hair", "hair/straight_ribbons.ply", -1, true, 2e-6f, 0.1f},
 };
 constexpr std::uint64_t kSurfels = 2'000'000;
 constexpr float kGroundSize = 1;  // over the diagonal: about half of the surfels are the object's

@@ -18,7 +18,7 @@ namespace surfeit {
 namespace {
 
 // Part of the names of scene files that are kept; raise it whenever a scene changes.
-constexpr int kSceneVersion = 2;
+constexpr int kSceneVersion = 3;
 constexpr std::size_t kDenseRuns = 64, kRunLength = 1024;
 constexpr std::size_t kScattered = 50'000;
 constexpr std::size_t kJudged = 2048;

@@ -74,13 +74,24 @@ class SlabCutter {
 
   double length() const { return length_; }
 
-  // The part between t = begin and t = end, begin < end.
-  PiecePart slab(double begin, double end) const {
+  // Of the corner above the edge.
+  double apexHeight() const { return 2 * area_ / length_; }
+  // The t of the place on the edge that is nearest to this one.
+  double nearestOnEdge(const glm::dvec3& place) const {
+    const glm::dvec3 edge = polygon_.corner[b_] - polygon_.corner[a_];
+    return std::clamp(glm::dot(place - polygon_.corner[a_], edge) / (length_ * length_), 0.0, 1.0);
+  }
+
+  // The part between t = begin and t = end, begin < end, and s = low and s = high; of area 0 where
+  // the triangle is not as high.
+  PiecePart slab(double begin, double end, double low = 0, double high = 1) const {
     // Its corners in turn: along the edge, and back along the top
-    glm::dvec2 corners[5] = {{begin, 0}, {end, 0}, {end, height(end)}};
+    glm::dvec2 corners[kMostCorners] = {{begin, 0}, {end, 0}, {end, height(end)}};
     int count = 3;
     if (begin < foot_ && foot_ < end) corners[count++] = {foot_, 1};
     corners[count++] = {begin, height(begin)};
+    if (low > 0) count = keepBeyond(low, 1, corners, count);
+    if (high < 1) count = keepBeyond(high, -1, corners, count);
 
     // Area and centroid, as a fan of triangles from the first corner
     double area = 0;
@@ -93,11 +104,12 @@ class SlabCutter {
     }
 
     PiecePart part;
+    if (!(area > 0)) return part;
     part.area = 2 * area * area_;
     const glm::dvec3 weights = pieceWeights(moment / area);
     part.centroid = combine(polygon_.corner, weights);
     part.weight = combine(polygon_.weight, weights);
-    glm::dvec3 places[5];
+    glm::dvec3 places[kMostCorners];
     for (int i = 0; i < count; ++i) {
       places[i] = combine(polygon_.corner, pieceWeights(corners[i]));
       part.radius = std::max(part.radius, glm::distance(places[i], part.centroid));
@@ -108,6 +120,24 @@ class SlabCutter {
   }
 
  private:
+  static constexpr int kMostCorners = 7;  // 5, and one more with each cut
+
+  // Cuts off what lies on the other side of s = limit: below for side 1, above for -1.
+  static int keepBeyond(double limit, double side, glm::dvec2 (&corners)[kMostCorners], int count) {
+    glm::dvec2 kept[kMostCorners];
+    int kept_count = 0;
+    for (int i = 0; i < count; ++i) {
+      const glm::dvec2 &from = corners[i], &to = corners[(i + 1) % count];
+      const double before = side * (from.y - limit), after = side * (to.y - limit);
+      if (before >= 0) kept[kept_count++] = from;
+      if ((before >= 0) != (after >= 0)) {
+        kept[kept_count++] = from + before / (before - after) * (to - from);
+      }
+    }
+    std::copy_n(kept, kept_count, corners);
+    return kept_count;
+  }
+
   double height(double t) const {
     if (t < foot_) return t / foot_;
     return foot_ < 1 ? (1 - t) / (1 - foot_) : 1;
@@ -199,6 +229,46 @@ void appendParts(const Micropolygon& polygon, double area, double spacing,
   for (int i = 0; i < slabs; ++i) {
     parts.push_back(cutter.slab(double(i) / slabs, double(i + 1) / slabs));
   }
+}
+
+TriangleDice::TriangleDice(const Micropolygon& triangle, double area, std::uint64_t piece_count,
+                           double spacing)
+    : triangle_(triangle), area_(area), spacing_(spacing), piece_count_(piece_count) {
+  SURFEIT_ASSERT(piece_count > 0);
+  const SlabCutter cutter(triangle, area);
+  const double height = cutter.apexHeight();
+  if (!(cutter.length() >= kStripAspect * height)) return;
+  // Each part has about the area of a square of `spacing`, and is at most twice as long
+  rows_ = int(std::clamp(std::ceil(height / spacing), 1.0, double(kMaxSlabs)));
+  const double length = rows_ > 1 ? spacing * spacing * rows_ / height : 2 * spacing;
+  const double most = double(piece_count) * double(kMaxSlabs / rows_);
+  slabs_ = std::uint64_t(std::clamp(std::ceil(cutter.length() / length), 1.0, most));
+}
+
+void TriangleDice::appendParts(std::uint64_t index, std::vector<PiecePart>& parts) const {
+  SURFEIT_ASSERT(index < piece_count_);
+  if (!isStrip()) {
+    const double area = area_ / double(piece_count_);
+    return surfeit::appendParts(piece(triangle_, piece_count_, index), area, spacing_, parts);
+  }
+  const SlabCutter cutter(triangle_, area_);
+  const std::uint64_t end = slabs_ * (index + 1) / piece_count_;
+  for (std::uint64_t slab = slabs_ * index / piece_count_; slab < end; ++slab) {
+    for (int row = 0; row < rows_; ++row) {
+      const PiecePart part =
+          cutter.slab(double(slab) / double(slabs_), double(slab + 1) / double(slabs_),
+                      double(row) / rows_, double(row + 1) / rows_);
+      if (part.area > 0) parts.push_back(part);
+    }
+  }
+}
+
+std::uint64_t TriangleDice::pieceNear(const glm::dvec3& target) const {
+  if (!isStrip()) return surfeit::pieceNear(triangle_, piece_count_, target);
+  const double along = SlabCutter(triangle_, area_).nearestOnEdge(target);
+  const std::uint64_t slab = std::min(std::uint64_t(along * double(slabs_)), slabs_ - 1);
+  // The one of which the slabs end beyond this one
+  return ((slab + 1) * piece_count_ + slabs_ - 1) / slabs_ - 1;
 }
 
 DicePlan::DicePlan(const Mesh& mesh, std::uint64_t count) : mesh_(mesh), count_(count) {

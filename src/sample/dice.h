@@ -48,6 +48,36 @@ inline constexpr int kMaxSlabs = 1 << kMaxSlabBits;
 void appendParts(const Micropolygon& polygon, double area, double spacing,
                  std::vector<PiecePart>& parts);
 
+// Cuts one triangle into the parts that become its surfels. Immutable; the triangle must outlive
+// it.
+//
+// Triangles at least kStripAspect times as long as high, such as halves of a ribbon's segments, are
+// strips: cut across their longest edge into slabs, and those along it into rows, for the pieces of
+// piece() would be needles side by side, as long as the triangle, and rectangles instead of them
+// would overlap. Others are cut by piece().
+class TriangleDice {
+ public:
+  static constexpr double kStripAspect = 8;
+
+  // `area` is the triangle's, `piece_count` at least 1.
+  TriangleDice(const Micropolygon& triangle, double area, std::uint64_t piece_count,
+               double spacing);
+
+  // Appends the parts of piece `index` < piece_count, which of a strip may be none.
+  void appendParts(std::uint64_t index, std::vector<PiecePart>& parts) const;
+  // The index of a piece, with parts, that lies near `target`.
+  std::uint64_t pieceNear(const glm::dvec3& target) const;
+
+ private:
+  bool isStrip() const { return slabs_ > 0; }
+
+  const Micropolygon& triangle_;
+  double area_, spacing_;
+  std::uint64_t piece_count_;
+  std::uint64_t slabs_ = 0;  // 0: no strip
+  int rows_ = 1;
+};
+
 // Which surfels a mesh triangle gives.
 struct DiceJob {
   std::uint32_t triangle = 0;

@@ -93,7 +93,7 @@ class SurfelMaker {
     std::uint64_t piece = 0;  // that takes them over: the one nearest to their centroid
   };
 
-  Carried gatherCarried(const DiceJob& job, const Micropolygon& whole) const {
+  Carried gatherCarried(const DiceJob& job, const TriangleDice& dice) const {
     Carried carried;
     for (std::uint64_t i = job.carried_begin; i < job.carried_end; ++i) {
       const std::uint32_t triangle = plan_.order()[i];
@@ -104,7 +104,7 @@ class SurfelMaker {
     }
     if (carried.area > 0) {
       carried.centroid /= carried.area;
-      carried.piece = pieceNear(whole, job.piece_count, carried.centroid);
+      carried.piece = dice.pieceNear(carried.centroid);
     }
     return carried;
   }
@@ -162,12 +162,12 @@ class SurfelMaker {
   void addPieces(const PieceRange& range, std::vector<Surfel>& surfels) const {
     const DiceJob& job = range.job;
     const Micropolygon whole = wholeTriangle(mesh_, job.triangle);
-    const Carried carried = gatherCarried(job, whole);
-    const double piece_area = job.area / double(job.piece_count);
+    const TriangleDice dice(whole, job.area, job.piece_count, plan_.spacing());
+    const Carried carried = gatherCarried(job, dice);
     std::vector<PiecePart> parts;
     for (std::uint64_t i = range.begin; i < range.end; ++i) {
       parts.clear();
-      appendParts(piece(whole, job.piece_count, i), piece_area, plan_.spacing(), parts);
+      dice.appendParts(i, parts);
       const std::size_t begin = surfels.size();
       for (std::size_t k = 0; k < parts.size(); ++k) {
         const std::uint64_t seed = ((job.first_surfel + i) << kMaxSlabBits) + k;

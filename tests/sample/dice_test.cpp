@@ -85,14 +85,90 @@ TEST(Dice, SliversAreCutUntilTheirDisksAreSmall) {
   }
 }
 
-// A rectangle of two needles: pieces lie along it, and none is longer than wide by more than it is.
-TEST(Dice, LongSidesLieAlongARibbon) {
-  const Mesh mesh = triangleMesh({{0, 0, 0}, {4, 0, 0}, {4, 0.1f, 0}});
+// Of all pieces of a triangle.
+std::vector<PiecePart> allParts(const TriangleDice& dice, std::uint64_t piece_count) {
   std::vector<PiecePart> parts;
-  for (std::uint64_t i = 0; i < 4; ++i) {
-    const Micropolygon needle = piece(wholeTriangle(mesh, 0), 4, i);
-    appendParts(needle, area(needle), 0.1, parts);
+  for (std::uint64_t i = 0; i < piece_count; ++i) dice.appendParts(i, parts);
+  return parts;
+}
+
+std::uint64_t pieceCount(double area, double spacing) {
+  return std::uint64_t(std::max(1.0, std::ceil(area / (spacing * spacing))));
+}
+
+TEST(TriangleDice, PartsOfAStripTileIt) {
+  constexpr double kSpacing = 0.1;
+  for (const float apex : {0.0f, 3.3f, 10.0f}) {
+    for (const float height : {0.003f, 0.09f, 0.11f, 0.34f, 1.2f}) {
+      const Mesh mesh = triangleMesh({{0, 0, 0}, {10, 0, 0}, {apex, height, 0}});
+      const Micropolygon whole = wholeTriangle(mesh, 0);
+      const std::uint64_t count = pieceCount(area(whole), kSpacing);
+      const TriangleDice dice(whole, area(whole), count, kSpacing);
+      const std::vector<PiecePart> parts = allParts(dice, count);
+      EXPECT_GE(parts.size(), count);
+      EXPECT_LE(parts.size(), 2 * count + 100);  // 2 spacings long or as large as a square of it
+      double sum = 0;
+      glm::dvec3 moment(0);
+      for (const PiecePart& part : parts) {
+        EXPECT_LE(part.radius, 1.5 * kSpacing);
+        EXPECT_GT(part.area, 0);
+        EXPECT_NEAR(part.weight.x + part.weight.y + part.weight.z, 1, 1e-12);
+        sum += part.area;
+        moment += part.area * part.centroid;
+
+        std::vector<PiecePart> near;
+        dice.appendParts(dice.pieceNear(part.centroid), near);
+        double distance = 1e30;
+        for (const PiecePart& other : near) {
+          distance = std::min(distance, glm::distance(other.centroid, part.centroid));
+        }
+        ASSERT_LT(distance, 0.1 * kSpacing);
+      }
+      EXPECT_NEAR(sum / area(whole), 1, 1e-12);
+      EXPECT_NEAR(glm::distance(moment / sum, whole.centroid()), 0, 1e-9);
+    }
   }
+}
+
+// Whether a place lies in the rectangle of a part.
+bool isInRectangle(const PiecePart& part, const glm::dvec3& place) {
+  const double length = glm::length(part.long_side), width = part.area / length;
+  const glm::dvec3 off = place - part.centroid;
+  const double along = glm::dot(off, part.long_side) / length;
+  const double across = std::sqrt(std::max(0.0, glm::dot(off, off) - along * along));
+  return std::abs(along) <= 0.5 * length && across <= 0.5 * width;
+}
+
+// A ribbon of two triangles, of which the parts are drawn as rectangles: they lie side by side.
+// (Those of the needles that piece() cuts cover .90, .89 and .87 of it.)
+TEST(TriangleDice, RectanglesCoverARibbon) {
+  const Mesh mesh =
+      triangleMesh({{0, 0, 0}, {5, 0, 0}, {5, 0.1f, 0}, {0, 0, 0}, {5, 0.1f, 0}, {0, 0.1f, 0}});
+  for (const double spacing : {0.14, 0.06, 0.02}) {
+    std::vector<PiecePart> parts;
+    for (const std::uint32_t triangle : {0u, 1u}) {
+      const Micropolygon whole = wholeTriangle(mesh, triangle);
+      const std::uint64_t count = pieceCount(area(whole), spacing);
+      const TriangleDice dice(whole, area(whole), count, spacing);
+      for (const PiecePart& part : allParts(dice, count)) parts.push_back(part);
+    }
+    int covered = 0, places = 0;
+    for (int i = 0; i < 1000; ++i) {
+      for (int j = 0; j < 20; ++j, ++places) {
+        const glm::dvec3 place((i + 0.5) * 5 / 1000, (j + 0.5) * 0.1 / 20, 0);
+        covered += std::any_of(parts.begin(), parts.end(),
+                               [&](const PiecePart& part) { return isInRectangle(part, place); });
+      }
+    }
+    EXPECT_GT(covered, 0.97 * places) << spacing;
+  }
+}
+
+// And none is longer than wide by more than the ribbon is.
+TEST(TriangleDice, LongSidesLieAlongARibbon) {
+  const Mesh mesh = triangleMesh({{0, 0, 0}, {4, 0, 0}, {4, 0.1f, 0}});
+  const Micropolygon whole = wholeTriangle(mesh, 0);
+  const std::vector<PiecePart> parts = allParts(TriangleDice(whole, area(whole), 20, 0.1), 20);
   ASSERT_GT(parts.size(), 10u);
   for (const PiecePart& part : parts) {
     const double length = glm::length(part.long_side);
