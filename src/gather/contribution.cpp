@@ -188,8 +188,18 @@ float thicketPart(const Surfel& surfel) {
   return is_ribbon ? 1 : 0;
 }
 
-float reachOf(const Surfel& surfel, float radius, float cosine) {
-  return (thicketPart(surfel) > 0 ? kThicketReach : 1) * layerReachOfDisk(radius, cosine);
+float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
+              const glm::vec3& direction) {
+  if (thicketPart(surfel) > 0 && !ribbon.isEmpty()) {
+    return kRibbonReach * ribbon.halfExtent(direction) + kRibbonDepth * ribbon.width;
+  }
+  const float reach = layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
+  return thicketPart(surfel) > 0 ? kThicketReach * reach : reach;
+}
+
+float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionRules& rules) {
+  if (!surfel.isTwoSided()) return kNested;
+  return thicketPart(surfel) > 0 && !ribbon.isEmpty() ? rules.ribbon_nested : 0;
 }
 
 // Four times band 0 is the area of one-sided disks, twice that of two-sided ones, and four times
@@ -301,16 +311,16 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   if (!sends_light && rules.sides != GatherSides::kBoth) return false;
 
   contribution.distance_sq = distance_sq;
-  contribution.reach = reachOf(surfel, surfel.radius, surfel.isSphere() ? 0 : cosine);
+  const Ribbon ribbon = Ribbon::of(surfel);
+  contribution.reach = reachOf(surfel, ribbon, surfel.radius, direction);
   contribution.direction = direction;
   contribution.solid_angle = surfel.area * std::abs(cosine) / distance_sq;
   contribution.spread = surfel.area / distance_sq;
   contribution.overlap = 0;
   contribution.thicket = thicketPart(surfel);
   contribution.opacity = 1;
-  contribution.nested = nestedPart(surfel.isTwoSided(), contribution.thicket);
+  contribution.nested = nestedPart(surfel, ribbon, rules);
   contribution.normal = surfel.normal;
-  const Ribbon ribbon = Ribbon::of(surfel);
   contribution.shape = ribbon.isEmpty() ? withoutDirection(surfel.normal) : ribbon.shape();
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);
   return contribution.solid_angle > 0;

@@ -11,6 +11,8 @@
 
 namespace surfeit {
 
+struct Ribbon;
+
 // A rough node that shows less than this part of its area shows nothing: three bands cannot tell so
 // little from zero, and dividing power by it would make up bright specks.
 inline constexpr float kLeastVisiblePart = 0.01f;
@@ -37,6 +39,7 @@ static_assert(sizeof(Contribution) == 23 * sizeof(float));
 struct ContributionRules {
   GatherSides sides = GatherSides::kFront;
   bool has_color = true;
+  float ribbon_nested = 0;  // coverage_rules.h
 };
 
 // The surfel as one whose front is the side that covers: with GatherSides::kBack turned round, and
@@ -98,11 +101,13 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
 
 // How far before and behind its middle a facet meets others of its layer, seen in this direction.
 float reachOf(const Facet& facet, const glm::vec3& direction);
-// How far before and behind its middle a surfel meets others of its layer, seen at an angle with
-// this cosine. `radius`: effectiveRadius.
-float reachOf(const Surfel& surfel, float radius, float cosine);
+// How far before and behind its middle a surfel meets others of its layer, seen in this direction.
+// `radius`: drawnRadius.
+float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius, const glm::vec3& direction);
 // How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
 float thicketPart(const Surfel& surfel);
+// How much of what it covers hides behind the same side of a pixel as other layers, 0..1.
+float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionRules& rules);
 // How much of a rough node is leaves or hair, 0..1: what of it is two-sided.
 float thicketPart(const Node& node);
 

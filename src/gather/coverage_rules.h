@@ -91,6 +91,17 @@ inline constexpr float kSphereClearance = 3;
 // A face on which a direction lies farther out than 1 / this gets nothing of what is there.
 inline constexpr float kLeastAxis = 0.3f;
 
+// Rays through the middles of pixels tell what a near surfel covers, of a patch the area does: a
+// thin one differs by parts of a pixel. So from the border of the near field to kWholeNear of that
+// distance it is both, in parts that add up. `nearness`: the squared distance over that of the
+// border. (Largest step of irradiance along the floor of a box, below a sphere, where levels hardly
+// change: .90 % of its mean at a hard border, .67 % so; bench/line_steps.sh --max-solid-angle
+// 0.002.)
+inline constexpr float kWholeNear = 0.875f;
+inline float nearPart(float nearness) {
+  return std::clamp((1 - nearness) / (1 - kWholeNear * kWholeNear), 0.f, 1.f);
+}
+
 // The least spread of a disk on a face: keeps one that is seen edge-on from becoming a line.
 inline constexpr float kLeastSpread = 1.f / 64;
 
@@ -128,6 +139,25 @@ inline bool looksLikeRibbon(float radius, float area) {
 // 8: .0084 and +.0023, .0085 and +.0026, .0093 and +.0039; leaves, whose pieces are shorter, .0069,
 // and .0096 if they were pieces of ribbons.)
 inline constexpr float kRibbonElongation = 3;
+
+// Such a piece meets others of its layer this part of what it extends before and behind its middle,
+// and a little of its width, so that no rounding decides. With all of it, the pieces of one ribbon
+// that leads away from the receiver would be of one layer, but other ribbons as well. (Hair at 40
+// pixels with .15, .5, .7, 1: color .89, .73, .70, .75 %; bias of AO at 16 pixels +.0007, +.0012,
+// +.0017, +.0050.)
+inline constexpr float kRibbonReach = 0.5f;
+inline constexpr float kRibbonDepth = 0.02f;
+// Of a ribbon's width the rays begin this part of the bias above the receiver: its pieces are flat,
+// and another ribbon may pass as close. (With the whole bias one receiver of 2,048 looks through
+// such a one: AO RMSE .0076 instead of .0070.)
+inline constexpr float kRibbonBias = 1.f / 3;
+// Ribbons grow in tufts, side by side: this part of them hides as if behind the same side of a
+// pixel (kNested), the more, the larger the pixels are. (AO bias of hair at 16 pixels with 0, .04,
+// .12:
+// +.0034, +.0027, +.0012; at 40 pixels +.0026, and +.0009 with .05.)
+inline float ribbonNested(float pixels_per_slope) {
+  return std::min(kNested, 1 / std::max(pixels_per_slope, 1.f));
+}
 
 // What the soft disks of the near field cover, over the surfels' areas: more than 1, so that they
 // leave no gaps where the pieces are irregular. With 1 surfaces have holes, with 2 thin things

@@ -115,7 +115,7 @@ inline constexpr float kFading = 0.02f;
 // Each receiver of a packet has its own blend, as long as the packet's radius is no larger than
 // this part of the distance; in one that is larger all have, more and more, that of the closest:
 // too many nodes would fade. (Steps on the floor when all have that: 1.7 %.)
-inline constexpr float kMostFadingSpread = 0.01f;
+inline constexpr float kMostFadingSpread = 0.03f;
 
 // Sorts siblings by what the packet makes of them; those in neither class are not seen, and those
 // in both fade. docs/algorithm.md, "Choosing the cut", has the tests. This is the definition.

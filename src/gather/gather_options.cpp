@@ -111,7 +111,7 @@ void setQuality(QualityPreset preset, GatherQuality& quality) {
           standard.far_field_parallax);
       break;
     case QualityPreset::kFinal:
-      set(0.02f, 28, 16, 0);  // a shared far field steps where packets meet
+      set(0.012f, 40, 16, 0);  // a shared far field steps where packets meet
       break;
   }
 }

@@ -117,7 +117,8 @@ class Brush {
     });
   }
 
-  Cover MakeCover(const Patch& patch, const Sight& sight, V distance) const {
+  // Of this part of it.
+  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
     const V reach = Splat(patch.reach);
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
@@ -125,8 +126,8 @@ class Brush {
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
     cover.thicket = patch.thicket;
-    cover.nested = patch.nested();
-    cover.opacity = Opacity(patch, sight);
+    cover.nested = patch.nested(ribbonNested(scale_));
+    cover.opacity = hn::Mul(part, Opacity(patch, sight));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
@@ -177,7 +178,7 @@ class Brush {
     // Numbers of lanes that see nothing must be numbers, too
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
     CoverParallelogram(OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w), seen,
-                       MakeCover(patch, sight, distance));
+                       MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part)));
   }
 
   // As facingAreas of a facet; all times the distance.
@@ -288,7 +289,7 @@ class Brush {
     Sight from_ray = sight;
     from_ray.facing = Dot(to_centre, patch.normal);
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
-             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq)));
+             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part));
   }
 
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,

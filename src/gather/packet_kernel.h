@@ -57,7 +57,10 @@ struct alignas(64) Patch {
   bool isRound() const { return disk_area == 0; }
   bool isRibbon() const { return soft_peak < 0; }
   float ribbonWidth() const { return -soft_peak; }
-  float nested() const { return nestedPart(facing_limit == kBothSides, thicket); }
+  float nested(float ribbon_nested) const {
+    if (isRibbon() && thicket > 0) return ribbon_nested;
+    return nestedPart(facing_limit == kBothSides, thicket);
+  }
 };
 static_assert(sizeof(Patch) == 128);
 

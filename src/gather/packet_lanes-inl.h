@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <glm/vec3.hpp>
+#include <limits>
 
 #include "gather/coverage_rules.h"
 #include "gather/packet_kernel.h"
@@ -128,12 +129,21 @@ struct Receivers {
 struct Sight {
   V3 offset;  // from the receivers
   V distance_sq, height;
-  V facing;    // offset . normal: negative in front
-  M in_reach;  // not too far away, and for spheres around spherical receivers, not too close
-  M is_near;
-  V bias;    // of rays: see ReceiverRaster::rayBias
-  M traced;  // near, and seen by the rays
+  V facing;     // offset . normal: negative in front
+  M in_reach;   // not too far away, and for spheres around spherical receivers, not too close
+  V near_part;  // of what is seen, as nearPart
+  V bias;       // of rays: see ReceiverRaster::rayBias
+  M traced;     // near in part, and seen by the rays
 };
+
+// As nearPart.
+inline V NearPart(const Patch& patch, const Sight& sight) {
+  const float border_sq =
+      std::max(patch.near_distance * patch.near_distance, std::numeric_limits<float>::min());
+  const V rest = hn::NegMulAdd(sight.distance_sq, Splat(1 / border_sq), Splat(1));
+  const V part = hn::Mul(rest, Splat(1 / (1 - kWholeNear * kWholeNear)));
+  return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
+}
 
 HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers& receivers) {
   const D d;
@@ -144,7 +154,8 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   sight.height = Dot(sight.offset, receivers.normal);
   sight.facing = Dot(sight.offset, patch.normal);
   sight.in_reach = hn::Le(sight.distance_sq, Splat(canvas.max_distance_sq));
-  sight.is_near = sight.traced = hn::Gt(zero, zero);
+  sight.traced = hn::Gt(zero, zero);
+  sight.near_part = zero;
   sight.bias = zero;
   if (!(patch.near_distance > 0)) return sight;
 
@@ -154,16 +165,16 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
         hn::And(receivers.spherical, hn::Lt(sight.distance_sq, Splat(clearance * clearance)));
     sight.in_reach = hn::AndNot(too_close, sight.in_reach);
   }
-  sight.is_near = hn::And(
-      sight.in_reach, hn::Lt(sight.distance_sq, Splat(patch.near_distance * patch.near_distance)));
-  if (hn::AllFalse(d, sight.is_near)) return sight;
+  sight.near_part = hn::IfThenElseZero(sight.in_reach, NearPart(patch, sight));
+  const M is_near = hn::Gt(sight.near_part, zero);
+  if (hn::AllFalse(d, is_near)) return sight;
 
   // As ReceiverRaster::addSurfel: the disk must rise above the horizon of the rays
   const V cosine = Dot(receivers.normal, patch.normal);
   const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
   const float size = patch.isRibbon() ? patch.ribbonWidth() : patch.radius;
-  sight.bias =
-      hn::Mul(Splat(canvas.bias * size), hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
+  const float bias = canvas.bias * size * (patch.isRibbon() ? kRibbonBias : 1);
+  sight.bias = hn::Mul(Splat(bias), hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
   if (patch.facing_limit == Patch::kBothSides) {
     const float inverse = 1 / (kBiasHeight * size);
     const V part = hn::NegMulAdd(sight.height, Splat(inverse), one);
@@ -172,7 +183,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const V rise =
       hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
   const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));
-  sight.traced = hn::And(sight.is_near, rises);
+  sight.traced = hn::And(is_near, rises);
 
   // ... and show its front, or the sphere its outside, to where the rays begin
   if (patch.facing_limit == Patch::kFrontOnly) {
@@ -190,7 +201,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 // Lanes to which the patch is a patch of solid angle: the mid or the far field.
 HWY_INLINE M SeenAsPatch(const Patch& patch, const Receivers& receivers, const Sight& sight) {
   const M faces = hn::Lt(sight.facing, Splat(patch.facing_limit));
-  return hn::And(hn::AndNot(sight.is_near, sight.in_reach),
+  return hn::And(hn::And(hn::Lt(sight.near_part, Splat(1)), sight.in_reach),
                  hn::And(receivers.SeeAt(sight.height), faces));
 }
 

@@ -153,19 +153,23 @@ std::uint32_t PacketRaster::facesThatSeeLarge(const Patch& patch, float extent) 
   // Flat ones are longest for their area when seen from above
   const float determinant =
       patch.isRound() ? quadraticForm(adjoint, middle / distance) : adjoint.trace();
-  const float half_side = 0.5f * std::sqrt(std::max(patch.most_area, patch.round_area));
   const float growth = (1 + 0.5f * extent) / std::sqrt(std::max(determinant, 1e-12f));
+  const float half_side_sq = 0.25f * std::max(patch.most_area, patch.round_area);
+  const float least_half_sq = leastHalf(patch) * leastHalf(patch);
+  const float shift = 0.5f * extent * size[front] + kDiagonal * view_.radius;
   std::uint32_t faces = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    // What it spreads across the edge to the face in front
-    const float along = middle[axis] * middle[front] < 0 ? -2.f : 2.f;
-    const float spread = shape(axis, axis) + shape(front, front) - along * shape(axis, front);
-    const float half = half_side * std::sqrt(std::min(growth * spread, kMostSpread));
-    // On the face it is drawn larger by (distance / w)^(3/2) than at its middle
-    const float w = std::max(size[axis] - view_.radius, kLeastAxis * distance);
-    const float reach = std::max(kShear * half, leastHalf(patch)) * std::sqrt(distance / w) +
-                        0.5f * extent * size[front] + kDiagonal * view_.radius;
-    if (size[axis] + reach < size[front]) continue;
+    const float gap = size[front] - size[axis] - shift;
+    if (gap > 0) {
+      // What it spreads across the edge to the face in front
+      const float along = middle[axis] * middle[front] < 0 ? -2.f : 2.f;
+      const float spread = shape(axis, axis) + shape(front, front) - along * shape(axis, front);
+      const float half_sq = std::max(
+          kShear * kShear * half_side_sq * std::min(growth * spread, kMostSpread), least_half_sq);
+      // On the face it is drawn larger by (distance / w)^(3/2) than at its middle
+      const float w = std::max(size[axis] - view_.radius, kLeastAxis * distance);
+      if (gap * gap * w > half_sq * distance) continue;
+    }
     faces |= (middle[axis] + view_.radius > 0 ? 1u : 0u) << 2 * axis;
     faces |= (view_.radius - middle[axis] > 0 ? 1u : 0u) << (2 * axis + 1);
   }
@@ -308,8 +312,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
     const glm::vec3 to_surfel = surfel.position - view_.centre;
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
-    patch.reach =
-        reachOf(surfel, patch.radius, glm::dot(to_surfel, surfel.normal) / std::sqrt(distance_sq));
+    patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
     patch.thicket = thicketPart(surfel);
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float size = nearFieldSize(patch.radius, ribbon);

@@ -16,7 +16,8 @@ namespace surfeit {
 
 ReceiverRaster::ReceiverRaster(const GatherRules& rules)
     : rules_(rules),
-      contribution_rules_{rules.quality.sides, rules.hasLight()},
+      contribution_rules_{rules.quality.sides, rules.hasLight(),
+                          ribbonNested(pixelsPerSlope(rules))},
       near_field_radii_(nearFieldRadii(rules)),
       max_distance_sq_(rules.quality.max_distance < 1e19f
                            ? rules.quality.max_distance * rules.quality.max_distance
@@ -69,16 +70,16 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
 
   // Mid field: a patch, when its middle is above the horizon
   const float height = heightAboveHorizon(receiver_, to_surfel);
-  const float near_distance = near_field_radii_ * nearFieldSize(surfel.radius, ribbon);
-  if (distance_sq >= near_distance * near_distance) {
-    Entry entry;
-    if (height > 0 &&
-        makeContribution(surfel, to_surfel, contribution_rules_, entry.contribution)) {
-      entry.contribution.opacity = part;
-      contributions_.push_back(entry);
-    }
-    return;
+  const float border = near_field_radii_ * nearFieldSize(surfel.radius, ribbon);
+  const float near_part =
+      nearPart(distance_sq / std::max(border * border, std::numeric_limits<float>::min()));
+  Entry patch;
+  if (near_part < 1 && height > 0 &&
+      makeContribution(surfel, to_surfel, contribution_rules_, patch.contribution)) {
+    patch.contribution.opacity = part * (1 - near_part);
+    contributions_.push_back(patch);
   }
+  if (near_part == 0) return;
 
   // Near field: traced later, unless even the highest point of the disk is below the horizon of the
   // rays. Along the receiver's normal a disk reaches radius * sin(angle of normals) above its
@@ -92,10 +93,9 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
   Entry entry;
   entry.contribution = {};
   entry.contribution.distance_sq = distance_sq;
-  entry.contribution.opacity = part;
-  const float cosine_of_view = glm::dot(to_surfel, surfel.normal) /
-                               std::sqrt(std::max(distance_sq, std::numeric_limits<float>::min()));
-  entry.contribution.reach = reachOf(surfel, surfel.radius, cosine_of_view);
+  entry.contribution.opacity = part * near_part;
+  const float distance = std::sqrt(std::max(distance_sq, std::numeric_limits<float>::min()));
+  entry.contribution.reach = reachOf(surfel, ribbon, surfel.radius, to_surfel / distance);
   entry.near_index = std::int32_t(near_surfels_.size());
   near_surfels_.push_back(surfel);
   contributions_.push_back(entry);
@@ -152,7 +152,7 @@ void ReceiverRaster::sortByDistance() {
 float ReceiverRaster::rayBias(const Surfel& surfel) const {
   const Ribbon ribbon = Ribbon::of(surfel);
   const float radius = ribbon.isEmpty() ? surfel.radius : ribbon.width;
-  float bias = rules_.quality.bias * radius;
+  float bias = rules_.quality.bias * radius * (ribbon.isEmpty() ? 1 : kRibbonBias);
   if (surfel.isTwoSided()) {
     const glm::vec3 to_surfel = surfel.position - receiver_.position;
     bias *= biasPart(heightAboveHorizon(receiver_, to_surfel) / radius);
@@ -167,9 +167,10 @@ float ReceiverRaster::rayBias(const Surfel& surfel) const {
 void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& depth) {
   const glm::vec3 centre =
       surfel.position - receiver_.position - rayBias(surfel) * receiver_.normal;
-  const RasterCube::Texture texture = {.thicket = thicketPart(surfel),
-                                       .opacity = part,
-                                       .nested = nestedPart(surfel.isTwoSided(), 0)};
+  const RasterCube::Texture texture = {
+      .thicket = thicketPart(surfel),
+      .opacity = part,
+      .nested = nestedPart(surfel, Ribbon::of(surfel), contribution_rules_)};
   if (surfel.isSphere()) {
     cube_.traceSphere(inRaster(centre), surfel.radius, texture, depth, surfel.radiosity);
     return;

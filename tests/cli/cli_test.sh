@@ -300,7 +300,7 @@ optionsOfTheirOwnWinOverThePreset() {
     far_field_parallax 0.5
   differentBytes draft.ply default.ply
   gatherPatch final --quality final
-  jsonIs final.json max_solid_angle 0.02 raster_resolution 28 near_field_radii 16 \
+  jsonIs final.json max_solid_angle 0.012 raster_resolution 40 near_field_radii 16 \
     far_field_parallax 0
 
   # One, all, before and after; what is not given comes from the preset

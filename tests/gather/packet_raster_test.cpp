@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "gather/gather_rules.h"
 #include "gather/receiver_raster.h"
 
 namespace surfeit {
@@ -159,6 +160,47 @@ TEST(PacketRaster, SurfelsAreKeptForTheFacesThatSeeThem) {
     EXPECT_GE(kept, seen);
     EXPECT_LT(kept, seen + seen / 16);
   }
+}
+
+// Rays through the middles of pixels meet most of a thin disk that lies on them, or nothing.
+TEST(PacketRaster, ThinDisksMakeNoStepAtTheBorderOfTheNearField) {
+  const GatherRules rules(GatherMode::kOcclusion, {});
+  Surfel surfel;
+  surfel.radius = .1f;
+  surfel.area = .02f;
+  surfel.normal = glm::normalize(glm::vec3(1, 0, -.1f));
+  const float border = nearFieldRadii(rules) * surfel.radius;
+  constexpr std::size_t kPlaces = 64;  // from .8 to 1.1 times the border
+  std::vector<Receiver> receivers(kPlaces);
+  for (std::size_t i = 0; i < kPlaces; ++i) {
+    const float distance = border * (.8f + .3f * float(i) / float(kPlaces - 1));
+    receivers[i] = {{-.5f / 8 * distance, -.5f / 8 * distance, -distance}, {0, 0, 1}};
+  }
+  ReceiverRaster alone(rules);
+  PacketRaster packet(rules);
+  std::vector<float> occlusion;
+  for (std::size_t i = 0; i < kPlaces; i += kPacketReceivers) {
+    const std::span<const Receiver> lanes = std::span(receivers).subspan(i, kPacketReceivers);
+    packet.begin(lanes, viewPacket(lanes));
+    packet.addSurfels({&surfel, 1}, {});
+    packet.sort();
+    packet.draw();
+    std::vector<GatherResult> results(lanes.size());
+    packet.integrate(results);
+    for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
+      alone.begin(lanes[lane]);
+      alone.addSurfel(surfel);
+      EXPECT_NEAR(results[lane].occlusion, alone.finish().occlusion, 1e-5f);
+      occlusion.push_back(results[lane].occlusion);
+    }
+  }
+  float largest = 0;
+  for (std::size_t i = 1; i < kPlaces; ++i) {
+    largest = std::max(largest, std::abs(occlusion[i] - occlusion[i - 1]));
+  }
+  const float change = std::abs(occlusion.front() - occlusion.back());
+  EXPECT_GT(change, .0005f);
+  EXPECT_LT(largest, .1f * change);
 }
 
 }  // namespace
