@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/spherical_harmonics.h"
 
@@ -93,13 +94,17 @@ inline constexpr float kLeastAxis = 0.3f;
 
 // Rays through the middles of pixels tell what a near surfel covers, of a patch the area does: a
 // thin one differs by parts of a pixel. So from the border of the near field to kWholeNear of that
-// distance it is both, in parts that add up. `nearness`: the squared distance over that of the
-// border. (Largest step of irradiance along the floor of a box, below a sphere, where levels hardly
-// change: .90 % of its mean at a hard border, .67 % so; bench/line_steps.sh --max-solid-angle
-// 0.002.)
+// distance it is both, in parts that add up. (Largest step of irradiance along the floor of a box,
+// below a sphere, where levels hardly change: .90 % of its mean at a hard border, .67 % so;
+// bench/line_steps.sh --max-solid-angle 0.002.)
 inline constexpr float kWholeNear = 0.875f;
-inline float nearPart(float nearness) {
-  return std::clamp((1 - nearness) / (1 - kWholeNear * kWholeNear), 0.f, 1.f);
+// Finite and positive, for a surfel may be at a receiver; then it is near at any setting.
+inline float nearBorderSq(float near_distance) {
+  return std::clamp(near_distance * near_distance, std::numeric_limits<float>::min(),
+                    std::numeric_limits<float>::max());
+}
+inline float nearPart(float distance_sq, float border_sq) {
+  return std::clamp((1 - distance_sq / border_sq) / (1 - kWholeNear * kWholeNear), 0.f, 1.f);
 }
 
 // The least spread of a disk on a face: keeps one that is seen edge-on from becoming a line.
@@ -152,9 +157,8 @@ inline constexpr float kRibbonDepth = 0.02f;
 // such a one: AO RMSE .0076 instead of .0070.)
 inline constexpr float kRibbonBias = 1.f / 3;
 // Ribbons grow in tufts, side by side: this part of them hides as if behind the same side of a
-// pixel (kNested), the more, the larger the pixels are. (AO bias of hair at 16 pixels with 0, .04,
-// .12:
-// +.0034, +.0027, +.0012; at 40 pixels +.0026, and +.0009 with .05.)
+// pixel (kNested), the more, the larger the pixels are. (AO bias of hair at 16
+// pixels with 0, .04, .12: +.0034, +.0027, +.0012; at 40 pixels +.0026, and +.0009 with .05.)
 inline float ribbonNested(float pixels_per_slope) {
   return std::min(kNested, 1 / std::max(pixels_per_slope, 1.f));
 }

@@ -13,7 +13,6 @@
 #include <array>
 #include <cmath>
 #include <glm/vec3.hpp>
-#include <limits>
 
 #include "gather/coverage_rules.h"
 #include "gather/packet_kernel.h"
@@ -138,9 +137,8 @@ struct Sight {
 
 // As nearPart.
 inline V NearPart(const Patch& patch, const Sight& sight) {
-  const float border_sq =
-      std::max(patch.near_distance * patch.near_distance, std::numeric_limits<float>::min());
-  const V rest = hn::NegMulAdd(sight.distance_sq, Splat(1 / border_sq), Splat(1));
+  const float inverse = 1 / nearBorderSq(patch.near_distance);
+  const V rest = hn::NegMulAdd(sight.distance_sq, Splat(inverse), Splat(1));
   const V part = hn::Mul(rest, Splat(1 / (1 - kWholeNear * kWholeNear)));
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
 }

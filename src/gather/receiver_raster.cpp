@@ -71,8 +71,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
   // Mid field: a patch, when its middle is above the horizon
   const float height = heightAboveHorizon(receiver_, to_surfel);
   const float border = near_field_radii_ * nearFieldSize(surfel.radius, ribbon);
-  const float near_part =
-      nearPart(distance_sq / std::max(border * border, std::numeric_limits<float>::min()));
+  const float near_part = nearPart(distance_sq, nearBorderSq(border));
   Entry patch;
   if (near_part < 1 && height > 0 &&
       makeContribution(surfel, to_surfel, contribution_rules_, patch.contribution)) {
