@@ -103,6 +103,7 @@ inline float nearBorderSq(float near_distance) {
   return std::clamp(near_distance * near_distance, std::numeric_limits<float>::min(),
                     std::numeric_limits<float>::max());
 }
+// How much of what is so far away is ray traced; `border_sq`: nearBorderSq.
 inline float nearPart(float distance_sq, float border_sq) {
   return std::clamp((1 - distance_sq / border_sq) / (1 - kWholeNear * kWholeNear), 0.f, 1.f);
 }

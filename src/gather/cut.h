@@ -114,7 +114,8 @@ struct SiblingClasses {
 inline constexpr float kFading = 0.02f;
 // Each receiver of a packet has its own blend, as long as the packet's radius is no larger than
 // this part of the distance; in one that is larger all have, more and more, that of the closest:
-// too many nodes would fade. (Steps on the floor when all have that: 1.7 %.)
+// too many nodes would fade. (Steps on the floor when all have that: 1.7 %. With .01 instead of .03
+// the largest step of irradiance along lines is 1.5 instead of 1.1 %, for 1 to 2 % fewer patches.)
 inline constexpr float kMostFadingSpread = 0.03f;
 
 // Sorts siblings by what the packet makes of them; those in neither class are not seen, and those

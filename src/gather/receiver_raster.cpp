@@ -166,15 +166,15 @@ float ReceiverRaster::rayBias(const Surfel& surfel) const {
 void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& depth) {
   const glm::vec3 centre =
       surfel.position - receiver_.position - rayBias(surfel) * receiver_.normal;
-  const RasterCube::Texture texture = {
-      .thicket = thicketPart(surfel),
-      .opacity = part,
-      .nested = nestedPart(surfel, Ribbon::of(surfel), contribution_rules_)};
+  Ribbon ribbon = Ribbon::of(surfel);
+  const RasterCube::Texture texture = {.thicket = thicketPart(surfel),
+                                       .opacity = part,
+                                       .nested = nestedPart(surfel, ribbon, contribution_rules_)};
   if (surfel.isSphere()) {
     cube_.traceSphere(inRaster(centre), surfel.radius, texture, depth, surfel.radiosity);
     return;
   }
-  if (Ribbon ribbon = Ribbon::of(surfel); !ribbon.isEmpty()) {
+  if (!ribbon.isEmpty()) {
     ribbon.along = inRaster(ribbon.along);
     ribbon.across = inRaster(ribbon.across);
     cube_.traceRibbon(inRaster(centre), inRaster(surfel.normal), ribbon, texture, depth,
