@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Do results step where the cut changes between tree levels? Gathers along straight lines in the
 # Cornell box of the demo, at 10,000 places each, and prints the largest difference of occlusion
-# between neighbours, and that of irradiance over its mean: their true differences are far smaller,
-# those of a level that comes or goes would stand out. Then over the whole floor, as a picture has
-# it: second differences along rows, which a slope has none of, where 10, 1 and .1 % are larger.
+# between neighbours, its step, and that of irradiance over its mean. A slope has steps, too, below
+# a sphere that touches the floor of half a percent; a level that comes or goes would be a jump: a
+# step that differs from the mean of those before and after it. Then over the whole floor, as a
+# picture has it: second differences along rows, where 10, 1 and .1 % are larger.
 #
 #   bench/line_steps.sh [GATHER OPTIONS ...]     surfeit and cornell_scene from PATH or build/dev
 set -euo pipefail
@@ -38,12 +39,19 @@ line() {
         total += step
         if (step > largest) largest = step
         if (light_step > light_largest) light_largest = light_step
+        change = light - light_before
+        if (NR > 4) {
+          jump = last_change - (change + change_before) / 2; if (jump < 0) jump = -jump
+          if (jump > light_jump) light_jump = jump
+        }
+        change_before = last_change; last_change = change
       }
       before = $o; light_before = light
     }
     END {
-      printf "%-12s %.5f   %.5f         %.2f %%\n", name, total / (NR - 2), largest,
-             100 * light_largest / (sum / (NR - 1))
+      percent = 100 * (NR - 1) / sum
+      printf "%-12s %.5f   %.5f         %.2f %%          %.2f %%\n", name, total / (NR - 2), largest,
+             percent * light_largest, percent * light_jump
     }' "$work/$1.result.csv"
 }
 
@@ -74,7 +82,7 @@ options=("$@")
 cornell_scene "$work" > "$work/log"
 surfeit sample "$work/cornell.obj" -o "$work/cornell.ply" --count 1000000 --quiet
 surfeit index "$work/cornell.ply" -o "$work/cornell.sft" --quiet
-echo "line         mean step   largest step    largest of irradiance"
+echo "line         mean step   largest step    of irradiance   largest jump of it"
 line floor "0.03 0 0.7" "0.97 0 0.7" "0 1 0"
 line diagonal "0.03 0 0.97" "0.97 0 0.55" "0 1 0"
 line wall "0 0.03 0.8" "0 0.97 0.8" "1 0 0"

@@ -24,6 +24,26 @@ inline float layerReachOfDisk(float radius, float cosine) {
   return layerReach(radius, 0.25f * radius * radius * (1 - cosine * cosine));
 }
 
+// What begins farther than its layer ends begins a new one: in part where the gap is narrower than
+// this many times its reach (layerReach), or else neither could tell at the border, and results
+// would step from one receiver to the next. (Largest jumps of irradiance along lines on the wall
+// and the back of a box, bench/line_steps.sh, without: .25 and .50 %, now .10 and .37. AO RMSE of
+// spheres, the bunny and the city with 0, 1, 2: .0039, .0025, .0047; .0040, .0024, .0048; .0042,
+// .0023, .0049.)
+inline constexpr float kLayerGap = 1;
+// And what no more than touches a pixel hardly says how far its layer reaches there: a patch says
+// so in full where it covers this part of the pixel or has this part of its area. (Without, jumps
+// on the wall and the back are .19 and .41 %; more than .05 tears tiles of slanted planes apart.)
+inline constexpr float kTouch = 0.02f;
+inline float inverseLayerGap(float reach) { return 1 / std::max(kLayerGap * reach, 1e-30f); }
+inline float newLayerPart(float gap, float reach) {
+  return std::clamp(gap * inverseLayerGap(reach), 0.f, 1.f);
+}
+// `area`: what a patch covers in all, in pixels.
+inline float touchPart(float amount, float area) {
+  return std::min(1.f, amount / (kTouch * std::min(1.f, area)));
+}
+
 // What lies behind a half-covered pixel shows beside what covers it. How much of it does depends on
 // where in the pixel either is. What lies anywhere hides each other at random; but outlines of what
 // stands on the same ground rise from the same side, and the smaller lies behind the larger. This

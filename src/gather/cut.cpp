@@ -49,13 +49,17 @@ float facingOf(const Node& node, const CutRules& rules) {
   return node.isFlat() && node.isTwoSided() ? 0 : rules.facing;
 }
 
+float fadingOf(const Node& node, const CutRules& rules) {
+  return rules.fading > 0 && node.isLeaf() ? kLeafFading : rules.fading;
+}
 // Of what is below, over what a node looks like as a part of what it may; without fading a step.
-float fadingSlope(const CutRules& rules) { return 1 / std::max(2 * rules.fading, 1e-6f); }
+constexpr float kLeastFadingRange = 1e-6f;
+float fadingSlope(float fading) { return 1 / std::max(2 * fading, kLeastFadingRange); }
 
 float mostFadingSpread(const CutRules& rules) { return rules.fading > 0 ? kMostFadingSpread : 0; }
 // What looks smaller or larger than these parts of what it may fades for nobody.
-constexpr float kLeastFading = 0.8f, kMostFading = 1.25f;
-static_assert(1 - kFading > kLeastFading && 1 + kFading < kMostFading);
+constexpr float kLeastFading = 0.6f, kMostFading = 1.6f;
+static_assert(1 - kLeafFading > kLeastFading && 1 + kLeafFading < kMostFading);
 
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 
@@ -78,6 +82,7 @@ struct alignas(64) Columns {
   float share[kMostSiblings] = {};    // what it may look like, as a part of the max solid angle
   float is_flat[kMostSiblings] = {};  // 1: yes
   float facing[kMostSiblings] = {};   // CutRules::facing; 0: seen from both sides
+  float fading[kMostSiblings] = {};   // as CutRules::fading
 };
 constexpr float kNodeShare = 2, kUnevenNodeShare = 2 * kUnevenShare;
 
@@ -103,7 +108,7 @@ using V3 = VectorsOf3<V>;
 // Some of the siblings.
 struct Nodes {
   V3 position, normal;
-  V radius, spread, share, area;
+  V radius, spread, share, area, fading;
   M is_flat;
 
   Nodes(const Columns& columns, std::size_t at) {
@@ -117,6 +122,7 @@ struct Nodes {
     spread =
         hn::Mul(Splat(kNormalSpread), hn::Sqrt(hn::Mul(Splat(2.f), hn::Sub(Splat(1), flatness))));
     share = hn::Load(d, columns.share + at);
+    fading = hn::Load(d, columns.fading + at);
     area = hn::Mul(Splat(kPi), hn::Mul(radius, radius));
     is_flat = hn::Gt(hn::Load(d, columns.is_flat + at), hn::Zero(d));
   }
@@ -181,8 +187,9 @@ struct Standings {
       limit = hn::Mul(limit, hn::Min(most, hn::Max(one, gain)));
     }
     const V looks = hn::Div(nodes.area, limit);
-    const V steepness = Splat(fadingSlope(rules));
-    at_centre = hn::Mul(hn::Sub(looks, Splat(1 - rules.fading)), steepness);
+    const V range = hn::Max(hn::Add(nodes.fading, nodes.fading), Splat(kLeastFadingRange));
+    const V steepness = hn::Div(one, range);
+    at_centre = hn::Mul(hn::Sub(looks, hn::Sub(one, nodes.fading)), steepness);
     slope = {zero, zero, zero};
     V differs = zero;  // the blend within the packet, from that at the centre
     const M may_fade =
@@ -276,6 +283,7 @@ Columns ColumnsOf(std::span<const Node> siblings, const CutRules& rules) {
     columns.share[i] = node.isFlat() ? kNodeShare : kUnevenNodeShare;
     columns.is_flat[i] = node.isFlat() ? 1 : 0;
     columns.facing[i] = facingOf(node, rules);
+    columns.fading[i] = fadingOf(node, rules);
   }
   return columns;
 }
@@ -382,18 +390,19 @@ Standing standingOf(const Node& node, const glm::vec3& to_node, float highest,
   const float limit = 2 * share * rules.max_solid_angle * looked_from * looked_from;
   if (!(nearest > node.radius && area < kMostFading * limit)) return {};
   const float looks = area / limit;
-  Blend below{(looks - (1 - rules.fading)) * fadingSlope(rules), glm::vec3(0)};
-  if (rules.fading > 0 && view.radius > 0 && looks > kLeastFading) {
+  const float fading = fadingOf(node, rules), steepness = fadingSlope(fading);
+  Blend below{(looks - (1 - fading)) * steepness, glm::vec3(0)};
+  if (fading > 0 && view.radius > 0 && looks > kLeastFading) {
     // The limit changes with the distance squared and, for what is low, with the distance over the
     // height
     const bool grows = gain > 1 && gain < rules.most_coarser;
     const glm::vec3 toward = ((grows ? 3.f : 2.f) / (distance * distance)) * to_node;
     const glm::vec3 change = grows ? toward - view.axis / highest : toward;
-    below.slope = looks * fadingSlope(rules) * (shift / view.radius) * change;
+    below.slope = looks * steepness * (shift / view.radius) * change;
   }
   const float differs = view.radius * glm::length(below.slope);
   if (!(below.at_centre - differs < 1)) return {};
-  if (!(rules.fading > 0 && below.at_centre + differs > 0)) {
+  if (!(fading > 0 && below.at_centre + differs > 0)) {
     return {true, false, {0, glm::vec3(0)}};
   }
   return {true, true, below};

@@ -31,6 +31,9 @@ namespace {
 // behind the receiver.
 constexpr float kLeastInFront = 1e-3f;
 
+// The greatest part that a touch may count for its amount: what is traced says all about its layer.
+constexpr float kFullTouch = 1e12f;
+
 // As RasterCube::Parallelogram, in pixels.
 struct Parallelogram {
   V x, y, half_x, half_y, shear;
@@ -117,12 +120,14 @@ class Brush {
     });
   }
 
-  // Of this part of it.
+  // Of this part of it, traced.
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
     const V reach = Splat(patch.reach);
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
     cover.depth_end = hn::Add(distance, reach);
+    cover.inverse_gap = inverseLayerGap(patch.reach);
+    cover.inverse_touch = Splat(kFullTouch);
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
     cover.thicket = patch.thicket;
@@ -163,8 +168,9 @@ class Brush {
   HWY_INLINE void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
     const V3 offset = InRaster(sight.offset);
     const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(offset, face_ / 2));
-    const V inverse = InverseSqrt(sight.distance_sq);
-    const V distance = hn::Mul(sight.distance_sq, inverse);
+    // Numbers of lanes that see nothing must be numbers, too
+    const V distance_sq = hn::IfThenElse(seen, sight.distance_sq, Splat(1));
+    const V distance = hn::Mul(distance_sq, InverseSqrt(distance_sq));
     seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kLeastAxis), distance)));
     if (hn::AllFalse(D(), seen)) return;
 
@@ -175,10 +181,18 @@ class Brush {
     const V area = hn::Min(
         hn::MulAdd(Splat(patch.disk_area), cosine, hn::Mul(Splat(patch.round_area), distance)),
         hn::Mul(Splat(patch.most_area), distance));
-    // Numbers of lanes that see nothing must be numbers, too
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
-    CoverParallelogram(OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w), seen,
-                       MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part)));
+    const Parallelogram shape = OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w);
+    Cover cover = MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part));
+    cover.inverse_touch = InverseTouch(shape);
+    CoverParallelogram(shape, seen, cover);
+  }
+
+  // As touchPart.
+  static V InverseTouch(const Parallelogram& shape) {
+    const V area = hn::Mul(Splat(4), hn::Mul(shape.half_x, shape.half_y));
+    const V least = Splat(1 / kFullTouch);
+    return Reciprocal(hn::Max(least, hn::Mul(Splat(kTouch), hn::Min(Splat(1), area))));
   }
 
   // As facingAreas of a facet; all times the distance.

@@ -28,6 +28,8 @@ namespace {
 // How some of the receivers' pixels are covered.
 struct Cover {
   V depth_begin, depth_end;
+  float inverse_gap;  // inverseLayerGap
+  V inverse_touch;    // of touchPart
   M is_lit;
   bool is_all_lit;
   float overlap, thicket, nested;
@@ -58,13 +60,14 @@ inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const V end = hn::Load(d, end_at), open = hn::Load(d, open_at);
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
-  // A gap in depth begins a new layer
-  const M touched = hn::Gt(amount, zero);
-  const M is_new = hn::And(touched, hn::Gt(cover.depth_begin, end));
-  room = hn::IfThenElse(is_new, open, room);
-  before = hn::IfThenZeroElse(is_new, before);
+  // A gap in depth begins a new layer, by and by
+  const V touch = hn::Min(one, hn::Mul(amount, cover.inverse_touch));
+  const V gap = hn::Mul(hn::Sub(cover.depth_begin, end), Splat(cover.inverse_gap));
+  const V is_new = hn::Mul(touch, hn::Min(one, hn::Max(zero, gap)));
+  room = hn::MulAdd(is_new, hn::Sub(open, room), room);
+  before = hn::NegMulAdd(is_new, before, before);
   hn::Store(room, d, room_at);
-  hn::Store(hn::IfThenElse(touched, hn::Max(end, cover.depth_end), end), d, end_at);
+  hn::Store(hn::MulAdd(touch, hn::Max(zero, hn::Sub(cover.depth_end, end)), end), d, end_at);
 
   V counts = amount;
   if constexpr (kOverlaps) {
@@ -74,7 +77,7 @@ inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
   const V layer = hn::Min(one, hn::Add(before, counts));
   hn::Store(layer, d, layer_at);
   const V left = hn::Min(open, OpenBehind(room, layer, Splat(cover.nested)));
-  const V covered = hn::IfThenElseZero(touched, hn::Sub(open, left));
+  const V covered = hn::IfThenElseZero(hn::Gt(amount, zero), hn::Sub(open, left));
   hn::Store(hn::Sub(open, covered), d, open_at);
   if constexpr (Kind::kChannels > 0) {
     V added = covered;

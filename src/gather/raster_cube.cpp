@@ -99,17 +99,17 @@ void RasterCube::clear() {
 }
 
 // A layer with less room than `amount` ends at exactly 1, and the pixel is exactly 1 then.
-inline void RasterCube::coverPixel(std::size_t pixel, float amount, const Texture& texture,
-                                   const DepthRange& depth, const glm::vec3& radiosity) {
+inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
+                                   const Texture& texture, const DepthRange& depth,
+                                   const glm::vec3& radiosity) {
   Coverage& coverage = coverage_[pixel];
   if (coverage.total >= 1) return;
 
-  // A gap in depth begins a new layer
-  if (depth.begin > coverage.layer_end) {
-    coverage.room = 1 - coverage.total;
-    coverage.layer = 0;
-  }
-  coverage.layer_end = std::max(coverage.layer_end, depth.end);
+  // A gap in depth begins a new layer, by and by
+  const float is_new = touch * newLayerPart(depth.begin - coverage.layer_end, depth.reach());
+  coverage.room += is_new * (1 - coverage.total - coverage.room);
+  coverage.layer -= is_new * coverage.layer;
+  coverage.layer_end += touch * std::max(0.f, depth.end - coverage.layer_end);
 
   // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer;
   // what of a thicket hides behind itself is left out of its opacity
@@ -170,6 +170,7 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
   const float size = float(resolution), middle = 0.5f * size, scale = geometry_->pixelsPerSlope();
   const float x_middle = shape.u * scale + middle, y_middle = shape.v * scale + middle;
   const float half_x = shape.half_u * scale, half_y = shape.half_v * scale;
+  const float area = 4 * half_x * half_y;
   const float y_begin = std::max(0.f, y_middle - half_y);
   const float y_end = std::min(size, y_middle + half_y);
   if (!(y_begin < y_end)) return;
@@ -185,7 +186,9 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
     const float height = texture.opacity * (top - bottom);
     for (int column = int(x_begin); column <= column_last; ++column) {
       const float width = std::min(x_end, float(column + 1)) - std::max(x_begin, float(column));
-      coverPixel(row_first + std::size_t(column), width * height, texture, depth, radiosity);
+      const float amount = width * height;
+      coverPixel(row_first + std::size_t(column), amount, touchPart(amount, area), texture, depth,
+                 radiosity);
     }
   }
 }
@@ -265,7 +268,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
       for (int column = column_begin; column < column_end; ++column) {
         const std::size_t pixel = row_first + std::size_t(column);
         const float amount = texture.opacity * amountOf(pixels[pixel].direction);
-        if (amount > 0) coverPixel(pixel, amount, texture, depth, radiosity);
+        if (amount > 0) coverPixel(pixel, amount, 1, texture, depth, radiosity);
       }
     }
   }

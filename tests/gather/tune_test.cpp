@@ -104,7 +104,7 @@ TEST_F(Tune, AQuarterOfTheReceiversForeseesNearlyTheSame) {
   for (std::size_t i = 0; i < all.rows.size(); ++i) {
     const TuneOutcome &expected = all.rows[i].predicted, &found = quarter.rows[i].predicted;
     EXPECT_NEAR(missRate(found.node_cache), missRate(expected.node_cache), 0.08) << i;
-    EXPECT_NEAR(missRate(found.surfel_cache), missRate(expected.surfel_cache), 0.02) << i;
+    EXPECT_NEAR(missRate(found.surfel_cache), missRate(expected.surfel_cache), 0.025) << i;
   }
   // What is read at least once is extrapolated, and in so small a scene from few packets
   const double all_read = all.rows.back().predicted.bytesRead();
