@@ -56,6 +56,7 @@ Node randomNode(std::mt19937& random) {
   node.flatness = 1 - uniform(random) * uniform(random);
   node.flags = node.flatness > .97f ? kNodeFlat : 0;
   if (node.isFlat() && random() % 2 == 0) node.flags |= kNodeTwoSided;
+  node.child_count = random() % 2 == 0 ? 0 : 8;
   node.groups = 1 + random() % 7;  // some of three
   return node;
 }

@@ -191,6 +191,54 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
   EXPECT_NEAR(cube.radiosity(pixel).y, .5f, 1e-5);
 }
 
+TEST(RasterCube, LayersBeginByAndBy) {
+  const RasterGeometry geometry(2);
+  RasterCube cube(geometry, false);
+  const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
+  const RasterCube::Patch half =
+      diskPatch(direction, kRound, .5f * direction.x * direction.x * direction.x);
+  const auto covered = [&](float gap) {
+    cube.clear();
+    cube.splat(half, {1, 2}, kWhite);
+    cube.splat(half, {2 + gap, 3 + gap}, kWhite);
+    return cube.coverage(3);
+  };
+  EXPECT_NEAR(covered(-.1f), 1, 1e-5);
+  EXPECT_NEAR(covered(.5f * kLayerGap), .75f, 1e-5);  // half of the range is its reach
+  float before = 1;
+  for (float gap = 0; gap < .6f; gap += .01f) {
+    const float now = covered(gap);
+    EXPECT_LE(now, before + 1e-5f) << gap;
+    EXPECT_GT(now, before - .02f) << gap;
+    before = now;
+  }
+}
+
+TEST(RasterCube, WhatHardlyTouchesAPixelHardlyChangesIt) {
+  const RasterGeometry geometry(4);
+  RasterCube cube(geometry, false);
+  // All in pixels of the face +x
+  const auto square = [&](float column, float row, float side, const DepthRange& depth) {
+    const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f * column - 1, .5f * row - 1));
+    const float area = .25f * side * side;
+    cube.splat(diskPatch(direction, {-1, 0, 0}, area * direction.x * direction.x * direction.x),
+               depth, kWhite);
+  };
+  // Something deep beside the pixel laps over it, between two of different layers
+  const auto covered = [&](float lap) {
+    cube.clear();
+    square(1.5f, 1.5f, .7f, {1, 2});
+    square(2.5f - lap, 1.5f, 1, {1.5f, 9});
+    square(1.5f, 1.5f, .7f, {3, 4});
+    return cube.coverage(1 * 4 + 1);
+  };
+  const float apart = covered(0);
+  EXPECT_NEAR(apart, .49f + .51f * .49f, 1e-4);
+  EXPECT_NEAR(covered(1e-4f), apart, .005f);
+  EXPECT_NEAR(covered(1e-3f), apart, .05f);
+  EXPECT_GT(covered(.1f), .97f) << "now they are of one layer";
+}
+
 TEST(RasterCube, WhatIsNestedHidesBehindTheLargerLayer) {
   const RasterGeometry geometry(2);
   RasterCube cube(geometry, false);
