@@ -25,12 +25,11 @@ inline float layerReachOfDisk(float radius, float cosine) {
 }
 
 // What begins farther than its layer ends begins a new one: in part where the gap is narrower than
-// this many times its reach (layerReach), or else neither could tell at the border, and results
-// would step from one receiver to the next. (Largest jumps of irradiance along lines on the wall
-// and the back of a box, bench/line_steps.sh, without: .25 and .50 %, now .10 and .37. AO RMSE of
-// spheres, the bunny and the city with 0, 1, 2: .0039, .0025, .0047; .0040, .0024, .0048; .0042,
-// .0023, .0049.)
-inline constexpr float kLayerGap = 1;
+// this many times its reach (layerReach), or else results would step from one receiver to the next
+// where the gap closes. (Largest jumps of irradiance along lines on the wall and the back of a box,
+// bench/line_steps.sh, without: .25 and .50 %, now .10 and .37. AO RMSE of spheres at standard and
+// draft quality with 0, .5, 1: .0041, .0041, .0042; .0083, .0085, .0089.)
+inline constexpr float kLayerGap = 0.5f;
 // And what no more than touches a pixel hardly says how far its layer reaches there: a patch says
 // so in full where it covers this part of the pixel or has this part of its area. (Without, jumps
 // on the wall and the back are .19 and .41 %; more than .05 tears tiles of slanted planes apart.)

@@ -206,7 +206,7 @@ TEST(RasterCube, LayersBeginByAndBy) {
   EXPECT_NEAR(covered(-.1f), 1, 1e-5);
   EXPECT_NEAR(covered(.5f * kLayerGap), .75f, 1e-5);  // half of the range is its reach
   float before = 1;
-  for (float gap = 0; gap < .6f; gap += .01f) {
+  for (float gap = 0; gap < .6f * kLayerGap; gap += .01f * kLayerGap) {
     const float now = covered(gap);
     EXPECT_LE(now, before + 1e-5f) << gap;
     EXPECT_GT(now, before - .02f) << gap;
