@@ -114,14 +114,14 @@ struct SiblingClasses {
 inline constexpr float kFading = 0.02f;
 // Leaves fade by this part: their surfels are near and ray traced, which differs more, and where a
 // surface touches another the next receiver may be farther by a percent. (Largest jump of
-// irradiance below a sphere on the floor, bench/line_steps.sh: .62 % with kFading, .44 %, for 2 %
+// irradiance below a sphere on the floor, bench/line_steps.sh: .62 % with kFading, .45 %, for 2 %
 // more patches.)
 inline constexpr float kLeafFading = 0.1f;
 // Each receiver of a packet has its own blend, as long as the packet's radius is no larger than
 // this part of the distance; in one that is larger all have, more and more, that of the closest:
 // too many nodes would fade. (With .03 instead of .2 the largest jumps of irradiance on the floor
-// are .9 and 1.2 instead of .3 and .6 %, where a sphere touches it and 16 receivers are as wide as
-// a tenth of the way; patches are as many.)
+// are 1.0 and 1.2 instead of .2 and .6 %, where a sphere touches it and 16 receivers are as wide as
+// a tenth of the way; for 2 % more patches.)
 inline constexpr float kMostFadingSpread = 0.2f;
 
 // Sorts siblings by what the packet makes of them; those in neither class are not seen, and those
