@@ -74,7 +74,7 @@ enum class GatherSides : std::uint8_t { kFront, kBoth, kBack };
 struct GatherQuality {
   // sigma_max, steradians, >= 0; 0 opens every node (memo 5). Nodes that are not flat
   // keep below 2/3 of it.
-  float max_solid_angle = 0.105f;
+  float max_solid_angle = 0.1f;
   int raster_resolution = 16;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
   // Rays and horizon start this far above the receiver, in radii of the surfel looked at, or where
   // its longer side is known (two-sided surfels only) in widths.

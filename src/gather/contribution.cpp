@@ -190,16 +190,18 @@ float thicketPart(const Surfel& surfel) {
 
 float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
               const glm::vec3& direction) {
-  if (thicketPart(surfel) > 0 && !ribbon.isEmpty()) {
+  const bool is_thicket = thicketPart(surfel) > 0;
+  if (is_thicket && !ribbon.isEmpty()) {
     return kRibbonReach * ribbon.halfExtent(direction) + kRibbonDepth * ribbon.width;
   }
   const float reach = layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
-  return thicketPart(surfel) > 0 ? kThicketReach * reach : reach;
+  return is_thicket ? kThicketReach * reach : reach;
 }
 
 float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionRules& rules) {
-  if (!surfel.isTwoSided()) return kNested;
-  return thicketPart(surfel) > 0 && !ribbon.isEmpty() ? rules.ribbon_nested : 0;
+  const float thicket = thicketPart(surfel);
+  if (thicket > 0 && !ribbon.isEmpty()) return rules.ribbon_nested;
+  return nestedPart(surfel.isTwoSided(), thicket);
 }
 
 // Four times band 0 is the area of one-sided disks, twice that of two-sided ones, and four times

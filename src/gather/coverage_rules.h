@@ -27,20 +27,21 @@ inline float layerReachOfDisk(float radius, float cosine) {
 // What begins farther than its layer ends begins a new one: in part where the gap is narrower than
 // this many times its reach (layerReach), or else results would step from one receiver to the next
 // where the gap closes. (Largest jumps of irradiance along lines on the wall and the back of a box,
-// bench/line_steps.sh, without: .25 and .50 %, now .10 and .37. AO RMSE of spheres at standard and
-// draft quality with 0, .5, 1: .0041, .0041, .0042; .0083, .0085, .0089.)
+// bench/line_steps.sh at .11 sr, without: .25 and .50 %, so .10 and .37. AO RMSE of spheres at
+// standard and draft quality with 0, .5, 1: .0041, .0041, .0042; .0083, .0085, .0089.)
 inline constexpr float kLayerGap = 0.5f;
 // And what no more than touches a pixel hardly says how far its layer reaches there: a patch says
-// so in full where it covers this part of the pixel or has this part of its area. (Without, jumps
-// on the wall and the back are .19 and .41 %; more than .05 tears tiles of slanted planes apart.)
-inline constexpr float kTouch = 0.02f;
+// so in full where it covers this part of the pixel or has this part of its area, and that of an
+// area of kLeastTouched where it is smaller, or traced. (Without, jumps on the wall and the back
+// are .19 and .41 %; more than .05 tears tiles of slanted planes apart.)
+inline constexpr float kTouch = 0.02f, kLeastTouched = 0.05f;
 inline float inverseLayerGap(float reach) { return 1 / std::max(kLayerGap * reach, 1e-30f); }
 inline float newLayerPart(float gap, float reach) {
   return std::clamp(gap * inverseLayerGap(reach), 0.f, 1.f);
 }
-// `area`: what a patch covers in all, in pixels.
+// `area`: what a patch covers in all, in pixels; 0 of what is traced.
 inline float touchPart(float amount, float area) {
-  return std::min(1.f, amount / (kTouch * std::min(1.f, area)));
+  return std::min(1.f, amount / (kTouch * std::clamp(area, kLeastTouched, 1.f)));
 }
 
 // What lies behind a half-covered pixel shows beside what covers it. How much of it does depends on

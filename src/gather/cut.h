@@ -65,7 +65,8 @@ struct CutRules {
   float facing = 1;                   // 1: only fronts are seen, -1: only backs, 0: both
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
   float most_coarser = 1;             // what is low may look so many times as large
-  float fading = 0;  // nodes that look by this part smaller or larger than they may fade
+  float fading = 0;  // nodes that look by this part smaller or larger than they may fade; if any
+                     // do, leaves by kLeafFading
 
   bool approximates() const { return max_solid_angle > 0; }
   bool seesAllGroups() const { return groups == kAllGroups; }

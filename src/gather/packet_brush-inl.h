@@ -20,7 +20,7 @@
 #include "gather/packet_cover-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
-#include "gather/packet_ribbon-inl.h"
+#include "gather/packet_rays-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {
@@ -30,9 +30,6 @@ namespace {
 // What begins closer than this part of its distance, measured across the face, is taken to reach
 // behind the receiver.
 constexpr float kLeastInFront = 1e-3f;
-
-// The greatest part that a touch may count for its amount: what is traced says all about its layer.
-constexpr float kFullTouch = 1e12f;
 
 // As RasterCube::Parallelogram, in pixels.
 struct Parallelogram {
@@ -47,6 +44,7 @@ class Brush {
         lane_(lane),
         resolution_(canvas.geometry->resolution()),
         scale_(canvas.geometry->pixelsPerSlope()),
+        ribbon_nested_(ribbonNested(scale_)),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane) {}
 
@@ -120,18 +118,19 @@ class Brush {
     });
   }
 
-  // Of this part of it, traced.
-  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
+  // Of this part of it.
+  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part,
+                  V inverse_touch) const {
     const V reach = Splat(patch.reach);
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
     cover.depth_end = hn::Add(distance, reach);
     cover.inverse_gap = inverseLayerGap(patch.reach);
-    cover.inverse_touch = Splat(kFullTouch);
+    cover.inverse_touch = inverse_touch;
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
     cover.thicket = patch.thicket;
-    cover.nested = patch.nested(ribbonNested(scale_));
+    cover.nested = patch.nested(ribbon_nested_);
     cover.opacity = hn::Mul(part, Opacity(patch, sight));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
@@ -183,16 +182,16 @@ class Brush {
         hn::Mul(Splat(patch.most_area), distance));
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
     const Parallelogram shape = OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w);
-    Cover cover = MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part));
-    cover.inverse_touch = InverseTouch(shape);
-    CoverParallelogram(shape, seen, cover);
+    CoverParallelogram(
+        shape, seen,
+        MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape)));
   }
 
   // As touchPart.
   static V InverseTouch(const Parallelogram& shape) {
     const V area = hn::Mul(Splat(4), hn::Mul(shape.half_x, shape.half_y));
-    const V least = Splat(1 / kFullTouch);
-    return Reciprocal(hn::Max(least, hn::Mul(Splat(kTouch), hn::Min(Splat(1), area))));
+    const V counts = hn::Min(Splat(1), hn::Max(Splat(kLeastTouched), area));
+    return Reciprocal(hn::Mul(Splat(kTouch), counts));
   }
 
   // As facingAreas of a facet; all times the distance.
@@ -303,7 +302,8 @@ class Brush {
     Sight from_ray = sight;
     from_ray.facing = Dot(to_centre, patch.normal);
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
-             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part));
+             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part,
+                       Splat(1 / (kTouch * kLeastTouched))));
   }
 
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
@@ -461,36 +461,11 @@ class Brush {
     }
   }
 
-  static V SphereAmount(const Patch& patch, const glm::vec3& ray, const V3& centre, V centre_sq) {
-    const V along = Dot(centre, ray);
-    const V power = hn::Sub(centre_sq, Splat(patch.radius * patch.radius));
-    const M hit = hn::And(hn::Gt(along, hn::Zero(D())), hn::Ge(hn::Mul(along, along), power));
-    return hn::IfThenElseZero(hit, Splat(1));
-  }
-
-  // How much of the ray's pixel the soft disk covers; zero or less where the ray misses it.
-  static V DiskAmount(const Patch& patch, const Normal& normal, const glm::vec3& ray,
-                      const V3& centre, V c_n, V centre_sq) {
-    V t;
-    if constexpr (Kind::kFrame) {
-      const V d_n = Dot(normal, ray);
-      t = hn::Div(c_n, hn::IfThenElse(hn::Eq(d_n, hn::Zero(D())), Splat(1e-20f), d_n));
-    } else {
-      const float d_n = glm::dot(ray, normal);
-      t = hn::Mul(c_n, Splat(1 / (d_n != 0 ? d_n : 1e-20f)));
-    }
-    const V along = Dot(centre, ray);
-    const V miss_sq = hn::MulAdd(t, hn::NegMulAdd(Splat(2), along, t), centre_sq);
-    const V part_sq = hn::Mul(miss_sq, Splat(1 / (patch.radius * patch.radius)));
-    const V peak = Splat(patch.soft_peak);
-    const V amount = hn::Min(Splat(1), hn::NegMulAdd(peak, part_sq, peak));
-    return hn::IfThenElseZero(hn::Gt(t, hn::Zero(D())), hn::Max(amount, hn::Zero(D())));
-  }
-
   const PacketCanvas& canvas_;
   const std::size_t lane_;
   const int resolution_;
   const float scale_;  // pixels for a slope of 1
+  const float ribbon_nested_;
   const Receivers receivers_;
   const Frames frames_;
   int face_ = 0;

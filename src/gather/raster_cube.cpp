@@ -268,7 +268,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
       for (int column = column_begin; column < column_end; ++column) {
         const std::size_t pixel = row_first + std::size_t(column);
         const float amount = texture.opacity * amountOf(pixels[pixel].direction);
-        if (amount > 0) coverPixel(pixel, amount, 1, texture, depth, radiosity);
+        if (amount > 0) coverPixel(pixel, amount, touchPart(amount, 0), texture, depth, radiosity);
       }
     }
   }

@@ -64,8 +64,8 @@ class RasterGeometry {
 // Distances from the receiver between which something lies.
 struct DepthRange {
   float begin, end;
-  float reach() const { return 0.5f * (end - begin); }
   float fade = 1;  // what its occlusion counts
+  float reach() const { return 0.5f * (end - begin); }
 };
 
 // Axes of a cone's frame: local coordinates are dot products with them.

@@ -291,7 +291,7 @@ optionsOfTheirOwnWinOverThePreset() {
   makeScene 5000
   makePatch
   gatherPatch default
-  jsonIs default.json max_solid_angle 0.105 raster_resolution 16 near_field_radii 8 \
+  jsonIs default.json max_solid_angle 0.1 raster_resolution 16 near_field_radii 8 \
     far_field_parallax 0.2
   gatherPatch standard --quality standard
   sameBytes standard.ply default.ply

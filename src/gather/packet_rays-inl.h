@@ -1,10 +1,10 @@
-// Pieces of ribbons as rays from some receivers meet them; for one instruction set (see
-// packet_kernel-inl.h).
-#if defined(SURFEIT_PACKET_RIBBON_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef SURFEIT_PACKET_RIBBON_INL_H_
-#undef SURFEIT_PACKET_RIBBON_INL_H_
+// What rays from some receivers meet of near spheres, disks and pieces of ribbons; for one
+// instruction set (see packet_kernel-inl.h).
+#if defined(SURFEIT_PACKET_RAYS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_RAYS_INL_H_
+#undef SURFEIT_PACKET_RAYS_INL_H_
 #else
-#define SURFEIT_PACKET_RIBBON_INL_H_
+#define SURFEIT_PACKET_RAYS_INL_H_
 #endif
 
 #include <hwy/highway.h>
@@ -19,6 +19,37 @@ HWY_BEFORE_NAMESPACE();
 namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
+
+// How much of a ray's pixel the sphere covers, all or nothing.
+inline V SphereAmount(const Patch& patch, const glm::vec3& ray, const V3& centre, V centre_sq) {
+  const V along = Dot(centre, ray);
+  const V power = hn::Sub(centre_sq, Splat(patch.radius * patch.radius));
+  const M hit = hn::And(hn::Gt(along, hn::Zero(D())), hn::Ge(hn::Mul(along, along), power));
+  return hn::IfThenElseZero(hit, Splat(1));
+}
+
+// How far along the ray its plane is; `normal`: of the world, or in the frames of the lanes.
+inline V PlaneDistance(const glm::vec3& normal, const glm::vec3& ray, V c_n) {
+  const float d_n = glm::dot(ray, normal);
+  return hn::Mul(c_n, Splat(1 / (d_n != 0 ? d_n : 1e-20f)));
+}
+inline V PlaneDistance(const V3& normal, const glm::vec3& ray, V c_n) {
+  const V d_n = Dot(normal, ray);
+  return hn::Div(c_n, hn::IfThenElse(hn::Eq(d_n, hn::Zero(D())), Splat(1e-20f), d_n));
+}
+
+// How much of the ray's pixel the soft disk covers; zero where the ray misses it.
+template <typename Vector>
+V DiskAmount(const Patch& patch, const Vector& normal, const glm::vec3& ray, const V3& centre,
+             V c_n, V centre_sq) {
+  const V t = PlaneDistance(normal, ray, c_n);
+  const V along = Dot(centre, ray);
+  const V miss_sq = hn::MulAdd(t, hn::NegMulAdd(Splat(2), along, t), centre_sq);
+  const V part_sq = hn::Mul(miss_sq, Splat(1 / (patch.radius * patch.radius)));
+  const V peak = Splat(patch.soft_peak);
+  const V amount = hn::Min(Splat(1), hn::NegMulAdd(peak, part_sq, peak));
+  return hn::IfThenElseZero(hn::Gt(t, hn::Zero(D())), hn::Max(amount, hn::Zero(D())));
+}
 
 // As RasterCube::traceRibbon. Axes are vectors of the world, or in the frames of the lanes.
 template <typename Vector>
@@ -35,11 +66,10 @@ class RibbonRays {
 
   // How much of the pixel around the ray lies within.
   V Amount(const glm::vec3& ray) const {
-    const V zero = hn::Zero(D()), d_n = Cosine(normal_, ray);
-    const V t = hn::Div(c_n_, hn::IfThenElse(hn::Eq(d_n, zero), Splat(1e-20f), d_n));
+    const V t = PlaneDistance(normal_, ray, c_n_);
     const V size = hn::Mul(t, half_pixel_);
     const V amount = hn::Mul(Part(along_, ray, t, size), Part(across_, ray, t, size));
-    return hn::IfThenElseZero(hn::Gt(t, zero), amount);
+    return hn::IfThenElseZero(hn::Gt(t, hn::Zero(D())), amount);
   }
 
  private:
