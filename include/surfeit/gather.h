@@ -191,7 +191,7 @@ struct GatherStats {
 // plus `occlusion` and with kBleeding `irradiance_r irradiance_g irradiance_b`. A receiver without
 // a normal gathers over the whole sphere. The result depends on scene, receivers, order, mode,
 // quality and the machine's instruction set alone, bit for bit; instruction sets agree within 1e-4,
-// and for two of 1000 receivers within 2e-3.
+// and for two of 1000 receivers within 3e-3.
 // Errors: as indexClouds.
 Result<GatherStats> gatherCloud(const std::string& scene_path, const std::string& receivers_path,
                                 const std::string& result_path, const GatherOptions& options,
