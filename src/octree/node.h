@@ -55,6 +55,13 @@ struct Node {
   // Unit mean normal, direction of sum A n; zero when that sum is zero. Two-sided surfels do not
   // add to it, but where all are two-sided and flat: then their normals are turned to one side.
   glm::vec3 normal;
+  // Cosine of the largest angle between `normal` and the normal of any surfel below; -1 where
+  // nothing is known: a surfel below is a sphere or two-sided, `normal` is zero, the file is of
+  // format version 1.
+  float normal_cosine;
+  // Half the thickness of a slab around `position`, across `normal`, that holds every surfel's disk
+  // or sphere: 0 to radius. Radius where nothing is known, and where `normal` is zero.
+  float thickness;
   float area;           // sum of the surfel areas
   glm::vec3 radiosity;  // area-weighted mean
   float flatness;       // |sum A n| / sum A, 0..1
@@ -74,6 +81,12 @@ struct Node {
     std::array<NodeFacet, kMostFacets> facets;
   };
 
+  // Makes the slab and the cone of normals those of a node of which nothing is known but the sphere.
+  void forgetBounds() {
+    thickness = radius;
+    normal_cosine = -1;
+  }
+
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
   bool hasFacets() const { return facet_count > 0; }
@@ -86,7 +99,7 @@ struct Node {
     return facet;
   }
 };
-static_assert(sizeof(Node) == 320);
+static_assert(sizeof(Node) == 328);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

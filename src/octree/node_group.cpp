@@ -90,6 +90,7 @@ class Columns {
       Node& node = nodes[i];
       node.position = at(position, i);
       node.radius = radius[i];
+      node.forgetBounds();
       // |sum A n| is zero in these: no direction
       node.normal = flatness[i] == 0 ? glm::vec3(0) : at(normal, i);
       node.area = area[i];

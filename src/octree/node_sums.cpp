@@ -125,6 +125,7 @@ RoughNode NodeSums::toRough() const {
 Node NodeSums::toNode(float flatness_limit, float radius) const {
   Node node{};
   node.radius = radius;
+  node.forgetBounds();
   node.surfel_count = surfel_count;
   node.groups = groups;
   const Facet all = toFacet(*this);

@@ -48,6 +48,7 @@ Node makeNode(std::span<const glm::vec3> normals, const glm::vec3& radiosity) {
   Node node{};
   node.position = {0, 0, 2};
   node.radius = 1;
+  node.forgetBounds();
   glm::vec3 sum(0);
   for (const glm::vec3& normal : normals) sum += normal;
   node.area = 1;
@@ -231,6 +232,7 @@ TEST(NodeContribution, FrontsOverlapWhereBacksPrevail) {
 TEST(NodeContribution, NeverExceedsTheOutlineOfItsSphere) {
   Node node = makeNode(evenDirections(500), {1, 1, 1});
   node.radius = .1f;
+  node.forgetBounds();
   node.covariance = .01f * node.covariance;
   Contribution patch;
   ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
@@ -410,6 +412,7 @@ TEST(RoughNode, OfAWireShowsAllThatFacesTheReceiver) {
 TEST(RoughNode, OfAThicketCoversItsOutlineInPart) {
   Node node{};
   node.radius = 1;
+  node.forgetBounds();
   node.area = 4 * kPi;
   node.covariance = {{.2f, .2f, .2f, 0, 0, 0}};
   const glm::vec3 direction = {0, 0, 1};

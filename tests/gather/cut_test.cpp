@@ -53,6 +53,7 @@ Node randomNode(std::mt19937& random) {
   node.position = 3 * uniform(random) * randomDirection(random);
   node.normal = randomDirection(random);
   node.radius = .5f * uniform(random) * uniform(random);
+  node.forgetBounds();
   node.flatness = 1 - uniform(random) * uniform(random);
   node.flags = node.flatness > .97f ? kNodeFlat : 0;
   if (node.isFlat() && random() % 2 == 0) node.flags |= kNodeTwoSided;
@@ -181,6 +182,7 @@ TEST(Cut, FlatNodesOfTwoSidedSurfelsTurnTheirBackOnNobody) {
   node.position = {0, 0, 5};
   node.normal = {0, 0, 1};  // as the receiver looks
   node.radius = .1f;
+  node.forgetBounds();
   node.flatness = 1;
   node.groups = 1;
   const PacketView view = viewPacket(std::vector<Receiver>{{{0, 0, 0}, {0, 0, 1}}});
@@ -307,6 +309,7 @@ TEST(Cut, NodesOfWhichFewAreSeenAreOpenedWhereverTheyFace) {
   wall.position = {0, 0, 5};
   wall.normal = {0, 0, 1};
   wall.radius = .3f;
+  wall.forgetBounds();
   wall.flatness = .999f;
   wall.flags = kNodeFlat;
   wall.groups = 0b11;

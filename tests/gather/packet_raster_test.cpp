@@ -21,6 +21,7 @@ namespace {
 Node bentNode() {
   Node node{};
   node.radius = .5f;
+  node.forgetBounds();
   node.normal = {1, 0, 0};
   node.flatness = .975f;
   node.flags = kNodeFlat;
