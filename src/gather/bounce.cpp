@@ -265,7 +265,7 @@ Result<SceneFile> Bouncer::write(int bounce, BounceRadiosity& radiosity, BounceP
   SURFEIT_ASSIGN_OR_RETURN(
       PageFileWriter writer,
       PageFileWriter::create(is_last ? result_path_ : temporary_directory_ + "/surfeit-bounce.sft",
-                             identity));
+                             identity, scene_->header().format_version));
   Result<glm::dvec3> mean = Status::failed("bounce: not written");
   withThreads(gather_options_.threads, [&] {
     mean = rewriteRadiosity(*scene_, radiosity, writer, gather_options_.threads, progress_);

@@ -10,7 +10,6 @@
 #include "core/assert.h"
 #include "io/byte_coding.h"
 #include "io/page_codec.h"
-#include "surfeit/version.h"
 
 namespace surfeit {
 namespace {
@@ -99,10 +98,10 @@ Status PageFile::readHeader() {
   }
   ByteReader reader(header);
   reader.take(sizeof kHeaderMagic);
-  const std::uint32_t version = reader.get<std::uint32_t>();
-  if (version == 0 || version > kFormatVersion) {
+  format_version_ = reader.get<std::uint32_t>();
+  if (format_version_ == 0 || format_version_ > kFormatVersion) {
     return partError("header", fmt::format("format version {}, this program reads up to {}",
-                                           version, kFormatVersion));
+                                           format_version_, kFormatVersion));
   }
   const std::uint32_t header_bytes = reader.get<std::uint32_t>();
   identity_ = reader.get<std::uint64_t>();
@@ -232,12 +231,13 @@ Status PageFile::readPage(std::uint32_t page, AlignedBuffer& stored,
   return status.ok() ? Status() : pageError(page, status.message());
 }
 
-Result<PageFileWriter> PageFileWriter::create(const std::string& path, std::uint64_t identity) {
+Result<PageFileWriter> PageFileWriter::create(const std::string& path, std::uint64_t identity,
+                                              std::uint32_t format_version) {
   SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
   // Room for the header, which is written last
   const std::vector<std::byte> header(kFileHeaderBytes);
   SURFEIT_RETURN_IF_ERROR(file.append(header));
-  return PageFileWriter(std::move(file), identity);
+  return PageFileWriter(std::move(file), identity, format_version);
 }
 
 Status PageFileWriter::addPage(Bytes stored, std::uint32_t payload_bytes,
@@ -327,7 +327,7 @@ Status PageFileWriter::complete(Bytes scene_fields, const std::string& provenanc
   std::vector<std::byte> header;
   ByteWriter head(header);
   head.putBytes(std::as_bytes(std::span(kHeaderMagic)));
-  head.put(kFormatVersion);
+  head.put(format_version_);
   head.put(static_cast<std::uint32_t>(kFileHeaderBytes));
   head.put(identity_);
   header.resize(kSceneFieldsOffset);

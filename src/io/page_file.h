@@ -18,6 +18,7 @@
 
 #include "io/file.h"
 #include "surfeit/status.h"
+#include "surfeit/version.h"
 
 namespace surfeit {
 
@@ -52,6 +53,7 @@ class PageFile {
 
   const std::string& path() const { return file_.path(); }
   std::uint64_t fileBytes() const { return file_.size(); }
+  std::uint32_t formatVersion() const { return format_version_; }
   std::uint64_t identity() const { return identity_; }
   Bytes sceneFields() const { return scene_fields_; }
   const std::string& provenance() const { return provenance_; }
@@ -85,6 +87,7 @@ class PageFile {
   Status partError(const char* part, const std::string& message) const;
 
   InputFile file_;
+  std::uint32_t format_version_ = 0;
   std::uint64_t identity_ = 0;
   std::uint32_t node_page_count_ = 0;
   std::vector<std::byte> scene_fields_;
@@ -99,7 +102,9 @@ class PageFile {
 class PageFileWriter {
  public:
   // `identity` must differ between files of different content and be the same for the same content.
-  static Result<PageFileWriter> create(const std::string& path, std::uint64_t identity);
+  // `format_version` is that of the pages to come.
+  static Result<PageFileWriter> create(const std::string& path, std::uint64_t identity,
+                                       std::uint32_t format_version = kFormatVersion);
 
   // `stored` is a page that compressPage made of payload_bytes bytes. Surfel pages are numbered as
   // they come, node pages level by level (below kMaxNodeLevels); the kinds and the levels may take
@@ -120,14 +125,15 @@ class PageFileWriter {
   std::uint64_t fileBytes() const { return file_.size(); }
 
  private:
-  PageFileWriter(AtomicFile file, std::uint64_t identity)
-      : file_(std::move(file)), identity_(identity) {}
+  PageFileWriter(AtomicFile file, std::uint64_t identity, std::uint32_t format_version)
+      : file_(std::move(file)), identity_(identity), format_version_(format_version) {}
   Status addPage(Bytes stored, std::uint32_t payload_bytes, std::deque<PageEntry>& pages);
   Status appendDirectory(std::uint64_t& checksum);
   Status complete(Bytes scene_fields, const std::string& provenance);
 
   AtomicFile file_;
   std::uint64_t identity_;
+  std::uint32_t format_version_;
   // Lists that do not move when they grow
   std::deque<PageEntry> surfel_pages_;
   std::array<std::deque<PageEntry>, kMaxNodeLevels> node_pages_;

@@ -49,8 +49,10 @@ class CellSweep {
   // Puts `node` under the cell that it shares with the next one, from which it differs at
   // `boundary_level`, and closes the cells that end between them. When `top_level`, the level of
   // the cell that is swept, is not above the boundary, that cell ends too: true, and `node` is its
-  // root.
-  bool place(FinishedNode& node, int boundary_level, int top_level);
+  // root. Of `surfels`, the last are those of the node and of all nodes before it in its cells, as
+  // far as they are at hand: bounds from surfels are tighter than those from children.
+  bool place(FinishedNode& node, int boundary_level, int top_level,
+             std::span<const Surfel> surfels = {});
 
   bool isEmpty() const { return depth_ == 0; }
 
@@ -63,7 +65,7 @@ class CellSweep {
 
     void add(const FinishedNode& child);
   };
-  void close(const OpenCell& cell, FinishedNode& node);
+  void close(const OpenCell& cell, std::span<const Surfel> surfels, FinishedNode& node);
 
   SiblingSink& sink_;
   const float flatness_limit_;

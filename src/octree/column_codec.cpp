@@ -198,10 +198,6 @@ bool getPositions(PayloadReader& reader, const MutableAxes& values) {
   return true;
 }
 
-float positionError(const Axes& values, float max_error, bool full_precision) {
-  return positionGrid(values, max_error, full_precision).form == kFormFloat ? 0 : max_error;
-}
-
 void putPositive(PayloadWriter& writer, std::span<const float> values, Rounding rounding,
                  bool full_precision) {
   const auto [least, greatest] = rangeOf(values);

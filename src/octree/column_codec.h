@@ -29,9 +29,6 @@ inline Axes constAxes(const MutableAxes& axes) { return {axes[0], axes[1], axes[
 // coarse as `max_error` allows; or floats when that or `full_precision` asks for more.
 void putPositions(PayloadWriter& writer, const Axes& values, float max_error, bool full_precision);
 bool getPositions(PayloadReader& reader, const MutableAxes& values);
-// Largest distance between a position and its stored form, for values that putPositions would
-// store with this max_error.
-float positionError(const Axes& values, float max_error, bool full_precision);
 
 // Positive numbers: the leading 16 bits of how far their bit patterns lie above that of the
 // smallest, which is a logarithmic scale; or floats. With kUp no value decodes to less than it was.

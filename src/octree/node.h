@@ -81,7 +81,8 @@ struct Node {
     std::array<NodeFacet, kMostFacets> facets;
   };
 
-  // Makes the slab and the cone of normals those of a node of which nothing is known but the sphere.
+  // Makes the slab and the cone of normals those of a node of which nothing is known but the
+  // sphere.
   void forgetBounds() {
     thickness = radius;
     normal_cosine = -1;

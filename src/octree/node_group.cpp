@@ -11,15 +11,18 @@
 #include "core/thread_scratch.h"
 #include "octree/column_codec.h"
 #include "octree/facet_columns.h"
+#include "octree/node_bounds.h"
 #include "octree/node_moments.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 namespace {
 
-// Position error allowed, as a part of the smallest node radius in the group; the radii stored
-// grow by as much, so that they still hold every disk.
+// Position error allowed, as a part of the smallest node radius in the group.
 constexpr float kPositionTolerance = 1e-3f;
+
+// Makes up for rounding to a float.
+constexpr double kRoundedUp = 1 + 1.2e-7;
 
 // Coefficients are stored over area (times mean radiosity): largest for spheres, 4 pi Y00 = 3.54.
 constexpr float kCoefficientLimit = 4;
@@ -30,6 +33,29 @@ constexpr std::size_t kCoefficientKinds = kNodeShKinds;
 Status damaged(const char* field) {
   return Status::corruption(fmt::format("node group: damaged field {}", field));
 }
+
+// Positions and normals as a reader will find them. Every page of a thread uses the same.
+struct StoredPlaces {
+  MutableAxes position, normal;
+  bool are_readable = false;
+
+  StoredPlaces(const Axes& positions, const Axes& normals, float max_error, bool full_precision) {
+    std::vector<float>& floats = threadScratch<std::vector<float>>([] {});
+    std::vector<std::byte>& payload = threadScratch<std::vector<std::byte>>([] {});
+    const std::size_t count = positions[0].size();
+    floats.resize(6 * count);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      position[axis] = std::span(floats).subspan(axis * count, count);
+      normal[axis] = std::span(floats).subspan((3 + axis) * count, count);
+    }
+    PayloadWriter writer(payload, static_cast<std::uint32_t>(count));
+    putPositions(writer, positions, max_error, full_precision);
+    putNormals(writer, normals, full_precision);
+    writer.finish();
+    PayloadReader reader(payload);
+    are_readable = getPositions(reader, position) && getNormals(reader, normal);
+  }
+};
 
 // The nodes of a page as columns. Every page of a thread uses the same.
 class Columns {
@@ -57,6 +83,8 @@ class Columns {
     flags = column(bytes, 0);
     child_count = column(bytes, 1);
     child_level = column(bytes, 2);
+    thickness = column(bytes, 3);
+    cone = column(bytes, 4);
     page = column(integers, 0);
     first = column(integers, 1);
     surfel_count = column(integers, 2);
@@ -84,15 +112,33 @@ class Columns {
     }
   }
 
+  // Bounds by the positions and normals that a reader will find: radii grow by how far their node
+  // moves, so that they still hold every disk. Nothing is known of what cannot be read.
+  void bound(std::span<const LevelNode> nodes, float max_error, bool full_precision) {
+    const StoredPlaces places(constAxes(position), constAxes(normal), max_error, full_precision);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      BoundCodes codes;
+      if (places.are_readable) {
+        const glm::vec3 at_place = at(places.position, i);
+        const double moved = glm::distance(glm::dvec3(at(position, i)), glm::dvec3(at_place));
+        if (moved > 0) radius[i] = float((double(radius[i]) + moved) * kRoundedUp);
+        const bool has_normal = full_precision ? flatness[i] != 0 : signedCode(flatness[i], 1) != 0;
+        codes = boundCodes(nodes[i], at_place, has_normal ? at(places.normal, i) : glm::vec3(0));
+      }
+      thickness[i] = codes.thickness;
+      cone[i] = codes.cone;
+    }
+  }
+
   // All but the reference: page and first depend on the limits.
-  void scatter(bool has_groups, std::span<Node> nodes) const {
+  void scatter(const PageForm& form, std::span<Node> nodes) const {
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       Node& node = nodes[i];
       node.position = at(position, i);
       node.radius = radius[i];
-      node.forgetBounds();
       // |sum A n| is zero in these: no direction
       node.normal = flatness[i] == 0 ? glm::vec3(0) : at(normal, i);
+      setBounds(form.has_bounds ? BoundCodes{thickness[i], cone[i]} : BoundCodes(), node);
       node.area = area[i];
       node.radiosity = at(radiosity, i);
       node.flatness = flatness[i];
@@ -101,17 +147,17 @@ class Columns {
       node.facet_count = 0;
       node.rough = {};
       node.surfel_count = surfel_count[i];
-      node.groups = has_groups ? groups[i] : groupBit(0);
+      node.groups = form.has_groups ? groups[i] : groupBit(0);
     }
   }
 
   MutableAxes position, normal, radiosity;
   std::span<float> radius, area, flatness;
-  std::span<std::uint8_t> flags, child_count, child_level;
+  std::span<std::uint8_t> flags, child_count, child_level, thickness, cone;
   std::span<std::uint64_t> page, first, surfel_count, groups;
 
  private:
-  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 3, kIntegerColumns = 4;
+  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 5, kIntegerColumns = 4;
 
   static glm::vec3 at(const MutableAxes& axes, std::size_t i) {
     return {axes[0][i], axes[1][i], axes[2][i]};
@@ -175,15 +221,18 @@ Status resolveReference(const NodeLimits& limits, int level, int child_level,
 
 // The columns of a page but for the coefficients, checked one by one: those before the radiosity,
 // and those after.
-Status decodeGeometry(PayloadReader& reader, bool full_precision, const Columns& columns) {
+Status decodeGeometry(PayloadReader& reader, const PageForm& form, const Columns& columns) {
   if (!getPositions(reader, columns.position)) return damaged("position");
   if (!getPositive(reader, columns.radius)) return damaged("radius");
   if (!getPositive(reader, columns.area)) return damaged("area");
   if (!getNormals(reader, columns.normal)) return damaged("normal");
-  if (!(full_precision ? getFloats(reader, columns.flatness)
-                       : getSigned(reader, columns.flatness, 1))) {
+  if (!(form.full_precision ? getFloats(reader, columns.flatness)
+                            : getSigned(reader, columns.flatness, 1))) {
     return damaged("flatness");
   }
+  if (!form.has_bounds) return {};
+  if (!getBytes8(reader, columns.thickness)) return damaged("thickness");
+  if (!getBytes8(reader, columns.cone)) return damaged("cone");
   return {};
 }
 
@@ -323,8 +372,7 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   const Axes positions = constAxes(columns.position);
   const float max_error =
       *std::min_element(columns.radius.begin(), columns.radius.end()) * kPositionTolerance;
-  const float error = positionError(positions, max_error, full_precision);
-  for (float& radius : columns.radius) radius += error;
+  columns.bound(nodes, max_error, full_precision);
 
   PayloadWriter writer(payload, static_cast<std::uint32_t>(nodes.size()));
   putPositions(writer, positions, max_error, full_precision);
@@ -332,6 +380,10 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   putPositive(writer, columns.area, Rounding::kNearest, full_precision);
   putNormals(writer, constAxes(columns.normal), full_precision);
   full_precision ? putFloats(writer, columns.flatness) : putSigned(writer, columns.flatness, 1);
+  if (form.has_bounds) {
+    putBytes8(writer, columns.thickness);
+    putBytes8(writer, columns.cone);
+  }
   putColors(writer, constAxes(columns.radiosity), full_precision);
   putBytes8(writer, columns.flags);
   putBytes8(writer, columns.child_count);
@@ -369,10 +421,10 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
   }
   const Columns columns(count);
   const std::span<Node> out = nodes.first(count);
-  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, full_precision, columns));
+  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, form, columns));
   if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
   SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
-  columns.scatter(form.has_groups, out);
+  columns.scatter(form, out);
   SURFEIT_RETURN_IF_ERROR(checkNodes(out));
   const int level = levelOfPage(limits.level_first_page, page);
   for (std::size_t i = 0; i < count; ++i) {
@@ -400,7 +452,7 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
   PayloadWriter writer(replaced, reader.recordCount());
 
   const PayloadReader begin = reader;
-  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, full_precision, columns));
+  SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, form, columns));
   copyTaken(begin, reader, writer);
   if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
   for (std::size_t i = 0; i < nodes.size(); ++i) {

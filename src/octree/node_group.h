@@ -9,16 +9,22 @@
 
 #include "io/file.h"
 #include "octree/node.h"
+#include "core/spherical_harmonics.h"
 #include "octree/page_form.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
+
+// The angle of a cone that holds every normal.
+inline constexpr float kUnknownAngle = kPi;
 
 // A node on its way to a page: its `page` counts within the level of its children, because where
 // that level's pages begin is known only when all are written.
 struct LevelNode {
   Node node;
   std::uint8_t child_level = 0;  // of an interior node; 0 for a leaf
+  // Of Node::normal_cosine, of which nothing is known as yet: a cosine says little of small angles.
+  float normal_angle = kUnknownAngle;
 };
 
 // What references of a group may point at; from the header.

@@ -7,6 +7,8 @@
 #include <iterator>
 #include <limits>
 
+#include "octree/surfel_group.h"
+
 namespace surfeit {
 namespace {
 
@@ -59,7 +61,7 @@ void NodeSums::add(const Surfel& surfel) {
     for (int i = 0; i < kShCount; ++i) band_4[i] += weight * double(fourth[i]);
   }
   // Far from the origin a sum of position and radius rounds by more than the radius
-  const glm::vec3 half = glm::abs(surfel.position) * 0x1p-23f + surfel.radius;
+  const glm::vec3 half = glm::abs(surfel.position) * 0x1p-23f + radiusWithLoss(surfel);
   disk_bounds.add(surfel.position - half);
   disk_bounds.add(surfel.position + half);
 }

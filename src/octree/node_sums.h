@@ -23,14 +23,14 @@ struct NodeSums : AreaSums {
   double sh[kShCount][4] = {};     // sum A K_l Y_lm(n) times 1, B_r, B_g and B_b
   double band_4[kShCount] = {};    // Node::area_band_4
   FacetSums facets;
-  Bounds3 disk_bounds;  // boxes around every surfel's bounding sphere
+  Bounds3 disk_bounds;  // boxes around every surfel's bounding sphere, as it is read back
 
   void add(const Surfel& surfel);
   void add(const NodeSums& child);
 
   // Mean position.
   glm::vec3 centre() const;
-  // The node's numbers, without references. `radius`: of a sphere around centre() that holds all
+  // The node's numbers, without references, slab and cone. `radius`: of a sphere around centre() that holds all
   // disks. `flatness_limit` decides what is flat, and what is made of facets that are.
   Node toNode(float flatness_limit, float radius) const;
 

@@ -167,7 +167,8 @@ void SlabStitcher::resolve(LevelNode& node) const {
   }
 }
 
-// The sums of a giant leaf add up piece by piece; its sphere is that around their box.
+// The sums of a giant leaf add up piece by piece; its sphere is that around their box, and nothing
+// is known of slab and cone, because the normal is known after the last piece only.
 void SlabStitcher::addGiantPiece(BuiltSlab& slab, BuiltSlab::Root& root) {
   if (slab.giant->begins) {
     giant_ = root.node;
@@ -179,6 +180,7 @@ void SlabStitcher::addGiantPiece(BuiltSlab& slab, BuiltSlab::Root& root) {
   Node& node = giant_.node.node;
   const float radius = radiusOfBox(giant_.sums.centre(), giant_.sums.disk_bounds) * 1.000001f;
   node = giant_.sums.toNode(writer_.header().flatness_limit, radius);
+  giant_.node.normal_angle = kUnknownAngle;
   node.page = first.page;
   node.first = first.first;
   join(giant_, root.boundary_level);

@@ -10,6 +10,7 @@ struct PageForm {
   bool has_albedo = false;
   bool has_groups = false;
   bool has_long_sides = false;
+  bool has_bounds = true;  // slabs and cones of nodes: since format version 2
 };
 
 }  // namespace surfeit

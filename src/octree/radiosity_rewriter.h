@@ -1,6 +1,7 @@
 // Writes a scene again with other radiosities: the same surfels in the same order, the same pages,
 // nodes and references, of which every byte is kept; radiosities of surfels and nodes and the power
-// coefficients are new. Surfel pages are streamed once, in order; nothing is sorted.
+// coefficients are new. The file is of the format version that the scene is of. Surfel pages are
+// streamed once, in order; nothing is sorted.
 //
 //   decode, replace, encode ----> sweep --------------> encode -------> write
 //   surfel pages (any thread)     nodes (in order)      node pages      (in order)
@@ -26,7 +27,7 @@ class RadiositySource {
   virtual Status read(std::uint32_t surfel_page, std::span<glm::vec3> radiosity) = 0;
 };
 
-// Appends all pages of `scene` to `writer`, with the threads of the current arena; `threads` of
+// Appends all pages of `scene` to `writer`, which must be of the scene's format version, with the threads of the current arena; `threads` of
 // them bound what is on its way. Advances progress by surfels. Returns the mean radiosity, by area.
 // Errors: those of source and files; kCorruption where the pages are not in the order of the tree,
 // as every file of the indexer has them; kInterrupted.

@@ -23,6 +23,7 @@ Result<SceneFile> SceneFile::open(PageFile pages) {
                   fmt::format("{}: {}", scene.path(), header.status().message()));
   }
   scene.header_ = *header;
+  scene.header_.format_version = scene.pages_.formatVersion();
   return scene;
 }
 

@@ -16,11 +16,13 @@
 #include "octree/page_form.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/version.h"
 
 namespace surfeit {
 
 // What the header says about the scene.
 struct SceneHeader {
+  std::uint32_t format_version = kFormatVersion;  // in the header of the container
   std::uint64_t surfel_count = 0;
   std::uint64_t node_count = 0;
   std::uint32_t leaf_capacity = 0;          // surfels per leaf, unless more share one curve cell
@@ -35,7 +37,8 @@ struct SceneHeader {
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 
   PageForm pageForm() const {
-    return {full_precision, channels.albedo, channels.group, channels.long_side};
+    return {full_precision, channels.albedo, channels.group, channels.long_side,
+            format_version >= 2};
   }
 };
 

@@ -12,7 +12,8 @@ namespace surfeit {
 Result<std::unique_ptr<SceneWriter>> SceneWriter::create(const std::string& path,
                                                          const SceneHeader& header,
                                                          std::uint64_t identity) {
-  SURFEIT_ASSIGN_OR_RETURN(PageFileWriter file, PageFileWriter::create(path, identity));
+  SURFEIT_ASSIGN_OR_RETURN(PageFileWriter file,
+                           PageFileWriter::create(path, identity, header.format_version));
   return std::unique_ptr<SceneWriter>(new SceneWriter(std::move(file), header));
 }
 

@@ -4,6 +4,7 @@
 
 #include "core/thread_scratch.h"
 #include "io/page_codec.h"
+#include "octree/node_bounds.h"
 #include "octree/surfel_group.h"
 
 namespace surfeit {
@@ -103,7 +104,7 @@ void SlabBuilder::buildBrick(std::size_t begin, const Brick& brick) {
     makeLeaf(begin, end, node);
     boundary_level =
         end < brick.end ? firstDifferentLevel(keys_[end - 1], keys_[end]) : brick.level;
-    sweep_.place(node, boundary_level, brick.level);
+    sweep_.place(node, boundary_level, brick.level, std::span(surfels_).first(end));
     begin = end;
   }
   built_.roots.push_back({node, brick.boundary_level, built_.siblings.size()});
@@ -136,10 +137,11 @@ void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& lea
   const glm::vec3 centre = leaf.sums.centre();
   float radius = 0;
   for (const Surfel& surfel : surfels) {
-    radius = std::max(radius, reach(centre, surfel.position, surfel.radius));
+    radius = std::max(radius, reach(centre, surfel.position, radiusWithLoss(surfel)));
   }
   Node& node = leaf.node.node;
   node = leaf.sums.toNode(header_.flatness_limit, radius);
+  boundSurfels(surfels, leaf.node);
   leaf.node.child_level = 0;
   const GroupPlace place = placeSurfels(begin, end);
   node.page = place.page;

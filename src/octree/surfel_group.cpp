@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <glm/common.hpp>
 
 #include "core/long_side.h"
 #include "core/thread_scratch.h"
@@ -149,6 +150,16 @@ Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns
 }
 
 }  // namespace
+
+double positionLoss(const Surfel& surfel) {
+  const double step = double(kPositionTolerance) * double(surfel.radius);
+  const glm::dvec3 size = glm::abs(glm::dvec3(surfel.position));
+  return step + std::min(step, (size.x + size.y + size.z) * 0x1p-24);
+}
+
+float radiusWithLoss(const Surfel& surfel) {
+  return float((double(surfel.radius) * (1 + kRadiusLoss) + positionLoss(surfel)) * 1.0000001);
+}
 
 std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
                               std::vector<std::byte>& payload) {

@@ -14,6 +14,16 @@
 
 namespace surfeit {
 
+// How much a surfel may differ when it is read back. Radius: as a part of it, half a step of the
+// largest shift. Normal: half a step of the octahedral map where it is widest, sqrt(3) times
+// sqrt(6) / 65534 radians. docs/format.md, "Columns".
+inline constexpr double kRadiusLoss = 0x1p-11, kNormalLoss = 7e-5;
+// Position: 1/1000 of the radius, and far from the origin what the nearest float adds, which is no
+// more than there is to round.
+double positionLoss(const Surfel& surfel);
+// Radius of a sphere around its position that holds the surfel when it is read back.
+float radiusWithLoss(const Surfel& surfel);
+
 // The payload of a page with these surfels (at least one), replaced. Returns how many bytes at its
 // front are worth compressing, for compressPage. Safe from any thread.
 std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/curve_key.h"
+#include "octree/node_bounds.h"
 #include "octree/node_sums.h"
 #include "octree/test_scenes.h"
 
@@ -30,7 +31,8 @@ class NodeGroupTest : public testing::Test {
       std::vector<Surfel> cloud = i % 3 == 0 ? planeCloud(4, 0.1f) : randomCloud(9, seed);
       if (i % 4 == 3) cloud = boxCloud(3, 0.1f, 2 + int(i / 4 % 5));
       for (const Surfel& surfel : cloud) sums.add(surfel);
-      LevelNode node{sums.toNode(0.97f, radiusOfBox(sums.centre(), sums.disk_bounds)), 0};
+      LevelNode node{sums.toNode(0.97f, radiusOfBox(sums.centre(), sums.disk_bounds))};
+      boundSurfels(cloud, node);
       node.node.page = seed % 10;
       node.node.first = static_cast<std::uint16_t>(i);
       if (i % 2 == 0) {
@@ -53,7 +55,9 @@ class NodeGroupTest : public testing::Test {
   }
 
   static constexpr PageForm kQuantized = {}, kFull = {true};
-  static constexpr PageForm kForms[] = {kQuantized, kFull, {false, true, true}, {true, true, true}};
+  static constexpr PageForm kVersionOne = {.has_bounds = false};
+  static constexpr PageForm kForms[] = {
+      kQuantized, kFull, {false, true, true}, {true, true, true}, kVersionOne};
 
   std::uint32_t first_page_[kCurveLevels + 2];
   std::vector<Node> found_ = std::vector<Node>(128);
@@ -160,12 +164,35 @@ TEST_F(NodeGroupTest, MomentsOfEnormousNodesStayNumbers) {
       sums.add(surfel);
     }
     sums.facets.giveUp();
-    LevelNode node{sums.toNode(0.97f, 1.1e12f), 0};
+    LevelNode node{sums.toNode(0.97f, 1.1e12f)};
     const Result<std::uint32_t> count = storeAndRead(std::span(&node, 1), form);
     ASSERT_TRUE(count.ok()) << count.status().message();
     for (const glm::vec3& row : found_[0].rough.front_moment) {
       EXPECT_TRUE(std::isfinite(row.x) && std::isfinite(row.y) && std::isfinite(row.z));
     }
+  }
+}
+
+TEST_F(NodeGroupTest, PagesOfVersionOneHaveNoBounds) {
+  const std::vector<LevelNode> nodes = someNodes(20);
+  std::vector<std::byte> payload, with_bounds;
+  encodeNodeGroup(nodes, kVersionOne, payload);
+  encodeNodeGroup(nodes, kQuantized, with_bounds);
+  EXPECT_EQ(payload.size() + 2 * nodes.size(), with_bounds.size());
+  ASSERT_TRUE(decode(payload, kVersionOne).ok());
+  for (const Node& node : std::span(found_).first(nodes.size())) {
+    EXPECT_EQ(node.thickness, node.radius);
+    EXPECT_EQ(node.normal_cosine, -1);
+  }
+}
+
+TEST_F(NodeGroupTest, ReplacingRadiosityByItselfChangesNoByte) {
+  for (const PageForm& form : kForms) {
+    std::vector<std::byte> payload, replaced;
+    encodeNodeGroup(someNodes(50), form, payload);
+    ASSERT_TRUE(decode(payload, form).ok());
+    ASSERT_TRUE(replaceNodeRadiosity(payload, form, std::span(found_).first(50), replaced).ok());
+    EXPECT_EQ(replaced, payload);
   }
 }
 
@@ -289,6 +316,8 @@ TEST_F(NodeGroupTest, DamagedPayloadsDecodeToValidNodesOrNot) {
       for (const Node& node : std::span(found_).first(*count)) {
         ASSERT_TRUE(node.radius > 0 && node.area > 0 && node.surfel_count <= 5120u * 1000);
         ASSERT_TRUE(node.flatness >= 0 && node.flatness <= 1);
+        ASSERT_TRUE(node.thickness >= 0 && node.thickness <= node.radius);
+        ASSERT_TRUE(node.normal_cosine >= -1 && node.normal_cosine <= 1);
         ASSERT_NE(node.groups, 0u);
         for (const float entry : node.covariance.entries) ASSERT_TRUE(std::isfinite(entry));
         if (node.isLeaf()) {

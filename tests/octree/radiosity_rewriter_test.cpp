@@ -50,7 +50,8 @@ class RadiosityRewriterTest : public SceneTest {
                                 int threads = 2) {
     SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, SceneFile::open(from));
     LightSource source(scene, light);
-    SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer, PageFileWriter::create(to, kIdentity));
+    SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer,
+                             PageFileWriter::create(to, kIdentity, scene.header().format_version));
     Result<glm::dvec3> mean = Status::failed("not run");
     withThreads(threads,
                 [&] { mean = rewriteRadiosity(scene, source, writer, threads, progress_); });
@@ -133,6 +134,20 @@ TEST_F(RadiosityRewriterTest, EverythingButLightKeepsItsValues) {
     }
     EXPECT_EQ(findingsOf(this->path("new.sft")), std::vector<std::string>{});
   }
+}
+
+TEST_F(RadiosityRewriterTest, AFileOfVersionOneStaysOne) {
+  const std::string before = SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft";
+  const std::string after = rewrite(before, "new.sft", wavesOfLight);
+  EXPECT_EQ(findingsOf(after), std::vector<std::string>{});
+  const ReadScene a = read(before), b = read(after);
+  EXPECT_EQ(b.header.format_version, 1u);
+  ASSERT_EQ(a.nodes.size(), b.nodes.size());
+  for (std::size_t i = 0; i < a.nodes.size(); ++i) {
+    EXPECT_TRUE(sameBytes(withoutLight(a.nodes[i].node), withoutLight(b.nodes[i].node))) << i;
+  }
+  EXPECT_EQ(bytesOf(rewrite(rewrite(before, "dark.sft", darkness), "twice.sft", wavesOfLight)),
+            bytesOf(after));
 }
 
 // Mean radiosity and the power that a node sends: what a gather takes from it.

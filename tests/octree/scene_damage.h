@@ -1,6 +1,7 @@
 // Scenes whose pages are changed and whose checksums are valid all the same.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -21,7 +22,7 @@ using HeaderEdit = std::function<void(std::vector<std::byte>& scene_fields)>;
 inline Status rewriteScene(const std::string& from, const std::string& to, const PayloadEdit& edit,
                            const HeaderEdit& edit_header = {}) {
   SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(from));
-  SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer, PageFileWriter::create(to, pages.identity()));
+  SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer, PageFileWriter::create(to, pages.identity(), pages.formatVersion()));
   AlignedBuffer buffer;
   std::vector<std::byte> stored, payload;
   const auto copy = [&](std::uint32_t page) -> Status {
@@ -47,7 +48,7 @@ inline Status rewriteScene(const std::string& from, const std::string& to, const
 inline std::vector<LevelNode> levelNodes(const SceneHeader& header, std::span<const Node> nodes) {
   std::vector<LevelNode> level_nodes;
   for (const Node& node : nodes) {
-    LevelNode level_node{node, 0};
+    LevelNode level_node{node, 0, std::acos(node.normal_cosine)};
     if (!node.isLeaf()) {
       while (header.level_first_page[level_node.child_level + 1] <= node.page) {
         ++level_node.child_level;
