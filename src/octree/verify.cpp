@@ -11,6 +11,7 @@
 #include "core/worker_threads.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
+#include "octree/verify_bounds.h"
 #include "surfeit/scene.h"
 
 namespace surfeit {
@@ -275,6 +276,12 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
       (node_balance != placeHash(kRootRange.page, kRootRange.first) || surfel_balance != 0)) {
     findings.add(fmt::format("{}: {} are not each referenced once", path,
                              surfel_balance != 0 ? "surfels" : "nodes"));
+  }
+
+  // What is not known to be a tree is not walked
+  if (report.finding_count == 0 && file.header().pageForm().has_bounds) {
+    SURFEIT_RETURN_IF_ERROR(verifyBounds(
+        *octree, threads, progress, [&](const std::string& finding) { findings.add(finding); }));
   }
   report.pages_checked = pages;
   report.bytes_checked = file.fileBytes();

@@ -132,6 +132,20 @@ TEST_F(VerifyTest, NewerVersionIsRefusedWithItsNumber) {
               Contains(HasSubstr("version " + std::to_string(kFormatVersion + 1))));
 }
 
+TEST_F(VerifyTest, ReservedBytesOfTheSceneFieldsAreZero) {
+  for (const std::string& sound :
+       {bytesOf(smallScene()), bytesOf(SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft")}) {
+    for (std::size_t at = 252; at < kHeaderChecksumAt; ++at) {
+      std::string file = sound;
+      ASSERT_EQ(file[at], 0);
+      file[at] = 1;
+      sealFile(file);
+      replaceContents(path("reserved.sft"), file);
+      EXPECT_THAT(findingsOf(path("reserved.sft")), Contains(HasSubstr("reserved space")));
+    }
+  }
+}
+
 TEST_F(VerifyTest, MissingFileIsAnIoErrorAndCancellingInterrupts) {
   Progress progress;
   EXPECT_EQ(verifyScene(path("absent.sft"), 1, progress).status().code(), StatusCode::kIoError);
@@ -180,6 +194,52 @@ TEST_F(VerifyTest, ClaimsThatDoNotHoldAreFound) {
   EXPECT_THAT(findingsAfter(root, [](auto& n) { n[0].node.radius *= 0.01f; }), Not(IsEmpty()));
   EXPECT_THAT(findingsAfter(root, [](auto& n) { n[0].node.position.x += 10; }), Not(IsEmpty()));
   EXPECT_THAT(findingsAfter(root, [](auto& n) { n.push_back(n[0]); }), Not(IsEmpty()));
+}
+
+TEST_F(VerifyTest, BoundsThatDoNotHoldForTheSurfelsBelowAreFound) {
+  IndexOptions options;
+  options.leaf_capacity = 4;
+  options.full_precision = true;
+  const Result<SceneInfo> info = readSceneInfo(index(sphereCloud(3000), kAllChannels, options));
+  ASSERT_TRUE(info.ok());
+  // The root, and nodes with and without children
+  for (const std::uint32_t page : {0u, info->node_pages / 2, info->node_pages - 1}) {
+    const auto findings = [&](const std::function<void(LevelNode&)>& edit) {
+      return findingsAfter(page, [&](std::vector<LevelNode>& nodes) {
+        edit(*std::max_element(nodes.begin(), nodes.end(), [](auto& a, auto& b) {
+          return a.node.surfel_count < b.node.surfel_count;
+        }));
+      });
+    };
+    const auto finds = [&](const char* claim) {
+      return Contains(testing::AllOf(HasSubstr("edited.sft: page " + std::to_string(page) + " at "),
+                                     HasSubstr(claim)));
+    };
+    EXPECT_THAT(findings([](LevelNode&) {}), IsEmpty());
+    EXPECT_THAT(findings([](LevelNode& n) { n.node.thickness *= .3f; }), finds(": thickness"));
+    EXPECT_THAT(findings([](LevelNode& n) { n.normal_angle *= .5f; }), finds(": normal cosine"));
+    EXPECT_THAT(findings([](LevelNode& n) { n.node.radius *= .5f; }), finds(": bounding radius"));
+  }
+}
+
+// Nothing but the byte of a slab or a cone is other than it was.
+TEST_F(VerifyTest, TamperedBytesOfBoundsAreFound) {
+  const std::string scene = index(boxCloud(20, .1f, 2));
+  // On a page of one node 54 bytes of position, radius, area, normal and flatness come before
+  constexpr std::size_t kThickness = 62, kCone = 63;
+  for (const std::size_t place : {kThickness, kCone}) {
+    const Status status = rewriteScene(scene, path("edited.sft"),
+                                       [&](std::uint32_t page, std::vector<std::byte>& payload) {
+                                         if (page != 0) return;
+                                         ASSERT_GT(payload[place], std::byte{40});
+                                         payload[place] = std::byte{40};
+                                       });
+    ASSERT_TRUE(status.ok()) << status.message();
+    const char* const claim = place == kCone ? "normal cosine" : "thickness";
+    EXPECT_THAT(findingsOf(path("edited.sft")),
+                testing::ElementsAre(
+                    testing::AllOf(HasSubstr("edited.sft: page 0 at "), HasSubstr(claim))));
+  }
 }
 
 TEST_F(VerifyTest, GroupsThatAreNotThoseBelowAreFound) {
