@@ -365,6 +365,8 @@ TEST_F(PageFileTest, HostileFieldsWithValidChecksumsDoNoHarm) {
       sealFile(damaged);
       // The checksums that sealFile sets are not hostile then; 0 and n are met again as they are
       if (damaged == file) continue;
+      // The container of an older version is the same: what its pages hold tells
+      if (field.at == 8 && value > 0 && value < kFormatVersion) continue;
       EXPECT_TRUE(noticed(damaged)) << "field at " << field.at << ": " << value;
       ++cases;
     }

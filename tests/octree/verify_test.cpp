@@ -132,6 +132,15 @@ TEST_F(VerifyTest, NewerVersionIsRefusedWithItsNumber) {
               Contains(HasSubstr("version " + std::to_string(kFormatVersion + 1))));
 }
 
+TEST_F(VerifyTest, PagesOfAnotherVersionThanTheHeaderSaysAreCorruption) {
+  for (const bool is_old : {false, true}) {
+    std::string file = bytesOf(is_old ? SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft" : smallScene());
+    setAt(file, 8, is_old ? 2u : 1u);
+    sealFile(file);
+    EXPECT_TRUE(noticed(file)) << is_old;
+  }
+}
+
 TEST_F(VerifyTest, ReservedBytesOfTheSceneFieldsAreZero) {
   for (const std::string& sound :
        {bytesOf(smallScene()), bytesOf(SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft")}) {
