@@ -48,28 +48,27 @@ struct PlacedPanel {
 };
 using PanelRows = std::vector<std::vector<PlacedPanel>>;
 
-// Of at most three, or with rays of pairs: gathered left, traced right.
+// Rows of up to three. With rays, coverage and depth have rows of their own, gathered and traced,
+// and the others stand to the right of them, and below.
 PanelRows arrange(const CubeViews& cubes, const std::vector<CubePanel>& panels) {
+  constexpr std::size_t kColumns = 3;
   PanelRows rows;
-  if (cubes.traced == nullptr) {
-    const std::size_t columns = panels.size() <= 3 ? panels.size() : (panels.size() + 1) / 2;
-    for (std::size_t i = 0; i < panels.size(); ++i) {
-      if (i % columns == 0) rows.emplace_back();
-      rows.back().push_back({panels[i], false});
-    }
-    return rows;
-  }
   std::vector<PlacedPanel> others;
   for (const CubePanel panel : panels) {
-    if (panel == CubePanel::kCoverage || panel == CubePanel::kDepth) {
+    const bool is_traced = panel == CubePanel::kCoverage || panel == CubePanel::kDepth;
+    if (is_traced && cubes.traced != nullptr) {
       rows.push_back({{panel, false}, {panel, true}});
     } else {
       others.push_back({panel, false});
     }
   }
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    if (i % 2 == 0) rows.emplace_back();
-    rows.back().push_back(others[i]);
+  std::size_t next = 0;
+  for (auto& row : rows) {
+    if (next < others.size()) row.push_back(others[next++]);
+  }
+  for (; next < others.size(); ++next) {
+    if (rows.empty() || rows.back().size() == kColumns) rows.emplace_back();
+    rows.back().push_back(others[next]);
   }
   return rows;
 }

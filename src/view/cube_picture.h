@@ -35,8 +35,8 @@ struct CubeViews {
   const CubeImage* traced = nullptr;
 };
 
-// The panels, in rows, with display values (PngOptions::is_data). The traced coverage and depth
-// stand to the right of the gathered ones.
+// The panels, in rows of up to three, with display values (PngOptions::is_data). The traced
+// coverage and depth stand to the right of the gathered ones.
 Picture drawCube(const CubeViews& cubes, const CubePictureOptions& options);
 // What the colors and brightnesses of that picture mean, and where its panels are; lines of text.
 std::string cubeLegend(const CubeViews& cubes, const CubePictureOptions& options);
