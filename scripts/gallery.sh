@@ -2,7 +2,7 @@
 # Makes the pictures of docs/gallery.md, in docs/gallery/, from scenes that it makes itself. Clouds
 # and scenes go to out/gallery/. Minutes on two cores. Chapters may be named to make only these:
 #
-#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset ...]
+#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube ...]
 #
 # SURFEIT_BUILD names a build directory to take the programs from; else build/release is built.
 set -euo pipefail
@@ -192,9 +192,17 @@ volume() {
   draw volume_haze haze_in_box.ply --channel lit --exposure -1.5 "${speckled_view[@]}"
 }
 
+cube() {
+  say "The raster cube of a receiver on the floor, and of one on the ceiling"
+  timed surfeit cube box.sft --at 0.5,0,0.6 --normal 0,1,0 -o "$pictures/cube_floor.png" --zoom 5 \
+    --reference cornell.obj
+  timed surfeit cube box.sft --at 0.25,1,0.75 --normal 0,-1,0 -o "$pictures/cube_ceiling.png" \
+    --zoom 5 --exposure -1 --reference cornell.obj
+}
+
 chapters=("$@")
 if ((${#chapters[@]} == 0)); then
-  chapters=(direct quality area subset photons environment bounces occlusion glossy volume)
+  chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube)
   scenes
 fi
 for chapter in "${chapters[@]}"; do "$chapter"; done

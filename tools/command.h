@@ -109,5 +109,6 @@ void addBrickCommand(CLI::App& app, CommandContext& context);
 void addTuneCommand(CLI::App& app, CommandContext& context);
 void addViewCommand(CLI::App& app, CommandContext& context);
 void addCompositeCommand(CLI::App& app, CommandContext& context);
+void addCubeCommand(CLI::App& app, CommandContext& context);
 
 }  // namespace surfeit

@@ -119,11 +119,15 @@ void addPagingOptions(CLI::App& command, GatherOptions& options) {
 
 }  // namespace
 
-void addGatherOptions(CLI::App& command, GatherOptions& options) {
-  addChoice<GatherMode>(command, "--mode", options.mode, "What is gathered",
+void addModeOption(CLI::App& command, GatherMode& mode) {
+  addChoice<GatherMode>(command, "--mode", mode, "What is gathered",
                         {{"occlusion", GatherMode::kOcclusion},
                          {"bleeding", GatherMode::kBleeding},
                          {"glossy", GatherMode::kGlossy}});
+}
+
+void addGatherOptions(CLI::App& command, GatherOptions& options) {
+  addModeOption(command, options.mode);
   addChannelOptions(command, options.channels, options.part);
   command.add_flag("--strict", options.strict,
                    "Refuse invalid receivers instead of writing NaN for them");

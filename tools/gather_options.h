@@ -36,8 +36,9 @@ CLI::Option* addChoice(CLI::App& command, const std::string& name, Value& target
 // threads and memory are left to the program's own options.
 void addGatherOptions(CLI::App& command, GatherOptions& options);
 
-// Parts of it, for commands that gather at the surfels of a scene: what decides about errors, and
-// the caches.
+// Parts of it, for commands that gather elsewhere: the mode, what decides about errors, and the
+// caches.
+void addModeOption(CLI::App& command, GatherMode& mode);
 void addQualityOptions(CLI::App& command, GatherQuality& quality);
 void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io);
 

@@ -32,6 +32,8 @@ std::uint32_t parseOutputs(std::string_view text) {
   return outputs;
 }
 
+}  // namespace
+
 void addDirectionOptions(CLI::App& command, GatherOptions& options) {
   constexpr const char* kGroup = "Directions";
   using Distribution = GatherWeights::Distribution;
@@ -81,6 +83,8 @@ void addDirectionOptions(CLI::App& command, GatherOptions& options) {
           "--clamp", [] {}, "For scripts of older tools: pixels never count more than once here")
       ->group(kGroup);
 }
+
+namespace {
 
 void addEnvironmentOptions(CLI::App& command, GatherEnvironment& environment) {
   constexpr const char* kGroup = "Environment";

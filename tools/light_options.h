@@ -12,6 +12,9 @@ namespace surfeit {
 // Parsing fills `options`, which must outlive `command`.
 void addLightOptions(CLI::App& command, GatherOptions& options);
 
+// A part of it: weights of directions, and falloff.
+void addDirectionOptions(CLI::App& command, GatherOptions& options);
+
 // "occlusion,irradiance": the words of a set of GatherOutput.
 std::string outputWords(std::uint32_t outputs);
 

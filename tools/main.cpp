@@ -27,6 +27,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addTuneCommand(app, context);
   addViewCommand(app, context);
   addCompositeCommand(app, context);
+  addCubeCommand(app, context);
 }
 
 int parseAndRun(int argc, char** argv) {

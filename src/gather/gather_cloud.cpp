@@ -30,13 +30,6 @@
 namespace surfeit {
 namespace {
 
-Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
-                                                                 Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, EnvironmentMap::load(options.environment, progress));
-  EnvironmentCube cube(map, RasterGeometry(options.quality.raster_resolution));
-  return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
-}
-
 Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
                                        const std::string& receivers_path,
                                        const std::string& result_path, const GatherOptions& given,
@@ -62,10 +55,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();
 
-  std::unique_ptr<const LoadedEnvironment> environment;
-  if (!options.environment.path.empty()) {
-    SURFEIT_ASSIGN_OR_RETURN(environment, loadEnvironment(options, progress));
-  }
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<const LoadedEnvironment> environment,
+                           loadEnvironment(options, progress));
   RowWriterOptions writing;
   writing.properties = result_rows.properties();
   writing.comments = input.reader().comments();

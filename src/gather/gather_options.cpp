@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "core/job_limits.h"
 #include "gather/gather_outputs.h"
@@ -114,6 +115,14 @@ void setQuality(QualityPreset preset, GatherQuality& quality) {
       set(0.012f, 40, 16, 0);  // a shared far field steps where packets meet
       break;
   }
+}
+
+Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
+                                                                 Progress& progress) {
+  if (options.environment.path.empty()) return std::unique_ptr<const LoadedEnvironment>();
+  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, EnvironmentMap::load(options.environment, progress));
+  EnvironmentCube cube(map, RasterGeometry(options.quality.raster_resolution));
+  return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
 }
 
 GatherOptions withDefaults(GatherOptions options) {

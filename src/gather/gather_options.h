@@ -1,8 +1,12 @@
 // Checks of what a caller asks for.
 #pragma once
 
+#include <memory>
+
+#include "gather/gather_rules.h"
 #include "io/positional_file.h"
 #include "surfeit/gather.h"
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -12,6 +16,11 @@ Status checkGatherOptions(const GatherOptions& options);
 
 // With threads and memory that were left open filled in, from what the job may use.
 GatherOptions withDefaults(GatherOptions options);
+
+// The environment that is asked for, ready for a raster of that resolution; null when there is
+// none. Errors: as EnvironmentMap::load.
+Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
+                                                                 Progress& progress);
 
 // How the pages of the scene are read.
 inline Access sceneAccess(const GatherOptions& options) {

@@ -26,6 +26,10 @@ class PointGatherer {
   // alone, bit for bit.
   Status gather(const Receiver& receiver, PagedOctree::Reader& octree, GatherResult& result);
 
+  // ReceiverRaster::setRecorder, and what the last gather drew.
+  void setRecorder(PixelRecorder* recorder) { raster_.setRecorder(recorder); }
+  const ReceiverRaster& raster() const { return raster_; }
+
   // What the last gather took, for benches and tests.
   struct Work {
     std::size_t nodes_visited = 0;

@@ -9,6 +9,7 @@
 #include "core/assert.h"
 #include "core/tangent_frame.h"
 #include "gather/coverage_rules.h"
+#include "gather/pixel_record.h"
 #include "gather/ribbon.h"
 
 namespace surfeit {
@@ -121,6 +122,9 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
   coverage.thicket += (coverage.total - before) * texture.thicket;
   if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
   if (!faded_.empty()) faded_[pixel] += (coverage.total - before) * depth.fade;
+  if (recorder_ != nullptr) {
+    recorder_->add(pixel, coverage.total - before, is_new, 0.5f * (depth.begin + depth.end));
+  }
 }
 
 void RasterCube::fill() {

@@ -19,6 +19,7 @@
 
 namespace surfeit {
 
+class PixelRecorder;
 struct Ribbon;
 
 // Directions and solid angles of the pixels for one resolution. Immutable, so threads may share it.
@@ -98,6 +99,10 @@ class RasterCube {
   // `geometry` must outlive the cube; with that of a cone, all directions are of its frame. Without
   // color, radiosities are neither added nor stored; what fades neither, unless `fades`.
   RasterCube(const RasterGeometry& geometry, bool has_color, bool fades = false);
+
+  // Tells it from now on what every pixel gets; null, as at first: nobody. It must outlive the
+  // drawing.
+  void setRecorder(PixelRecorder* recorder) { recorder_ = recorder; }
 
   // Uncovers every pixel.
   void clear();
@@ -181,6 +186,7 @@ class RasterCube {
                    const DepthRange& depth, const glm::vec3& radiosity, const AmountOf& amountOf);
 
   const RasterGeometry* geometry_;
+  PixelRecorder* recorder_ = nullptr;
   std::vector<Coverage> coverage_;
   std::vector<glm::vec3> radiosity_;
   std::vector<float> faded_;

@@ -9,7 +9,7 @@
 
 #include "core/assert.h"
 #include "gather/coverage_rules.h"
-#include "gather/result_sums.h"
+#include "gather/pixel_record.h"
 #include "gather/ribbon.h"
 
 namespace surfeit {
@@ -34,24 +34,30 @@ ReceiverRaster::ReceiverRaster(const GatherRules& rules)
 void ReceiverRaster::begin(const Receiver& receiver) {
   receiver_ = receiver;
   is_spherical_ = receiver.isSpherical();
-  if (has_frame_) frame_ = ConeFrame(lobeAxis(receiver, rules_));
+  axis_ = lobeAxis(receiver, rules_);
+  if (has_frame_) frame_ = ConeFrame(axis_);
   contributions_.clear();
   near_surfels_.clear();
 }
 
 void ReceiverRaster::addNode(const Node& node, float part) {
-  if (!node.hasFacets()) return addPatch(node, part);
-  for (std::size_t i = 0; i < node.facet_count; ++i) addPatch(node.facet(i), part);
+  if (!node.hasFacets()) {
+    return addPatch(node, node.isFlat() ? CubeKind::kFlatNode : CubeKind::kRoughNode, part);
+  }
+  for (std::size_t i = 0; i < node.facet_count; ++i) {
+    addPatch(node.facet(i), CubeKind::kFacet, part);
+  }
 }
 
 template <typename NodeOrFacet>
-void ReceiverRaster::addPatch(const NodeOrFacet& source, float part) {
+void ReceiverRaster::addPatch(const NodeOrFacet& source, CubeKind kind, float part) {
   const glm::vec3 to_source = source.position - receiver_.position;
   Entry entry;
   if (!makeContribution(source, to_source, contribution_rules_, entry.contribution)) return;
   if (!(heightAboveHorizon(receiver_, entry.contribution.direction) > 0)) return;
   if (!(entry.contribution.distance_sq <= max_distance_sq_)) return;
   entry.contribution.opacity *= part;
+  entry.kind = kind;
   contributions_.push_back(entry);
 }
 
@@ -76,6 +82,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
   if (near_part < 1 && height > 0 &&
       makeContribution(surfel, to_surfel, contribution_rules_, patch.contribution)) {
     patch.contribution.opacity = part * (1 - near_part);
+    patch.kind = CubeKind::kPatch;
     contributions_.push_back(patch);
   }
   if (near_part == 0) return;
@@ -96,6 +103,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
   const float distance = std::sqrt(std::max(distance_sq, std::numeric_limits<float>::min()));
   entry.contribution.reach = reachOf(surfel, ribbon, surfel.radius, to_surfel / distance);
   entry.near_index = std::int32_t(near_surfels_.size());
+  entry.kind = CubeKind::kTraced;
   near_surfels_.push_back(surfel);
   contributions_.push_back(entry);
 }
@@ -187,12 +195,19 @@ void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& d
                   sends_light ? surfel.radiosity : glm::vec3(0));
 }
 
+void ReceiverRaster::setRecorder(PixelRecorder* recorder) {
+  recorder_ = recorder;
+  cube_.setRecorder(recorder);
+}
+
 GatherResult ReceiverRaster::finish() {
   sortByDistance();
   cube_.clear();
+  if (recorder_ != nullptr) recorder_->begin(geometry_.pixels().size());
   for (const std::uint64_t key : order_) {
     const Entry& entry = contributions_[std::uint32_t(key)];
     const Contribution& patch = entry.contribution;
+    if (recorder_ != nullptr) recorder_->setKind(entry.kind);
     const float distance = std::sqrt(patch.distance_sq);
     const DepthRange depth = {distance - patch.reach, distance + patch.reach,
                               rules_.fades() ? fadeAt(distance, rules_) : 1};
@@ -212,31 +227,31 @@ GatherResult ReceiverRaster::finish() {
   return integrate();
 }
 
-GatherResult ReceiverRaster::integrate() const {
-  const std::span<const RasterGeometry::Pixel> pixels = geometry_.pixels();
-  const glm::vec3 axis = lobeAxis(receiver_, rules_);
-  ResultSums sums;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const glm::vec3 direction =
-        has_frame_ ? frame_.toWorld(pixels[i].direction) : pixels[i].direction;
-    float weight = 1;
-    if (!is_spherical_) {
-      weight = glm::dot(direction, receiver_.normal) > 0 ? weights_(glm::dot(direction, axis)) : 0;
-    }
-    glm::vec3 environment(0);
-    if (has_frame_ && rules_.environment != nullptr) {
-      environment = rules_.environment->lookup(direction, pixels[i].solid_angle);
-    } else if (rules_.environment_cube != nullptr) {
-      environment = rules_.environment_cube->pixels()[i];
-    }
-    sums.add({.direction = direction,
-              .solid_angle = pixels[i].solid_angle,
-              .weight = weight,
-              .coverage = cube_.coverage(i),
-              .occlusion = rules_.fades() ? cube_.fadedCoverage(i) : cube_.coverage(i),
-              .radiosity = rules_.hasLight() ? cube_.radiosity(i) : glm::vec3(0),
-              .environment = environment});
+ResultSums::Pixel ReceiverRaster::pixel(std::size_t i) const {
+  const RasterGeometry::Pixel& pixel = geometry_.pixels()[i];
+  const glm::vec3 direction = has_frame_ ? frame_.toWorld(pixel.direction) : pixel.direction;
+  float weight = 1;
+  if (!is_spherical_) {
+    weight = glm::dot(direction, receiver_.normal) > 0 ? weights_(glm::dot(direction, axis_)) : 0;
   }
+  glm::vec3 environment(0);
+  if (has_frame_ && rules_.environment != nullptr) {
+    environment = rules_.environment->lookup(direction, pixel.solid_angle);
+  } else if (rules_.environment_cube != nullptr) {
+    environment = rules_.environment_cube->pixels()[i];
+  }
+  return {.direction = direction,
+          .solid_angle = pixel.solid_angle,
+          .weight = weight,
+          .coverage = cube_.coverage(i),
+          .occlusion = rules_.fades() ? cube_.fadedCoverage(i) : cube_.coverage(i),
+          .radiosity = rules_.hasLight() ? cube_.radiosity(i) : glm::vec3(0),
+          .environment = environment};
+}
+
+GatherResult ReceiverRaster::integrate() const {
+  ResultSums sums;
+  for (std::size_t i = 0; i < geometry_.pixels().size(); ++i) sums.add(pixel(i));
   return sums.result(rules_, is_spherical_);
 }
 

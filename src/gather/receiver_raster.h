@@ -12,7 +12,9 @@
 #include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
 #include "gather/receiver.h"
+#include "gather/result_sums.h"
 #include "octree/node.h"
+#include "surfeit/cube.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
 
@@ -44,6 +46,15 @@ class ReceiverRaster {
   // Draws everything added since begin() and integrates.
   GatherResult finish();
 
+  // Tells it what the pixels get, from the next finish() on; null, as at first: nobody. It must
+  // outlive the raster, or be taken away before.
+  void setRecorder(PixelRecorder* recorder);
+  const RasterGeometry& geometry() const { return geometry_; }
+  // Of a cone raster.
+  const ConeFrame& frame() const { return frame_; }
+  // A pixel of what was drawn last, as finish() integrated it.
+  ResultSums::Pixel pixel(std::size_t i) const;
+
   const Receiver& receiver() const { return receiver_; }
   // Contributions added since begin(), and near surfels among them.
   std::size_t contributionCount() const { return contributions_.size(); }
@@ -56,9 +67,10 @@ class ReceiverRaster {
   struct Entry {
     Contribution contribution;     // near surfels: distance and radius, the rest is zero
     std::int32_t near_index = -1;  // in near_surfels_, or -1
+    CubeKind kind = CubeKind::kNothing;
   };
   template <typename NodeOrFacet>
-  void addPatch(const NodeOrFacet& source, float part);
+  void addPatch(const NodeOrFacet& source, CubeKind kind, float part);
   void sortByDistance();
   bool isLessContent(const Entry& a, const Entry& b) const;
   float rayBias(const Surfel& surfel) const;
@@ -80,8 +92,10 @@ class ReceiverRaster {
   DirectionWeights weights_;
   ConeFrame frame_;
   RasterCube cube_;
+  PixelRecorder* recorder_ = nullptr;
   Receiver receiver_;
   bool is_spherical_ = true;
+  glm::vec3 axis_{1, 0, 0};  // lobeAxis
   std::vector<Entry> contributions_;
   std::vector<Surfel> near_surfels_;
   std::vector<std::uint64_t> order_;  // [ distance_sq as bits : 32 | index : 32 ]

@@ -65,6 +65,7 @@ class Scene {
     return result;
   }
   PagedOctree::Reader& reader() { return *reader_; }
+  std::string path() const { return directory_.file("c.sft"); }
   // The surfels as they are read: with normals normalized once more, in their last bits.
   const std::vector<Surfel>& cloud() const { return cloud_; }
   const PointGatherer::Work& work() const { return work_; }
