@@ -16,6 +16,9 @@ namespace {
 
 constexpr int kFewestSurfels = 500, kMostSurfels = 30'000;
 constexpr int kFewestReceivers = 32, kMostReceivers = 96;
+constexpr float kContact = .05f;  // receivers this near to planes of others, in radii, are left out
+
+constexpr int kMostTries = 1000;  // to put receivers on surfaces
 
 // Where the units of the shapes go: scaled, turned, moved.
 struct Setting {
@@ -70,7 +73,7 @@ class SceneMaker {
 
  private:
   void chooseParts();
-  ShapePlace choosePlace(bool is_ground, RandomNumbers& random) const;
+  ShapePlace choosePlace(int kind, RandomNumbers& random) const;
   void makeGrids(int surfels, RandomNumbers& random, Part& part) const;
   void addPart(std::uint8_t number);
   void addSurfels(const std::vector<SampledSurfel>& sampled, std::uint8_t number, bool are_spheres);
@@ -79,6 +82,7 @@ class SceneMaker {
                    std::uint8_t number);
 
   void addReceivers();
+  bool isInContact(const glm::vec3& position, int number) const;
   void addSurfaceReceivers(int number, RandomNumbers& random);
   void addReceiver(const SurfaceSite& site, const char* place, int number);
   void addFreeReceiver(bool is_spherical, RandomNumbers& random);
@@ -91,14 +95,16 @@ class SceneMaker {
   RandomScene scene_;
 };
 
-ShapePlace SceneMaker::choosePlace(bool is_ground, RandomNumbers& random) const {
+ShapePlace SceneMaker::choosePlace(int kind, RandomNumbers& random) const {
+  const bool is_ground = isGroundKind(kind);
   ShapePlace place;
   place.size = is_ground ? random.logBetween(.7, 3) : random.logBetween(.08, 1.2);
   glm::dvec3 foot;
   for (int axis = 0; axis < 3; ++axis) foot[axis] = random.between(-1, 1);
   const bool stands = has_ground_ && random.chance(.6), is_tilted = random.chance(.35);
   if (is_ground) foot *= .3;
-  if (stands) foot.z = random.chance(.7) ? 0 : random.logBetween(.001, .1);
+  // Sheets lie over the ground, not in it; solids may stand on it
+  if (stands) foot.z = isSolidKind(kind) && random.chance(.6) ? 0 : random.logBetween(.001, .1);
   if (is_ground && !has_ground_) foot = {};
   place.frame = !stands && is_tilted ? anyFrame(foot, random) : uprightFrame(foot, random);
   return place;
@@ -141,7 +147,7 @@ void SceneMaker::chooseParts() {
       kind = own.below(shapeKindCount());
     } while (i == 0 && begins_with_ground && !isGroundKind(kind));
     wanted_.push_back(std::max(20, int(total * shares[std::size_t(i)] / sum)));
-    ShapePlace place = choosePlace(isGroundKind(kind), own);
+    ShapePlace place = choosePlace(kind, own);
     place.surfels = wanted_.back();
     Part& part = parts_.emplace_back();
     part.shape = makeShape(kind, place, own);
@@ -235,13 +241,29 @@ void SceneMaker::addTruth(const CellGrid& grid, bool is_flat, bool is_two_sided,
   }
 }
 
+// Whether the place lies in the surface of another part, as below a box on its ground: what it sees
+// is a matter of rounding.
+bool SceneMaker::isInContact(const glm::vec3& position, int number) const {
+  for (std::size_t i = 0; i < scene_.surfels.size(); ++i) {
+    const Surfel& surfel = scene_.surfels[i];
+    if (int(scene_.surfel_ingredients[i]) == number || surfel.isSphere()) continue;
+    const glm::vec3 offset = position - surfel.position;
+    if (glm::dot(offset, offset) > 2 * surfel.radius * surfel.radius) continue;
+    if (std::abs(glm::dot(offset, surfel.normal)) < kContact * surfel.radius) return true;
+  }
+  return false;
+}
+
 void SceneMaker::addReceiver(const SurfaceSite& site, const char* place, int number) {
-  RandomReceiver& one = scene_.receivers.emplace_back();
+  RandomReceiver one;
   one.receiver.position = setting_.position(site.position);
   one.receiver.normal = glm::normalize(setting_.direction(site.normal));
   one.place = place;
   one.ingredient = number;
-  one.ray_offset = float(1e-3 * setting_.scale * site.spacing);
+  const glm::vec3 away = glm::abs(one.receiver.position);
+  one.ray_offset = std::max(float(2e-3 * setting_.scale * site.spacing),
+                            2e-6f * std::max({away.x, away.y, away.z}));
+  if (!isInContact(one.receiver.position, number)) scene_.receivers.push_back(one);
 }
 
 // One or some neighbours on a part.
@@ -285,7 +307,7 @@ void SceneMaker::addSurfaceReceivers(int number, RandomNumbers& random) {
         grid.site(int(column), int(row), column - std::floor(column), row - std::floor(row));
     if (turns) site.normal = -site.normal;
     addReceiver(site,
-                turns && !is_two_sided ? "on a back"
+                turns && !is_two_sided ? "behind a back"
                 : at_edge              ? "at an edge"
                 : patch.is_cavity      ? "in a cavity"
                                        : "on a surface",
@@ -304,9 +326,10 @@ void SceneMaker::addFreeReceiver(bool is_spherical, RandomNumbers& random) {
 void SceneMaker::addReceivers() {
   RandomNumbers random = random_.fork(3);
   const std::size_t count = std::size_t(random.intBetween(kFewestReceivers, kMostReceivers));
+  int tries = 0;
   while (scene_.receivers.size() < count) {
     const double kind = random.unit();
-    if (kind < .85) {
+    if (kind < .85 && tries++ < kMostTries) {
       addSurfaceReceivers(random.below(int(parts_.size())), random);
     } else {
       addFreeReceiver(kind > .95, random);

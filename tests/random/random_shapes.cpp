@@ -431,7 +431,7 @@ void makeLight(const ShapePlace& place, RandomNumbers& random, Shape& shape) {
 struct Kind {
   const char* name;
   void (*make)(const ShapePlace&, RandomNumbers&, Shape&);
-  bool is_ground = false;
+  bool is_ground = false, is_solid = false;
 };
 
 constexpr Kind kKinds[] = {
@@ -444,18 +444,18 @@ constexpr Kind kKinds[] = {
     {"sheet", makeSheet, false},  // twice, as in most scenes
     {"cloth", makeCloth, false},
     {"slats", makeSlats, false},
-    {"box", makeBox, false},
-    {"open box", makeOpenBox, false},
-    {"ball", makeBall, false},
-    {"shells", makeShells, false},
+    {"box", makeBox, false, true},
+    {"open box", makeOpenBox, false, true},
+    {"ball", makeBall, false, true},
+    {"shells", makeShells, false, true},
     {"tubes", makeTubes, false},
-    {"thin wall", makeThinWall, false},
-    {"stairs", makeStairs, false},
-    {"blocks", makeBlocks, false},
-    {"roof with hut", makeRoof, false},
-    {"table with cup", makeTable, false},
+    {"thin wall", makeThinWall, false, true},
+    {"stairs", makeStairs, false, true},
+    {"blocks", makeBlocks, false, true},
+    {"roof with hut", makeRoof, false, true},
+    {"table with cup", makeTable, false, true},
     {"bowl", makeBowl, false},
-    {"foliage", makeFoliage, false},
+    {"foliage", makeFoliage, false, true},
     {"ribbons", makeRibbons, false},
     {"points", makePoints, false},
     {"light", makeLight, false},
@@ -486,6 +486,8 @@ int shapeKindCount() { return int(std::size(kKinds)); }
 const char* shapeKindName(int kind) { return kKinds[kind].name; }
 
 bool isGroundKind(int kind) { return kKinds[kind].is_ground; }
+
+bool isSolidKind(int kind) { return kKinds[kind].is_solid; }
 
 Shape makeShape(int kind, const ShapePlace& place, RandomNumbers& random) {
   Shape shape;

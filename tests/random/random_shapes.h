@@ -62,10 +62,12 @@ struct ShapePlace {
   int surfels = 1000;  // about so many are wanted
 };
 
-// How many kinds there are, their names, and whether others may stand on them.
+// How many kinds there are, their names, whether others may stand on them, and whether they may
+// stand on others.
 int shapeKindCount();
 const char* shapeKindName(int kind);
 bool isGroundKind(int kind);
+bool isSolidKind(int kind);
 Shape makeShape(int kind, const ShapePlace& place, RandomNumbers& random);
 
 }  // namespace surfeit

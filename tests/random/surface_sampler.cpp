@@ -70,6 +70,17 @@ SurfaceSite CellGrid::site(int column, int row, double s, double t) const {
   return site;
 }
 
+SurfaceSite CellGrid::trueSite(int column, int row, double s, double t) const {
+  const glm::dvec3 a = corner(column, row), d = corner(column + 1, row + 1);
+  const glm::dvec3 between = s > t ? corner(column + 1, row) : corner(column, row + 1);
+  SurfaceSite site;
+  site.position = a + std::max(s, t) * (between - a) + std::min(s, t) * (d - between);
+  const glm::dvec3 normal = glm::cross(between - a, d - a);
+  site.normal = glm::normalize(s > t ? normal : -normal);
+  site.spacing = std::sqrt(cellArea(column, row));
+  return site;
+}
+
 double CellGrid::cellArea(int column, int row) const {
   const glm::dvec3 across = corner(column + 1, row + 1) - corner(column, row);
   return .5 * glm::length(glm::cross(across, corner(column, row + 1) - corner(column + 1, row)));

@@ -47,6 +47,8 @@ class CellGrid {
   }
   // Bilinear within the cell; s and t in 0..1.
   SurfaceSite site(int column, int row, double s, double t) const;
+  // On the two triangles that the cell is in truth, cut from its first corner to its last.
+  SurfaceSite trueSite(int column, int row, double s, double t) const;
   double cellArea(int column, int row) const;
   double cellRadius(int column, int row) const;  // of the circle around its middle
 
