@@ -4,8 +4,6 @@
 #include <stdlib.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <numeric>
 #include <system_error>
@@ -64,6 +62,19 @@ Result<std::vector<std::string>> writeClouds(std::span<const Surfel> cloud, int 
   return paths;
 }
 
+Status indexCloud(std::span<const Surfel> cloud, const IndexedSceneOptions& options,
+                  const ScratchDirectory& directory, const std::string& path) {
+  if (!directory.ok()) return Status::ioError("no directory for temporary files");
+  SURFEIT_ASSIGN_OR_RETURN(const std::vector<std::string> paths,
+                           writeClouds(cloud, options.files, directory));
+  IndexOptions indexing;
+  indexing.threads = options.threads;
+  indexing.memory_bytes = options.memory_bytes;
+  indexing.full_precision = options.full_precision;
+  Progress progress;
+  return indexClouds(paths, path, indexing, progress).status();
+}
+
 }  // namespace
 
 CloudChannels channelsOf(std::span<const Surfel> cloud) {
@@ -77,19 +88,7 @@ CloudChannels channelsOf(std::span<const Surfel> cloud) {
   return channels;
 }
 
-Result<std::unique_ptr<IndexedScene>> IndexedScene::make(std::span<const Surfel> cloud,
-                                                         const IndexedSceneOptions& options) {
-  const ScratchDirectory directory;
-  if (!directory.ok()) return Status::ioError(std::strerror(errno));
-  SURFEIT_ASSIGN_OR_RETURN(const std::vector<std::string> paths,
-                           writeClouds(cloud, options.files, directory));
-  IndexOptions indexing;
-  indexing.threads = options.threads;
-  indexing.memory_bytes = options.memory_bytes;
-  indexing.full_precision = options.full_precision;
-  Progress progress;
-  const std::string path = directory.file("scene.sft");
-  SURFEIT_RETURN_IF_ERROR(indexClouds(paths, path, indexing, progress).status());
+Result<std::unique_ptr<IndexedScene>> IndexedScene::open(const std::string& path) {
   SURFEIT_ASSIGN_OR_RETURN(SceneFile file, SceneFile::open(path));
   SURFEIT_ASSIGN_OR_RETURN(
       const PagedOctree::Memory memory,
@@ -97,6 +96,25 @@ Result<std::unique_ptr<IndexedScene>> IndexedScene::make(std::span<const Surfel>
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(file), memory));
   return std::unique_ptr<IndexedScene>(new IndexedScene(std::move(octree)));
+}
+
+Result<std::unique_ptr<IndexedScene>> IndexedScene::make(std::span<const Surfel> cloud,
+                                                         const IndexedSceneOptions& options) {
+  const ScratchDirectory directory;
+  const std::string path = directory.file("scene.sft");
+  SURFEIT_RETURN_IF_ERROR(indexCloud(cloud, options, directory, path));
+  return open(path);  // what is open stays readable
+}
+
+Result<std::unique_ptr<IndexedScene>> IndexedScene::makeBounced(std::span<const Surfel> cloud,
+                                                                const IndexedSceneOptions& options,
+                                                                const BounceOptions& bounce) {
+  const ScratchDirectory directory;
+  const std::string path = directory.file("scene.sft"), bounced = directory.file("bounced.sft");
+  SURFEIT_RETURN_IF_ERROR(indexCloud(cloud, options, directory, path));
+  Progress progress;
+  SURFEIT_RETURN_IF_ERROR(bounceScene(path, bounced, bounce, progress).status());
+  return open(bounced);
 }
 
 Result<std::vector<GatherResult>> IndexedScene::gatherAlone(std::span<const Receiver> receivers,

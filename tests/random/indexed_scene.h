@@ -10,6 +10,7 @@
 #include "gather/gather_rules.h"
 #include "gather/receiver.h"
 #include "octree/paged_octree.h"
+#include "surfeit/bounce.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
@@ -27,6 +28,11 @@ class IndexedScene {
  public:
   static Result<std::unique_ptr<IndexedScene>> make(std::span<const Surfel> cloud,
                                                     const IndexedSceneOptions& options = {});
+  // The same, with the light of bounces.
+  static Result<std::unique_ptr<IndexedScene>> makeBounced(std::span<const Surfel> cloud,
+                                                           const IndexedSceneOptions& options,
+                                                           const BounceOptions& bounce);
+  static Result<std::unique_ptr<IndexedScene>> open(const std::string& path);
 
   // Each by itself, by the scalar gather; and together as gatherCloud does, along the curve. In the
   // order of the receivers.

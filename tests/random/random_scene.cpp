@@ -306,6 +306,7 @@ void SceneMaker::addSurfaceReceivers(int number, RandomNumbers& random) {
     SurfaceSite site =
         grid.site(int(column), int(row), column - std::floor(column), row - std::floor(row));
     if (turns) site.normal = -site.normal;
+    if (turns && !is_two_sided) site.position += .3 * site.spacing * site.normal;
     addReceiver(site,
                 turns && !is_two_sided ? "behind a back"
                 : at_edge              ? "at an edge"
