@@ -1,0 +1,47 @@
+// What the gather may differ by on random scenes. Each limit is a little above what the present
+// engine needs on the seeds of the normal run; the goal stands beside it.
+#pragma once
+
+namespace surfeit {
+
+// Occlusion of a kind of gather against the exact one, over the scenes of a batch of 25: the RMS
+// over a scene's receivers, the worst receiver, and how many scenes may exceed kUsualRms and
+// kLargeRms. Light is the RMS of irradiance over the mean irradiance of the scene.
+struct FidelityLimits {
+  double rms, worst;
+  int above_usual, above_large;
+  double median_light;
+};
+inline constexpr double kUsualRms = .01, kLargeRms = .02;
+
+// Goal of all: rms .02, worst .1, none above .02, none above .01 in three batches of four (99 % of
+// scenes), median light .01; final: half of each. Counts are of 25 scenes, in proportion where a
+// batch has fewer.
+inline constexpr FidelityLimits kFrontLimits = {.65, 1, 8, 8, .02};
+inline constexpr FidelityLimits kBothLimits = {.65, 1, 12, 12, .15};
+inline constexpr FidelityLimits kBackLimits = {.65, 1, 20, 20, .15};
+inline constexpr FidelityLimits kFinalLimits = {.65, 1, 20, 20, .1};
+inline constexpr FidelityLimits kGlossyLimits = {.65, 1, 20, 20, .15};
+inline constexpr FidelityLimits kConeLimits = {.65, 1, 20, 20, .1};
+inline constexpr FidelityLimits kFalloffLimits = {.65, 1, 20, 20, .1};
+inline constexpr FidelityLimits kSubsetLimits = {.65, 1, 20, 20, .1};
+
+// One bounce, by default against exactly: RMS of irradiance over its mean. Goal: .02.
+inline constexpr double kMostBounceLight = .1;
+
+// A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
+// by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.
+inline constexpr double kUsualStep = .004, kMostStep = 1;
+inline constexpr double kUnusualSteps = 300;
+
+// The same scene moved, turned by quarters, and twice as large. Results of the exact gather differ
+// by rounding, of the default by other cells of the octree as well: RMS over a scene. Goals: .002
+// and .01 for what is moved or turned, nothing for the scale.
+struct InvarianceLimits {
+  double exact, fast;
+};
+inline constexpr InvarianceLimits kMovedLimits = {.5, .5};
+inline constexpr InvarianceLimits kTurnedLimits = {.5, .5};
+inline constexpr InvarianceLimits kScaledLimits = {0, 0};
+
+}  // namespace surfeit
