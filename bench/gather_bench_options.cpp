@@ -62,10 +62,6 @@ void addGatherBenchOptions(CLI::App& app, GatherBenchOptions& options) {
   app.add_option("--near-field", quality.near_field_radii, "Reach of tracing, in surfel radii")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  app.add_option("--far-parallax", quality.far_field_parallax,
-                 "Error of the shared far field, in pixels; 0: none is shared")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str();
   app.add_option("--bias", quality.bias, "Start of rays above the receiver, in surfel radii")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();

@@ -61,7 +61,7 @@ class PacketEngine : public GatherEngine {
     return {.receivers = receivers_,
             .nodes_visited = work.nodes_visited,
             .surfels_visited = work.surfels_visited,
-            .contributions = work.patches + work.shared_patches,
+            .contributions = work.patches,
             .phases = {.walk = work.walk_seconds,
                        .sort = work.sort_seconds,
                        .draw = work.draw_seconds,

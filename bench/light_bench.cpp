@@ -130,14 +130,13 @@ std::vector<Light> makeLights(const GatherQuality& quality, const LoadedEnvironm
 }
 
 // Root mean square difference of occlusion from a gather that takes the same light far more
-// exactly: an eighth of the solid angle, raster and near field twice as fine, nothing shared.
+// exactly: an eighth of the solid angle, raster and near field twice as fine.
 Result<double> errorOf(const Light& light, const LoadedEnvironment& fine_sky,
                        const ReceiverSet& set, PagedOctree& octree) {
   GatherRules fine = light.rules;
   fine.quality.max_solid_angle /= 8;
   fine.quality.raster_resolution *= 2;
   fine.quality.near_field_radii *= 2;
-  fine.quality.far_field_parallax = 0;
   if (fine.environment != nullptr) {
     fine.environment = &fine_sky.map;
     fine.environment_cube = &fine_sky.cube;

@@ -62,7 +62,6 @@ Status runBounce(BounceArguments& arguments, CommandContext& context) {
                              {"max_solid_angle", options.quality.max_solid_angle},
                              {"raster_resolution", options.quality.raster_resolution},
                              {"near_field_radii", options.quality.near_field_radii},
-                             {"far_field_parallax", options.quality.far_field_parallax},
                              {"memory_bytes", stats.memory_bytes},
                              {"surfels", stats.surfels},
                              {"file_bytes", stats.file_bytes},

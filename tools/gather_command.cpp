@@ -47,7 +47,6 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
                              {"max_solid_angle", options.quality.max_solid_angle},
                              {"raster_resolution", options.quality.raster_resolution},
                              {"near_field_radii", options.quality.near_field_radii},
-                             {"far_field_parallax", options.quality.far_field_parallax},
                              {"max_variation", options.quality.max_variation},
                              {"memory_bytes", stats.memory_bytes},
                              {"receivers", stats.receivers},

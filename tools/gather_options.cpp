@@ -58,13 +58,6 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
       ->capture_default_str()
       ->group(kGroup);
   command
-      .add_option("--far-parallax", quality.far_field_parallax,
-                  "Neighbours share a far field where that moves it by less than this part of a "
-                  "pixel; 0: none do")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str()
-      ->group(kGroup);
-  command
       .add_option("--max-dist,--maxdist", quality.max_distance,
                   "Surfels farther away do not count, in scene units")
       ->check(CLI::PositiveNumber)

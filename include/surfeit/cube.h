@@ -89,7 +89,7 @@ struct CubeImage {
 
 // Gathers at one receiver and returns its raster. Options mean what they mean to gatherCloud, so
 // give it the same: mode, outputs, quality, weights, environment, groups, eye, memory and direct_io
-// count; max variation, far-field parallax, order, threads and all about files do not. Without
+// count; max variation, order, threads and all about files do not. Without
 // an output that needs light (GatherOptions::outputs), pixels have none. The receiver is gathered
 // alone, by the scalar definition of the gather; in gatherCloud it shares its cut with neighbours
 // and may differ by what docs/benchmarks.md tells. Works on one thread. Calls are independent, so

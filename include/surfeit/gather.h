@@ -82,9 +82,6 @@ struct GatherQuality {
   // Surfels closer than this many of their radii are ray traced (memo 3.4.1), or of eighths of
   // their longer side.
   float near_field_radii = 8;
-  // The far field is seen from the middle of 16 neighbouring receivers where that moves it by less
-  // than this part of a raster pixel; 0: by every receiver for itself.
-  float far_field_parallax = 0.2f;
   // Surfels farther than this do not count; scene units.
   float max_distance = 1e30f;
   GatherSides sides = GatherSides::kFront;
@@ -97,8 +94,8 @@ struct GatherQuality {
 // Settings from measured tables (docs/benchmarks.md, "Errors and rates"). Standard is the default.
 enum class QualityPreset : std::uint8_t { kDraft, kStandard, kFinal };
 
-// Sets what decides about errors: max solid angle, raster resolution, near field, parallax. The
-// rest, such as sides and distances, stays as it is.
+// Sets what decides about errors: max solid angle, raster resolution, near field. The rest, such as
+// sides and distances, stays as it is.
 void setQuality(QualityPreset preset, GatherQuality& quality);
 
 // The order in which receivers are gathered. Decides how often pages are read, and which receivers

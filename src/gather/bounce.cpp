@@ -294,7 +294,6 @@ std::string Bouncer::provenance() const {
                           {"max_solid_angle", quality.max_solid_angle},
                           {"raster_resolution", quality.raster_resolution},
                           {"near_field_radii", quality.near_field_radii},
-                          {"far_field_parallax", quality.far_field_parallax},
                           {"bias", quality.bias},
                           {"max_distance", quality.max_distance},
                           {"both_sides", quality.sides == GatherSides::kBoth}};

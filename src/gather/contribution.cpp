@@ -146,6 +146,14 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 }
 
 namespace {
+// Four times band 0, over the area: 1 of one-sided disks, 2 of two-sided ones, 4 of spheres.
+float partsOfBand0(const Node& node) {
+  return 4 * kShY00 * node.rough.sh[0][kAreaKind] / node.area;
+}
+// How much of a rough node is spheres, 0..1, when the rest is two-sided; one-sided disks count for
+// less.
+float spherePart(const Node& node) { return std::clamp(0.5f * (partsOfBand0(node) - 2), 0.f, 1.f); }
+
 // The ellipse that spreads as the node does, projected along the direction. The covariance is
 // stored in steps of 1/255 of its trace: that much is added, lest a thin wire has no outline.
 float ellipseArea(const Node& node, const glm::vec3& direction) {
@@ -162,7 +170,8 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
 // in front plus back, which the limit of the area takes back head-on.)
 RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket) {
   const float ellipse = ellipseArea(node, direction), sphere = kPi * node.radius * node.radius;
-  const float most = std::min({node.area, sphere, kFilledOutline * ellipse});
+  const float filled = kFilledOutline + spherePart(node) * (1 - kFilledOutline);
+  const float most = std::min({node.area, sphere, filled * ellipse});
   const float surface = std::min(shown, most);
   const float outline = std::min(sphere, kThicketOutline * ellipse);
   if (!(thicket > 0 && outline > 0)) return {surface, 1, most};
@@ -204,11 +213,10 @@ float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionR
   return nestedPart(surfel.isTwoSided(), thicket);
 }
 
-// Four times band 0 is the area of one-sided disks, twice that of two-sided ones, and four times
-// that of spheres, which are a surface. Codes round: what is about none is none.
+// Spheres are a surface. Codes round: what is about none is none.
 float thicketPart(const Node& node) {
   constexpr float kNone = 0.05f;
-  const float more = 4 * kShY00 * node.rough.sh[0][kAreaKind] / node.area - 1;
+  const float more = partsOfBand0(node) - 1;
   const float part = std::min(more, 0.5f * (3 - more));
   return std::clamp((part - kNone) / (1 - 2 * kNone), 0.f, 1.f);
 }
@@ -251,6 +259,7 @@ bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const Contr
   contribution.overlap = contribution.thicket = facet.is_thicket ? 1 : 0;
   contribution.opacity = 1;
   contribution.nested = nestedPart(facet.is_two_sided, contribution.thicket);
+  contribution.is_solid = 1;
   contribution.normal = facet.normal;
   contribution.shape = shapeOf(facet.covariance);
   contribution.radiosity = glm::vec3(0);
@@ -292,6 +301,7 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
     contribution.overlap = overlapOf(facing.back, facing.front);
   }
   contribution.overlap = std::max(contribution.overlap, contribution.thicket);
+  contribution.is_solid = 0;
   contribution.normal = node.flatness * node.normal;
   contribution.shape = shapeOf(node.covariance);
   contribution.radiosity = glm::vec3(0);
@@ -322,6 +332,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.thicket = thicketPart(surfel);
   contribution.opacity = 1;
   contribution.nested = nestedPart(surfel, ribbon, rules);
+  contribution.is_solid = mayTile(surfel) ? 1 : 0;
   contribution.normal = surfel.normal;
   contribution.shape = ribbon.isEmpty() ? withoutDirection(surfel.normal) : ribbon.shape();
   contribution.radiosity = sends_light && rules.has_color ? surfel.radiosity : glm::vec3(0);

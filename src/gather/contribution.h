@@ -29,11 +29,12 @@ struct Contribution {
   float opacity;          // what it hides of its solid angle, 0..1; 1 but for thickets, and while
                           // a node fades into what is below it
   float nested;           // how far it hides behind other layers; likewise
+  float is_solid;         // 1: a tile of a surface; 0: a sphere, or a rough node; likewise
   glm::vec3 normal;       // unit length for a disk, zero for a sphere, in between when partly flat
   SymmetricMatrix shape;  // how it spreads; see RasterCube::Patch
   glm::vec3 radiosity;    // of what covers; back sides are black. Zero when color is not asked for.
 };
-static_assert(sizeof(Contribution) == 23 * sizeof(float));
+static_assert(sizeof(Contribution) == 24 * sizeof(float));
 
 // How contributions are to be made.
 struct ContributionRules {
@@ -104,6 +105,9 @@ float reachOf(const Facet& facet, const glm::vec3& direction);
 // How far before and behind its middle a surfel meets others of its layer, seen in this direction.
 // `radius`: drawnRadius.
 float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius, const glm::vec3& direction);
+// Whether a surfel is a tile of a surface by all that it tells: spheres and two-sided ones, leaves,
+// may stand alone.
+inline bool mayTile(const Surfel& surfel) { return !surfel.isSphere() && !surfel.isTwoSided(); }
 // How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
 float thicketPart(const Surfel& surfel);
 // How much of what it covers hides behind the same side of a pixel as other layers, 0..1.

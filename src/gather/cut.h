@@ -40,24 +40,6 @@ struct PacketView {
 PacketView viewPacket(std::span<const Receiver> receivers);
 PacketView viewPacket(std::span<const Receiver> receivers, const GatherRules& rules);
 
-// A cluster of packets divides what lies around it: what is closer to its centre than the limit
-// each packet looks at by itself, the rest they look at together (docs/algorithm.md, "The shared
-// far field"). The cluster's two kinds of walk take every surfel exactly once between them.
-struct CutRegion {
-  enum class Part : std::uint8_t { kAll, kNear, kFar };
-  Part part = Part::kAll;
-  PacketView cluster{};  // all its receivers
-  float limit = 0;
-
-  // Whether a surfel here is of the part.
-  bool holds(const glm::vec3& position) const {
-    if (part == Part::kAll) return true;
-    const glm::vec3 offset = position - cluster.centre;
-    const bool is_near = glm::dot(offset, offset) < limit * limit;
-    return is_near == (part == Part::kNear);
-  }
-};
-
 // How a cut is chosen.
 struct CutRules {
   float max_solid_angle = 0;  // 0: nothing stands in for anything, and nothing visible is left out
@@ -65,8 +47,7 @@ struct CutRules {
   float facing = 1;                   // 1: only fronts are seen, -1: only backs, 0: both
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
   float most_coarser = 1;             // what is low may look so many times as large
-  float fading = 0;  // nodes that look by this part smaller or larger than they may fade; if any
-                     // do, leaves by kLeafFading
+  float pixel = 0;                    // slope of a pixel of the raster
 
   bool approximates() const { return max_solid_angle > 0; }
   bool seesAllGroups() const { return groups == kAllGroups; }
@@ -76,36 +57,17 @@ struct CutRules {
   bool isMixed(const Node& node) const { return (node.groups & ~groups) != 0; }
 };
 
-// How much something counts for each receiver of a packet, 0..1, where a node fades into what is
-// below it.
-struct Blend {
-  float at_centre = 1;  // of the packet; beyond 0..1 where only receivers beside it see a change
-  glm::vec3 slope{0};   // for each unit away from there
-  bool isWhole() const { return at_centre >= 1 && slope == glm::vec3(0); }
-  Blend rest() const { return {1 - at_centre, -slope}; }
-  // For a receiver that is here from the centre.
-  float at(const glm::vec3& offset) const {
-    return std::clamp(at_centre + glm::dot(slope, offset), 0.f, 1.f);
-  }
-};
+// How much something counts for each receiver of a packet, 0..1.
+using LaneParts = std::array<float, kPacketReceivers>;
 
-// Of one parent.
-inline constexpr std::size_t kMostSiblings = 8;
+// The highest that anything of the node rises above its middle, in unit direction `up`: of what its
+// sphere and its slab have in common.
+float riseOf(const Node& node, const glm::vec3& up);
 
-// What the test for siblings says. A node of both classes fades from one into the other.
-struct SiblingClasses {
-  std::uint32_t far = 0;   // bit i: node i is drawn as a whole
-  std::uint32_t open = 0;  // bit i: its children or surfels are looked at
-  // How much the latter count, of nodes in some class; the node itself has the rest
-  Blend below(std::size_t i) const { return {at_centre[i], {slope_x[i], slope_y[i], slope_z[i]}}; }
-  void setBelow(std::size_t i, const Blend& blend) {
-    at_centre[i] = blend.at_centre;
-    slope_x[i] = blend.slope.x;
-    slope_y[i] = blend.slope.y;
-    slope_z[i] = blend.slope.z;
-  }
-  std::array<float, kMostSiblings> at_centre, slope_x, slope_y, slope_z;
-};
+// How much of what is below a node the receiver looks at instead of the node as a whole: 0 when it
+// looks small enough, 1 when it does not, and in between while it fades from one into the other.
+// The definition of the cut (docs/algorithm.md, "Choosing the cut").
+float openPart(const Node& node, const Receiver& receiver, const CutRules& rules);
 
 // From one place to the next, a node would give way to its children at once, and what they show
 // differently would be a step. So it fades into them while it looks by this part smaller to this
@@ -118,27 +80,32 @@ inline constexpr float kFading = 0.02f;
 // irradiance below a sphere on the floor, bench/line_steps.sh: .62 % with kFading, .45 %, for 2 %
 // more patches.)
 inline constexpr float kLeafFading = 0.1f;
-// Each receiver of a packet has its own blend, as long as the packet's radius is no larger than
-// this part of the distance; in one that is larger all have, more and more, that of the closest:
-// too many nodes would fade. (With .03 instead of .2 the largest jumps of irradiance on the floor
-// are 1.0 and 1.2 instead of .2 and .6 %, where a sphere touches it and 16 receivers are as wide as
-// a tenth of the way; for 2 % more patches.)
-inline constexpr float kMostFadingSpread = 0.2f;
 
-// Sorts siblings by what the packet makes of them; those in neither class are not seen, and those
-// in both fade. docs/algorithm.md, "Choosing the cut", has the tests. This is the definition.
+// Of one parent.
+inline constexpr std::size_t kMostSiblings = 8;
+
+// What a packet makes of siblings, as bits. Those of no class are proved to be invisible, or cover
+// less than a stated part of the hemisphere.
+struct SiblingClasses {
+  std::uint32_t far = 0;    // openPart is 0 for all receivers
+  std::uint32_t open = 0;   // openPart is 1 for all receivers
+  std::uint32_t mixed = 0;  // neither is known
+};
+
+// Which nodes no receiver of the packet sees anything of, and how the rest stands.
 SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView& view,
-                                const CutRegion& region, const CutRules& rules);
+                                const CutRules& rules);
 
-// The same, eight at once, for this machine. Results may differ where rounding decides.
+// The same, eight at once, for this machine. Results may differ where rounding decides, and more
+// may be mixed.
 using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const PacketView&,
-                                             const CutRegion&, const CutRules&);
+                                             const CutRules&);
 SiblingClassifier fastestSiblingClassifier();
 
-// Calls visit.node(const Node&, const Blend&) for the nodes small enough as a whole, and
-// visit.leaf(const Node&) and visit.surfels(std::span<const Surfel>, const Blend&) for leaves too
-// near, of whose surfels the region may not hold all. The blend says how much they count, where a
-// node fades into what is below. Surfels of groups that are not seen are left out.
+// Calls visit.node(const Node&, const LaneParts*) for the nodes that some receiver sees as a whole,
+// visit.leaf(const Node&) and visit.surfels(std::span<const Surfel>, const LaneParts*) for leaves
+// that some receiver looks into. The parts say how much they count for each receiver; null: wholly
+// for all. Surfels of groups that are not seen are left out.
 // `Reader` has the functions of PagedOctree::Reader. The order depends on octree and view alone.
 // One thread at a time.
 class CutWalk {
@@ -146,31 +113,40 @@ class CutWalk {
   explicit CutWalk(const GatherRules& rules,
                    SiblingClassifier classify = fastestSiblingClassifier())
       : rules_{maxSolidAngle(rules), rules.quality.max_distance, facingOf(rules.quality.sides),
-               rules.groups, mostCoarser(rules)},
+               rules.groups,         mostCoarser(rules),         1 / pixelsPerSlope(rules)},
         classify_(classify) {}
 
+  // `view`: of these receivers, 1 to kPacketReceivers.
   template <typename Reader, typename Visit>
-  Status walk(const PacketView& view, const CutRegion& region, Reader& octree, Visit&& visit) {
+  Status walk(const PacketView& view, std::span<const Receiver> receivers, Reader& octree,
+              Visit&& visit) {
     nodes_visited_ = surfels_visited_ = 0;
     std::size_t stack_count = 0;
-    stack_[stack_count++] = {kRootRange, {}};
+    stack_[stack_count++] = {kRootRange, false, {}};
     while (stack_count > 0) {
-      const auto [range, blend] = stack_[--stack_count];
-      const bool fades = !blend.isWhole();
-      SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings, octree.nodes(range));
+      const Siblings from = stack_[--stack_count];
+      SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings, octree.nodes(from.range));
       nodes_visited_ += siblings.size();
       SURFEIT_RETURN_IF_ERROR(octree.checkVisits(nodes_visited_, surfels_visited_));
-      // What is below something that fades fades no more by itself
-      rules_.fading = fades ? 0 : kFading;
-      const SiblingClasses classes = classify_(siblings, view, region, rules_);
-      for (std::uint32_t far = classes.far; far != 0; far &= far - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(far));
-        visit.node(siblings[i], fades ? blend : classes.below(i).rest());
-      }
-      for (std::uint32_t open = classes.open; open != 0; open &= open - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(open));
+      const SiblingClasses classes = classify_(siblings, view, rules_);
+      const LaneParts* const whole = from.has_parts ? &from.parts : nullptr;
+      for (std::uint32_t rest = classes.far | classes.open | classes.mixed; rest != 0;
+           rest &= rest - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(rest));
         const Node& node = siblings[i];
-        const Blend below = fades ? blend : classes.below(i);
+        const std::uint32_t bit = 1u << i;
+        if ((classes.far & bit) != 0) {
+          visit.node(node, whole);
+          continue;
+        }
+        const LaneParts* below = whole;
+        LaneParts own_parts, below_parts;
+        if ((classes.mixed & bit) != 0) {
+          const Division division = divide(node, receivers, whole, own_parts, below_parts);
+          if (division.has_own) visit.node(node, &own_parts);
+          if (!division.has_below) continue;
+          below = division.has_own ? &below_parts : whole;
+        }
         if (node.isLeaf()) {
           visit.leaf(node);
           SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
@@ -178,7 +154,10 @@ class CutWalk {
             visitSeen(run, below, visit);
           }));
         } else if (stack_count < kStackSize) {
-          stack_[stack_count++] = {childrenOf(node), below};
+          Siblings& next = stack_[stack_count++];
+          next.range = childrenOf(node);
+          next.has_parts = below != nullptr;
+          if (below != nullptr) next.parts = *below;
         } else {
           return Status::corruption("octree: deeper than its curve has levels");
         }
@@ -195,17 +174,39 @@ class CutWalk {
   static float facingOf(GatherSides sides) {
     return sides == GatherSides::kFront ? 1.f : sides == GatherSides::kBack ? -1.f : 0.f;
   }
+  // Shares out what each receiver sees of a node to the node and what is below it.
+  struct Division {
+    bool has_own, has_below;  // for some receiver
+  };
+  Division divide(const Node& node, std::span<const Receiver> receivers, const LaneParts* whole,
+                  LaneParts& own, LaneParts& below) const {
+    Division division = {false, false};
+    for (std::size_t i = 0; i < kPacketReceivers; ++i) {
+      if (i >= receivers.size()) {
+        own[i] = own[i - 1];
+        below[i] = below[i - 1];
+        continue;
+      }
+      const float all = whole != nullptr ? (*whole)[i] : 1;
+      below[i] = all > 0 ? all * openPart(node, receivers[i], rules_) : 0;
+      own[i] = all - below[i];
+      division.has_own = division.has_own || own[i] > 0;
+      division.has_below = division.has_below || below[i] > 0;
+    }
+    return division;
+  }
+
   // Hands over the surfels of groups that are seen, as runs: neighbours are often of one group.
   template <typename Visit>
-  void visitSeen(std::span<const Surfel> surfels, const Blend& blend, Visit& visit) const {
-    if (rules_.seesAllGroups()) return visit.surfels(surfels, blend);
+  void visitSeen(std::span<const Surfel> surfels, const LaneParts* parts, Visit& visit) const {
+    if (rules_.seesAllGroups()) return visit.surfels(surfels, parts);
     const auto isSeen = [&](std::size_t i) { return rules_.sees(groupBit(surfels[i].group)); };
     for (std::size_t end = 0; end < surfels.size();) {
       std::size_t begin = end;
       while (begin < surfels.size() && !isSeen(begin)) ++begin;
       end = begin;
       while (end < surfels.size() && isSeen(end)) ++end;
-      if (end > begin) visit.surfels(surfels.subspan(begin, end - begin), blend);
+      if (end > begin) visit.surfels(surfels.subspan(begin, end - begin), parts);
     }
   }
 
@@ -216,7 +217,8 @@ class CutWalk {
   SiblingClassifier classify_;
   struct Siblings {
     NodeRange range;
-    Blend blend;
+    bool has_parts;
+    LaneParts parts;
   };
   std::array<Siblings, kStackSize> stack_;
   std::uint64_t nodes_visited_ = 0, surfels_visited_ = 0;
@@ -224,9 +226,9 @@ class CutWalk {
 
 // For walks that are made for the pages they touch.
 struct IgnoreCut {
-  void node(const Node&, const Blend&) {}
+  void node(const Node&, const LaneParts*) {}
   void leaf(const Node&) {}
-  void surfels(std::span<const Surfel>, const Blend&) {}
+  void surfels(std::span<const Surfel>, const LaneParts*) {}
 };
 
 }  // namespace surfeit

@@ -75,9 +75,6 @@ Status checkGatherOptions(const GatherOptions& options) {
   if (!isFromZero(quality.near_field_radii)) {
     return refuse("near field", quality.near_field_radii, "0 or more surfel radii");
   }
-  if (!isFromZero(quality.far_field_parallax)) {
-    return refuse("parallax of the far field", quality.far_field_parallax, "0 or more pixels");
-  }
   if (!(quality.max_distance > 0)) {
     return refuse("max distance", quality.max_distance, "more than 0 scene units");
   }
@@ -97,22 +94,20 @@ Status checkGatherOptions(const GatherOptions& options) {
 
 void setQuality(QualityPreset preset, GatherQuality& quality) {
   const GatherQuality standard;
-  const auto set = [&](float max_solid_angle, int resolution, float near_field, float parallax) {
+  const auto set = [&](float max_solid_angle, int resolution, float near_field) {
     quality.max_solid_angle = max_solid_angle;
     quality.raster_resolution = resolution;
     quality.near_field_radii = near_field;
-    quality.far_field_parallax = parallax;
   };
   switch (preset) {
     case QualityPreset::kDraft:
-      set(0.2f, 10, 4, 0.5f);
+      set(0.2f, 10, 4);
       break;
     case QualityPreset::kStandard:
-      set(standard.max_solid_angle, standard.raster_resolution, standard.near_field_radii,
-          standard.far_field_parallax);
+      set(standard.max_solid_angle, standard.raster_resolution, standard.near_field_radii);
       break;
     case QualityPreset::kFinal:
-      set(0.012f, 40, 16, 0);  // a shared far field steps where packets meet
+      set(0.012f, 40, 16);
       break;
   }
 }

@@ -8,10 +8,11 @@ namespace {
 // Hands the cut to the raster.
 struct DrawCut {
   ReceiverRaster& raster;
-  void node(const Node& node, const Blend& blend) { raster.addNode(node, blend.at(glm::vec3(0))); }
+  static float partOf(const LaneParts* parts) { return parts != nullptr ? (*parts)[0] : 1; }
+  void node(const Node& node, const LaneParts* parts) { raster.addNode(node, partOf(parts)); }
   void leaf(const Node&) {}
-  void surfels(std::span<const Surfel> run, const Blend& blend) {
-    for (const Surfel& surfel : run) raster.addSurfel(surfel, blend.at(glm::vec3(0)));
+  void surfels(std::span<const Surfel> run, const LaneParts* parts) {
+    for (const Surfel& surfel : run) raster.addSurfel(surfel, partOf(parts));
   }
 };
 
@@ -24,7 +25,7 @@ Status PointGatherer::gather(const Receiver& receiver, PagedOctree::Reader& octr
                              GatherResult& result) {
   raster_.begin(receiver);
   SURFEIT_RETURN_IF_ERROR(
-      cut_.walk(viewPacket({&receiver, 1}, rules_), {}, octree, DrawCut{raster_}));
+      cut_.walk(viewPacket({&receiver, 1}, rules_), {&receiver, 1}, octree, DrawCut{raster_}));
   work_ = {.nodes_visited = cut_.nodesVisited(),
            .surfels_visited = cut_.surfelsVisited(),
            .contributions = raster_.contributionCount(),

@@ -88,19 +88,16 @@ LookUpTrace::LookUpTrace(PagedOctree& octree, const GatherRules& rules, int thre
 
 // As PacketGatherer::gather walks.
 Status LookUpTrace::walk(std::span<const Receiver> receivers, Reader& reader) {
-  const PacketCluster cluster(receivers, rules_);
+  const PacketCluster cluster(receivers);
   cost_.begin(cluster.receivers(0)[0].position);
-  SURFEIT_RETURN_IF_ERROR(
-      cut_->walk(viewPacket(cluster.receivers(0).first(1), rules_), {}, reader, cost_));
-  if (cluster.shares()) {
-    SURFEIT_RETURN_IF_ERROR(cut_->walk(cluster.view(), cluster.farRegion(), reader, IgnoreCut{}));
-  }
+  const std::span<const Receiver> first = cluster.receivers(0).first(1);
+  SURFEIT_RETURN_IF_ERROR(cut_->walk(viewPacket(first, rules_), first, reader, cost_));
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
     const std::span<const Receiver> packet = cluster.receivers(i);
     SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(
         packet, cluster.mostPacketRadius(), [&](std::size_t begin, std::size_t count) {
-          return cut_->walk(viewPacket(packet.subspan(begin, count), rules_), cluster.regionOf(i),
-                            reader, IgnoreCut{});
+          const std::span<const Receiver> part = packet.subspan(begin, count);
+          return cut_->walk(viewPacket(part, rules_), part, reader, IgnoreCut{});
         }));
   }
   return {};

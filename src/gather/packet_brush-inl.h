@@ -52,24 +52,30 @@ class Brush {
   void BeginFace(int face) {
     face_ = face;
     seen_ = &canvas_.seen->faces[std::size_t(face)];
-    const auto lanesOf = [&](float* values, std::size_t channels) {
-      return FaceLanes(values, canvas_, std::size_t(face), lane_, channels);
-    };
-    pixels_ = lanesOf(canvas_.pixels, kChannels);
-    thickets_ = lanesOf(canvas_.thickets, 1);
-    begins_ = lanesOf(canvas_.begins, 1);
+    pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
+    hull_ =
+        Hull(pixels_, *seen_, canvas_.geometry->pixels().data() + face * resolution_ * resolution_,
+             resolution_, InRaster(receivers_.normal), receivers_.spherical);
     ClearFace();
   }
+  // Nothing more is drawn to it.
+  void EndFace() { hull_.CloseAll(); }
 
   HWY_INLINE void DrawPatch(const Patch& patch) {
-    const Sight sight = See(canvas_, patch, receivers_);
+    Sight sight = See(canvas_, patch, receivers_);
+    M seen = SeenAsPatch(patch, receivers_, sight);
+    if (patch.parts != 0) {
+      const M counts = hn::Gt(LoadLanes(canvas_.parts[patch.parts].of, lane_), hn::Zero(D()));
+      seen = hn::And(seen, counts);
+      sight.traced = hn::And(sight.traced, counts);
+    }
     if (!hn::AllFalse(D(), sight.traced)) Trace(patch, sight);
-    const M seen = SeenAsPatch(patch, receivers_, sight);
     if (!hn::AllFalse(D(), seen)) SplatPatch(patch, sight, seen);
   }
 
  private:
-  static constexpr std::size_t kChannels = PacketCanvas::kCoverageChannels + Kind::kChannels;
+  using Hull = FaceHull<Kind::kChannels>;
+  static constexpr std::size_t kChannels = Hull::kAll;
   // Of a patch, in the frame of the raster.
   using Normal = std::conditional_t<Kind::kFrame, V3, glm::vec3>;
   Normal InRaster(const glm::vec3& normal) const {
@@ -111,10 +117,11 @@ class Brush {
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
       float* const at = pixels_.at(pixel);
       for (std::size_t i = 0; i < kChannels; ++i) {
-        const bool is_open = i == PacketCanvas::kRoom || i == PacketCanvas::kOpen;
-        hn::Store(is_open ? Splat(1) : hn::Zero(d), d, at + i * kStep);
+        const bool is_open =
+            i == PacketCanvas::kRoom || i == PacketCanvas::kOpen || i == Hull::kOpenBefore;
+        const float value = is_open ? 1.f : i == Hull::kEnd ? -1.f : 0.f;
+        hn::Store(Splat(value), d, at + i * kStep);
       }
-      if (thickets_) hn::Store(hn::Zero(d), d, thickets_.at(pixel));
     });
   }
 
@@ -129,9 +136,10 @@ class Brush {
     cover.inverse_touch = inverse_touch;
     cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
-    cover.thicket = patch.thicket;
+    cover.has_hull = patch.thicket == 0;
+    cover.is_solid = patch.is_solid;
     cover.nested = patch.nested(ribbon_nested_);
-    cover.opacity = hn::Mul(part, Opacity(patch, sight));
+    cover.opacity = hn::Mul(part, Opacity(patch));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
@@ -140,14 +148,9 @@ class Brush {
   }
 
   // Each receiver has its own while a node fades into what is below it.
-  V Opacity(const Patch& patch, const Sight& sight) const {
-    if (patch.blend.isWhole()) return Splat(patch.opacity);
-    const glm::vec3& slope = patch.blend.slope;
-    // From the centre: the patch is in the same place for all
-    const glm::vec3 middle = patch.position - canvas_.centre;
-    const V at_centre = Splat(patch.blend.at_centre + glm::dot(slope, middle));
-    const V blend = hn::Sub(at_centre, Dot(sight.offset, slope));
-    return hn::Mul(Splat(patch.opacity), hn::Min(Splat(1), hn::Max(hn::Zero(D()), blend)));
+  V Opacity(const Patch& patch) const {
+    if (patch.parts == 0) return Splat(patch.opacity);
+    return hn::Mul(Splat(patch.opacity), LoadLanes(canvas_.parts[patch.parts].of, lane_));
   }
 
   // As fadeAt.
@@ -174,17 +177,20 @@ class Brush {
     if (hn::AllFalse(D(), seen)) return;
 
     // The visible area, times the distance
-    const V cosine = patch.range > 0
-                         ? RimCosine(sight.facing, hn::Mul(Splat(patch.range), distance))
-                         : hn::Abs(sight.facing);
+    V cosine = hn::Abs(sight.facing);
+    if (patch.range > 0) {
+      const V range = hn::Mul(Splat(patch.range), distance);
+      cosine = patch.showsBoth() ? RimOfBoth(cosine, range) : RimCosine(sight.facing, range);
+    }
     const V area = hn::Min(
         hn::MulAdd(Splat(patch.disk_area), cosine, hn::Mul(Splat(patch.round_area), distance)),
         hn::Mul(Splat(patch.most_area), distance));
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
     const Parallelogram shape = OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w);
-    CoverParallelogram(
-        shape, seen,
-        MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape)));
+    const Cover cover =
+        MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape));
+    CoverParallelogram(shape, seen, cover);
+    if (cover.has_hull) AddHull(shape, seen, cover);
   }
 
   // As touchPart.
@@ -199,6 +205,12 @@ class Brush {
     const V sum = hn::Max(hn::Zero(D()), hn::Sub(range, facing));
     const V rim = hn::Div(hn::Mul(sum, sum), hn::Mul(Splat(4), range));
     return hn::IfThenElse(hn::Lt(hn::Neg(facing), range), rim, hn::Neg(facing));
+  }
+
+  // Fronts and backs together.
+  static V RimOfBoth(V cosine, V range) {
+    const V rim = hn::Div(hn::MulAdd(cosine, cosine, hn::Mul(range, range)), hn::Add(range, range));
+    return hn::IfThenElse(hn::Lt(cosine, range), rim, cosine);
   }
 
   // As RasterCube::onFace; `area` is the visible area times the distance.
@@ -258,16 +270,73 @@ class Brush {
 
     const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
     const Rows rows = {y0, y1, half_x, range};
-    if (cover.thicket > 0) return CoverRows<true, true>(shape, rows, cover);
-    cover.overlap > 0 ? CoverRows<true, false>(shape, rows, cover)
-                      : CoverRows<false, false>(shape, rows, cover);
+    cover.overlap > 0 ? CoverRows<true>(shape, rows, cover) : CoverRows<false>(shape, rows, cover);
+  }
+
+  // As RasterCube::addHull, of lanes that hide enough.
+  HWY_INLINE void AddHull(const Parallelogram& shape, M seen, const Cover& cover) {
+    const D d;
+    const DU du;
+    seen = hn::And(seen, hn::Ge(cover.opacity, Splat(kHullOpacity)));
+    const V zero = hn::Zero(d), size = Splat(float(resolution_)), samples = Splat(float(kHullSide));
+    const V side = hn::Sqrt(hn::Mul(shape.half_x, shape.half_y));
+    const V half_side = hn::MulAdd(side, Splat(kHullWidening * float(kHullSide)), Splat(0.5f));
+    V widening = hn::Floor(hn::Min(samples, hn::Max(Splat(1), half_side)));
+    if (!cover.is_solid) widening = zero;
+    const V wider = hn::Mul(widening, Splat(1 / float(kHullSide)));
+    const V reach = hn::Add(hn::MulAdd(hn::Abs(shape.shear), shape.half_y, shape.half_x), wider);
+    const V half_y = hn::Add(shape.half_y, wider), half_x = hn::Add(shape.half_x, wider);
+    const V x0 = hn::Max(zero, hn::Sub(shape.x, reach)),
+            x1 = hn::Min(size, hn::Add(shape.x, reach));
+    const V y0 = hn::Sub(shape.y, half_y), y1 = hn::Add(shape.y, half_y);
+    const V y0_in = hn::Max(zero, y0), y1_in = hn::Min(size, y1);
+    seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0_in, y1_in)));
+    if (hn::AllFalse(d, seen)) return;
+    const PixelRange range = RangeOf(seen, x0, x1, y0_in, y1_in, resolution_, *seen_);
+    if (range.isEmpty()) return;
+    const hn::Mask<DU> counts = hn::RebindMask(du, seen);
+    for (int row = range.row_begin; row < range.row_end; ++row) {
+      const VU first = FirstSamples(y0, float(row)), last = LastSamples(y1, float(row));
+      const VU rows = hn::IfThenElseZero(hn::And(counts, hn::Lt(first, last)),
+                                         hn::Sub(hn::Shl(SplatU(1), hn::ShiftLeft<2>(last)),
+                                                 hn::Shl(SplatU(1), hn::ShiftLeft<2>(first))));
+      const V along = hn::Min(
+          shape.half_y, hn::Max(hn::Neg(shape.half_y), hn::Sub(Splat(float(row) + 0.5f), shape.y)));
+      const V x = hn::MulAdd(shape.shear, along, shape.x);
+      const V left = hn::Sub(x, half_x), right = hn::Add(x, half_x);
+      const auto [begin, end] = ColumnsOf(range, row, *seen_);
+      for (int column = begin; column < end; ++column) {
+        const VU from = FirstSamples(left, float(column)), to = LastSamples(right, float(column));
+        VU columns = hn::IfThenElseZero(hn::Lt(from, to),
+                                        hn::Sub(hn::Shl(SplatU(1), to), hn::Shl(SplatU(1), from)));
+        columns = hn::Or(columns, hn::ShiftLeft<4>(columns));
+        columns = hn::And(rows, hn::Or(columns, hn::ShiftLeft<8>(columns)));
+        if (hn::AllFalse(du, hn::Ne(columns, hn::Zero(du)))) continue;
+        hull_.Add(std::size_t(row * resolution_ + column), columns, widening, cover.depth_begin,
+                  cover.depth_end);
+      }
+    }
+  }
+  // As HullRun.
+  static VU FirstSamples(V low, float at) {
+    const V x = hn::Ceil(hn::MulSub(Splat(float(kHullSide)), hn::Sub(low, Splat(at)), Splat(0.5f)));
+    return Sample(x);
+  }
+  static VU LastSamples(V high, float at) {
+    const V x =
+        hn::Floor(hn::MulAdd(Splat(float(kHullSide)), hn::Sub(high, Splat(at)), Splat(0.5f)));
+    return Sample(x);
+  }
+  static VU Sample(V x) {
+    const V within = hn::Min(Splat(float(kHullSide)), hn::Max(hn::Zero(D()), x));
+    return hn::BitCast(DU(), hn::ConvertTo(DI(), within));
   }
 
   struct Rows {
     V begin, end, half_x;
     PixelRange range;
   };
-  template <bool kOverlaps, bool kIsThicket>
+  template <bool kOverlaps>
   HWY_INLINE void CoverRows(const Parallelogram& shape, const Rows& rows, const Cover& cover) {
     const V zero = hn::Zero(D());
     for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
@@ -280,18 +349,12 @@ class Brush {
       const auto [begin, end] = ColumnsOf(rows.range, row, *seen_);
       const auto first = std::size_t(row * resolution_ + begin);
       float* pixel = pixels_.at(first);
-      float* thicket = kIsThicket ? thickets_.at(first) : nullptr;
       for (int column = begin; column < end; ++column) {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
-        const V amount = hn::Mul(width, height);
-        if (begins_) NoteBegin(first + std::size_t(column - begin), amount, cover);
-        const V added = CoverPixel<Kind, kOverlaps>(pixel, amount, cover);
+        CoverPixel<Kind, kOverlaps>(pixel, std::size_t(row * resolution_ + column),
+                                    hn::Mul(width, height), cover, hull_);
         pixel += kChannels * kStep;
-        if constexpr (kIsThicket) {
-          AddTo(thicket, added, cover);
-          thicket += kStep;
-        }
       }
     }
   }
@@ -381,23 +444,15 @@ class Brush {
   }
 
   void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
-    if (hn::AllFalse(D(), hn::Gt(amount, hn::Zero(D())))) return;
-    amount = hn::Mul(cover.opacity, amount);
-    if (begins_) NoteBegin(pixel, amount, cover);
-    const V added = CoverPixel<Kind, false>(pixels_.at(pixel), amount, cover);
-    if (cover.thicket > 0) AddTo(thickets_.at(pixel), added, cover);
-  }
-  // Comes before the pixel is covered.
-  void NoteBegin(std::size_t pixel, V amount, const Cover& cover) {
     const D d;
-    float* const begin = begins_.at(pixel);
-    const V end = hn::Load(d, pixels_.at(pixel) + PacketCanvas::kEnd * kStep);
-    const M is_first = hn::And(hn::Gt(amount, hn::Zero(d)), hn::Le(end, hn::Zero(d)));
-    hn::Store(hn::IfThenElse(is_first, cover.depth_begin, hn::Load(d, begin)), d, begin);
-  }
-  // What thickets have of a pixel, when so much is newly covered.
-  static void AddTo(float* thicket, V added, const Cover& cover) {
-    hn::Store(hn::MulAdd(added, Splat(cover.thicket), hn::Load(D(), thicket)), D(), thicket);
+    if (hn::AllFalse(d, hn::Gt(amount, hn::Zero(d)))) return;
+    amount = hn::Mul(cover.opacity, amount);
+    CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, cover, hull_);
+    const M is_hull = hn::Ge(amount, Splat(kTracedHull));
+    if (!cover.has_hull || hn::AllFalse(d, is_hull)) return;
+    hull_.Add(pixel, hn::IfThenElseZero(hn::RebindMask(DU(), is_hull), SplatU(kHullSamples)),
+              Splat(cover.is_solid ? float(kHullSide / 2) : 0.f), cover.depth_begin,
+              cover.depth_end);
   }
 
   // Covers pixels by what amountOf(ray) says.
@@ -470,7 +525,8 @@ class Brush {
   const Frames frames_;
   int face_ = 0;
   const SeenPixels::Face* seen_ = nullptr;
-  FaceLanes pixels_, begins_, thickets_;  // of the face, the latter as far as the canvas has them
+  FaceLanes pixels_;  // of the face
+  Hull hull_;
 };
 
 }  // namespace

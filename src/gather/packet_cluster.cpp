@@ -9,20 +9,10 @@
 namespace surfeit {
 namespace {
 
-// A packet that is wider than this many times the median one would push the far field away for all:
-// it looks by itself.
-constexpr float kMostSharingWidth = 1.5f;
-
 // Where the curve jumps, a packet has receivers on both sides. One that is wider than this many
 // times the median is divided: it sees what is near from between them. (Largest step of occlusion
 // along lines in a box, bench/line_steps.sh: .0066 without this, .0030 with it.)
 constexpr float kMostPacketWidth = 4;
-
-// A cluster that spreads wider than this part of the distance of its far field, or than this many
-// times its widest packet (a square of receivers: 5 times, a line: 16), sees things there from
-// different sides: its packets look by themselves. (Likewise: .0201 without the first; of
-// irradiance 3.6 % without the second, 1.7 % with it.)
-constexpr float kMostSpread = 0.5f, kMostPackets = 8;
 
 using Places = std::span<std::uint16_t>;
 
@@ -62,7 +52,7 @@ void divideReceivers(Places places, std::span<const Receiver> receivers, float n
   divideReceivers(places.subspan(half), receivers, normal_weight, whole);
 }
 
-PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherRules& rules)
+PacketCluster::PacketCluster(std::span<const Receiver> receivers)
     : receiver_count_(receivers.size()) {
   SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kClusterReceivers);
   const Places places = std::span(places_).first(receiver_count_);
@@ -72,38 +62,12 @@ PacketCluster::PacketCluster(std::span<const Receiver> receivers, const GatherRu
 
   std::array<float, kClusterPackets> widths{};
   for (std::size_t at = 0; at < receiver_count_; at += kPacketReceivers) {
-    packets_[packet_count_] = viewPacket(this->receivers(packet_count_), rules);
-    widths[packet_count_] = packets_[packet_count_].radius;
+    widths[packet_count_] = viewPacket(this->receivers(packet_count_)).radius;
     ++packet_count_;
   }
   const auto middle = widths.begin() + std::ptrdiff_t(packet_count_ / 2);
   std::nth_element(widths.begin(), middle, widths.begin() + std::ptrdiff_t(packet_count_));
   most_packet_radius_ = kMostPacketWidth * *middle;
-
-  if (packet_count_ < 2 || !mayShare(rules)) return;
-  const GatherQuality& quality = rules.quality;
-  const float most_width = kMostSharingWidth * *middle;
-
-  // Those that share, and the sphere and cone around them
-  std::array<Receiver, kClusterReceivers> members;
-  std::size_t member_count = 0;
-  float width = 0;
-  for (std::size_t i = 0; i < packet_count_; ++i) {
-    const PacketView& view = packets_[i];
-    const bool has_one_horizon = view.has_horizon && view.cone_cosine > kOneHorizon;
-    centres_[i] = {view.centre, has_one_horizon ? view.axis : glm::vec3(0)};
-    if (view.radius > most_width) continue;
-    sharing_ |= 1u << i;
-    width = std::max(width, view.radius);
-    for (const Receiver& receiver : this->receivers(i)) members[member_count++] = receiver;
-  }
-  view_ = viewPacket(std::span(members).first(member_count), rules);
-
-  // Seen from a packet's centre instead of its rim, what is at distance d moves by width / d
-  const float pixel = 2 / float(quality.raster_resolution);
-  const float far_distance = width / (quality.far_field_parallax * pixel);
-  if (view_.radius > std::min(kMostSpread * far_distance, kMostPackets * width)) sharing_ = 0;
-  limit_ = view_.radius + far_distance;
 }
 
 }  // namespace surfeit

@@ -28,11 +28,11 @@ class PacketCost {
 
   // Starts over for a receiver here.
   void begin(const glm::vec3& position);
-  void node(const Node& node, const Blend&) {
+  void node(const Node& node, const LaneParts*) {
     add(node, float(std::max<int>(1, node.facet_count)));
   }
   void leaf(const Node& node) { add(node, float(node.surfel_count)); }
-  void surfels(std::span<const Surfel>, const Blend&) {}
+  void surfels(std::span<const Surfel>, const LaneParts*) {}
 
   // What a packet of this radius around the receiver takes, in some unit of time. A node of s
   // surfels at distance d is seen from d - radius at nearest, and gives way to about

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "gather/coverage_rules.h"
+#include "gather/packet_hull-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
 
@@ -32,7 +33,9 @@ struct Cover {
   V inverse_touch;    // of touchPart
   M is_lit;
   bool is_all_lit;
-  float overlap, thicket, nested;
+  float overlap, nested;
+  bool has_hull;  // it is no thicket
+  bool is_solid;  // and its hull is widened
   V opacity;
   float own;  // the part of its own that overlaps
   glm::vec3 radiosity;
@@ -47,23 +50,32 @@ struct BrushKind {
   static constexpr std::size_t kChannels = (kColor ? 3 : 0) + (kFade ? 1 : 0);
 };
 
-// As RasterCube::coverPixel, where `amount` is positive; but for what thickets have. Returns what
-// is newly covered. Without kOverlaps, nothing hides behind its own layer.
+// As RasterCube::coverPixel, where `amount` is positive. Without kOverlaps, nothing hides behind
+// its own layer. `place`: that of the pixel, which the hull is asked about.
 template <typename Kind, bool kOverlaps>
-inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
+HWY_INLINE void CoverPixel(float* pixel, std::size_t place, V amount, const Cover& cover,
+                           const FaceHull<Kind::kChannels>& hull) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
+  const M is_drawn =
+      hn::And(hn::Gt(amount, zero), hn::Gt(hn::Load(d, pixel + PacketCanvas::kOpen * kStep), zero));
+  if (hn::AllFalse(d, is_drawn)) return;
   float* const room_at = pixel + PacketCanvas::kRoom * kStep;
   float* const layer_at = pixel + PacketCanvas::kLayer * kStep;
   float* const end_at = pixel + PacketCanvas::kEnd * kStep;
   float* const open_at = pixel + PacketCanvas::kOpen * kStep;
-  const V end = hn::Load(d, end_at), open = hn::Load(d, open_at);
+  const V end = hn::Load(d, end_at);
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
   // A gap in depth begins a new layer, by and by
   const V touch = hn::Min(one, hn::Mul(amount, cover.inverse_touch));
   const V gap = hn::Mul(hn::Sub(cover.depth_begin, end), Splat(cover.inverse_gap));
   const V is_new = hn::Mul(touch, hn::Min(one, hn::Max(zero, gap)));
+  const M ends = hn::And(is_drawn, hn::Ge(gap, one));
+  if (!hn::AllFalse(d, hn::Gt(is_new, zero))) {
+    hull.Turn(place, ends, hn::And(is_drawn, hn::Ge(is_new, Splat(kNewClosing))));
+  }
+  const V open = hn::Load(d, open_at);
   room = hn::MulAdd(is_new, hn::Sub(open, room), room);
   before = hn::NegMulAdd(is_new, before, before);
   hn::Store(room, d, room_at);
@@ -94,7 +106,6 @@ inline V CoverPixel(float* pixel, V amount, const Cover& cover) {
       }
     }
   }
-  return covered;
 }
 
 // Pixels of a face, half open.
@@ -128,10 +139,7 @@ inline std::pair<int, int> ColumnsOf(const PixelRange& range, int row,
           std::min(range.column_end, int(columns.end))};
 }
 
-// So many rows and columns around a pixel have a say in how it is filled.
-constexpr int kFillReach = int(std::size(kFillPasses));
-
-void FindSeenPixels(const PacketCanvas& canvas, float slack, SeenPixels& seen) {
+void FindSeenPixels(const PacketCanvas& canvas, SeenPixels& seen) {
   const RasterGeometry& geometry = *canvas.geometry;
   const int size = geometry.resolution();
   const bool is_all_seen = canvas.rules->hasConeRaster();  // not a half space of the world
@@ -139,7 +147,7 @@ void FindSeenPixels(const PacketCanvas& canvas, float slack, SeenPixels& seen) {
     if (is_all_seen) return true;
     for (std::size_t lane = 0; lane < canvas.receiver_count; lane += kStep) {
       const Receivers receivers(*canvas.lanes, lane);
-      const M above = hn::Gt(Dot(receivers.normal, direction), Splat(-slack));
+      const M above = hn::Gt(Dot(receivers.normal, direction), hn::Zero(D()));
       if (!hn::AllFalse(D(), hn::Or(receivers.spherical, above))) return true;
     }
     return false;
@@ -148,30 +156,16 @@ void FindSeenPixels(const PacketCanvas& canvas, float slack, SeenPixels& seen) {
     SeenPixels::Face& face = seen.faces[std::size_t(i)];
     face.row_begin = face.row_end = 0;
     // What half spaces have of a row, and pixels between
-    std::array<SeenPixels::Columns, RasterGeometry::kMaxResolution> runs{};
     const RasterGeometry::Pixel* row = geometry.pixels().data() + i * size * size;
-    bool is_any = false;
     for (int y = 0; y < size; ++y, row += size) {
       int begin = 0, end = size;
       while (begin < size && !isSeen(row[begin].direction)) ++begin;
+      face.rows[std::size_t(y)] = {std::uint8_t(size), 0};
       if (begin == size) continue;
       while (!isSeen(row[end - 1].direction)) --end;
-      const auto at = std::size_t(y);
-      runs[at].begin = std::uint8_t(std::max(0, begin - kFillReach));
-      runs[at].end = std::uint8_t(std::min(size, end + kFillReach));
-      if (!is_any) face.row_begin = std::max(0, y - kFillReach);
-      face.row_end = std::min(size, y + 1 + kFillReach);
-      is_any = true;
-    }
-    for (int y = face.row_begin; y < face.row_end; ++y) {
-      SeenPixels::Columns& columns = face.rows[std::size_t(y)];
-      columns = {std::uint8_t(size), 0};
-      for (int k = std::max(0, y - kFillReach); k < std::min(size, y + 1 + kFillReach); ++k) {
-        const SeenPixels::Columns& run = runs[std::size_t(k)];
-        if (run.end == 0) continue;
-        columns.begin = std::min(columns.begin, run.begin);
-        columns.end = std::max(columns.end, run.end);
-      }
+      face.rows[std::size_t(y)] = {std::uint8_t(begin), std::uint8_t(end)};
+      if (face.isEmpty()) face.row_begin = y;
+      face.row_end = y + 1;
     }
   }
 }

@@ -1,14 +1,12 @@
 // The gather of neighbouring receivers from a paged octree: for every packet of 16 one traversal,
 // one cut, one order front to back, and a raster cube per receiver in the lanes of vectors (memo,
-// section 3); and one far field for a cluster of packets.
+// section 3).
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <span>
 
 #include "gather/cut.h"
-#include "gather/far_field.h"
 #include "gather/packet_cluster.h"
 #include "gather/packet_cost.h"
 #include "gather/packet_raster.h"
@@ -39,8 +37,7 @@ class PacketGatherer {
   struct Work {
     std::size_t packets = 0;  // drawn, of whatever size
     std::size_t nodes_visited = 0, surfels_visited = 0;
-    std::size_t patches = 0;         // drawn for single packets
-    std::size_t shared_patches = 0;  // drawn for clusters
+    std::size_t patches = 0;  // drawn
     // Time by phase; measured only when asked for with measurePhases().
     double walk_seconds = 0, sort_seconds = 0, draw_seconds = 0, integrate_seconds = 0;
   };
@@ -49,20 +46,16 @@ class PacketGatherer {
 
   // Bytes that a gatherer holds from the start.
   static std::size_t memoryBytes(const GatherRules& rules) {
-    return sizeof(PacketGatherer) + PacketCost::memoryBytes() + PacketRaster::memoryBytes(rules) +
-           (PacketCluster::mayShare(rules) ? FarField::memoryBytes(rules) : 0);
+    return sizeof(PacketGatherer) + PacketCost::memoryBytes() + PacketRaster::memoryBytes(rules);
   }
 
  private:
-  struct Part;
-  Status gatherPart(const Part& part, PagedOctree::Reader& octree, std::span<GatherResult> results);
-  Status draw(const PacketView& view, const CutRegion& region, std::span<const Receiver> receivers,
-              PagedOctree::Reader& octree, PacketRaster& raster);
+  Status gatherPacket(std::span<const Receiver> receivers, std::span<const std::uint16_t> places,
+                      PagedOctree::Reader& octree, std::span<GatherResult> results);
   void endPhase(double& seconds);
 
   const GatherRules rules_;
   PacketRaster raster_;
-  std::optional<FarField> far_field_;  // where clusters may share one
   CutWalk cut_;
   PacketCost cost_;
   Work work_;

@@ -15,7 +15,6 @@
 #include <limits>
 #include <span>
 
-#include "gather/packet_fill-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
 #include "gather/result_sums.h"
@@ -29,30 +28,18 @@ namespace {
 struct PixelSight {
   V coverage, occlusion;
   V3 radiosity;  // times the coverage
-  V thicket;     // likewise
 };
-
-// Less of a far field than this sends less light than it covers: how much of either there is comes
-// from different sums.
-constexpr float kLeastFarCoverage = 1.f / 64;
 
 // Sums over the pixels for some of the receivers, as ResultSums.
 class Integral {
  public:
-  Integral(const PacketCanvas& canvas, const SharedFarField* far, std::size_t lane)
+  Integral(const PacketCanvas& canvas, std::size_t lane)
       : canvas_(canvas),
         rules_(*canvas.rules),
-        far_(far),
         lane_(lane),
         channels_(PacketCanvas::channels(rules_)),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane) {
-    for (std::size_t a = 0; a < 2; ++a) {
-      from_centre_[a] = hn::Zero(D());
-      if (far == nullptr) continue;
-      const int axis = far->axes[a];
-      from_centre_[a] = hn::Sub(Axis(receivers_.position, axis), Splat(far->centre[axis]));
-    }
     weight_sum_ = covered_ = radiosity_.x = radiosity_.y = radiosity_.z = hn::Zero(D());
   }
 
@@ -60,26 +47,18 @@ class Integral {
     const SeenPixels::Face& seen = canvas_.seen->faces[face];
     if (seen.isEmpty()) return;
     const bool has_near = (*canvas_.is_face_used)[face];
-    const bool has_far = far_ != nullptr && (*far_->is_face_used)[face];
     const bool has_more = rules_.has(~std::uint32_t{kOutputOcclusion | kOutputIrradiance});
-    const bool has_thickets =
-        (has_near && canvas_.thickets != nullptr) || (has_far && far_->has_thickets);
-    const SurfaceFill fill(canvas_, seen, has_thickets);
     near_ = FaceLanes(canvas_.pixels, canvas_, face, lane_, channels_);
-    near_thickets_ = FaceLanes(canvas_.thickets, canvas_, face, lane_, 1);
-    far_pixels_ = far_ != nullptr ? far_->pixels + face * canvas_.geometry->facePixels() : nullptr;
     const auto size = std::size_t(canvas_.geometry->resolution());
     const std::size_t first = face * size * size;
-    if (has_near || has_far) ResolveFace(has_near, has_far, fill);
     seen.forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
       const std::size_t i = first + in_face;
       const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
       const V direction_weight = WeightOf(pixel.direction);
       const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
       weight_sum_ = hn::Add(weight_sum_, weight);
-      if (!has_near && !has_far && !has_more) return;
-      const PixelSight sight =
-          has_near || has_far ? Resolved(in_face, fill.Coverage(in_face)) : NothingSeen();
+      if (!has_near && !has_more) return;
+      const PixelSight sight = has_near ? Look(in_face) : NothingSeen();
       covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
       radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
       radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
@@ -149,16 +128,6 @@ class Integral {
             frames_.ToWorld(direction, 2)};
   }
 
-  // What the receivers see of a far field where its packet sees sight.*of, to first order.
-  template <typename Of>
-  HWY_INLINE V FarValue(const FarPixel& far, const Of& of) const {
-    V value = Splat(of(far.sight));
-    for (std::size_t a = 0; a < 2; ++a) {
-      value = hn::MulAdd(from_centre_[a], Splat(of(far.along[a])), value);
-    }
-    return hn::Max(hn::Zero(D()), value);
-  }
-
   static V3 LoadRadiosity(const float* pixel) {
     const D d;
     const float* const at = pixel + PacketCanvas::kCoverageChannels * kStep;
@@ -166,100 +135,23 @@ class Integral {
   }
   template <typename Float>
   Float* FadedOf(Float* pixel) const {
-    return pixel + (channels_ - 1) * kStep;
+    return pixel + (PacketCanvas::kCoverageChannels + rules_.channels() - 1) * kStep;
   }
 
-  PixelSight Look(std::size_t in_face, bool has_near, bool has_far) const {
+  PixelSight Look(std::size_t in_face) const {
     const D d;
-    const V zero = hn::Zero(d), one = Splat(1);
-    const bool has_light = rules_.hasLight(), fades = rules_.fades();
-    V room = one, layer = zero, end = zero, open = one, faded = zero, thicket = zero;
-    V3 radiosity = {zero, zero, zero};
-    if (has_near) {
-      const float* const near = near_.at(in_face);
-      room = hn::Load(d, near + PacketCanvas::kRoom * kStep);
-      layer = hn::Load(d, near + PacketCanvas::kLayer * kStep);
-      end = hn::Load(d, near + PacketCanvas::kEnd * kStep);
-      open = hn::Load(d, near + PacketCanvas::kOpen * kStep);
-      if (has_light) radiosity = LoadRadiosity(near);
-      if (fades) faded = hn::Load(d, FadedOf(near));
-      if (near_thickets_) thicket = hn::Load(d, near_thickets_.at(in_face));
-    }
-    // The far field comes last, as one contribution: a surface that reaches it goes on there, a
-    // thicket hides in part behind what reaches it
-    if (has_far && !far_pixels_[in_face].isEmpty()) {
-      const FarPixel& far = far_pixels_[in_face];
-      const V amount =
-          hn::Min(one, FarValue(far, [](const auto& sight) { return sight.coverage; }));
-      const M is_new = hn::Gt(Splat(far.begin), end);
-      room = hn::IfThenElse(is_new, open, room);
-      layer = hn::IfThenZeroElse(is_new, layer);
-      const V slope = hn::NegMulAdd(layer, Splat(far.thicket), one);
-      const V after = hn::Min(hn::MulAdd(amount, slope, layer), one);
-      const V nested = Splat(nestedPart(false, far.thicket));
-      const V left = hn::Min(open, OpenBehind(room, after, nested));
-      const V added = hn::IfThenElseZero(hn::Gt(amount, zero), hn::Sub(open, left));
-      if (has_light) {
-        const V part = hn::Mul(added, Reciprocal(hn::Max(amount, Splat(kLeastFarCoverage))));
-        const auto add = [&](V& sum, int c) HWY_ATTR {
-          const V all = FarValue(far, [c](const auto& sight) { return sight.radiosity[c]; });
-          sum = hn::MulAdd(part, all, sum);
-        };
-        add(radiosity.x, 0);
-        add(radiosity.y, 1);
-        add(radiosity.z, 2);
-      }
-      if (fades) faded = hn::MulAdd(added, Splat(far.faded), faded);
-      thicket = hn::MulAdd(added, Splat(far.thicket), thicket);
-      open = hn::Sub(open, added);
-    }
-    const V coverage = hn::Sub(one, open);
-    return {coverage, fades ? faded : coverage, radiosity, thicket};
-  }
-
-  // Puts what is seen into the pixels of a face: the coverage in the place of the room, radiosities
-  // and faded coverage in theirs.
-  void ResolveFace(bool has_near, bool has_far, const SurfaceFill& fill) {
-    fill.Run([&](std::size_t in_face) HWY_ATTR {
-      const PixelSight sight = ResolvePixel(in_face, has_near, has_far);
-      return SurfaceFill::Sight{sight.coverage, sight.thicket};
-    });
-  }
-  PixelSight ResolvePixel(std::size_t in_face, bool has_near, bool has_far) {
-    const D d;
-    const PixelSight sight = Look(in_face, has_near, has_far);
-    float* const pixel = near_.at(in_face);
-    hn::Store(sight.coverage, d, pixel);
-    if (rules_.hasLight()) {
-      float* const at = pixel + PacketCanvas::kCoverageChannels * kStep;
-      hn::Store(sight.radiosity.x, d, at);
-      hn::Store(sight.radiosity.y, d, at + kStep);
-      hn::Store(sight.radiosity.z, d, at + 2 * kStep);
-    }
-    if (rules_.fades()) hn::Store(sight.occlusion, d, FadedOf(pixel));
+    const float* const pixel = near_.at(in_face);
+    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    PixelSight sight = NothingSeen();
+    sight.coverage = hn::Sub(Splat(1), open);
+    if (rules_.hasLight()) sight.radiosity = LoadRadiosity(pixel);
+    sight.occlusion = rules_.fades() ? hn::Load(d, FadedOf(pixel)) : sight.coverage;
     return sight;
   }
 
   static PixelSight NothingSeen() {
     const V zero = hn::Zero(D());
-    return {zero, zero, {zero, zero, zero}, zero};
-  }
-
-  // What is seen of a pixel that was resolved, once its gaps are filled to `coverage`.
-  PixelSight Resolved(std::size_t in_face, V coverage) const {
-    const D d;
-    const float* const pixel = near_.at(in_face);
-    const V found = hn::Load(d, pixel);
-    const V scale = hn::IfThenElse(hn::Gt(coverage, found), hn::Div(coverage, found), Splat(1));
-    PixelSight sight = NothingSeen();
-    sight.coverage = sight.occlusion = coverage;
-    if (rules_.fades()) sight.occlusion = hn::Mul(scale, hn::Load(d, FadedOf(pixel)));
-    if (rules_.hasLight()) {
-      const V3 found_radiosity = LoadRadiosity(pixel);
-      sight.radiosity = {hn::Mul(scale, found_radiosity.x), hn::Mul(scale, found_radiosity.y),
-                         hn::Mul(scale, found_radiosity.z)};
-    }
-    return sight;
+    return {zero, zero, {zero, zero, zero}};
   }
 
   // pi times the radiance of the environment in the whole pixel.
@@ -326,25 +218,21 @@ class Integral {
 
   const PacketCanvas& canvas_;
   const GatherRules& rules_;
-  const SharedFarField* const far_;
   const std::size_t lane_, channels_;
   const Receivers receivers_;
   const Frames frames_;
-  FaceLanes near_, near_thickets_;        // of the face; the latter if there are any
-  const FarPixel* far_pixels_ = nullptr;  // likewise
-  V from_centre_[2];  // where the receivers are, along the axes of the far field
+  FaceLanes near_;  // of the face
   V weight_sum_, covered_;
   V3 radiosity_;
   std::array<Sum, kMore> more_;
 };
 
 // As ReceiverRaster::integrate.
-void Integrate(const PacketCanvas& canvas, const SharedFarField* far,
-               std::span<GatherResult> results) {
+void Integrate(const PacketCanvas& canvas, std::span<GatherResult> results) {
   const auto faces = static_cast<std::size_t>(canvas.geometry->faceCount());
   std::array<float, kPacketReceivers> weights;
   for (std::size_t lane = 0; lane < results.size(); lane += kStep) {
-    Integral integral(canvas, far, lane);
+    Integral integral(canvas, lane);
     for (std::size_t face = 0; face < faces; ++face) integral.AddFace(face);
     integral.Store(results, weights);
   }

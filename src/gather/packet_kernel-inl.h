@@ -17,7 +17,6 @@
 
 #include "core/spherical_harmonics.h"
 #include "gather/packet_brush-inl.h"
-#include "gather/packet_far_field-inl.h"
 #include "gather/packet_integral-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
@@ -144,12 +143,14 @@ void DrawAll(const PacketCanvas& canvas, const Patch* patches,
       hwy::Prefetch(later);
       hwy::Prefetch(later + sizeof(Patch) / 2);
       if (draw_order::face(order[i]) != face) {
+        if (face >= 0) brush.EndFace();
         face = draw_order::face(order[i]);
         brush.BeginFace(face);
         (*canvas.is_face_used)[std::size_t(face)] = true;
       }
       brush.DrawPatch(*patchOf(order[i]));
     }
+    if (face >= 0) brush.EndFace();
   }
 }
 

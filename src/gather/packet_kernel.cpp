@@ -20,7 +20,6 @@ PacketKernel Kernel() {
           .facesThatSee = FacesThatSee,
           .seeRoughNode = SeeRoughNode,
           .draw = Draw,
-          .finishFarField = FinishFarField,
           .integrate = Integrate};
 }
 

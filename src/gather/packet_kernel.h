@@ -39,7 +39,8 @@ struct alignas(64) Patch {
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
   float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
-  Blend blend;                                  // of the opacity
+  bool is_solid = true;                         // likewise
+  std::uint32_t parts = 0;  // place in PacketCanvas::parts of what counts of the opacity; 0: all
   glm::vec3 radiosity{0};
   // It is seen where offset . normal, from the receiver, is below this: kFrontOnly; kBothSides, of
   // a two-sided disk or facet; kDarkBack, when it is seen from both sides and sends light from its
@@ -55,6 +56,7 @@ struct alignas(64) Patch {
   static constexpr float kDarkBack = std::numeric_limits<float>::max();
   static constexpr float kAllAround = kDarkBack / 2;
   bool isRound() const { return disk_area == 0; }
+  bool showsBoth() const { return facing_limit >= kDarkBack; }
   bool isRibbon() const { return soft_peak < 0; }
   float ribbonWidth() const { return -soft_peak; }
   float nested(float ribbon_nested) const {
@@ -64,6 +66,11 @@ struct alignas(64) Patch {
 };
 static_assert(sizeof(Patch) == 128);
 
+// How much of a patch counts for each receiver.
+struct alignas(64) PacketParts {
+  LaneParts of;
+};
+
 // The receivers as columns, one per lane; lanes without a receiver repeat the last one.
 struct alignas(64) PacketLanes {
   std::array<float, kPacketReceivers> x, y, z, normal_x, normal_y, normal_z;
@@ -72,8 +79,8 @@ struct alignas(64) PacketLanes {
   std::array<std::array<float, kPacketReceivers>, 9> frame;
 };
 
-// The pixels that count: those that some receiver has above its horizon, and two more around them,
-// which filling looks at (kFillPasses). Nothing else is drawn, or looked at.
+// The pixels that count: those that some receiver has above its horizon. Nothing else is drawn, or
+// looked at.
 struct SeenPixels {
   struct Columns {
     std::uint8_t begin = 0, end = 0;
@@ -96,12 +103,13 @@ struct SeenPixels {
 
 // Where a packet is drawn: 16 rasters, interleaved by pixel as many at a time as a vector holds
 // (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage), and what is open
-// of it; with color red, green and blue; and the faded coverage, when occlusion fades.
+// of it; with color red, green and blue; the faded coverage, when occlusion fades; then the hull
+// (FaceHull), and what was open and seen before the last layer.
 struct PacketCanvas {
   static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3;  // places in a pixel
-  static constexpr std::size_t kCoverageChannels = 4, kColorChannels = 3;
+  static constexpr std::size_t kCoverageChannels = 4, kHullChannels = 4;
   static std::size_t channels(const GatherRules& rules) {
-    return kCoverageChannels + rules.channels();
+    return kCoverageChannels + kHullChannels + 2 * rules.channels();
   }
 
   const PacketLanes* lanes;
@@ -115,50 +123,10 @@ struct PacketCanvas {
   glm::vec3 centre;       // of the packet
   float packet_radius;
   float* pixels;  // aligned to 64 bytes
-  // What thickets have of the coverage, aligned likewise; null when there are none among what is
-  // drawn.
-  float* thickets;
-  // How far away what is first in a pixel begins, aligned likewise; null when nobody asks.
-  float* begins;
-  // Room for three values per pixel of a face and lane of a vector, aligned likewise.
-  float* fill_scratch;
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
   const SeenPixels* seen;
-};
-
-// A pixel of a far field: what a packet sees from its centre, and how that changes with the place.
-struct alignas(64) FarPixel {
-  struct Sight {
-    float coverage;
-    float radiosity[3];  // times the coverage
-  };
-  Sight sight;
-  Sight along[2];  // change for each unit along two axes of the world
-  float begin;     // how far away what is first begins
-  float thicket;   // what thickets have of the coverage, as a part
-  float faded;     // what is left of it, as a part, when occlusion fades
-  void clear() { sight.coverage = along[0].coverage = along[1].coverage = 0; }
-  bool isEmpty() const {
-    return !(sight.coverage > 0) && along[0].coverage == 0 && along[1].coverage == 0;
-  }
-};
-
-// How far fields change over a cluster: what packet k sees, times of[a][k][i], summed over k, is
-// the change along axis a at packet i.
-struct FarFieldSlopes {
-  std::array<int, 2> axes{};
-  alignas(64) float of[2][kPacketReceivers][kPacketReceivers] = {};
-  float distance = 0;  // that everything is away, at least
-};
-
-// The far field of a packet.
-struct SharedFarField {
-  const FarPixel* pixels;  // as those of the raster
-  const std::array<bool, RasterGeometry::kFaces>* is_face_used;
-  bool has_thickets;
-  std::array<int, 2> axes;
-  glm::vec3 centre;
+  const PacketParts* parts;  // of the patches
 };
 
 struct RoughSight {
@@ -185,8 +153,7 @@ inline constexpr float kSplatReach = 1.8f;
 
 struct PacketKernel {
   const char* name;  // of the instruction set
-  // What counts for receivers of which the horizons may be off by `slack`, the sine of an angle.
-  void (*findSeenPixels)(const PacketCanvas& canvas, float slack, SeenPixels& seen);
+  void (*findSeenPixels)(const PacketCanvas& canvas, SeenPixels& seen);
   // Whether any receiver has this place above its horizon.
   bool (*isAbove)(const PacketLanes& lanes, std::size_t receiver_count, const glm::vec3& position);
   // The faces on which some receiver may see something of the patch, which stands for a surfel, as
@@ -198,12 +165,7 @@ struct PacketKernel {
   // Draws patches in this order, all of one face after those of another.
   void (*draw)(const PacketCanvas& canvas, const Patch* patches,
                std::span<const std::uint64_t> order);
-  // Makes a drawn canvas 16 far fields, that of lane i in the i-th part of `pixels`.
-  void (*finishFarField)(const PacketCanvas& canvas, const FarFieldSlopes& slopes,
-                         FarPixel* pixels);
-  // `far`: what is behind everything drawn, or null.
-  void (*integrate)(const PacketCanvas& canvas, const SharedFarField* far,
-                    std::span<GatherResult> results);
+  void (*integrate)(const PacketCanvas& canvas, std::span<GatherResult> results);
 };
 
 // For the fastest instruction set of this machine.

@@ -172,12 +172,11 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
   const float size = patch.isRibbon() ? patch.ribbonWidth() : patch.radius;
   const float bias = canvas.bias * size * (patch.isRibbon() ? kRibbonBias : 1);
-  sight.bias = hn::Mul(Splat(bias), hn::Min(one, hn::MulAdd(Splat(turned), cosine, one)));
+  V part = hn::MulAdd(Splat(turned), cosine, one);
   if (patch.facing_limit == Patch::kBothSides) {
-    const float inverse = 1 / (kBiasHeight * size);
-    const V part = hn::NegMulAdd(sight.height, Splat(inverse), one);
-    sight.bias = hn::Mul(sight.bias, hn::Min(one, hn::Max(zero, part)));
+    part = hn::Max(zero, hn::NegMulAdd(sight.height, Splat(1 / (kBiasHeight * size)), one));
   }
+  sight.bias = hn::Mul(Splat(bias), hn::Min(one, part));
   const V rise =
       hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
   const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));

@@ -34,11 +34,6 @@ float leastHalf(const Patch& patch) {
   return patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius : 0;
 }
 
-std::size_t fillFloats(const GatherRules& rules) {
-  const auto resolution = static_cast<std::size_t>(rules.quality.raster_resolution);
-  return 3 * resolution * resolution * kPacketReceivers;
-}
-
 // Sorts by the upper 32 bits of keys, stable: a radix sort of 8 bits a pass, for a few thousand.
 // The first `count` of `order` are replaced; `scratch` grows to hold as many.
 void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
@@ -68,25 +63,23 @@ void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
 PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
     : kernel_(kernel),
       rules_(rules),
-      near_field_radii_(nearFieldRadii(rules)),
+      near_disk_radii_(nearFieldRadii(rules, false)),
+      near_sphere_radii_(nearFieldRadii(rules, true)),
       max_distance_sq_(rules.quality.max_distance < 1e19f
                            ? rules.quality.max_distance * rules.quality.max_distance
                            : std::numeric_limits<float>::infinity()),
       geometry_(rasterGeometry(rules)),
       weights_(rules, 1 / geometry_.pixelsPerSlope()),
       pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers *
-                                          PacketCanvas::channels(rules_))),
-      thickets_(hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers)),
-      fill_scratch_(hwy::AllocateAligned<float>(fillFloats(rules_))) {
-  if (pixels_ == nullptr || thickets_ == nullptr || fill_scratch_ == nullptr)
-    throw std::bad_alloc();
+                                          PacketCanvas::channels(rules_))) {
+  if (pixels_ == nullptr) throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
+  parts_.reserve(kReservedParts);
   order_.resize(kReservedEntries);
   order_scratch_.resize(kReservedEntries);
 }
 
-void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& view,
-                         float horizon_slack) {
+void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& view) {
   SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kPacketReceivers);
   view_ = view;
   receiver_count_ = receivers.size();
@@ -106,14 +99,14 @@ void PacketRaster::begin(std::span<const Receiver> receivers, const PacketView& 
       lanes_.frame[std::size_t(6 + axis)][i] = frame.z[axis];
     }
   }
-  kernel_.findSeenPixels(canvas(), horizon_slack, seen_);
+  kernel_.findSeenPixels(canvas(), seen_);
   seen_faces_ = 0;
   for (std::size_t i = 0; i < RasterGeometry::kFaces; ++i) {
     seen_faces_ |= (seen_.faces[i].isEmpty() ? 0u : 1u) << i;
   }
   is_face_used_.fill(false);
   patches_.clear();
-  has_thickets_ = false;
+  parts_.resize(1);  // that of what counts wholly
   order_count_ = 0;
 }
 
@@ -180,7 +173,6 @@ std::uint32_t PacketRaster::facesThatSeeLarge(const Patch& patch, float extent) 
 void PacketRaster::orderLastPatch(std::uint32_t faces) {
   faces &= seen_faces_;
   if (faces == 0) return patches_.pop_back();
-  has_thickets_ |= patches_.back().thicket > 0;
   SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
   const auto index = static_cast<std::uint32_t>(patches_.size() - 1);
   const glm::vec3 middle = patches_.back().position - view_.centre;
@@ -191,14 +183,22 @@ void PacketRaster::orderLastPatch(std::uint32_t faces) {
   }
 }
 
-void PacketRaster::addNode(const Node& node, const Blend& blend) {
-  if (node.isRough()) return addRoughNode(node, blend);
-  if (node.isFlat()) return addFacet(facetOf(node), blend);
+// Their place among those of the patches; 0: wholly.
+std::uint32_t PacketRaster::keepParts(const LaneParts* parts) {
+  if (parts == nullptr) return 0;
+  parts_.push_back({*parts});
+  return static_cast<std::uint32_t>(parts_.size() - 1);
+}
+
+void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts) {
+  const std::uint32_t parts = keepParts(lane_parts);
+  if (node.isRough()) return addRoughNode(node, parts);
+  if (node.isFlat()) return addFacet(facetOf(node), parts);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal()))
-      addFacet(node.facet(i), blend);
+      addFacet(node.facet(i), parts);
   }
 }
 
@@ -211,7 +211,7 @@ bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal)
   return away > normalRange(normal) * glm::length(to_facet) + view_.radius;
 }
 
-void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
+void PacketRaster::addFacet(const Facet& facet, std::uint32_t parts) {
   if (!kernel_.isAbove(lanes_, receiver_count_, facet.position)) return;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - view_.centre;
@@ -233,26 +233,16 @@ void PacketRaster::addFacet(const Facet& facet, const Blend& blend) {
   patch.disk_area = facet.area;
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + view_.radius / distance;
-  if (!is_rim || (shows_both && !(range > 0))) {
-    patch.facing_limit = facet.is_two_sided ? Patch::kBothSides
-                         : shows_both       ? Patch::kDarkBack
-                                            : Patch::kFrontOnly;
-  } else if (!shows_both) {
-    patch.range = range;
-    patch.facing_limit = range > 0 ? Patch::kAllAround : Patch::kFrontOnly;
-  } else {
-    // From both sides, at the rim of something curved all lanes see as much as the centre
-    patch.disk_area = 0;
-    const FacingAreas facing = facingAreas(facet, -direction);
-    patch.round_area = facing.front + facing.back;
-    if (!facet.is_two_sided) patch.radiosity *= facing.front / patch.round_area;
-    patch.facing_limit = facet.is_two_sided ? Patch::kBothSides : Patch::kAllAround;
-  }
-  patch.blend = blend;
+  if (is_rim) patch.range = range;
+  patch.facing_limit = facet.is_two_sided ? Patch::kBothSides
+                       : shows_both       ? Patch::kDarkBack
+                       : patch.range > 0  ? Patch::kAllAround
+                                          : Patch::kFrontOnly;
+  patch.parts = parts;
   orderLastPatch(facesThatSee(patch));
 }
 
-void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
+void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   RoughSight seen;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_node = node.position - view_.centre, direction = glm::normalize(to_node);
@@ -269,12 +259,13 @@ void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   patch.shape = shapeOf(node.covariance);
   patch.area = node.area;
   patch.thicket = thicketPart(node);
+  patch.is_solid = false;
   const RoughCover cover =
       roughCover(node, direction, visible.perspective * round_area, patch.thicket);
   patch.round_area = cover.area;
   patch.most_area = cover.most;
   patch.opacity = cover.opacity;
-  patch.blend = blend;
+  patch.parts = parts;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
@@ -284,11 +275,10 @@ void PacketRaster::addRoughNode(const Node& node, const Blend& blend) {
   orderLastPatch(facesThatSee(patch));
 }
 
-void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& region,
-                              const Blend& blend) {
+void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts) {
+  const std::uint32_t parts = keepParts(lane_parts);
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
-    if (!region.holds(stored.position)) continue;
     const Surfel surfel = withSides(stored, rules_.quality.sides);
     Patch& patch = patches_.emplace_back();
     patch.position = surfel.position;
@@ -314,10 +304,12 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const CutRegion& 
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
     patch.thicket = thicketPart(surfel);
+    patch.is_solid = mayTile(surfel);
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float size = nearFieldSize(patch.radius, ribbon);
-    patch.near_distance = std::max(near_field_radii_ * size, std::numeric_limits<float>::min());
-    patch.blend = blend;
+    const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;
+    patch.near_distance = std::max(radii * size, std::numeric_limits<float>::min());
+    patch.parts = parts;
     orderLastPatch(kernel_.facesThatSee(canvas, patch));
   }
 }
@@ -334,11 +326,9 @@ PacketCanvas PacketRaster::canvas() const {
           .centre = view_.centre,
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
-          .thickets = has_thickets_ ? thickets_.get() : nullptr,
-          .begins = begins_.get(),
-          .fill_scratch = fill_scratch_.get(),
           .is_face_used = &is_face_used_,
-          .seen = &seen_};
+          .seen = &seen_,
+          .parts = parts_.data()};
 }
 
 void PacketRaster::sort() { sortByUpperHalf(order_, order_count_, order_scratch_); }
@@ -347,27 +337,16 @@ void PacketRaster::draw() {
   kernel_.draw(canvas(), patches_.data(), std::span(order_).first(order_count_));
 }
 
-void PacketRaster::noteBegins() {
-  begins_ = hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers);
-  if (begins_ == nullptr) throw std::bad_alloc();
-}
-
-void PacketRaster::finishFarField(const FarFieldSlopes& slopes, FarPixel* pixels) {
-  SURFEIT_ASSERT(begins_ != nullptr);
-  kernel_.finishFarField(canvas(), slopes, pixels);
-}
-
-void PacketRaster::integrate(std::span<GatherResult> results, const SharedFarField* far) {
-  kernel_.integrate(canvas(), far, results);
+void PacketRaster::integrate(std::span<GatherResult> results) {
+  kernel_.integrate(canvas(), results);
 }
 
 std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
-  const std::size_t pixel_bytes =
-      sizeof(RasterGeometry::Pixel) +
-      (PacketCanvas::channels(rules) + 1) * kPacketReceivers * sizeof(float);
+  const std::size_t pixel_bytes = sizeof(RasterGeometry::Pixel) +
+                                  PacketCanvas::channels(rules) * kPacketReceivers * sizeof(float);
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
-         fillFloats(rules) * sizeof(float) + kReservedPatches * sizeof(Patch) +
+         kReservedPatches * sizeof(Patch) + kReservedParts * sizeof(PacketParts) +
          2 * kReservedEntries * sizeof(std::uint64_t);
 }
 

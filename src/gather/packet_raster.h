@@ -31,6 +31,7 @@ namespace surfeit {
 class PacketRaster {
  public:
   static constexpr std::size_t kReservedPatches = 4096;
+  static constexpr std::size_t kReservedParts = 1024;    // of what fades
   static constexpr std::size_t kReservedEntries = 8192;  // of the order
 
   // `rules` must be valid, as for PointGatherer.
@@ -39,30 +40,20 @@ class PacketRaster {
   PacketRaster(const PacketRaster&) = delete;
   PacketRaster& operator=(const PacketRaster&) = delete;
 
-  // Starts over for 1 to kPacketReceivers receivers. What they see is looked at as well from places
-  // of which the horizon differs by `horizon_slack`, the sine of an angle.
-  void begin(std::span<const Receiver> receivers, const PacketView& view, float horizon_slack = 0);
+  // Starts over for 1 to kPacketReceivers receivers.
+  void begin(std::span<const Receiver> receivers, const PacketView& view);
   // Adds a node as a whole. All receivers must lie outside its radius.
-  void addNode(const Node& node, const Blend& blend = {});
-  // Adds those of the surfels that are of the region and that some receiver may see.
-  void addSurfels(std::span<const Surfel> surfels, const CutRegion& region,
-                  const Blend& blend = {});
+  // `parts`: how much it counts for each receiver; null: wholly.
+  void addNode(const Node& node, const LaneParts* parts = nullptr);
+  // Adds those of the surfels that some receiver may see.
+  void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr);
 
   // Sorts what was added, and draws it.
   void sort();
   void draw();
 
-  // From now on, notes how far away what is first in a pixel begins; takes a float for each pixel
-  // and receiver.
-  void noteBegins();
-  // Makes what was drawn far fields for others, see PacketKernel. Requires noteBegins() before.
-  void finishFarField(const FarFieldSlopes& slopes, FarPixel* pixels);
-  // One result per receiver. `far`: what is behind everything, or null.
-  void integrate(std::span<GatherResult> results, const SharedFarField* far = nullptr);
-
-  std::size_t pixelCount() const { return geometry_.pixels().size(); }
-  const std::array<bool, RasterGeometry::kFaces>& isFaceUsed() const { return is_face_used_; }
-  bool hasThickets() const { return has_thickets_; }
+  // One result per receiver.
+  void integrate(std::span<GatherResult> results);
 
   std::size_t patchCount() const { return patches_.size(); }
 
@@ -71,8 +62,9 @@ class PacketRaster {
 
  private:
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
-  void addFacet(const Facet& facet, const Blend& blend);
-  void addRoughNode(const Node& node, const Blend& blend);
+  std::uint32_t keepParts(const LaneParts* parts);
+  void addFacet(const Facet& facet, std::uint32_t parts);
+  void addRoughNode(const Node& node, std::uint32_t parts);
   std::uint32_t facesThatSee(const Patch& patch) const;
   std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
   void orderLastPatch(std::uint32_t faces);
@@ -80,11 +72,11 @@ class PacketRaster {
 
   const PacketKernel& kernel_;
   const GatherRules rules_;
-  const float near_field_radii_;
+  const float near_disk_radii_, near_sphere_radii_;
   float max_distance_sq_;
   RasterGeometry geometry_;
   DirectionWeights weights_;
-  hwy::AlignedFreeUniquePtr<float[]> pixels_, thickets_, fill_scratch_, begins_;
+  hwy::AlignedFreeUniquePtr<float[]> pixels_;
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;
@@ -93,7 +85,7 @@ class PacketRaster {
   std::uint32_t seen_faces_ = 0;  // set of those with pixels that count
   PacketView view_;
   std::vector<Patch> patches_;
-  bool has_thickets_ = false;                         // among patches_
+  std::vector<PacketParts> parts_;
   std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling
   std::size_t order_count_ = 0;
 };

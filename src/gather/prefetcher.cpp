@@ -49,7 +49,9 @@ void Prefetcher::work() {
           queue_.lookAhead(controller_.prefetchReceivers(), kStride);
       bool failed = false;
       if (receiver)
-        failed = !cut->walk(viewPacket({&*receiver, 1}, rules_), {}, reader, IgnoreCut{}).ok();
+        failed =
+            !cut->walk(viewPacket({&*receiver, 1}, rules_), {&*receiver, 1}, reader, IgnoreCut{})
+                 .ok();
       if (!receiver) reader.release();
       lock.lock();
       if (failed) return;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -91,9 +92,15 @@ RasterCube::RasterCube(const RasterGeometry& geometry, bool has_color, bool fade
       coverage_(geometry.pixels().size()),
       radiosity_(has_color ? geometry.pixels().size() : 0),
       faded_(fades ? geometry.pixels().size() : 0),
-      fill_scratch_(2 * std::size_t(geometry.resolution()) * std::size_t(geometry.resolution())) {}
+      radiosity_before_(radiosity_.size()),
+      faded_before_(faded_.size()),
+      is_seen_(geometry.pixels().size(), true) {}
 
-void RasterCube::clear() {
+void RasterCube::clear(const glm::vec3& up) {
+  const std::span<const RasterGeometry::Pixel> pixels = geometry_->pixels();
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    is_seen_[i] = up == glm::vec3(0) || glm::dot(up, pixels[i].direction) > 0;
+  }
   std::fill(coverage_.begin(), coverage_.end(), Coverage{});
   std::fill(radiosity_.begin(), radiosity_.end(), glm::vec3(0));
   std::fill(faded_.begin(), faded_.end(), 0.f);
@@ -107,7 +114,10 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
   if (coverage.total >= 1) return;
 
   // A gap in depth begins a new layer, by and by
-  const float is_new = touch * newLayerPart(depth.begin - coverage.layer_end, depth.reach());
+  const float gap = newLayerPart(depth.begin - coverage.layer_end, depth.reach());
+  if (gap >= 1) closeLayer(pixel);
+  const float is_new = touch * gap;
+  if (is_new >= kNewClosing) beginLayer(pixel);
   coverage.room += is_new * (1 - coverage.total - coverage.room);
   coverage.layer -= is_new * coverage.layer;
   coverage.layer_end += touch * std::max(0.f, depth.end - coverage.layer_end);
@@ -119,7 +129,6 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
   coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
   coverage.total = std::max(before, 1 - openBehind(coverage.room, coverage.layer, texture.nested));
-  coverage.thicket += (coverage.total - before) * texture.thicket;
   if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
   if (!faded_.empty()) faded_[pixel] += (coverage.total - before) * depth.fade;
   if (recorder_ != nullptr) {
@@ -127,43 +136,96 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
   }
 }
 
-void RasterCube::fill() {
-  const std::size_t face_pixels =
-      coverage_.size() / static_cast<std::size_t>(geometry_->faceCount());
-  std::vector<float>& filled = fill_scratch_;
-  for (std::size_t first = 0; first < coverage_.size(); first += face_pixels) {
-    for (std::size_t i = 0; i < face_pixels; ++i) filled[i] = coverage_[first + i].total;
-    for (const FillPass& pass : kFillPasses) fillFace(first, pass);
-    for (std::size_t i = 0; i < face_pixels; ++i) {
-      float& total = coverage_[first + i].total;
-      if (!(filled[i] > total)) continue;
-      const float scale = filled[i] / total;
-      total = filled[i];
-      if (!radiosity_.empty()) radiosity_[first + i] *= scale;
-      if (!faded_.empty()) faded_[first + i] *= scale;
+void RasterCube::addHull(std::size_t pixel, std::uint32_t samples, int widening,
+                         const DepthRange& depth) {
+  Hull& hull = coverage_[pixel].hull;
+  if (coverage_[pixel].total >= 1) return;
+  if (depth.begin > hull.end) {
+    hull.before |= hull.now;
+    hull.now = 0;
+    hull.begin = depth.begin;
+  }
+  hull.end = std::max(hull.end, depth.end);
+  hull.now |= samples;
+  hull.widening = std::max(hull.widening, widening);
+}
+
+// Samples of the widened shape, with the same shift for all of a row of pixels.
+void RasterCube::addHull(int face, const Parallelogram& shape, bool is_solid,
+                         const DepthRange& depth) {
+  const int resolution = geometry_->resolution();
+  const float size = float(resolution), scale = geometry_->pixelsPerSlope();
+  const float x_middle = shape.u * scale + 0.5f * size, y_middle = shape.v * scale + 0.5f * size;
+  const float half_x = shape.half_u * scale, half_y = shape.half_v * scale;
+  const int widening = is_solid ? hullWidening(half_x, half_y) : 0;
+  const float wider = float(widening) / float(kHullSide);
+  const float y_begin = y_middle - half_y - wider, y_end = y_middle + half_y + wider;
+  if (!(y_begin < size && y_end > 0)) return;
+  const int row_last = std::min(resolution - 1, int(y_end));
+  for (int row = int(std::max(0.f, y_begin)); row <= row_last; ++row) {
+    const std::uint32_t rows = HullRun::of(y_begin, y_end, float(row)).rows();
+    const float x =
+        x_middle + shape.shear * std::clamp(float(row) + 0.5f - y_middle, -half_y, half_y);
+    const float x_begin = x - half_x - wider, x_end = x + half_x + wider;
+    if (rows == 0 || !(x_begin < size && x_end > 0)) continue;
+    const int column_last = std::min(resolution - 1, int(x_end));
+    for (int column = int(std::max(0.f, x_begin)); column <= column_last; ++column) {
+      const std::uint32_t samples = rows & HullRun::of(x_begin, x_end, float(column)).columns();
+      if (samples == 0) continue;
+      addHull(std::size_t((face * resolution + row) * resolution + column), samples, widening,
+              depth);
     }
   }
 }
 
-// One pass over a face, which begins with pixel `first` and whose coverages are at the front of
-// fill_scratch_; the sums of three of a row behind them. Neighbours on other faces do not count.
-void RasterCube::fillFace(std::size_t first, const FillPass& pass) {
-  const int size = geometry_->resolution();
-  float* const coverage = fill_scratch_.data();
-  float* const rows = coverage + size * size;
-  for (int i = 0; i < size * size; ++i) {
-    const int x = i % size;
-    rows[i] = coverage[i] + (x > 0 ? coverage[i - 1] : 0) + (x + 1 < size ? coverage[i + 1] : 0);
+// How many samples the hull lacks, of what was drawn up to the end of the pixel's last layer: its
+// own, and those of its neighbours that are as near as the hull was widened. What is not looked at
+// lacks none, nor what is covered.
+float RasterCube::missingSamples(std::size_t pixel) const {
+  const Coverage& coverage = coverage_[pixel];
+  const int resolution = geometry_->resolution();
+  const int column = int(pixel) % resolution, row = int(pixel) / resolution % resolution;
+  int missing = std::popcount(kHullSamples & ~coverage.hull.upTo(coverage.layer_end));
+  for (int y = -1; y <= 1; ++y) {
+    for (int x = -1; x <= 1; ++x) {
+      if ((x == 0 && y == 0) || float(missing) >= kHullMissing) continue;
+      if (std::min(column + x, row + y) < 0 || std::max(column + x, row + y) >= resolution)
+        continue;
+      const auto other = std::size_t(int(pixel) + y * resolution + x);
+      if (!is_seen_[other] || coverage_[other].total >= 1) continue;
+      const std::uint32_t hull = coverage_[other].hull.upTo(coverage.layer_end);
+      missing += std::popcount(hullBorder(x, y, coverage.hull.widening) & ~hull);
+    }
   }
-  for (int i = 0; i < size * size; ++i) {
-    const int x = i % size, y = i / size;
-    const float box = rows[i] + (y > 0 ? rows[i - size] : 0) + (y + 1 < size ? rows[i + size] : 0);
-    const int columns = 1 + (x > 0) + (x + 1 < size), lines = 1 + (y > 0) + (y + 1 < size);
-    const float around = (box - coverage[i]) / float(columns * lines - 1);
-    const Coverage& found = coverage_[first + std::size_t(i)];
-    const float surface = found.total > 0 ? 1 - found.thicket / found.total : 1;
-    coverage[i] = filledCoverage(coverage[i], around, surface, pass);
+  return float(missing);
+}
+
+// What is closed belongs to what its layer has brought.
+void RasterCube::closeLayer(std::size_t pixel) {
+  Coverage& coverage = coverage_[pixel];
+  const float layer = coverage.total - coverage.total_before;
+  if (coverage.is_closed || !(layer > 0) || coverage.total >= 1) return;
+  coverage.is_closed = true;
+  const float part = closedPart(missingSamples(pixel), coverage.total);
+  if (!(part > 0)) return;
+  const float scale = part * (1 - coverage.total) / layer;
+  coverage.total = part >= 1 ? 1 : coverage.total + scale * layer;
+  if (!radiosity_.empty()) {
+    radiosity_[pixel] += scale * (radiosity_[pixel] - radiosity_before_[pixel]);
   }
+  if (!faded_.empty()) faded_[pixel] += scale * (faded_[pixel] - faded_before_[pixel]);
+}
+
+void RasterCube::beginLayer(std::size_t pixel) {
+  Coverage& coverage = coverage_[pixel];
+  coverage.is_closed = false;
+  coverage.total_before = coverage.total;
+  if (!radiosity_.empty()) radiosity_before_[pixel] = radiosity_[pixel];
+  if (!faded_.empty()) faded_before_[pixel] = faded_[pixel];
+}
+
+void RasterCube::close() {
+  for (std::size_t i = 0; i < coverage_.size(); ++i) closeLayer(i);
 }
 
 // Covers pixels by the part of them that lies in the shape, row by row.
@@ -242,7 +304,11 @@ void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::v
     if (!(std::abs(patch.direction[axis]) > kLeastAxis)) continue;
     const int face = 2 * axis + (patch.direction[axis] < 0 ? 1 : 0);
     if (face >= geometry_->faceCount()) return;
-    coverParallelogram(face, onFace(patch, axis), patch.texture, depth, radiosity);
+    const Parallelogram shape = onFace(patch, axis);
+    coverParallelogram(face, shape, patch.texture, depth, radiosity);
+    if (patch.texture.thicket == 0 && patch.texture.opacity >= kHullOpacity) {
+      addHull(face, shape, patch.texture.is_solid, depth);
+    }
   }
 }
 
@@ -272,7 +338,11 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
       for (int column = column_begin; column < column_end; ++column) {
         const std::size_t pixel = row_first + std::size_t(column);
         const float amount = texture.opacity * amountOf(pixels[pixel].direction);
-        if (amount > 0) coverPixel(pixel, amount, touchPart(amount, 0), texture, depth, radiosity);
+        if (!(amount > 0)) continue;
+        coverPixel(pixel, amount, touchPart(amount, 0), texture, depth, radiosity);
+        if (texture.thicket == 0 && amount >= kTracedHull) {
+          addHull(pixel, kHullSamples, texture.is_solid ? kHullSide / 2 : 0, depth);
+        }
       }
     }
   }

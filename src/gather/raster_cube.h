@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <span>
@@ -81,8 +82,6 @@ struct ConeFrame {
   SymmetricMatrix toLocal(const SymmetricMatrix& m) const;
 };
 
-struct FillPass;
-
 // What the pixels hold for one receiver. Contributions must come front to back, in the order of the
 // middles of their depth ranges. One thread at a time.
 //
@@ -104,8 +103,9 @@ class RasterCube {
   // drawing.
   void setRecorder(PixelRecorder* recorder) { recorder_ = recorder; }
 
-  // Uncovers every pixel.
-  void clear();
+  // Uncovers every pixel. `up`: the receiver's normal in the frame of the raster, or zero; what
+  // lies below its horizon is not looked at.
+  void clear(const glm::vec3& up = glm::vec3(0));
 
   // How something covers its pixels.
   struct Texture {
@@ -115,6 +115,9 @@ class RasterCube {
     float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
     float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
     float nested = 0;   // how far it hides behind other layers; coverage_rules.h, kNested
+    // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
+    // alone.
+    bool is_solid = true;
   };
 
   // Something of the mid or the far field, as the receiver sees it.
@@ -145,9 +148,9 @@ class RasterCube {
   void traceSphere(const glm::vec3& centre, float radius, const Texture& texture,
                    const DepthRange& depth, const glm::vec3& radiosity);
 
-  // Closes the gaps that patches leave within a surface (coverage_rules.h, kFillPasses). Comes
-  // once, after everything has been drawn.
-  void fill();
+  // Closes the last layers (coverage_rules.h, "What hides, hides"). Comes once, after everything
+  // has been drawn.
+  void close();
 
   const RasterGeometry& geometry() const { return *geometry_; }
   // Covered fraction of a pixel, 0..1.
@@ -158,24 +161,36 @@ class RasterCube {
   // Coverage of a pixel, each part times its fade. Requires that something fades.
   float fadedCoverage(std::size_t pixel) const { return faded_[pixel]; }
 
-  // Bytes that a cube with color that fades holds for each pixel, with its part of the scratch
-  // space of a face.
-  static constexpr std::size_t kPixelBytes = 7 * sizeof(float) + sizeof(glm::vec3);
+  // Bytes that a cube with color that fades holds for each pixel, with what it was when its last
+  // layer began.
+  static constexpr std::size_t kPixelBytes = 16 * sizeof(float) + 2 * sizeof(glm::vec3);
 
  private:
+  struct Hull {
+    std::uint32_t before = 0, now = 0;  // samples within what was drawn, and within its last layer
+    float begin = 0, end = -1;          // of the last layer
+    int widening = 0;                   // at most, in samples
+    std::uint32_t upTo(float distance) const { return begin <= distance ? before | now : before; }
+  };
   struct Coverage {
     float total = 0;      // of all layers together
     float room = 1;       // what the layers before the last one leave uncovered
     float layer = 0;      // of the last layer by itself
     float layer_end = 0;  // where the depth ranges of the last layer end
-    float thicket = 0;    // what thickets have of the total
+    Hull hull;
+    float total_before = 0;  // when the last layer began
+    bool is_closed = false;  // that layer, as far as it is
   };
   // On a face: rows of width 2 half_u around the line u + shear (row - v).
   struct Parallelogram {
     float u, v, half_u, half_v, shear;
   };
   static Parallelogram onFace(const Patch& patch, int axis);
-  void fillFace(std::size_t first, const FillPass& pass);
+  void addHull(int face, const Parallelogram& shape, bool is_solid, const DepthRange& depth);
+  void addHull(std::size_t pixel, std::uint32_t samples, int widened, const DepthRange& depth);
+  float missingSamples(std::size_t pixel) const;
+  void closeLayer(std::size_t pixel);
+  void beginLayer(std::size_t pixel);
   // `touch`: how much it says about its layer, touchPart.
   void coverPixel(std::size_t pixel, float amount, float touch, const Texture& texture,
                   const DepthRange& depth, const glm::vec3& radiosity);
@@ -190,7 +205,9 @@ class RasterCube {
   std::vector<Coverage> coverage_;
   std::vector<glm::vec3> radiosity_;
   std::vector<float> faded_;
-  std::vector<float> fill_scratch_;  // of fill(), for one face: coverages, then sums along rows
+  std::vector<glm::vec3> radiosity_before_;  // when the last layer began
+  std::vector<float> faded_before_;
+  std::vector<bool> is_seen_;
 };
 
 }  // namespace surfeit

@@ -18,7 +18,8 @@ ReceiverRaster::ReceiverRaster(const GatherRules& rules)
     : rules_(rules),
       contribution_rules_{rules.quality.sides, rules.hasLight(),
                           ribbonNested(pixelsPerSlope(rules))},
-      near_field_radii_(nearFieldRadii(rules)),
+      near_disk_radii_(nearFieldRadii(rules, false)),
+      near_sphere_radii_(nearFieldRadii(rules, true)),
       max_distance_sq_(rules.quality.max_distance < 1e19f
                            ? rules.quality.max_distance * rules.quality.max_distance
                            : std::numeric_limits<float>::infinity()),
@@ -76,7 +77,8 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
 
   // Mid field: a patch, when its middle is above the horizon
   const float height = heightAboveHorizon(receiver_, to_surfel);
-  const float border = near_field_radii_ * nearFieldSize(surfel.radius, ribbon);
+  const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;
+  const float border = radii * nearFieldSize(surfel.radius, ribbon);
   const float near_part = nearPart(distance_sq, nearBorderSq(border));
   Entry patch;
   if (near_part < 1 && height > 0 &&
@@ -153,9 +155,10 @@ void ReceiverRaster::sortByDistance() {
 
 // The bias keeps disks of the receiver's own surface from covering it. What faces the receiver
 // closely is none of those, nor what rises above its plane and is seen from both sides: either
-// would be looked through. So the bias fades out with the normal, and of two-sided surfels with the
-// height. (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 fading with the normal.)
-// Ribbons are as rough as they are wide. (AO RMSE of hair .0088; .0117 with radii.)
+// would be looked through. So the bias fades out with the normal, and of two-sided surfels, whose
+// normal is one of two, with the height. (A dragon on a plane: AO RMSE .0254 with a constant bias,
+// .0218 fading with the normal.) Ribbons are as rough as they are wide. (AO RMSE of hair .0088;
+// .0117 with radii.)
 float ReceiverRaster::rayBias(const Surfel& surfel) const {
   const Ribbon ribbon = Ribbon::of(surfel);
   const float radius = ribbon.isEmpty() ? surfel.radius : ribbon.width;
@@ -168,7 +171,7 @@ float ReceiverRaster::rayBias(const Surfel& surfel) const {
   const bool is_turned = rules_.quality.sides == GatherSides::kBack && !surfel.isTwoSided();
   const float turned = is_turned ? -1.f : 1.f;
   const float cosine = turned * glm::dot(receiver_.normal, surfel.normal);
-  return bias * std::min(1.f, 1 + cosine);
+  return surfel.isTwoSided() ? bias : bias * std::min(1.f, 1 + cosine);
 }
 
 void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& depth) {
@@ -177,7 +180,8 @@ void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& d
   Ribbon ribbon = Ribbon::of(surfel);
   const RasterCube::Texture texture = {.thicket = thicketPart(surfel),
                                        .opacity = part,
-                                       .nested = nestedPart(surfel, ribbon, contribution_rules_)};
+                                       .nested = nestedPart(surfel, ribbon, contribution_rules_),
+                                       .is_solid = mayTile(surfel)};
   if (surfel.isSphere()) {
     cube_.traceSphere(inRaster(centre), surfel.radius, texture, depth, surfel.radiosity);
     return;
@@ -202,7 +206,7 @@ void ReceiverRaster::setRecorder(PixelRecorder* recorder) {
 
 GatherResult ReceiverRaster::finish() {
   sortByDistance();
-  cube_.clear();
+  cube_.clear(inRaster(receiver_.normal));
   if (recorder_ != nullptr) recorder_->begin(geometry_.pixels().size());
   for (const std::uint64_t key : order_) {
     const Entry& entry = contributions_[std::uint32_t(key)];
@@ -219,11 +223,11 @@ GatherResult ReceiverRaster::finish() {
                    inRaster(patch.shape),
                    patch.solid_angle,
                    patch.spread,
-                   {patch.overlap, patch.thicket, patch.opacity, patch.nested}},
+                   {patch.overlap, patch.thicket, patch.opacity, patch.nested, patch.is_solid > 0}},
                   depth, patch.radiosity);
     }
   }
-  cube_.fill();
+  cube_.close();
   return integrate();
 }
 

@@ -85,7 +85,7 @@ class ReceiverRaster {
 
   const GatherRules rules_;
   const ContributionRules contribution_rules_;
-  const float near_field_radii_;
+  const float near_disk_radii_, near_sphere_radii_;
   float max_distance_sq_;
   const bool has_frame_;
   RasterGeometry geometry_;

@@ -76,6 +76,9 @@ struct Node {
   // how the area spreads. Trace above 0 and at most about radius^2.
   SymmetricMatrix covariance;
   std::uint8_t facet_count;  // 0: it is flat or rough
+  // How far surfels lie off the planes that a flat node or one of facets is drawn on, at most or by
+  // their moments; 0 in a rough node. Not stored.
+  float off_plane;
   union {
     RoughNode rough;  // without facets; zero in a flat node
     std::array<NodeFacet, kMostFacets> facets;
@@ -87,6 +90,9 @@ struct Node {
     thickness = radius;
     normal_cosine = -1;
   }
+
+  // Sets off_plane by everything else.
+  void findOffPlane();
 
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
@@ -100,7 +106,7 @@ struct Node {
     return facet;
   }
 };
-static_assert(sizeof(Node) == 328);
+static_assert(sizeof(Node) == 328 || sizeof(Node) == 336);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

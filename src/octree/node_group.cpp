@@ -136,6 +136,7 @@ class Columns {
       Node& node = nodes[i];
       node.position = at(position, i);
       node.radius = radius[i];
+      node.forgetBounds();
       // |sum A n| is zero in these: no direction
       node.normal = flatness[i] == 0 ? glm::vec3(0) : at(normal, i);
       setBounds(form.has_bounds ? BoundCodes{thickness[i], cone[i]} : BoundCodes(), node);
@@ -435,6 +436,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
   SURFEIT_RETURN_IF_ERROR(checkFlags(out));
   SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
   SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
+  for (Node& node : out) node.findOffPlane();
   if (reader.remaining() != 0) {
     return Status::corruption(
         fmt::format("node group: {} bytes after the last field", reader.remaining()));

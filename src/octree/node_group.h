@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "core/spherical_harmonics.h"
 #include "io/file.h"
 #include "octree/node.h"
-#include "core/spherical_harmonics.h"
 #include "octree/page_form.h"
 #include "surfeit/status.h"
 

@@ -30,8 +30,9 @@ struct NodeSums : AreaSums {
 
   // Mean position.
   glm::vec3 centre() const;
-  // The node's numbers, without references, slab and cone. `radius`: of a sphere around centre() that holds all
-  // disks. `flatness_limit` decides what is flat, and what is made of facets that are.
+  // The node's numbers, without references, slab and cone. `radius`: of a sphere around centre()
+  // that holds all disks. `flatness_limit` decides what is flat, and what is made of facets that
+  // are.
   Node toNode(float flatness_limit, float radius) const;
 
  private:

@@ -27,10 +27,11 @@ class RadiositySource {
   virtual Status read(std::uint32_t surfel_page, std::span<glm::vec3> radiosity) = 0;
 };
 
-// Appends all pages of `scene` to `writer`, which must be of the scene's format version, with the threads of the current arena; `threads` of
-// them bound what is on its way. Advances progress by surfels. Returns the mean radiosity, by area.
-// Errors: those of source and files; kCorruption where the pages are not in the order of the tree,
-// as every file of the indexer has them; kInterrupted.
+// Appends all pages of `scene` to `writer`, which must be of the scene's format version, with the
+// threads of the current arena; `threads` of them bound what is on its way. Advances progress by
+// surfels. Returns the mean radiosity, by area. Errors: those of source and files; kCorruption
+// where the pages are not in the order of the tree, as every file of the indexer has them;
+// kInterrupted.
 Result<glm::dvec3> rewriteRadiosity(const SceneFile& scene, RadiositySource& source,
                                     PageFileWriter& writer, int threads, Progress& progress);
 

@@ -291,57 +291,43 @@ optionsOfTheirOwnWinOverThePreset() {
   makeScene 5000
   makePatch
   gatherPatch default
-  jsonIs default.json max_solid_angle 0.1 raster_resolution 16 near_field_radii 8 \
-    far_field_parallax 0.2
+  jsonIs default.json max_solid_angle 0.1 raster_resolution 16 near_field_radii 8
   gatherPatch standard --quality standard
   sameBytes standard.ply default.ply
   gatherPatch draft --quality draft
-  jsonIs draft.json max_solid_angle 0.2 raster_resolution 10 near_field_radii 4 \
-    far_field_parallax 0.5
+  jsonIs draft.json max_solid_angle 0.2 raster_resolution 10 near_field_radii 4
   differentBytes draft.ply default.ply
   gatherPatch final --quality final
-  jsonIs final.json max_solid_angle 0.012 raster_resolution 40 near_field_radii 16 \
-    far_field_parallax 0
+  jsonIs final.json max_solid_angle 0.012 raster_resolution 40 near_field_radii 16
 
   # One, all, before and after; what is not given comes from the preset
-  local own=(--max-solid-angle 0.2 --raster-resolution 8 --near-field 5 --far-parallax 0.4)
+  local own=(--max-solid-angle 0.2 --raster-resolution 8 --near-field 5)
   gatherPatch own "${own[@]}"
   gatherPatch after --quality final "${own[@]}"
   gatherPatch before "${own[@]}" --quality final
-  gatherPatch around --raster-resolution 8 --near-field 5 --quality final --far-parallax 0.4 \
+  gatherPatch around --raster-resolution 8 --near-field 5 --quality final \
     --max-solid-angle 0.2
   local name
   for name in own after before around; do
-    jsonIs $name.json max_solid_angle 0.2 raster_resolution 8 near_field_radii 5 \
-      far_field_parallax 0.4
+    jsonIs $name.json max_solid_angle 0.2 raster_resolution 8 near_field_radii 5
     sameBytes $name.ply own.ply
   done
   gatherPatch after --quality draft --raster-resolution 8
   gatherPatch before --raster-resolution 8 --quality draft
   for name in after before; do
-    jsonIs $name.json max_solid_angle 0.2 raster_resolution 8 near_field_radii 4 \
-      far_field_parallax 0.5
+    jsonIs $name.json max_solid_angle 0.2 raster_resolution 8 near_field_radii 4
   done
   sameBytes after.ply before.ply
   differentBytes after.ply draft.ply
 
   # No preset touches these
   local limits=(--max-dist 0.7 --sides both --bias 0.3)
-  gatherPatch own --max-solid-angle 0.2 --raster-resolution 10 --near-field 4 --far-parallax 0.5 "${limits[@]}"
+  gatherPatch own --max-solid-angle 0.2 --raster-resolution 10 --near-field 4 "${limits[@]}"
   gatherPatch after --quality draft "${limits[@]}"
   gatherPatch before "${limits[@]}" --quality draft
   sameBytes after.ply own.ply
   sameBytes before.ply own.ply
   differentBytes own.ply draft.ply
-}
-
-sharedFarFieldCanBeSwitchedOff() {
-  makeScene 5000
-  makePatch
-  gatherPatch shared
-  gatherPatch alone --far-parallax 0
-  jsonIs alone.json far_field_parallax 0
-  differentBytes alone.ply shared.ply
 }
 
 invalidReceiversGetNanOrAreRefused() {

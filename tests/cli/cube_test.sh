@@ -39,7 +39,7 @@ cubesAgreeWithTheGather() {
   local number=3 row
   row=$(sed -n "$((number + 2))p" some.csv)
   { head -n 1 some.csv && echo "$row"; } > one.csv
-  run 0 gather cornell.sft one.csv -o gathered.csv --mode bleeding --far-parallax 0
+  run 0 gather cornell.sft one.csv -o gathered.csv --mode bleeding
   run 0 cube cornell.sft --receivers some.csv --number $number -o cube.png --stats cube.json
   # A packet of one agrees with the scalar gather
   local column

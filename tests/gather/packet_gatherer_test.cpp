@@ -81,7 +81,8 @@ TEST(PacketGatherer, EqualReceiversGiveWhatTheScalarGatherGives) {
             worst = std::max(worst, difference(result, expected));
           }
         }
-        EXPECT_LT(worst, 1e-3) << max_solid_angle << ' ' << int(sides);
+        // Where rounding decides about a sample of a hull
+        EXPECT_LT(worst, 2e-3) << max_solid_angle << ' ' << int(sides);
       }
     }
   }
@@ -147,28 +148,6 @@ Differences differences(const std::vector<GatherResult>& a, const std::vector<Ga
   return found;
 }
 
-// Most of the scene is shared.
-TEST(PacketGatherer, SharingTheFarFieldChangesLittleButSomething) {
-  Scene scene(mixedCloud());
-  const std::vector<Receiver> dense = denseReceivers();
-  GatherQuality quality;
-  quality.far_field_parallax = 0;
-  PacketGatherer alone(GatherMode::kBleeding, quality), sharing(GatherMode::kBleeding, {});
-  for (const std::size_t count : {dense.size(), std::size_t{5 * kPacketReceivers}}) {
-    const std::vector<Receiver> receivers(dense.begin(), dense.begin() + std::ptrdiff_t(count));
-    const std::uint64_t before = alone.work().patches, shared_before = sharing.work().patches;
-    const std::vector<GatherResult> expected = gatherPacket(alone, scene, receivers);
-    EXPECT_EQ(alone.work().shared_patches, 0u);
-    const std::vector<GatherResult> results = gatherPacket(sharing, scene, receivers);
-    EXPECT_GT(sharing.work().shared_patches, 0u);
-    EXPECT_LT(sharing.work().patches - shared_before, (alone.work().patches - before) / 2);
-    const Differences found = differences(results, expected);
-    EXPECT_GT(found.rms, 0) << count;
-    EXPECT_LT(found.rms, .005) << count;
-    EXPECT_LT(found.largest, .02) << count;
-  }
-}
-
 // What is near to any receiver of a packet is opened for all: scattered ones are better off in less
 // company. Measured: 234 packets, differences of 0.0017 RMS and 0.022 at most.
 TEST(PacketGatherer, ScatteredReceiversAreDividedAndComeCloseToWhatEachGathersAlone) {
@@ -200,27 +179,6 @@ TEST(PacketGatherer, WhatWasGatheredBeforeLeavesNothing) {
       ASSERT_EQ(difference(found[i], expected[i]), 0) << i;
     }
   }
-}
-
-// Leaves before and behind the border of the shared far field hide each other as any do.
-TEST(PacketGatherer, SharingTheFarFieldOfLeavesAddsNothing) {
-  Scene scene(foliage(20'000, kLeaf));
-  std::vector<Receiver> receivers;
-  for (int i = 0; i < int(kClusterReceivers); ++i) {
-    receivers.push_back({{.04f * float(i % 16), .04f * float(i / 16), 0}, {0, 0, 1}});
-  }
-  const auto meanOcclusion = [&](float parallax) {
-    GatherQuality quality;
-    quality.far_field_parallax = parallax;
-    PacketGatherer gatherer(GatherMode::kOcclusion, quality);
-    double sum = 0;
-    for (const GatherResult& result : gatherPacket(gatherer, scene, receivers)) {
-      sum += double(result.occlusion) / kClusterReceivers;
-    }
-    EXPECT_EQ(gatherer.work().shared_patches > 0, parallax > 0);
-    return sum;
-  };
-  EXPECT_NEAR(meanOcclusion(.25f), meanOcclusion(0), .01);  // .06 more if they added up
 }
 
 // A two-sided sheet that leans over the receiver by 45 degrees and meets its plane a fiftieth of a
@@ -286,13 +244,9 @@ TEST(PacketGatherer, LeavesAndRibbonsCoverAsMuchAsWhatIsSpreadAtRandom) {
 
 TEST(PacketGatherer, DenseReceiversAreNotDivided) {
   Scene scene(fineCloud());
-  for (const float parallax : {0.f, .3f}) {
-    GatherQuality quality;
-    quality.far_field_parallax = parallax;
-    PacketGatherer gatherer(GatherMode::kBleeding, quality);
-    gatherPacket(gatherer, scene, denseReceivers());
-    EXPECT_EQ(gatherer.work().packets, kClusterPackets) << parallax;
-  }
+  PacketGatherer gatherer(GatherMode::kBleeding, GatherQuality());
+  gatherPacket(gatherer, scene, denseReceivers());
+  EXPECT_EQ(gatherer.work().packets, kClusterPackets);
 }
 
 }  // namespace

@@ -141,7 +141,7 @@ TEST(PacketRaster, SurfelsAreKeptForTheFacesThatSeeThem) {
     for (int i = 0; i < 1000; ++i) {
       const Surfel surfel = surfelAround(random);
       packet.begin(receivers, viewPacket(receivers));
-      packet.addSurfels({&surfel, 1}, {});
+      packet.addSurfels({&surfel, 1});
       kept += int(packet.patchCount());
       packet.sort();
       packet.draw();
@@ -170,7 +170,7 @@ TEST(PacketRaster, ThinDisksMakeNoStepAtTheBorderOfTheNearField) {
   surfel.radius = .1f;
   surfel.area = .02f;
   surfel.normal = glm::normalize(glm::vec3(1, 0, -.1f));
-  const float border = nearFieldRadii(rules) * surfel.radius;
+  const float border = nearFieldRadii(rules, false) * surfel.radius;
   constexpr std::size_t kPlaces = 64;  // from .8 to 1.1 times the border
   std::vector<Receiver> receivers(kPlaces);
   for (std::size_t i = 0; i < kPlaces; ++i) {
@@ -183,7 +183,7 @@ TEST(PacketRaster, ThinDisksMakeNoStepAtTheBorderOfTheNearField) {
   for (std::size_t i = 0; i < kPlaces; i += kPacketReceivers) {
     const std::span<const Receiver> lanes = std::span(receivers).subspan(i, kPacketReceivers);
     packet.begin(lanes, viewPacket(lanes));
-    packet.addSurfels({&surfel, 1}, {});
+    packet.addSurfels({&surfel, 1});
     packet.sort();
     packet.draw();
     std::vector<GatherResult> results(lanes.size());

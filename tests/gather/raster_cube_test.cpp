@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <random>
 #include <vector>
 
 #include "core/spherical_harmonics.h"
@@ -268,68 +270,113 @@ TEST(RasterCube, WhatIsNestedHidesBehindTheLargerLayer) {
   EXPECT_NEAR(cover(.1f, 2, 1), anywhere, 1e-5);
 }
 
-// Covers pixels of the face +x of a cube of 12 pixels one by one.
-class FilledCube : public ::testing::Test {
- protected:
-  void cover(int column, int row, float amount, float thicket = 0) {
-    const std::size_t pixel = at(column, row);
-    const RasterGeometry::Pixel& shape = geometry_.pixels()[pixel];
-    const float axis = shape.direction.x;
-    // As much of the face as a pixel takes, but for a rim, lest neighbours be touched
-    const float area = amount * 4 / 144.f;
-    RasterCube::Patch patch = diskPatch(shape.direction, kRound, area * axis * axis * axis);
-    patch.texture.thicket = thicket;
-    cube_.splat(patch, {1, 2}, kWhite);
-  }
-  static std::size_t at(int column, int row) { return std::size_t(row * 12 + column); }
+// A sheet of disks that face the cube at x = `distance`, on the face +x of 16 pixels: squares of
+// `side` pixels, scattered by a part of that, within a square of `half` pixels around the middle.
+struct SheetOfDisks {
+  float distance = 1, side = .8f, scatter = .3f, half = 8;
+  bool is_solid = true;
+  float thicket = 0;
 
-  RasterGeometry geometry_{12};
+  void drawTo(RasterCube& cube, const glm::vec3& radiosity) const {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    const float step = side * distance / 8;
+    const int count = int(2 * half / side);
+    for (int i = 0; i < count * count; ++i) {
+      const float u =
+          (float(i % count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const float v =
+          (float(i / count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const glm::vec3 to(distance, u, v), direction = glm::normalize(to);
+      const float length_sq = glm::dot(to, to);
+      RasterCube::Patch patch =
+          diskPatch(direction, {-1, 0, 0}, step * step * direction.x / length_sq);
+      patch.texture.is_solid = is_solid;
+      patch.texture.thicket = thicket;
+      cube.splat(patch, {.99f * distance, 1.01f * distance}, radiosity);
+    }
+  }
+};
+
+class Closing : public ::testing::Test {
+ protected:
+  // Mean of the light, and of what is covered, of pixels in the middle of the face.
+  glm::vec2 seen(int half) const {
+    glm::vec2 sum(0);
+    for (int row = 8 - half; row < 8 + half; ++row) {
+      for (int column = 8 - half; column < 8 + half; ++column) {
+        const auto pixel = std::size_t(row * 16 + column);
+        sum += glm::vec2(cube_.radiosity(pixel).x, cube_.coverage(pixel));
+      }
+    }
+    return sum / float(4 * half * half);
+  }
+  const glm::vec3 dark_{0};
+  RasterGeometry geometry_{16};
   RasterCube cube_{geometry_, true};
 };
 
-TEST_F(FilledCube, GapsWithinASurfaceAreClosed) {
-  for (int row = 0; row < 12; ++row) {
-    for (int column = 0; column < 12; ++column) {
-      for (int i = 0; i < 8; ++i) cover(column, row, column == 6 && row == 6 ? .0875f : .5f);
-    }
-  }
-  // Sides of the patches on a face far from its middle are not those of pixels
-  const float open = 1 - cube_.coverage(at(6, 6));
-  ASSERT_GT(open, .1f);
-  cube_.fill();
-  EXPECT_NEAR(cube_.coverage(at(6, 6)), 1, 1e-5);
-  EXPECT_NEAR(cube_.radiosity(at(6, 6)).x, 1, 1e-5);
-}
-
-TEST_F(FilledCube, GapsWithinThicketsStayOpen) {
-  const auto filledPart = [&](float thicket) {
+TEST_F(Closing, NothingShinesThroughTheGapsOfASheet) {
+  for (const float side : {.1f, .3f, .8f, 1.7f}) {
     cube_.clear();
-    for (int row = 0; row < 12; ++row) {
-      for (int column = 0; column < 12; ++column) {
-        for (int i = 0; i < 8; ++i) {
-          cover(column, row, column == 6 && row == 6 ? .0875f : .5f, thicket);
-        }
-      }
-    }
-    const float open = 1 - cube_.coverage(at(6, 6));
-    cube_.fill();
-    return (cube_.coverage(at(6, 6)) - (1 - open)) / open;
-  };
-  EXPECT_NEAR(filledPart(0), 1, 1e-4);
-  EXPECT_NEAR(filledPart(1), 0, 1e-4);
-  EXPECT_GT(filledPart(.5f), .4f);
-  EXPECT_LT(filledPart(.5f), .9f);
+    SheetOfDisks{.side = side}.drawTo(cube_, dark_);
+    ASSERT_LT(seen(4).y, .999f) << side;  // gaps
+    SheetOfDisks{.distance = 3}.drawTo(cube_, kWhite);
+    cube_.close();
+    EXPECT_LT(seen(4).x, .003f) << side;
+    EXPECT_NEAR(seen(4).y, 1, .003f) << side;
+  }
 }
 
-TEST_F(FilledCube, EdgesAndThinThingsStayAsTheyAre) {
-  for (int row = 2; row < 10; ++row) {
-    for (int i = 0; i < 8; ++i) cover(2, row, .1f);                      // a line
-    for (int column = 6; column < 9; ++column) cover(column, row, .6f);  // a band: edges
+TEST_F(Closing, WhatIsClosedShinesAsItsOwnLayerDoes) {
+  SheetOfDisks{}.drawTo(cube_, kWhite);
+  SheetOfDisks{.distance = 3}.drawTo(cube_, dark_);
+  cube_.close();
+  EXPECT_NEAR(seen(4).x, 1, .003f);
+}
+
+// The sheet covers a square of 6 by 6 pixels, and a part of those around.
+TEST_F(Closing, OutlinesStayWhereTheyAre) {
+  SheetOfDisks{.side = .5f, .scatter = 0, .half = 3.25f}.drawTo(cube_, dark_);
+  const float before = seen(8).y;
+  cube_.close();
+  EXPECT_NEAR(seen(8).y, before, .01f * before);
+  EXPECT_NEAR(before * 256, 6.5f * 6.5f, .8f);
+}
+
+TEST_F(Closing, GapsBetweenLeavesAndBetweenSpheresStayOpen) {
+  for (const bool is_thicket : {false, true}) {
+    cube_.clear();
+    SheetOfDisks{.scatter = 1.5f, .is_solid = is_thicket, .thicket = is_thicket ? 1.f : 0.f}.drawTo(
+        cube_, kWhite);
+    const float before = seen(8).y;
+    cube_.close();
+    EXPECT_NEAR(seen(8).y, before, is_thicket ? 1e-6f : .02f) << is_thicket;
   }
-  std::vector<float> before;
-  for (std::size_t i = 0; i < 144; ++i) before.push_back(cube_.coverage(i));
-  cube_.fill();
-  for (std::size_t i = 0; i < 144; ++i) EXPECT_EQ(cube_.coverage(i), before[i]) << i;
+}
+
+// Of less than a pixel, before a wall: it sends what its area says, wherever it is.
+TEST_F(Closing, SmallThingsKeepTheirPower) {
+  SheetOfDisks wall{.distance = 3};
+  double sum = 0;
+  constexpr int kPlaces = 400;
+  for (int i = 0; i < kPlaces; ++i) {
+    cube_.clear();
+    const glm::vec3 direction =
+        glm::normalize(glm::vec3(1, .013f * float(i % 20), .017f * float(i / 20)));
+    const float solid_angle = .1f * 4 / 256;
+    RasterCube::Patch lamp = diskPatch(direction, kRound, solid_angle);
+    lamp.texture.is_solid = false;
+    cube_.splat(lamp, {.999f, 1.001f}, kWhite);
+    wall.drawTo(cube_, dark_);
+    cube_.close();
+    double power = 0;
+    for (std::size_t pixel = 0; pixel < 256; ++pixel) {
+      power += double(cube_.radiosity(pixel).x * geometry_.pixels()[pixel].solid_angle);
+    }
+    sum += power / double(solid_angle) / kPlaces;
+  }
+  EXPECT_NEAR(sum, 1, .01);
 }
 
 TEST(RasterCube, WhatOverlapsHidesBehindItsOwnLayer) {

@@ -22,7 +22,8 @@ using HeaderEdit = std::function<void(std::vector<std::byte>& scene_fields)>;
 inline Status rewriteScene(const std::string& from, const std::string& to, const PayloadEdit& edit,
                            const HeaderEdit& edit_header = {}) {
   SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(from));
-  SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer, PageFileWriter::create(to, pages.identity(), pages.formatVersion()));
+  SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer,
+                           PageFileWriter::create(to, pages.identity(), pages.formatVersion()));
   AlignedBuffer buffer;
   std::vector<std::byte> stored, payload;
   const auto copy = [&](std::uint32_t page) -> Status {

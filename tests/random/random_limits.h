@@ -17,22 +17,22 @@ inline constexpr double kUsualRms = .01, kLargeRms = .02;
 // Goal of all: rms .02, worst .1, none above .02, none above .01 in three batches of four (99 % of
 // scenes), median light .01; final: half of each. Counts are of 25 scenes, in proportion where a
 // batch has fewer.
-inline constexpr FidelityLimits kFrontLimits = {.65, 1, 8, 8, .02};
-inline constexpr FidelityLimits kBothLimits = {.65, 1, 12, 12, .15};
-inline constexpr FidelityLimits kBackLimits = {.65, 1, 20, 20, .15};
-inline constexpr FidelityLimits kFinalLimits = {.65, 1, 20, 20, .1};
-inline constexpr FidelityLimits kGlossyLimits = {.65, 1, 20, 20, .15};
-inline constexpr FidelityLimits kConeLimits = {.65, 1, 20, 20, .1};
-inline constexpr FidelityLimits kFalloffLimits = {.65, 1, 20, 20, .1};
-inline constexpr FidelityLimits kSubsetLimits = {.65, 1, 20, 20, .1};
+inline constexpr FidelityLimits kFrontLimits = {.06, .25, 5, 2, .02};
+inline constexpr FidelityLimits kBothLimits = {.012, .04, 2, 1, .1};
+inline constexpr FidelityLimits kBackLimits = {.03, .15, 5, 2, .15};
+inline constexpr FidelityLimits kFinalLimits = {.003, .012, 1, 1, .05};
+inline constexpr FidelityLimits kGlossyLimits = {.08, .3, 6, 5, .1};
+inline constexpr FidelityLimits kConeLimits = {.01, .04, 1, 1, .06};
+inline constexpr FidelityLimits kFalloffLimits = {.1, .45, 10, 5, .06};
+inline constexpr FidelityLimits kSubsetLimits = {.012, .04, 1, 1, .05};
 
 // One bounce, by default against exactly: RMS of irradiance over its mean. Goal: .02.
-inline constexpr double kMostBounceLight = .1;
+inline constexpr double kMostBounceLight = .03;
 
 // A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
 // by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.
-inline constexpr double kUsualStep = .004, kMostStep = 1;
-inline constexpr double kUnusualSteps = 300;
+inline constexpr double kUsualStep = .004, kMostStep = .4;
+inline constexpr double kUnusualSteps = 200;
 
 // The same scene moved, turned by quarters, and twice as large. Results of the exact gather differ
 // by rounding, of the default by other cells of the octree as well: RMS over a scene. Goals: .002
@@ -40,8 +40,8 @@ inline constexpr double kUnusualSteps = 300;
 struct InvarianceLimits {
   double exact, fast;
 };
-inline constexpr InvarianceLimits kMovedLimits = {.5, .5};
-inline constexpr InvarianceLimits kTurnedLimits = {.5, .5};
+inline constexpr InvarianceLimits kMovedLimits = {.001, .01};
+inline constexpr InvarianceLimits kTurnedLimits = {.004, .005};
 inline constexpr InvarianceLimits kScaledLimits = {0, 0};
 
 }  // namespace surfeit

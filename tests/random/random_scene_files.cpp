@@ -82,9 +82,9 @@ std::string gatherCommands(const std::string& directory, const GatherOptions& op
   const GatherQuality& quality = options.quality;
   const std::string common = fmt::format(
       "surfeit gather {0}/scene.sft {0}/receivers.ply --mode {1} --sides {2} "
-      "--raster-resolution {3} --near-field {4} --far-parallax {5}",
+      "--raster-resolution {3} --near-field {4}",
       directory, modeWord(options.mode), sidesWord(quality.sides), quality.raster_resolution,
-      quality.near_field_radii, quality.far_field_parallax);
+      quality.near_field_radii);
   return fmt::format(
       "surfeit index {0}/scene.ply -o {0}/scene.sft\n"
       "{1} --max-solid-angle {2} -o {0}/fast.ply\n"

@@ -1,0 +1,207 @@
+// The hulls of what is drawn, and the closing of layers by them, in the rasters of a packet; for
+// one instruction set (see packet_kernel-inl.h). RasterCube is the definition: addHull,
+// missingSamples, closeLayer and beginLayer.
+#if defined(SURFEIT_PACKET_HULL_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_HULL_INL_H_
+#undef SURFEIT_PACKET_HULL_INL_H_
+#else
+#define SURFEIT_PACKET_HULL_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "gather/coverage_rules.h"
+#include "gather/packet_kernel.h"
+#include "gather/packet_lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+using DU = hn::RebindToUnsigned<D>;
+using DI = hn::RebindToSigned<D>;
+using VU = hn::Vec<DU>;
+inline VU SplatU(std::uint32_t value) { return hn::Set(DU(), value); }
+
+// Of one face. `kChannels` values of color and fade follow those of coverage in a pixel.
+template <std::size_t kChannels>
+class FaceHull {
+ public:
+  // Places in a pixel. What was open before the last layer is negative once that layer was closed
+  // as far as it is.
+  static constexpr std::size_t kHull = PacketCanvas::kCoverageChannels + kChannels;
+  static constexpr std::size_t kBegin = kHull + 1, kEnd = kHull + 2, kOpenBefore = kHull + 3;
+  static constexpr std::size_t kColorBefore = kHull + 4, kAll = kColorBefore + kChannels;
+  static_assert(kAll ==
+                PacketCanvas::kCoverageChannels + PacketCanvas::kHullChannels + 2 * kChannels);
+
+  FaceHull() = default;
+  FaceHull(const FaceLanes& pixels, const SeenPixels::Face& seen,
+           const RasterGeometry::Pixel* geometry, int resolution, const V3& up, M spherical)
+      : pixels_(pixels),
+        seen_(&seen),
+        geometry_(geometry),
+        resolution_(resolution),
+        up_(up),
+        spherical_(spherical) {}
+
+  // Adds samples of lanes that have some. `widening` in samples.
+  HWY_INLINE void Add(std::size_t at, VU samples, V widening, V depth_begin, V depth_end) const {
+    const D d;
+    const DU du;
+    float* const pixel = pixels_.at(at);
+    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    const M counts =
+        hn::And(hn::RebindMask(d, hn::Ne(samples, hn::Zero(du))), hn::Gt(open, hn::Zero(d)));
+    if (hn::AllFalse(d, counts)) return;
+    samples = hn::IfThenElseZero(hn::RebindMask(du, counts), samples);
+    const V end = hn::Load(d, pixel + kEnd * kStep), begin = hn::Load(d, pixel + kBegin * kStep);
+    VU hull = hn::BitCast(du, hn::Load(d, pixel + kHull * kStep));
+    const M is_new = hn::And(counts, hn::Gt(depth_begin, end));
+    const VU moved = hn::AndNot(SplatU(kHullSamples), hn::Or(hull, hn::ShiftLeft<16>(hull)));
+    hull = hn::Or(hn::IfThenElse(hn::RebindMask(du, is_new), moved, hull), samples);
+    hn::Store(hn::BitCast(d, hull), d, pixel + kHull * kStep);
+    hn::Store(hn::IfThenElse(counts, hn::Max(end, depth_end), end), d, pixel + kEnd * kStep);
+    // The widening is in the lowest bits of the beginning
+    const VU wide = hn::BitCast(du, hn::ConvertTo(DI(), widening));
+    const VU before = hn::And(hn::BitCast(du, begin), SplatU(kWidening));
+    const VU widest = hn::Max(before, hn::IfThenElseZero(hn::RebindMask(du, counts), wide));
+    const VU place = hn::BitCast(du, hn::IfThenElse(is_new, depth_begin, begin));
+    hn::Store(hn::BitCast(d, hn::Or(hn::AndNot(SplatU(kWidening), place), widest)), d,
+              pixel + kBegin * kStep);
+  }
+
+  // What comes before something is drawn that begins layers of their own in lanes of `ends`, and
+  // new ones in lanes of `begins`.
+  HWY_INLINE void Turn(std::size_t at, M ends, M begins) const {
+    const D d;
+    float* const pixel = pixels_.at(at);
+    const V before = hn::Load(d, pixel + kOpenBefore * kStep);
+    V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    const M has_layer = hn::And(ends, hn::Gt(before, open));
+    if (!hn::AllFalse(d, has_layer)) Close(at, has_layer);
+    open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    begins = hn::And(begins, hn::Ne(before, open));
+    if (hn::AllFalse(d, begins)) return;
+    hn::Store(hn::IfThenElse(begins, open, hn::Load(d, pixel + kOpenBefore * kStep)), d,
+              pixel + kOpenBefore * kStep);
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      float* const to = pixel + (kColorBefore + c) * kStep;
+      const float* const from = pixel + (PacketCanvas::kCoverageChannels + c) * kStep;
+      hn::Store(hn::IfThenElse(begins, hn::Load(d, from), hn::Load(d, to)), d, to);
+    }
+  }
+
+  // Closes the last layers of all pixels.
+  void CloseAll() const {
+    const D d;
+    seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t at) HWY_ATTR {
+      const float* const pixel = pixels_.at(at);
+      const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+      const V before = hn::Load(d, pixel + kOpenBefore * kStep);
+      const M has_layer = hn::And(hn::Gt(before, open), hn::Gt(open, hn::Zero(d)));
+      if (!hn::AllFalse(d, has_layer)) Close(at, has_layer);
+    });
+  }
+
+ private:
+  static constexpr std::uint32_t kWidening = 7;  // bits
+
+  // Samples of what begins no farther than `distance`.
+  static VU UpTo(const float* pixel, V distance) {
+    const D d;
+    const DU du;
+    const VU hull = hn::BitCast(du, hn::Load(d, pixel + kHull * kStep));
+    const VU before = hn::ShiftRight<16>(hull);
+    const M all = hn::Le(hn::Load(d, pixel + kBegin * kStep), distance);
+    return hn::IfThenElse(hn::RebindMask(du, all), hn::Or(before, hull), before);
+  }
+
+  // At least kHullMissing in lanes that do not count.
+  V MissingSamples(std::size_t at, M counts) const {
+    const D d;
+    const DU du;
+    const float* const pixel = pixels_.at(at);
+    const V end = hn::Load(d, pixel + PacketCanvas::kEnd * kStep);
+    VU missing =
+        hn::IfThenElse(hn::RebindMask(du, counts),
+                       hn::PopulationCount(hn::AndNot(UpTo(pixel, end), SplatU(kHullSamples))),
+                       SplatU(kHullSamples));
+    const VU enough = SplatU(std::uint32_t(kHullMissing));
+    const VU widening =
+        hn::And(hn::BitCast(du, hn::Load(d, pixel + kBegin * kStep)), SplatU(kWidening));
+    const int column = int(at) % resolution_, row = int(at) / resolution_;
+    for (int y = -1; y <= 1; ++y) {
+      const int other_row = row + y;
+      if (other_row < seen_->row_begin || other_row >= seen_->row_end) continue;
+      const SeenPixels::Columns& columns = seen_->rows[std::size_t(other_row)];
+      for (int x = -1; x <= 1; ++x) {
+        const int other_column = column + x;
+        if ((x == 0 && y == 0) || other_column < columns.begin || other_column >= columns.end) {
+          continue;
+        }
+        if (hn::AllFalse(du, hn::Lt(missing, enough))) return AsFloat(missing);
+        const auto other = std::size_t(other_row * resolution_ + other_column);
+        VU border = hn::Zero(du);
+        for (std::uint32_t wide = 0; wide < std::uint32_t(kHullSide); ++wide) {
+          border = hn::IfThenElse(hn::Gt(widening, SplatU(wide)),
+                                  SplatU(hullBorder(x, y, int(wide) + 1)), border);
+        }
+        const V open = hn::Load(d, pixels_.at(other) + PacketCanvas::kOpen * kStep);
+        const M above = hn::Gt(Dot(up_, geometry_[other].direction), hn::Zero(d));
+        const M seen = hn::And(hn::Or(spherical_, above), hn::Gt(open, hn::Zero(d)));
+        const VU lacks = hn::IfThenElseZero(hn::RebindMask(du, seen),
+                                            hn::AndNot(UpTo(pixels_.at(other), end), border));
+        missing = hn::Add(missing, hn::PopulationCount(lacks));
+      }
+    }
+    return AsFloat(missing);
+  }
+  static V AsFloat(VU count) { return hn::ConvertTo(D(), hn::BitCast(DI(), count)); }
+
+  // Of the lanes whose layers cover something.
+  void Close(std::size_t at, M lanes) const {
+    const D d;
+    const V zero = hn::Zero(d), one = Splat(1);
+    float* const pixel = pixels_.at(at);
+    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    const V before = hn::Load(d, pixel + kOpenBefore * kStep);
+    hn::Store(hn::IfThenElse(lanes, hn::Neg(before), before), d, pixel + kOpenBefore * kStep);
+    const V whole = hn::Mul(hn::Sub(hn::Sub(one, open), Splat(kClosedFrom)),
+                            Splat(1 / (kClosedWhole - kClosedFrom)));
+    lanes = hn::And(lanes, hn::Gt(whole, zero));
+    if (hn::AllFalse(d, lanes)) return;
+    const V lack = hn::Mul(MissingSamples(at, lanes), Splat(1 / kHullMissing));
+    const V part = hn::Mul(hn::Max(zero, hn::Sub(one, lack)), hn::Min(one, hn::Max(zero, whole)));
+    lanes = hn::And(lanes, hn::Gt(part, zero));
+    if (hn::AllFalse(d, lanes)) return;
+    const V added = hn::IfThenElseZero(lanes, hn::Mul(part, open));
+    const V layer = hn::IfThenElse(lanes, hn::Sub(before, open), one);
+    const V scale = hn::Div(added, layer);
+    hn::Store(hn::Sub(open, added), d, pixel + PacketCanvas::kOpen * kStep);
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      float* const to = pixel + (PacketCanvas::kCoverageChannels + c) * kStep;
+      const V all = hn::Load(d, to), rest = hn::Load(d, pixel + (kColorBefore + c) * kStep);
+      hn::Store(hn::MulAdd(scale, hn::Sub(all, rest), all), d, to);
+    }
+  }
+
+  FaceLanes pixels_;
+  const SeenPixels::Face* seen_ = nullptr;
+  const RasterGeometry::Pixel* geometry_ = nullptr;
+  int resolution_ = 0;
+  V3 up_;  // the receivers' normals in the frame of the raster
+  M spherical_;
+};
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target guard
