@@ -251,7 +251,6 @@ Power powerOf(float radius, const Settings& settings) {
   lamp.radiosity = glm::vec3(100);
   lamp.position = {.3f, .2f, -3};
   lamp.normal = glm::vec3(0);
-  lamp.flags = lamp.flags;
   wall.push_back(lamp);
   std::vector<Receiver> receivers;
   for (int i = 0; i < kTrials; ++i) {

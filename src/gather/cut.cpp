@@ -344,11 +344,12 @@ float openPart(const Node& node, const Receiver& receiver, const CutRules& rules
   if (!(distance > node.radius)) return 1;
 
   float gain = 1;
-  if (!receiver.isSpherical()) {
+  const float most_coarser = mostCoarserOf(node, rules);
+  if (most_coarser > 1 && !receiver.isSpherical()) {
     const float highest = glm::dot(to_node, receiver.normal) + riseOf(node, receiver.normal);
     gain =
         std::clamp(kWholeCosine * distance / std::max(highest, std::numeric_limits<float>::min()),
-                   1.f, mostCoarserOf(node, rules));
+                   1.f, most_coarser);
   }
   const float limit = 2 * shareOf(node) * gain * rules.max_solid_angle;
   const float off_plane = node.off_plane * inverseOffPlane(rules);

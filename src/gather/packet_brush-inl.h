@@ -14,6 +14,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <type_traits>
 
 #include "gather/coverage_rules.h"
@@ -113,13 +114,14 @@ class Brush {
   }
 
   void ClearFace() {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
     const D d;
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
       float* const at = pixels_.at(pixel);
       for (std::size_t i = 0; i < kChannels; ++i) {
         const bool is_open =
             i == PacketCanvas::kRoom || i == PacketCanvas::kOpen || i == Hull::kOpenBefore;
-        const float value = is_open ? 1.f : i == Hull::kEnd ? -1.f : 0.f;
+        const float value = is_open ? 1.f : i == Hull::kEnd ? -kInfinity : 0.f;
         hn::Store(Splat(value), d, at + i * kStep);
       }
     });

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -168,8 +169,8 @@ class RasterCube {
  private:
   struct Hull {
     std::uint32_t before = 0, now = 0;  // samples within what was drawn, and within its last layer
-    float begin = 0, end = -1;          // of the last layer
-    int widening = 0;                   // at most, in samples
+    float begin = 0, end = -std::numeric_limits<float>::infinity();  // of the last layer
+    int widening = 0;                                                // at most, in samples
     std::uint32_t upTo(float distance) const { return begin <= distance ? before | now : before; }
   };
   struct Coverage {

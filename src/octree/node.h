@@ -106,7 +106,7 @@ struct Node {
     return facet;
   }
 };
-static_assert(sizeof(Node) == 328 || sizeof(Node) == 336);
+static_assert(sizeof(Node) == 328);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

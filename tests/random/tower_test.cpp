@@ -17,7 +17,8 @@ namespace surfeit {
 namespace {
 
 const std::string kTower = std::string(SURFEIT_SHARED_DATA_DIR) + "/../cases/tower/";
-constexpr double kTolerance = .0105;  // .01 of the case's README; final quality needs .0101
+constexpr double kTolerance = .01;         // of the case's README
+constexpr double kFinalTolerance = .0105;  // needs .0101; the goal is .01, too
 
 GatherOptions towerOptions() {
   GatherOptions options;
@@ -39,7 +40,8 @@ Table gatherTower(const std::string& cloud, const std::string& receivers,
 }
 
 // Means over the receivers at each distance, which follow each other.
-void expectOcclusion(const Table& result, const std::vector<double>& expected) {
+void expectOcclusion(const Table& result, const std::vector<double>& expected,
+                     double tolerance = kTolerance) {
   const std::vector<double> found = result.column("occlusion");
   ASSERT_GT(found.size(), 0u);
   ASSERT_EQ(found.size() % expected.size(), 0u);
@@ -47,7 +49,7 @@ void expectOcclusion(const Table& result, const std::vector<double>& expected) {
   for (std::size_t i = 0; i < expected.size(); ++i) {
     double mean = 0;
     for (std::size_t j = 0; j < each; ++j) mean += found[i * each + j] / double(each);
-    EXPECT_NEAR(mean, expected[i], kTolerance) << "distance " << i;
+    EXPECT_NEAR(mean, expected[i], tolerance) << "distance " << i;
   }
 }
 
@@ -76,7 +78,7 @@ TEST_F(Tower, RoofTwentyMetresHighHasAHut) {
 TEST_F(Tower, FinalQualitySeesTheHutToo) {
   GatherOptions options = towerOptions();
   setQuality(QualityPreset::kFinal, options.quality);
-  expectOcclusion(gatherTower("roof_20.ply", "at_hut_20.ply", options), kAtHut);
+  expectOcclusion(gatherTower("roof_20.ply", "at_hut_20.ply", options), kAtHut, kFinalTolerance);
 }
 
 TEST_F(Tower, HutOnTheRoofSendsLight) {
