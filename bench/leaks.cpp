@@ -6,28 +6,19 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
-#include <filesystem>
-#include <functional>
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <memory>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "bench/gather_scenes.h"
-#include "core/assert.h"
-#include "core/tangent_frame.h"
-#include "gather/gather_point.h"
-#include "gather/packet_gatherer.h"
-#include "io/surfel_writer.h"
-#include "octree/paged_octree.h"
-#include "octree/scene_file.h"
-#include "surfeit/index.h"
+#include "random/closed_things.h"
+#include "random/indexed_scene.h"
+#include "surfeit/gather.h"
 
 namespace surfeit {
 namespace {
@@ -44,143 +35,31 @@ T take(Result<T> result) {
   }
   return std::move(*result);
 }
-void must(const Status& status) {
-  if (!status.ok()) {
-    fmt::print(stderr, "leaks: {}\n", status.message());
-    std::exit(1);
-  }
-}
-
-std::unique_ptr<PagedOctree> octreeOf(const Cloud& cloud) {
-  const WorkDirectory directory = take(WorkDirectory::open(""));
-  const std::string cloud_path = directory.path() + "/cloud.ply";
-  const std::string path = directory.path() + "/cloud.sft";
-  CloudChannels channels;
-  channels.normal = channels.radius = channels.area = channels.radiosity = true;
-  SurfelWriter writer = take(SurfelWriter::create(cloud_path, channels));
-  must(writer.write(cloud));
-  must(writer.finish());
-  Progress progress;
-  must(indexClouds({cloud_path}, path, {}, progress).status());
-  SceneFile file = take(SceneFile::open(path));
-  const auto memory =
-      take(PagedOctree::planMemory(file, PagedOctree::unlimitedCacheBytes(file), 1));
-  return take(PagedOctree::create(std::move(file), memory));
-}
-
-Surfel disk(const glm::vec3& position, const glm::vec3& normal, float area, float radiosity) {
-  Surfel surfel;
-  surfel.position = position;
-  surfel.normal = normal;
-  surfel.area = area;
-  surfel.radius = std::sqrt(area / 2);
-  surfel.radiosity = glm::vec3(radiosity);
-  return surfel;
-}
-
-// Disks of a sphere, along a spiral, scattered; facing out, or in with side -1.
-void addBall(Cloud& cloud, int count, const glm::vec3& centre, float radius, float radiosity,
-             float side = 1, float scatter = .33f) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<float> uniform(-1, 1);
-  const float area = 4 * kPi * radius * radius / float(count), spacing = std::sqrt(area);
-  for (int i = 0; i < count; ++i) {
-    const float z = 1 - (2 * float(i) + 1) / float(count), across = std::sqrt(1 - z * z);
-    const double angle = std::fmod(i * kPiExact * (3 - std::sqrt(5.)), 2 * kPiExact);
-    glm::vec3 at(across * float(std::cos(angle)), across * float(std::sin(angle)), z);
-    const glm::vec3 off(uniform(random), uniform(random), uniform(random));
-    at = glm::normalize(at + scatter * spacing / radius * off);
-    cloud.push_back(disk(centre + radius * at, side * at, area, radiosity));
-  }
-}
-
-// Disks of a parallelogram with these sides, facing along u x v, scattered within their squares.
-void addSheet(Cloud& cloud, int count, const glm::vec3& corner, const glm::vec3& u,
-              const glm::vec3& v, float radiosity, float scatter = .33f) {
-  std::mt19937 random(9);
-  std::uniform_real_distribution<float> uniform(-1, 1);
-  const float width = glm::length(u), height = glm::length(v);
-  const int columns = std::max(1, int(std::lround(std::sqrt(float(count) * width / height))));
-  const int rows = std::max(1, int(std::lround(float(count) / float(columns))));
-  const glm::vec3 normal = glm::normalize(glm::cross(u, v));
-  const float area = width * height / float(columns * rows);
-  for (int i = 0; i < columns * rows; ++i) {
-    const float x = (float(i % columns) + .5f + scatter * uniform(random)) / float(columns);
-    const float y = (float(i / columns) + .5f + scatter * uniform(random)) / float(rows);
-    cloud.push_back(disk(corner + x * u + y * v, normal, area, radiosity));
-  }
-}
-
-void addBox(Cloud& cloud, int count, const glm::vec3& centre, float side, float radiosity) {
-  const float h = side / 2;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const float sign : {-1.f, 1.f}) {
-      glm::vec3 n(0), u(0), v(0);
-      n[axis] = sign;
-      u[(axis + 1) % 3] = side;
-      v[(axis + 2) % 3] = sign * side;
-      addSheet(cloud, count / 6, centre + h * n - .5f * u - .5f * v, u, v, radiosity);
-    }
-  }
-}
-
-class Gatherer {
- public:
-  Gatherer(const Cloud& cloud, const GatherQuality& quality, bool packets)
-      : octree_(octreeOf(cloud)),
-        reader_(*octree_),
-        point_(GatherMode::kBleeding, quality),
-        packet_(GatherMode::kBleeding, quality),
-        packets_(packets) {}
-  std::vector<GatherResult> gather(const std::vector<Receiver>& receivers) {
-    std::vector<GatherResult> results(receivers.size());
-    for (std::size_t i = 0; i < receivers.size();) {
-      const std::size_t count = packets_ ? std::min(kClusterReceivers, receivers.size() - i) : 1;
-      if (packets_) {
-        must(packet_.gather(std::span(receivers).subspan(i, count), reader_,
-                            std::span(results).subspan(i, count)));
-      } else {
-        must(point_.gather(receivers[i], reader_, results[i]));
-      }
-      i += count;
-    }
-    return results;
-  }
-
- private:
-  std::unique_ptr<PagedOctree> octree_;
-  PagedOctree::Reader reader_;
-  PointGatherer point_;
-  PacketGatherer packet_;
-  bool packets_;
-};
-
 struct Settings {
   GatherQuality quality;
   bool packets = false;
 };
 
-double meanLight(const Cloud& cloud, const std::vector<Receiver>& receivers,
-                 const Settings& settings) {
-  Gatherer gatherer(cloud, settings.quality, settings.packets);
-  double sum = 0;
-  for (const GatherResult& result : gatherer.gather(receivers)) sum += double(result.irradiance.x);
-  return sum / double(receivers.size());
+std::vector<GatherResult> gather(const Cloud& cloud, const std::vector<Receiver>& receivers,
+                                 const Settings& settings) {
+  const auto scene = take(IndexedScene::make(cloud));
+  const GatherRules rules(GatherMode::kBleeding, settings.quality);
+  return take(settings.packets ? scene->gatherTogether(receivers, rules)
+                               : scene->gatherAlone(receivers, rules));
 }
 
-std::vector<Receiver> receiversBehind() {
-  std::vector<Receiver> receivers;
-  for (int i = 0; i < 25; ++i) {
-    const glm::vec3 at(.1f * float(i % 5 - 2), .1f * float(i / 5 - 2), 3);
-    receivers.push_back({at, glm::normalize(glm::vec3(.02f * float(i % 3), .01f, -1))});
+double meanLight(const Cloud& cloud, const std::vector<Receiver>& receivers,
+                 const Settings& settings) {
+  double sum = 0;
+  for (const GatherResult& result : gather(cloud, receivers, settings)) {
+    sum += double(result.irradiance.x);
   }
-  return receivers;
+  return sum / double(receivers.size());
 }
 
 // A lamp wholly hidden by what stands before it: what arrives, of what would without.
 double leakOf(const Cloud& blocker, const Settings& settings) {
-  Cloud lamp;
-  addSheet(lamp, 2000, {-.4f, -.4f, -3}, {.8f, 0, 0}, {0, .8f, 0}, 1);
+  Cloud lamp = hiddenLamp();
   const double open = meanLight(lamp, receiversBehind(), settings);
   lamp.insert(lamp.end(), blocker.begin(), blocker.end());
   return meanLight(lamp, receiversBehind(), settings) / open;
@@ -200,9 +79,8 @@ Closed closedness(int count, float scatter, const Settings& settings) {
   std::vector<Receiver> receivers;
   for (int i = 0; i < 64; ++i)
     receivers.push_back({.8f * float(i) / 64 * direction(), direction()});
-  Gatherer gatherer(shell, settings.quality, settings.packets);
   Closed closed;
-  for (const GatherResult& result : gatherer.gather(receivers)) {
+  for (const GatherResult& result : gather(shell, receivers, settings)) {
     closed.mean += double(result.occlusion) / 64;
     closed.worst = std::min(closed.worst, double(result.occlusion));
   }
@@ -212,7 +90,7 @@ Closed closedness(int count, float scatter, const Settings& settings) {
 // A dark ball on a floor before a bright wall, seen from the floor on its other side.
 double floorBeside(int count, const Settings& settings) {
   Cloud cloud;
-  addBall(cloud, count, {0, 0, 1}, 1, 0);
+  addBall(cloud, count, {0, 0, 1}, 1);
   addSheet(cloud, 20'000, {3, -3, 0}, {0, 0, 6}, {0, 6, 0}, 1);
   std::vector<Receiver> receivers;
   double truth = 0;
@@ -244,21 +122,21 @@ Power powerOf(float radius, const Settings& settings) {
   double sum = 0, square = 0;
   constexpr int kTrials = 200;
   Cloud wall;
-  addSheet(wall, 5000, {-6, -6, -4}, {12, 0, 0}, {0, 12, 0}, 0);
+  addSheet(wall, 5000, {-6, -6, -4}, {12, 0, 0}, {0, 12, 0});
   Surfel lamp;
   lamp.radius = radius;
   lamp.area = kPi * radius * radius;
   lamp.radiosity = glm::vec3(100);
   lamp.position = {.3f, .2f, -3};
   lamp.normal = glm::vec3(0);
+  lamp.flags = kSurfelSphere;
   wall.push_back(lamp);
   std::vector<Receiver> receivers;
   for (int i = 0; i < kTrials; ++i) {
     receivers.push_back(
         {{2.8f * uniform(random), 2.8f * uniform(random), .3f * uniform(random)}, {0, 0, -1}});
   }
-  Gatherer gatherer(wall, settings.quality, settings.packets);
-  const std::vector<GatherResult> results = gatherer.gather(receivers);
+  const std::vector<GatherResult> results = gather(wall, receivers, settings);
   for (std::size_t i = 0; i < results.size(); ++i) {
     const glm::dvec3 to = glm::dvec3(lamp.position) - glm::dvec3(receivers[i].position);
     const double d2 = glm::dot(to, to);
@@ -274,9 +152,9 @@ void printLeaks(const Settings& settings, const std::vector<int>& counts) {
   fmt::print("behind          {:>8} {:>8} {:>8}   floor beside a ball\n", "ball", "box", "wall");
   for (const int count : counts) {
     Cloud ball, box, wall;
-    addBall(ball, count, glm::vec3(0), 1, 0);
-    addBox(box, count, glm::vec3(0), 1.6f, 0);
-    addSheet(wall, count, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
+    addBall(ball, count, glm::vec3(0), 1);
+    addBox(box, count, glm::vec3(0), 1.6f);
+    addSheet(wall, count, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
     fmt::print("{:>8}        {:8.4f} {:8.4f} {:8.4f}   {:+.4f}\n", count, leakOf(ball, settings),
                leakOf(box, settings), leakOf(wall, settings), floorBeside(count, settings));
   }
@@ -287,7 +165,7 @@ void printShells(const Settings& settings, const std::vector<int>& pixels) {
   for (const int p : pixels) fmt::print("     {:>2} pixels   ", p);
   fmt::print("\n");
   for (const int count : {2000, 20'000, 200'000}) {
-    for (const float scatter : {0.f, .33f}) {
+    for (const float scatter : {0.f, kScatter}) {
       fmt::print("{:>8} {:>4}   ", count, scatter);
       for (const int p : pixels) {
         Settings at = settings;
@@ -320,14 +198,18 @@ int main(int argc, char** argv) {
   int resolution = 0;
   std::vector<int> counts = {5000, 50'000}, pixels = {8, 16, 32, 64};
   std::vector<std::string> parts = {"leaks", "shells", "power"};
-  app.add_option("--quality", preset, "draft, standard, final");
-  app.add_option("--engine", engine, "scalar, packet");
+  app.add_option("--quality", preset, "Of the gather")
+      ->check(CLI::IsMember({"draft", "standard", "final"}));
+  app.add_option("--engine", engine, "Receivers alone, or together")
+      ->check(CLI::IsMember({"scalar", "packet"}));
   app.add_option("--max-solid-angle", max_solid_angle, "Largest cluster drawn as one");
   app.add_option("--raster-resolution", resolution, "Pixels along a cube face, even");
   app.add_option("--near-field", near_field, "Reach of tracing, in surfel radii");
   app.add_option("--surfels", counts, "Of what hides the light")->delimiter(',');
   app.add_option("--pixels", pixels, "Of the closed shells")->delimiter(',');
-  app.add_option("--parts", parts, "leaks, shells, power")->delimiter(',');
+  app.add_option("--parts", parts, "What is printed")
+      ->check(CLI::IsMember({"leaks", "shells", "power"}))
+      ->delimiter(',');
   CLI11_PARSE(app, argc, argv);
   if (preset == "draft") setQuality(QualityPreset::kDraft, settings.quality);
   if (preset == "final") setQuality(QualityPreset::kFinal, settings.quality);

@@ -19,6 +19,7 @@
 
 #include "gather/coverage_rules.h"
 #include "gather/packet_cover-inl.h"
+#include "gather/packet_footprint-inl.h"
 #include "gather/packet_kernel.h"
 #include "gather/packet_lanes-inl.h"
 #include "gather/packet_rays-inl.h"
@@ -31,11 +32,6 @@ namespace {
 // What begins closer than this part of its distance, measured across the face, is taken to reach
 // behind the receiver.
 constexpr float kLeastInFront = 1e-3f;
-
-// As RasterCube::Parallelogram, in pixels.
-struct Parallelogram {
-  V x, y, half_x, half_y, shear;
-};
 
 template <typename Kind>
 class Brush {
@@ -192,7 +188,7 @@ class Brush {
     const Cover cover =
         MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape));
     CoverParallelogram(shape, seen, cover);
-    if (cover.has_hull) AddHull(shape, seen, cover);
+    if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_);
   }
 
   // As touchPart.
@@ -273,65 +269,6 @@ class Brush {
     const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
     const Rows rows = {y0, y1, half_x, range};
     cover.overlap > 0 ? CoverRows<true>(shape, rows, cover) : CoverRows<false>(shape, rows, cover);
-  }
-
-  // As RasterCube::addHull, of lanes that hide enough.
-  HWY_INLINE void AddHull(const Parallelogram& shape, M seen, const Cover& cover) {
-    const D d;
-    const DU du;
-    seen = hn::And(seen, hn::Ge(cover.opacity, Splat(kHullOpacity)));
-    const V zero = hn::Zero(d), size = Splat(float(resolution_)), samples = Splat(float(kHullSide));
-    const V side = hn::Sqrt(hn::Mul(shape.half_x, shape.half_y));
-    const V half_side = hn::MulAdd(side, Splat(kHullWidening * float(kHullSide)), Splat(0.5f));
-    V widening = hn::Floor(hn::Min(samples, hn::Max(Splat(1), half_side)));
-    if (!cover.is_solid) widening = zero;
-    const V wider = hn::Mul(widening, Splat(1 / float(kHullSide)));
-    const V reach = hn::Add(hn::MulAdd(hn::Abs(shape.shear), shape.half_y, shape.half_x), wider);
-    const V half_y = hn::Add(shape.half_y, wider), half_x = hn::Add(shape.half_x, wider);
-    const V x0 = hn::Max(zero, hn::Sub(shape.x, reach)),
-            x1 = hn::Min(size, hn::Add(shape.x, reach));
-    const V y0 = hn::Sub(shape.y, half_y), y1 = hn::Add(shape.y, half_y);
-    const V y0_in = hn::Max(zero, y0), y1_in = hn::Min(size, y1);
-    seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0_in, y1_in)));
-    if (hn::AllFalse(d, seen)) return;
-    const PixelRange range = RangeOf(seen, x0, x1, y0_in, y1_in, resolution_, *seen_);
-    if (range.isEmpty()) return;
-    const hn::Mask<DU> counts = hn::RebindMask(du, seen);
-    for (int row = range.row_begin; row < range.row_end; ++row) {
-      const VU first = FirstSamples(y0, float(row)), last = LastSamples(y1, float(row));
-      const VU rows = hn::IfThenElseZero(hn::And(counts, hn::Lt(first, last)),
-                                         hn::Sub(hn::Shl(SplatU(1), hn::ShiftLeft<2>(last)),
-                                                 hn::Shl(SplatU(1), hn::ShiftLeft<2>(first))));
-      const V along = hn::Min(
-          shape.half_y, hn::Max(hn::Neg(shape.half_y), hn::Sub(Splat(float(row) + 0.5f), shape.y)));
-      const V x = hn::MulAdd(shape.shear, along, shape.x);
-      const V left = hn::Sub(x, half_x), right = hn::Add(x, half_x);
-      const auto [begin, end] = ColumnsOf(range, row, *seen_);
-      for (int column = begin; column < end; ++column) {
-        const VU from = FirstSamples(left, float(column)), to = LastSamples(right, float(column));
-        VU columns = hn::IfThenElseZero(hn::Lt(from, to),
-                                        hn::Sub(hn::Shl(SplatU(1), to), hn::Shl(SplatU(1), from)));
-        columns = hn::Or(columns, hn::ShiftLeft<4>(columns));
-        columns = hn::And(rows, hn::Or(columns, hn::ShiftLeft<8>(columns)));
-        if (hn::AllFalse(du, hn::Ne(columns, hn::Zero(du)))) continue;
-        hull_.Add(std::size_t(row * resolution_ + column), columns, widening, cover.depth_begin,
-                  cover.depth_end);
-      }
-    }
-  }
-  // As HullRun.
-  static VU FirstSamples(V low, float at) {
-    const V x = hn::Ceil(hn::MulSub(Splat(float(kHullSide)), hn::Sub(low, Splat(at)), Splat(0.5f)));
-    return Sample(x);
-  }
-  static VU LastSamples(V high, float at) {
-    const V x =
-        hn::Floor(hn::MulAdd(Splat(float(kHullSide)), hn::Sub(high, Splat(at)), Splat(0.5f)));
-    return Sample(x);
-  }
-  static VU Sample(V x) {
-    const V within = hn::Min(Splat(float(kHullSide)), hn::Max(hn::Zero(D()), x));
-    return hn::BitCast(DU(), hn::ConvertTo(DI(), within));
   }
 
   struct Rows {

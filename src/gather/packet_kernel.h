@@ -136,7 +136,7 @@ struct RoughSight {
 
 // An entry of the order: one patch on one face of the cube, [ face : 3 | distance : 29 | index of
 // the patch : 32 ]. Faces are drawn one after the other, because the pixels of one face of 16
-// receivers fill the fastest cache. `distance` is the upper part of the squared distance's bits,
+// receivers fit a near cache. `distance` is the upper part of the squared distance's bits,
 // which sort like the distance.
 namespace draw_order {
 inline std::uint64_t key(int face, float distance_sq, std::uint32_t index) {

@@ -36,7 +36,7 @@ inline V LoadLanes(const std::array<float, kPacketReceivers>& column, std::size_
 }
 
 // Values of the pixels of a face, for the kStep receivers from `lane` on, which lie together: all
-// pixels of these, then all of the next. What one vector draws fits the fastest cache so, as far as
+// pixels of these, then all of the next. What one vector draws fits a near cache so, as far as
 // it is seen. `channels`: values of a pixel and receiver.
 class FaceLanes {
  public:
