@@ -73,30 +73,21 @@ inline float openBehind(float room, float layer, float nested) {
 inline constexpr int kHullSide = 4;  // samples along a pixel
 inline constexpr std::uint32_t kHullSamples = 0xffff;
 // Patches are widened by this part of half their side, at least by 1 sample and at most by a pixel;
-// spheres, two-sided surfels and rough nodes, which may stand alone, are not. (With .5, .9: AO RMSE
-// of scattered receivers around the bunny .0063, .0035, of spheres .0038, .0041; what arrives
-// behind a ball .0000 of the light. With .9 and rough nodes widened, spheres .0128.
-// bench/versus_embree, bench/leaks)
-inline constexpr float kHullWidening = 0.9f;
+// spheres, two-sided surfels and rough nodes, which may stand alone, are not. (AO RMSE and bias with
+// .7, .8, .9: scattered receivers around the bunny .0054 and -.0012, .0042 and -.0010, .0037 and
+// -.0009; city .0049 and +.0026, .0053 and +.0030, .0057 and +.0033; what arrives behind a ball
+// .0000 of the light. With rough nodes widened, spheres .0128. bench/versus_embree, bench/leaks)
+inline constexpr float kHullWidening = 0.8f;
 inline int hullWidening(float half_width, float half_height) {  // in samples
   const float widening = kHullWidening * float(kHullSide) * std::sqrt(half_width * half_height);
   return int(std::clamp(widening + 0.5f, 1.f, float(kHullSide)));
 }
-// What hides less of its pixels than this is no part of the hull: of what fades one part or both
-// are.
-inline constexpr float kHullOpacity = 0.25f;
-// What is ray traced tells of the middle of a pixel alone: all of it is of the hull where so much
-// is covered.
+// What is ray traced tells of the middle of a pixel alone, so it is of the hull in all of a pixel or
+// in none, whichever is nearer.
 inline constexpr float kTracedHull = 0.5f;
-// Closing falls to nothing where so many samples are missing, here or around, or so little is
-// covered: at once, it would step from one receiver to the next.
-inline constexpr float kHullMissing = 2, kClosedFrom = 0.05f, kClosedWhole = 0.25f;
-inline float closedPart(float missing, float covered) {
-  const float whole = (covered - kClosedFrom) / (kClosedWhole - kClosedFrom);
-  return std::max(0.f, 1 - missing / kHullMissing) * std::clamp(whole, 0.f, 1.f);
-}
-// A new layer begins for closing where a gap begins at least this part of one.
-inline constexpr float kNewClosing = 0.5f;
+
+// Samples are bits, column by column: 4 column + row.
+constexpr std::uint32_t hullSample(int column, int row) { return 1u << (kHullSide * column + row); }
 
 // Samples of the neighbour in direction (x, y) that lie within `widening` samples of the pixel.
 constexpr std::uint32_t hullBorder(int x, int y, int widening) {
@@ -105,7 +96,7 @@ constexpr std::uint32_t hullBorder(int x, int y, int widening) {
     for (int column = 0; column < kHullSide; ++column) {
       const int dx = x < 0 ? kHullSide - column : x > 0 ? column + 1 : 0;
       const int dy = y < 0 ? kHullSide - row : y > 0 ? row + 1 : 0;
-      if (dx <= widening && dy <= widening) samples |= 1u << (row * kHullSide + column);
+      if (dx <= widening && dy <= widening) samples |= hullSample(column, row);
     }
   }
   return samples;
@@ -121,11 +112,9 @@ struct HullRun {
             int(std::clamp(std::floor(scale * (high - at) + 0.5f), 0.f, scale))};
   }
   std::uint32_t columns() const {
-    return begin < end ? ((1u << end) - (1u << begin)) * 0x1111u : 0u;
-  }
-  std::uint32_t rows() const {
     return begin < end ? (1u << kHullSide * end) - (1u << kHullSide * begin) : 0u;
   }
+  std::uint32_t rows() const { return begin < end ? ((1u << end) - (1u << begin)) * 0x1111u : 0u; }
 };
 
 // Two-sided surfels that no plane holds together, rough nodes of them and nodes of several facets,

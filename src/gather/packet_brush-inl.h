@@ -50,9 +50,7 @@ class Brush {
     face_ = face;
     seen_ = &canvas_.seen->faces[std::size_t(face)];
     pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
-    hull_ =
-        Hull(pixels_, *seen_, canvas_.geometry->pixels().data() + face * resolution_ * resolution_,
-             resolution_, InRaster(receivers_.normal), receivers_.spherical);
+    hull_ = Hull(pixels_, *seen_, resolution_);
     ClearFace();
   }
   // Nothing more is drawn to it.
@@ -109,17 +107,23 @@ class Brush {
     }
   }
 
+  // What a receiver does not look at is not open.
   void ClearFace() {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     const D d;
+    const V zero = hn::Zero(d), one = Splat(1);
+    const V3 up = InRaster(receivers_.normal);
+    const RasterGeometry::Pixel* const pixels =
+        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
       float* const at = pixels_.at(pixel);
-      for (std::size_t i = 0; i < kChannels; ++i) {
-        const bool is_open =
-            i == PacketCanvas::kRoom || i == PacketCanvas::kOpen || i == Hull::kOpenBefore;
-        const float value = is_open ? 1.f : i == Hull::kEnd ? -kInfinity : 0.f;
-        hn::Store(Splat(value), d, at + i * kStep);
+      for (std::size_t i = 0; i < kChannels; ++i) hn::Store(zero, d, at + i * kStep);
+      const M above = hn::Gt(Dot(up, pixels[pixel].direction), zero);
+      const V open = hn::IfThenElseZero(hn::Or(receivers_.spherical, above), one);
+      for (const std::size_t i : {PacketCanvas::kRoom, PacketCanvas::kOpen, Hull::kOpenBefore}) {
+        hn::Store(open, d, at + i * kStep);
       }
+      hn::Store(Splat(-kInfinity), d, at + Hull::kEnd * kStep);
     });
   }
 
@@ -387,11 +391,10 @@ class Brush {
     if (hn::AllFalse(d, hn::Gt(amount, hn::Zero(d)))) return;
     amount = hn::Mul(cover.opacity, amount);
     CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, cover, hull_);
-    const M is_hull = hn::Ge(amount, Splat(kTracedHull));
-    if (!cover.has_hull || hn::AllFalse(d, is_hull)) return;
-    hull_.Add(pixel, hn::IfThenElseZero(hn::RebindMask(DU(), is_hull), SplatU(kHullSamples)),
-              Splat(cover.is_solid ? float(kHullSide / 2) : 0.f), cover.depth_begin,
-              cover.depth_end);
+    if (!cover.has_hull) return;
+    const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(kTracedHull)));
+    hull_.Add(pixel, hn::IfThenElseZero(is_hull, SplatU(kHullSamples)),
+              SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.depth_begin, cover.depth_end);
   }
 
   // Covers pixels by what amountOf(ray) says.

@@ -73,7 +73,7 @@ HWY_INLINE void CoverPixel(float* pixel, std::size_t place, V amount, const Cove
   const V is_new = hn::Mul(touch, hn::Min(one, hn::Max(zero, gap)));
   const M ends = hn::And(is_drawn, hn::Ge(gap, one));
   if (!hn::AllFalse(d, hn::Gt(is_new, zero))) {
-    hull.Turn(place, ends, hn::And(is_drawn, hn::Ge(is_new, Splat(kNewClosing))));
+    hull.Turn(place, ends, hn::And(is_drawn, hn::Gt(is_new, zero)));
   }
   const V open = hn::Load(d, open_at);
   room = hn::MulAdd(is_new, hn::Sub(open, room), room);

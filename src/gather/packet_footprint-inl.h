@@ -27,71 +27,80 @@ struct Parallelogram {
   V x, y, half_x, half_y, shear;
 };
 
-// As HullRun: the first sample of 4 in a row or column at `at`, and the one behind the last.
-inline VU Sample(V x) {
-  const V within = hn::Min(Splat(float(kHullSide)), hn::Max(hn::Zero(D()), x));
-  return hn::BitCast(DU(), hn::ConvertTo(DI(), within));
-}
-inline VU FirstSample(V low, float at) {
-  const V samples = hn::Mul(Splat(float(kHullSide)), hn::Sub(low, Splat(at)));
-  return Sample(hn::Ceil(hn::Sub(samples, Splat(0.5f))));
-}
-inline VU EndSample(V high, float at) {
-  const V samples = hn::Mul(Splat(float(kHullSide)), hn::Sub(high, Splat(at)));
-  return Sample(hn::Floor(hn::Add(samples, Splat(0.5f))));
-}
-// Bits [begin, end).
-inline VU Bits(VU begin, VU end) {
-  const VU bits = hn::Sub(hn::Shl(SplatU(1), end), hn::Shl(SplatU(1), begin));
-  return hn::IfThenElseZero(hn::Lt(begin, end), bits);
-}
+// The samples of rows, or columns, of a face that lie between `low` and `high`, in pixels; half
+// open. As HullRun, but of all pixels at once.
+struct SampleRun {
+  using VI = hn::Vec<DI>;
+  VI begin, end;
 
-// As hullWidening.
-inline V Widening(const Parallelogram& shape, bool is_solid) {
-  if (!is_solid) return hn::Zero(D());
+  SampleRun(V low, V high) {
+    const V scale = Splat(float(kHullSide)), half = Splat(0.5f);
+    begin = hn::ConvertTo(DI(), hn::Ceil(hn::MulSub(scale, low, half)));
+    end = hn::ConvertTo(DI(), hn::Floor(hn::MulAdd(scale, high, half)));
+  }
+  // Bits of those columns in a column of pixels.
+  VU Columns(int pixel) const {
+    const VU all = SplatU(kHullSamples);
+    return hn::AndNot(hn::Shl(all, hn::ShiftLeft<2>(Within(end, pixel))),
+                      hn::Shl(all, hn::ShiftLeft<2>(Within(begin, pixel))));
+  }
+  // Of those rows in a row of pixels.
+  VU Rows(int pixel) const {
+    const VU column = SplatU(0xf);
+    const VU some = hn::AndNot(hn::Shl(column, Within(end, pixel)),
+                               hn::And(column, hn::Shl(column, Within(begin, pixel))));
+    return InEveryColumn(some);
+  }
+
+ private:
+  static VU Within(VI at, int pixel) {
+    const DI d;
+    const VI first = hn::Set(d, kHullSide * pixel), most = hn::Set(d, kHullSide);
+    return hn::BitCast(DU(), hn::Min(most, hn::Max(hn::Zero(d), hn::Sub(at, first))));
+  }
+};
+
+// As hullWidening, in samples.
+inline VU Widening(const Parallelogram& shape, bool is_solid) {
+  if (!is_solid) return hn::Zero(DU());
   const V side = hn::Sqrt(hn::Mul(shape.half_x, shape.half_y));
   const V samples = hn::MulAdd(side, Splat(kHullWidening * float(kHullSide)), Splat(0.5f));
-  return hn::Floor(hn::Min(Splat(float(kHullSide)), hn::Max(Splat(1), samples)));
+  const V within = hn::Min(Splat(float(kHullSide)), hn::Max(Splat(1), samples));
+  return hn::BitCast(DU(), hn::ConvertTo(DI(), within));
 }
 
-// As RasterCube::addHull, in lanes of `seen` that hide enough.
+// As RasterCube::addHull, in lanes of `seen`.
 template <typename Hull>
 HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, const Cover& cover,
                         int resolution, const SeenPixels::Face& face) {
   const D d;
   const V zero = hn::Zero(d), size = Splat(float(resolution));
-  const V widening = Widening(shape, cover.is_solid);
-  const V wider = hn::Mul(widening, Splat(1 / float(kHullSide)));
+  const VU widening = Widening(shape, cover.is_solid);
+  const V wider =
+      hn::Mul(hn::ConvertTo(d, hn::BitCast(DI(), widening)), Splat(1 / float(kHullSide)));
   const V half_x = hn::Add(shape.half_x, wider), half_y = hn::Add(shape.half_y, wider);
   const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, half_x);
-  const V y0 = hn::Sub(shape.y, half_y), y1 = hn::Add(shape.y, half_y);
-  const V left_in = hn::Max(zero, hn::Sub(shape.x, reach));
-  const V right_in = hn::Min(size, hn::Add(shape.x, reach));
-  const V low_in = hn::Max(zero, y0), high_in = hn::Min(size, y1);
-  seen = hn::And(seen, hn::Ge(cover.opacity, Splat(kHullOpacity)));
-  seen = hn::And(seen, hn::And(hn::Lt(left_in, right_in), hn::Lt(low_in, high_in)));
+  const V y0 = hn::Max(zero, hn::Sub(shape.y, half_y));
+  const V y1 = hn::Min(size, hn::Add(shape.y, half_y));
+  const V x0 = hn::Max(zero, hn::Sub(shape.x, reach));
+  const V x1 = hn::Min(size, hn::Add(shape.x, reach));
+  seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)));
   if (hn::AllFalse(d, seen)) return;
-  const PixelRange range = RangeOf(seen, left_in, right_in, low_in, high_in, resolution, face);
+  const PixelRange range = RangeOf(seen, x0, x1, y0, y1, resolution, face);
   if (range.isEmpty()) return;
   const auto counts = hn::RebindMask(DU(), seen);
+  const SampleRun across(y0, y1);
   for (int row = range.row_begin; row < range.row_end; ++row) {
-    const VU first = hn::ShiftLeft<2>(FirstSample(y0, float(row)));
-    const VU end = hn::ShiftLeft<2>(EndSample(y1, float(row)));
-    const VU rows = hn::IfThenElseZero(counts, Bits(first, end));
+    const VU rows = hn::IfThenElseZero(counts, across.Rows(row));
     // The same shift for all of a row of pixels
     const V along = hn::Sub(Splat(float(row) + 0.5f), shape.y);
     const V within = hn::Min(shape.half_y, hn::Max(hn::Neg(shape.half_y), along));
     const V x = hn::MulAdd(shape.shear, within, shape.x);
-    const V left = hn::Sub(x, half_x), right = hn::Add(x, half_x);
+    const SampleRun run(hn::Max(x0, hn::Sub(x, half_x)), hn::Min(x1, hn::Add(x, half_x)));
     const auto [column_begin, column_end] = ColumnsOf(range, row, face);
     for (int column = column_begin; column < column_end; ++column) {
-      const float at = float(column);
-      VU samples = Bits(FirstSample(left, at), EndSample(right, at));
-      samples = hn::Or(samples, hn::ShiftLeft<4>(samples));
-      samples = hn::And(rows, hn::Or(samples, hn::ShiftLeft<8>(samples)));
-      if (hn::AllFalse(DU(), hn::Ne(samples, hn::Zero(DU())))) continue;
-      hull.Add(std::size_t(row * resolution + column), samples, widening, cover.depth_begin,
-               cover.depth_end);
+      hull.Add(std::size_t(row * resolution + column), hn::And(rows, run.Columns(column)), widening,
+               cover.depth_begin, cover.depth_end);
     }
   }
 }

@@ -28,6 +28,12 @@ using DI = hn::RebindToSigned<D>;
 using VU = hn::Vec<DU>;
 inline VU SplatU(std::uint32_t value) { return hn::Set(DU(), value); }
 
+// Samples of one column of a pixel, in all of them.
+inline VU InEveryColumn(VU column) {
+  column = hn::Or(column, hn::ShiftLeft<kHullSide>(column));
+  return hn::Or(column, hn::ShiftLeft<2 * kHullSide>(column));
+}
+
 // Of one face. `kChannels` values of color and fade follow those of coverage in a pixel.
 template <std::size_t kChannels>
 class FaceHull {
@@ -41,17 +47,11 @@ class FaceHull {
                 PacketCanvas::kCoverageChannels + PacketCanvas::kHullChannels + 2 * kChannels);
 
   FaceHull() = default;
-  FaceHull(const FaceLanes& pixels, const SeenPixels::Face& seen,
-           const RasterGeometry::Pixel* geometry, int resolution, const V3& up, M spherical)
-      : pixels_(pixels),
-        seen_(&seen),
-        geometry_(geometry),
-        resolution_(resolution),
-        up_(up),
-        spherical_(spherical) {}
+  FaceHull(const FaceLanes& pixels, const SeenPixels::Face& seen, int resolution)
+      : pixels_(pixels), seen_(&seen), resolution_(resolution) {}
 
   // Adds samples of lanes that have some. `widening` in samples.
-  HWY_INLINE void Add(std::size_t at, VU samples, V widening, V depth_begin, V depth_end) const {
+  HWY_INLINE void Add(std::size_t at, VU samples, VU widening, V depth_begin, V depth_end) const {
     const D d;
     const DU du;
     float* const pixel = pixels_.at(at);
@@ -68,9 +68,8 @@ class FaceHull {
     hn::Store(hn::BitCast(d, hull), d, pixel + kHull * kStep);
     hn::Store(hn::IfThenElse(counts, hn::Max(end, depth_end), end), d, pixel + kEnd * kStep);
     // The widening is in the lowest bits of the beginning
-    const VU wide = hn::BitCast(du, hn::ConvertTo(DI(), widening));
     const VU before = hn::And(hn::BitCast(du, begin), SplatU(kWidening));
-    const VU widest = hn::Max(before, hn::IfThenElseZero(hn::RebindMask(du, counts), wide));
+    const VU widest = hn::Max(before, hn::IfThenElseZero(hn::RebindMask(du, counts), widening));
     const VU place = hn::BitCast(du, hn::IfThenElse(is_new, depth_begin, begin));
     hn::Store(hn::BitCast(d, hn::Or(hn::AndNot(SplatU(kWidening), place), widest)), d,
               pixel + kBegin * kStep);
@@ -122,19 +121,17 @@ class FaceHull {
     return hn::IfThenElse(hn::RebindMask(du, all), hn::Or(before, hull), before);
   }
 
-  // At least kHullMissing in lanes that do not count.
-  V MissingSamples(std::size_t at, M counts) const {
+  // As RasterCube::isHeld, of these lanes.
+  M Held(std::size_t at, M lanes) const {
     const D d;
     const DU du;
     const float* const pixel = pixels_.at(at);
     const V end = hn::Load(d, pixel + PacketCanvas::kEnd * kStep);
-    VU missing =
-        hn::IfThenElse(hn::RebindMask(du, counts),
-                       hn::PopulationCount(hn::AndNot(UpTo(pixel, end), SplatU(kHullSamples))),
-                       SplatU(kHullSamples));
-    const VU enough = SplatU(std::uint32_t(kHullMissing));
+    lanes = hn::And(lanes, Holds(UpTo(pixel, end), SplatU(kHullSamples)));
+    if (hn::AllFalse(d, lanes)) return lanes;
     const VU widening =
         hn::And(hn::BitCast(du, hn::Load(d, pixel + kBegin * kStep)), SplatU(kWidening));
+    const Borders borders(widening);
     const int column = int(at) % resolution_, row = int(at) / resolution_;
     for (int y = -1; y <= 1; ++y) {
       const int other_row = row + y;
@@ -145,24 +142,35 @@ class FaceHull {
         if ((x == 0 && y == 0) || other_column < columns.begin || other_column >= columns.end) {
           continue;
         }
-        if (hn::AllFalse(du, hn::Lt(missing, enough))) return AsFloat(missing);
-        const auto other = std::size_t(other_row * resolution_ + other_column);
-        VU border = hn::Zero(du);
-        for (std::uint32_t wide = 0; wide < std::uint32_t(kHullSide); ++wide) {
-          border = hn::IfThenElse(hn::Gt(widening, SplatU(wide)),
-                                  SplatU(hullBorder(x, y, int(wide) + 1)), border);
-        }
-        const V open = hn::Load(d, pixels_.at(other) + PacketCanvas::kOpen * kStep);
-        const M above = hn::Gt(Dot(up_, geometry_[other].direction), hn::Zero(d));
-        const M seen = hn::And(hn::Or(spherical_, above), hn::Gt(open, hn::Zero(d)));
-        const VU lacks = hn::IfThenElseZero(hn::RebindMask(du, seen),
-                                            hn::AndNot(UpTo(pixels_.at(other), end), border));
-        missing = hn::Add(missing, hn::PopulationCount(lacks));
+        const float* const other = pixels_.at(std::size_t(other_row * resolution_ + other_column));
+        const M is_full = hn::Le(hn::Load(d, other + PacketCanvas::kOpen * kStep), hn::Zero(d));
+        const M holds = Holds(UpTo(other, end), borders.Of(x, y));
+        lanes = hn::And(lanes, hn::Or(is_full, holds));
+        if (hn::AllFalse(d, lanes)) return lanes;
       }
     }
-    return AsFloat(missing);
+    return lanes;
   }
-  static V AsFloat(VU count) { return hn::ConvertTo(D(), hn::BitCast(DI(), count)); }
+  static M Holds(VU hull, VU samples) {
+    const DU du;
+    return hn::RebindMask(D(), hn::Eq(hn::AndNot(hull, samples), hn::Zero(du)));
+  }
+
+  // As hullBorder, of all neighbours.
+  struct Borders {
+    VU columns[3], rows[3];
+
+    explicit Borders(VU widening) {
+      const VU all = SplatU(kHullSamples), column = SplatU((1u << kHullSide) - 1);
+      const VU rest = hn::Sub(SplatU(kHullSide), widening);
+      columns[0] = hn::And(all, hn::Shl(all, hn::ShiftLeft<2>(rest)));
+      columns[1] = rows[1] = all;
+      columns[2] = hn::AndNot(hn::Shl(all, hn::ShiftLeft<2>(widening)), all);
+      rows[0] = InEveryColumn(hn::And(column, hn::Shl(column, rest)));
+      rows[2] = InEveryColumn(hn::AndNot(hn::Shl(column, widening), column));
+    }
+    VU Of(int x, int y) const { return hn::And(columns[x + 1], rows[y + 1]); }
+  };
 
   // Of the lanes whose layers cover something.
   void Close(std::size_t at, M lanes) const {
@@ -172,18 +180,11 @@ class FaceHull {
     const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
     const V before = hn::Load(d, pixel + kOpenBefore * kStep);
     hn::Store(hn::IfThenElse(lanes, hn::Neg(before), before), d, pixel + kOpenBefore * kStep);
-    const V whole = hn::Mul(hn::Sub(hn::Sub(one, open), Splat(kClosedFrom)),
-                            Splat(1 / (kClosedWhole - kClosedFrom)));
-    lanes = hn::And(lanes, hn::Gt(whole, zero));
+    lanes = Held(at, lanes);
     if (hn::AllFalse(d, lanes)) return;
-    const V lack = hn::Mul(MissingSamples(at, lanes), Splat(1 / kHullMissing));
-    const V part = hn::Mul(hn::Max(zero, hn::Sub(one, lack)), hn::Min(one, hn::Max(zero, whole)));
-    lanes = hn::And(lanes, hn::Gt(part, zero));
-    if (hn::AllFalse(d, lanes)) return;
-    const V added = hn::IfThenElseZero(lanes, hn::Mul(part, open));
     const V layer = hn::IfThenElse(lanes, hn::Sub(before, open), one);
-    const V scale = hn::Div(added, layer);
-    hn::Store(hn::Sub(open, added), d, pixel + PacketCanvas::kOpen * kStep);
+    const V scale = hn::Div(hn::IfThenElseZero(lanes, open), layer);
+    hn::Store(hn::IfThenElse(lanes, zero, open), d, pixel + PacketCanvas::kOpen * kStep);
     for (std::size_t c = 0; c < kChannels; ++c) {
       float* const to = pixel + (PacketCanvas::kCoverageChannels + c) * kStep;
       const V all = hn::Load(d, to), rest = hn::Load(d, pixel + (kColorBefore + c) * kStep);
@@ -193,10 +194,7 @@ class FaceHull {
 
   FaceLanes pixels_;
   const SeenPixels::Face* seen_ = nullptr;
-  const RasterGeometry::Pixel* geometry_ = nullptr;
   int resolution_ = 0;
-  V3 up_;  // the receivers' normals in the frame of the raster
-  M spherical_;
 };
 
 }  // namespace

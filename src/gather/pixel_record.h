@@ -41,6 +41,11 @@ class PixelRecorder {
     record.new_layers += new_layer;
     if (record.total >= kCubeFirstPart) record.depth = std::min(record.depth, distance);
   }
+  // A layer at this distance is closed: it covers the pixel.
+  void close(std::size_t pixel, float distance) {
+    PixelRecord& record = records_[pixel];
+    record.depth = std::min(record.depth, distance);
+  }
 
   std::span<const PixelRecord> records() const { return records_; }
 

@@ -117,7 +117,7 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
   const float gap = newLayerPart(depth.begin - coverage.layer_end, depth.reach());
   if (gap >= 1) closeLayer(pixel);
   const float is_new = touch * gap;
-  if (is_new >= kNewClosing) beginLayer(pixel);
+  if (is_new > 0) beginLayer(pixel);
   coverage.room += is_new * (1 - coverage.total - coverage.room);
   coverage.layer -= is_new * coverage.layer;
   coverage.layer_end += touch * std::max(0.f, depth.end - coverage.layer_end);
@@ -178,26 +178,26 @@ void RasterCube::addHull(int face, const Parallelogram& shape, bool is_solid,
   }
 }
 
-// How many samples the hull lacks, of what was drawn up to the end of the pixel's last layer: its
-// own, and those of its neighbours that are as near as the hull was widened. What is not looked at
-// lacks none, nor what is covered.
-float RasterCube::missingSamples(std::size_t pixel) const {
+// Whether the hull of what was drawn up to the end of the pixel's last layer, narrowed again, holds
+// the pixel: all of its own samples are of the hull, and those of its neighbours that are as near
+// as the hull was widened. What is not looked at lacks none, nor what is covered.
+bool RasterCube::isHeld(std::size_t pixel) const {
   const Coverage& coverage = coverage_[pixel];
   const int resolution = geometry_->resolution();
   const int column = int(pixel) % resolution, row = int(pixel) / resolution % resolution;
-  int missing = std::popcount(kHullSamples & ~coverage.hull.upTo(coverage.layer_end));
+  if (coverage.hull.upTo(coverage.layer_end) != kHullSamples) return false;
   for (int y = -1; y <= 1; ++y) {
     for (int x = -1; x <= 1; ++x) {
-      if ((x == 0 && y == 0) || float(missing) >= kHullMissing) continue;
+      if (x == 0 && y == 0) continue;
       if (std::min(column + x, row + y) < 0 || std::max(column + x, row + y) >= resolution)
         continue;
       const auto other = std::size_t(int(pixel) + y * resolution + x);
       if (!is_seen_[other] || coverage_[other].total >= 1) continue;
       const std::uint32_t hull = coverage_[other].hull.upTo(coverage.layer_end);
-      missing += std::popcount(hullBorder(x, y, coverage.hull.widening) & ~hull);
+      if ((hullBorder(x, y, coverage.hull.widening) & ~hull) != 0) return false;
     }
   }
-  return float(missing);
+  return true;
 }
 
 // What is closed belongs to what its layer has brought.
@@ -206,10 +206,12 @@ void RasterCube::closeLayer(std::size_t pixel) {
   const float layer = coverage.total - coverage.total_before;
   if (coverage.is_closed || !(layer > 0) || coverage.total >= 1) return;
   coverage.is_closed = true;
-  const float part = closedPart(missingSamples(pixel), coverage.total);
-  if (!(part > 0)) return;
-  const float scale = part * (1 - coverage.total) / layer;
-  coverage.total = part >= 1 ? 1 : coverage.total + scale * layer;
+  if (!isHeld(pixel)) return;
+  const float scale = (1 - coverage.total) / layer;
+  coverage.total = 1;
+  if (recorder_ != nullptr) {
+    recorder_->close(pixel, 0.5f * (coverage.hull.begin + coverage.layer_end));
+  }
   if (!radiosity_.empty()) {
     radiosity_[pixel] += scale * (radiosity_[pixel] - radiosity_before_[pixel]);
   }
@@ -306,9 +308,7 @@ void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::v
     if (face >= geometry_->faceCount()) return;
     const Parallelogram shape = onFace(patch, axis);
     coverParallelogram(face, shape, patch.texture, depth, radiosity);
-    if (patch.texture.thicket == 0 && patch.texture.opacity >= kHullOpacity) {
-      addHull(face, shape, patch.texture.is_solid, depth);
-    }
+    if (patch.texture.thicket == 0) addHull(face, shape, patch.texture.is_solid, depth);
   }
 }
 

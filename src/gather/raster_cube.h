@@ -180,7 +180,7 @@ class RasterCube {
     float layer_end = 0;  // where the depth ranges of the last layer end
     Hull hull;
     float total_before = 0;  // when the last layer began
-    bool is_closed = false;  // that layer, as far as it is
+    bool is_closed = false;  // that layer was asked for its hull
   };
   // On a face: rows of width 2 half_u around the line u + shear (row - v).
   struct Parallelogram {
@@ -189,7 +189,7 @@ class RasterCube {
   static Parallelogram onFace(const Patch& patch, int axis);
   void addHull(int face, const Parallelogram& shape, bool is_solid, const DepthRange& depth);
   void addHull(std::size_t pixel, std::uint32_t samples, int widened, const DepthRange& depth);
-  float missingSamples(std::size_t pixel) const;
+  bool isHeld(std::size_t pixel) const;
   void closeLayer(std::size_t pixel);
   void beginLayer(std::size_t pixel);
   // `touch`: how much it says about its layer, touchPart.
