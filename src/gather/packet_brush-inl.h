@@ -51,6 +51,7 @@ class Brush {
     seen_ = &canvas_.seen->faces[std::size_t(face)];
     pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
     hull_ = Hull(pixels_, *seen_, resolution_);
+    open_.Begin(*seen_);
     ClearFace();
   }
   // Nothing more is drawn to it.
@@ -192,7 +193,7 @@ class Brush {
     const Cover cover =
         MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape));
     CoverParallelogram(shape, seen, cover);
-    if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_);
+    if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
   }
 
   // As touchPart.
@@ -289,16 +290,12 @@ class Brush {
       const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
       const V x = hn::NegMulAdd(shape.shear, along, shape.x);
       const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
-      const auto [begin, end] = ColumnsOf(rows.range, row, *seen_);
-      const auto first = std::size_t(row * resolution_ + begin);
-      float* pixel = pixels_.at(first);
-      for (int column = begin; column < end; ++column) {
+      open_.DrawRow(rows.range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
-        CoverPixel<Kind, kOverlaps>(pixel, std::size_t(row * resolution_ + column),
-                                    hn::Mul(width, height), cover, hull_);
-        pixel += kChannels * kStep;
-      }
+        return CoverPixel<Kind, kOverlaps>(pixels_.at(pixel), pixel, hn::Mul(width, height), cover,
+                                           hull_);
+      });
     }
   }
 
@@ -386,15 +383,14 @@ class Brush {
     end = hn::Min(size, hn::Max(zero, end));
   }
 
-  void CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
-    const D d;
-    if (hn::AllFalse(d, hn::Gt(amount, hn::Zero(d)))) return;
+  bool CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
     amount = hn::Mul(cover.opacity, amount);
-    CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, cover, hull_);
-    if (!cover.has_hull) return;
+    const bool is_open = CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, cover, hull_);
+    if (!is_open || !cover.has_hull) return is_open;
     const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(kTracedHull)));
     hull_.Add(pixel, hn::IfThenElseZero(is_hull, SplatU(kHullSamples)),
               SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.depth_begin, cover.depth_end);
+    return true;
   }
 
   // Covers pixels by what amountOf(ray) says.
@@ -404,12 +400,10 @@ class Brush {
     const RasterGeometry::Pixel* const pixels =
         canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
     for (int row = range.row_begin; row < range.row_end; ++row) {
-      const auto [begin, end] = ColumnsOf(range, row, *seen_);
-      for (int column = begin; column < end; ++column) {
-        const std::size_t pixel = std::size_t(row * resolution_ + column);
+      open_.DrawRow(range, row, resolution_, [&](std::size_t pixel, int) HWY_ATTR {
         const V amount = amountOf(pixels[pixel].direction);
-        CoverTraced(pixel, hn::IfThenElseZero(traced, amount), cover);
-      }
+        return CoverTraced(pixel, hn::IfThenElseZero(traced, amount), cover);
+      });
     }
   }
 
@@ -443,18 +437,15 @@ class Brush {
       const V n_row = hn::MulAdd(n_v, v, n_w), m_row = hn::MulAdd(m_v, v, m_w);
       const V linear = hn::MulAdd(n_u, m_row, hn::Mul(m_u, n_row));
       const V constant = hn::MulAdd(n_row, m_row, hn::Mul(plane_sq, hn::MulAdd(v, v, Splat(1))));
-      const auto [begin, end] = ColumnsOf(range, row, *seen_);
-      for (int column = begin; column < end; ++column) {
+      open_.DrawRow(range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
         const V u = Splat(slope * (float(column) + first));
         const V outside = hn::MulAdd(hn::MulAdd(square, u, linear), u, constant);
         const M hit = hn::And(traced, hn::Lt(outside, hn::Zero(d)));
-        if (hn::AllFalse(d, hit)) continue;
-        const std::size_t pixel = std::size_t(row * resolution_ + column);
+        if (hn::AllFalse(d, hit)) return true;
         const glm::vec3& ray = pixels[pixel].direction;
-        CoverTraced(pixel,
-                    hn::IfThenElseZero(hit, DiskAmount(patch, normal, ray, centre, c_n, centre_sq)),
-                    cover);
-      }
+        const V amount = DiskAmount(patch, normal, ray, centre, c_n, centre_sq);
+        return CoverTraced(pixel, hn::IfThenElseZero(hit, amount), cover);
+      });
     }
   }
 
@@ -468,6 +459,7 @@ class Brush {
   int face_ = 0;
   const SeenPixels::Face* seen_ = nullptr;
   FaceLanes pixels_;  // of the face
+  OpenPixels open_;
   Hull hull_;
 };
 

@@ -11,10 +11,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <iterator>
-#include <utility>
 
 #include "gather/coverage_rules.h"
 #include "gather/packet_hull-inl.h"
@@ -51,15 +51,17 @@ struct BrushKind {
 };
 
 // As RasterCube::coverPixel, where `amount` is positive. Without kOverlaps, nothing hides behind
-// its own layer. `place`: that of the pixel, which the hull is asked about.
+// its own layer. `place`: that of the pixel, which the hull is asked about. False: the pixel was
+// open to nobody.
 template <typename Kind, bool kOverlaps>
-HWY_INLINE void CoverPixel(float* pixel, std::size_t place, V amount, const Cover& cover,
+HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, const Cover& cover,
                            const FaceHull<Kind::kChannels>& hull) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
-  const M is_drawn =
-      hn::And(hn::Gt(amount, zero), hn::Gt(hn::Load(d, pixel + PacketCanvas::kOpen * kStep), zero));
-  if (hn::AllFalse(d, is_drawn)) return;
+  const M is_open = hn::Gt(hn::Load(d, pixel + PacketCanvas::kOpen * kStep), zero);
+  if (hn::AllFalse(d, is_open)) return false;
+  const M is_drawn = hn::And(hn::Gt(amount, zero), is_open);
+  if (hn::AllFalse(d, is_drawn)) return true;
   float* const room_at = pixel + PacketCanvas::kRoom * kStep;
   float* const layer_at = pixel + PacketCanvas::kLayer * kStep;
   float* const end_at = pixel + PacketCanvas::kEnd * kStep;
@@ -106,6 +108,7 @@ HWY_INLINE void CoverPixel(float* pixel, std::size_t place, V amount, const Cove
       }
     }
   }
+  return true;
 }
 
 // Pixels of a face, half open.
@@ -131,13 +134,33 @@ inline PixelRange RangeOf(M active, V x0, V x1, V y0, V y1, int resolution,
   return range;
 }
 
-// Those of its columns that count in a row.
-inline std::pair<int, int> ColumnsOf(const PixelRange& range, int row,
-                                     const SeenPixels::Face& seen) {
-  const SeenPixels::Columns& columns = seen.rows[std::size_t(row)];
-  return {std::max(range.column_begin, int(columns.begin)),
-          std::min(range.column_end, int(columns.end))};
-}
+// The pixels of a face that may be open to some receiver, as bits of rows: nothing else is drawn.
+class OpenPixels {
+ public:
+  void Begin(const SeenPixels::Face& seen) {
+    for (int row = seen.row_begin; row < seen.row_end; ++row) {
+      const SeenPixels::Columns& columns = seen.rows[std::size_t(row)];
+      rows_[std::size_t(row)] = Bits(columns.begin, columns.end);
+    }
+  }
+  // Calls draw(pixel, column) for those of a row of the range until it says that one is not open.
+  template <typename Draw>
+  HWY_INLINE void DrawRow(const PixelRange& range, int row, int resolution, const Draw& draw) {
+    std::uint64_t& open = rows_[std::size_t(row)];
+    std::uint64_t left = open & Bits(range.column_begin, range.column_end);
+    for (; left != 0; left &= left - 1) {
+      const int column = std::countr_zero(left);
+      if (!draw(std::size_t(row * resolution + column), column)) open &= ~(left & -left);
+    }
+  }
+
+ private:
+  static std::uint64_t Bits(int begin, int end) {
+    return begin < end ? ~std::uint64_t{0} >> (64 - (end - begin)) << begin : 0;
+  }
+  static_assert(RasterGeometry::kMaxResolution <= 64);
+  std::array<std::uint64_t, RasterGeometry::kMaxResolution> rows_;
+};
 
 void FindSeenPixels(const PacketCanvas& canvas, SeenPixels& seen) {
   const RasterGeometry& geometry = *canvas.geometry;

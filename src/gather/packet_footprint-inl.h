@@ -72,7 +72,7 @@ inline VU Widening(const Parallelogram& shape, bool is_solid) {
 // As RasterCube::addHull, in lanes of `seen`.
 template <typename Hull>
 HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, const Cover& cover,
-                        int resolution, const SeenPixels::Face& face) {
+                        int resolution, const SeenPixels::Face& face, OpenPixels& open) {
   const D d;
   const V zero = hn::Zero(d), size = Splat(float(resolution));
   const VU widening = Widening(shape, cover.is_solid);
@@ -97,11 +97,10 @@ HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, co
     const V within = hn::Min(shape.half_y, hn::Max(hn::Neg(shape.half_y), along));
     const V x = hn::MulAdd(shape.shear, within, shape.x);
     const SampleRun run(hn::Max(x0, hn::Sub(x, half_x)), hn::Min(x1, hn::Add(x, half_x)));
-    const auto [column_begin, column_end] = ColumnsOf(range, row, face);
-    for (int column = column_begin; column < column_end; ++column) {
-      hull.Add(std::size_t(row * resolution + column), hn::And(rows, run.Columns(column)), widening,
-               cover.depth_begin, cover.depth_end);
-    }
+    open.DrawRow(range, row, resolution, [&](std::size_t pixel, int column) HWY_ATTR {
+      return hull.Add(pixel, hn::And(rows, run.Columns(column)), widening, cover.depth_begin,
+                      cover.depth_end);
+    });
   }
 }
 

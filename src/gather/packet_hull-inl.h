@@ -50,15 +50,17 @@ class FaceHull {
   FaceHull(const FaceLanes& pixels, const SeenPixels::Face& seen, int resolution)
       : pixels_(pixels), seen_(&seen), resolution_(resolution) {}
 
-  // Adds samples of lanes that have some. `widening` in samples.
-  HWY_INLINE void Add(std::size_t at, VU samples, VU widening, V depth_begin, V depth_end) const {
+  // Adds samples of lanes that have some. `widening` in samples. False: the pixel is open to
+  // nobody.
+  HWY_INLINE bool Add(std::size_t at, VU samples, VU widening, V depth_begin, V depth_end) const {
     const D d;
     const DU du;
     float* const pixel = pixels_.at(at);
     const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
-    const M counts =
-        hn::And(hn::RebindMask(d, hn::Ne(samples, hn::Zero(du))), hn::Gt(open, hn::Zero(d)));
-    if (hn::AllFalse(d, counts)) return;
+    const M is_open = hn::Gt(open, hn::Zero(d));
+    if (hn::AllFalse(d, is_open)) return false;
+    const M counts = hn::And(hn::RebindMask(d, hn::Ne(samples, hn::Zero(du))), is_open);
+    if (hn::AllFalse(d, counts)) return true;
     samples = hn::IfThenElseZero(hn::RebindMask(du, counts), samples);
     const V end = hn::Load(d, pixel + kEnd * kStep), begin = hn::Load(d, pixel + kBegin * kStep);
     VU hull = hn::BitCast(du, hn::Load(d, pixel + kHull * kStep));
@@ -73,6 +75,7 @@ class FaceHull {
     const VU place = hn::BitCast(du, hn::IfThenElse(is_new, depth_begin, begin));
     hn::Store(hn::BitCast(d, hn::Or(hn::AndNot(SplatU(kWidening), place), widest)), d,
               pixel + kBegin * kStep);
+    return true;
   }
 
   // What comes before something is drawn that begins layers of their own in lanes of `ends`, and
