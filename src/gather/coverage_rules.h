@@ -77,7 +77,7 @@ inline constexpr std::uint32_t kHullSamples = 0xffff;
 // .7, .8, .9: scattered receivers around the bunny .0054 and -.0012, .0042 and -.0010, .0037 and
 // -.0009; city .0049 and +.0026, .0053 and +.0030, .0057 and +.0033; what arrives behind a ball
 // .0000 of the light. With rough nodes widened, spheres .0128. bench/versus_embree, bench/leaks)
-inline constexpr float kHullWidening = 0.8f;
+inline constexpr float kHullWidening = 0.75f;
 inline int hullWidening(float half_width, float half_height) {  // in samples
   const float widening = kHullWidening * float(kHullSide) * std::sqrt(half_width * half_height);
   return int(std::clamp(widening + 0.5f, 1.f, float(kHullSide)));

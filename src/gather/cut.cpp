@@ -46,9 +46,10 @@ float mostCoarserOf(const Node& node, const CutRules& rules) {
   return node.isFlat() ? 1 : rules.most_coarser;
 }
 
-// What lies off the plane that it is drawn on by half a pixel is seen to be elsewhere.
-constexpr float kOffPlanePixels = 0.5f;
-float inverseOffPlane(const CutRules& rules) { return 1 / (kOffPlanePixels * rules.pixel); }
+// What lies off the plane that it is drawn on by a pixel is seen in another one. (Small lights
+// differ from place to place by .065 of their power, without by .080; half a pixel makes nothing
+// better but the city, AO RMSE .0053 instead of .0056, at .6 of its rate.)
+float inverseOffPlane(const CutRules& rules) { return 1 / rules.pixel; }
 
 float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
 

@@ -102,8 +102,12 @@ void RasterCube::clear(const glm::vec3& up) {
     is_seen_[i] = up == glm::vec3(0) || glm::dot(up, pixels[i].direction) > 0;
   }
   std::fill(coverage_.begin(), coverage_.end(), Coverage{});
-  std::fill(radiosity_.begin(), radiosity_.end(), glm::vec3(0));
-  std::fill(faded_.begin(), faded_.end(), 0.f);
+  for (std::vector<glm::vec3>* each : {&radiosity_, &radiosity_before_}) {
+    std::fill(each->begin(), each->end(), glm::vec3(0));
+  }
+  for (std::vector<float>* each : {&faded_, &faded_before_}) {
+    std::fill(each->begin(), each->end(), 0.f);
+  }
 }
 
 // A layer with less room than `amount` ends at exactly 1, and the pixel is exactly 1 then.

@@ -21,9 +21,9 @@ inline constexpr FidelityLimits kFrontLimits = {.06, .25, 5, 2, .02};
 inline constexpr FidelityLimits kBothLimits = {.012, .04, 2, 1, .1};
 inline constexpr FidelityLimits kBackLimits = {.03, .15, 5, 2, .15};
 inline constexpr FidelityLimits kFinalLimits = {.003, .012, 1, 1, .05};
-inline constexpr FidelityLimits kGlossyLimits = {.08, .3, 6, 5, .1};
+inline constexpr FidelityLimits kGlossyLimits = {.01, .04, 1, 1, .02};
 inline constexpr FidelityLimits kConeLimits = {.01, .04, 1, 1, .06};
-inline constexpr FidelityLimits kFalloffLimits = {.1, .45, 10, 5, .06};
+inline constexpr FidelityLimits kFalloffLimits = {.02, .1, 2, 1, .06};
 inline constexpr FidelityLimits kSubsetLimits = {.012, .04, 1, 1, .05};
 
 // One bounce, by default against exactly: RMS of irradiance over its mean. Goal: .02.
