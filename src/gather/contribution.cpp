@@ -210,7 +210,7 @@ float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
 float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionRules& rules) {
   const float thicket = thicketPart(surfel);
   if (thicket > 0 && !ribbon.isEmpty()) return rules.ribbon_nested;
-  return nestedPart(surfel.isTwoSided(), thicket);
+  return nestedPart(mayTile(surfel), thicket);
 }
 
 // Spheres are a surface. Codes round: what is about none is none.
@@ -258,7 +258,7 @@ bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const Contr
   contribution.spread = facet.area / distance_sq;
   contribution.overlap = contribution.thicket = facet.is_thicket ? 1 : 0;
   contribution.opacity = 1;
-  contribution.nested = nestedPart(facet.is_two_sided, contribution.thicket);
+  contribution.nested = nestedPart(!facet.is_two_sided, contribution.thicket);
   contribution.is_solid = 1;
   contribution.normal = facet.normal;
   contribution.shape = shapeOf(facet.covariance);
@@ -293,7 +293,7 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   contribution.solid_angle = cover.area / distance_sq;
   contribution.opacity = cover.opacity;
   contribution.nested = nestedPart(false, contribution.thicket);
-  contribution.spread = node.area / distance_sq;
+  contribution.spread = cover.area / distance_sq;
   contribution.overlap = 0;
   if (rules.sides == GatherSides::kFront) {
     contribution.overlap = overlapOf(facing.front, facing.back);

@@ -51,10 +51,10 @@ struct BrushKind {
 };
 
 // As RasterCube::coverPixel, where `amount` is positive. Without kOverlaps, nothing hides behind
-// its own layer. `place`: that of the pixel, which the hull is asked about. False: the pixel was
-// open to nobody.
+// its own layer. `place`: that of the pixel, which the hull is asked about; `weight`: of the middle
+// of what covers it, over that of its own. False: the pixel was open to nobody.
 template <typename Kind, bool kOverlaps>
-HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, const Cover& cover,
+HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, const Cover& cover,
                            const FaceHull<Kind::kChannels>& hull) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
@@ -93,8 +93,12 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, const Cove
   const V left = hn::Min(open, OpenBehind(room, layer, Splat(cover.nested)));
   const V covered = hn::IfThenElseZero(hn::Gt(amount, zero), hn::Sub(open, left));
   hn::Store(hn::Sub(open, covered), d, open_at);
+  float* const rest_at = pixel + PacketCanvas::kRest * kStep;
+  const V rest = hn::Load(d, rest_at);
+  const V taken = TakenWeight(covered, open, rest, weight);
+  hn::Store(hn::Sub(rest, taken), d, rest_at);
   if constexpr (Kind::kChannels > 0) {
-    V added = covered;
+    V added = taken;
     float* at = pixel + PacketCanvas::kCoverageChannels * kStep;
     if constexpr (Kind::kFade) {
       float* const fade_at = at + (Kind::kChannels - 1) * kStep;

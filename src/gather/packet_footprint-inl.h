@@ -34,9 +34,9 @@ struct SampleRun {
   VI begin, end;
 
   SampleRun(V low, V high) {
-    const V scale = Splat(float(kHullSide)), half = Splat(0.5f);
-    begin = hn::ConvertTo(DI(), hn::Ceil(hn::MulSub(scale, low, half)));
-    end = hn::ConvertTo(DI(), hn::Floor(hn::MulAdd(scale, high, half)));
+    const V scale = Splat(float(kHullSide));
+    begin = hn::ConvertTo(DI(), hn::Ceil(hn::Mul(scale, low)));
+    end = hn::ConvertTo(DI(), hn::Floor(hn::Mul(scale, high)));
   }
   // Bits of those columns in a column of pixels.
   VU Columns(int pixel) const {
@@ -76,8 +76,10 @@ HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, co
   const D d;
   const V zero = hn::Zero(d), size = Splat(float(resolution));
   const VU widening = Widening(shape, cover.is_solid);
-  const V wider =
-      hn::Mul(hn::ConvertTo(d, hn::BitCast(DI(), widening)), Splat(1 / float(kHullSide)));
+  const V in_samples = hn::ConvertTo(d, hn::BitCast(DI(), widening));
+  const V wider = cover.is_solid ? hn::MulAdd(in_samples, Splat(1 / float(kHullSide)),
+                                              Splat(0.5f / float(kHullSide)))
+                                 : hn::Zero(d);
   const V half_x = hn::Add(shape.half_x, wider), half_y = hn::Add(shape.half_y, wider);
   const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, half_x);
   const V y0 = hn::Max(zero, hn::Sub(shape.y, half_y));

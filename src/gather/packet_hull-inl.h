@@ -38,10 +38,10 @@ inline VU InEveryColumn(VU column) {
 template <std::size_t kChannels>
 class FaceHull {
  public:
-  // Places in a pixel. What was open before the last layer is negative once that layer was closed
-  // as far as it is.
+  // Places in a pixel. What was left before the last layer is negative once that layer was asked
+  // for its hull.
   static constexpr std::size_t kHull = PacketCanvas::kCoverageChannels + kChannels;
-  static constexpr std::size_t kBegin = kHull + 1, kEnd = kHull + 2, kOpenBefore = kHull + 3;
+  static constexpr std::size_t kBegin = kHull + 1, kEnd = kHull + 2, kRestBefore = kHull + 3;
   static constexpr std::size_t kColorBefore = kHull + 4, kAll = kColorBefore + kChannels;
   static_assert(kAll ==
                 PacketCanvas::kCoverageChannels + PacketCanvas::kHullChannels + 2 * kChannels);
@@ -83,15 +83,15 @@ class FaceHull {
   HWY_INLINE void Turn(std::size_t at, M ends, M begins) const {
     const D d;
     float* const pixel = pixels_.at(at);
-    const V before = hn::Load(d, pixel + kOpenBefore * kStep);
-    V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
-    const M has_layer = hn::And(ends, hn::Gt(before, open));
+    const V before = hn::Load(d, pixel + kRestBefore * kStep);
+    V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
+    const M has_layer = hn::And(ends, hn::Gt(before, rest));
     if (!hn::AllFalse(d, has_layer)) Close(at, has_layer);
-    open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
-    begins = hn::And(begins, hn::Ne(before, open));
+    rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
+    begins = hn::And(begins, hn::Ne(before, rest));
     if (hn::AllFalse(d, begins)) return;
-    hn::Store(hn::IfThenElse(begins, open, hn::Load(d, pixel + kOpenBefore * kStep)), d,
-              pixel + kOpenBefore * kStep);
+    hn::Store(hn::IfThenElse(begins, rest, hn::Load(d, pixel + kRestBefore * kStep)), d,
+              pixel + kRestBefore * kStep);
     for (std::size_t c = 0; c < kChannels; ++c) {
       float* const to = pixel + (kColorBefore + c) * kStep;
       const float* const from = pixel + (PacketCanvas::kCoverageChannels + c) * kStep;
@@ -105,8 +105,9 @@ class FaceHull {
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t at) HWY_ATTR {
       const float* const pixel = pixels_.at(at);
       const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
-      const V before = hn::Load(d, pixel + kOpenBefore * kStep);
-      const M has_layer = hn::And(hn::Gt(before, open), hn::Gt(open, hn::Zero(d)));
+      const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
+      const V before = hn::Load(d, pixel + kRestBefore * kStep);
+      const M has_layer = hn::And(hn::Gt(before, rest), hn::Gt(open, hn::Zero(d)));
       if (!hn::AllFalse(d, has_layer)) Close(at, has_layer);
     });
   }
@@ -180,18 +181,21 @@ class FaceHull {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
     float* const pixel = pixels_.at(at);
-    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
-    const V before = hn::Load(d, pixel + kOpenBefore * kStep);
-    hn::Store(hn::IfThenElse(lanes, hn::Neg(before), before), d, pixel + kOpenBefore * kStep);
+    const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
+    const V before = hn::Load(d, pixel + kRestBefore * kStep);
+    hn::Store(hn::IfThenElse(lanes, hn::Neg(before), before), d, pixel + kRestBefore * kStep);
     lanes = Held(at, lanes);
     if (hn::AllFalse(d, lanes)) return;
-    const V layer = hn::IfThenElse(lanes, hn::Sub(before, open), one);
-    const V scale = hn::Div(hn::IfThenElseZero(lanes, open), layer);
-    hn::Store(hn::IfThenElse(lanes, zero, open), d, pixel + PacketCanvas::kOpen * kStep);
+    const V layer = hn::IfThenElse(lanes, hn::Sub(before, rest), one);
+    const V scale = hn::Div(hn::IfThenElseZero(lanes, rest), layer);
+    for (const std::size_t i : {PacketCanvas::kOpen, PacketCanvas::kRest}) {
+      float* const left = pixel + i * kStep;
+      hn::Store(hn::IfThenElse(lanes, zero, hn::Load(d, left)), d, left);
+    }
     for (std::size_t c = 0; c < kChannels; ++c) {
       float* const to = pixel + (PacketCanvas::kCoverageChannels + c) * kStep;
-      const V all = hn::Load(d, to), rest = hn::Load(d, pixel + (kColorBefore + c) * kStep);
-      hn::Store(hn::MulAdd(scale, hn::Sub(all, rest), all), d, to);
+      const V all = hn::Load(d, to), early = hn::Load(d, pixel + (kColorBefore + c) * kStep);
+      hn::Store(hn::MulAdd(scale, hn::Sub(all, early), all), d, to);
     }
   }
 

@@ -141,9 +141,9 @@ class Integral {
   PixelSight Look(std::size_t in_face) const {
     const D d;
     const float* const pixel = near_.at(in_face);
-    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
     PixelSight sight = NothingSeen();
-    sight.coverage = hn::Sub(Splat(1), open);
+    sight.coverage = hn::Sub(Splat(1), rest);
     if (rules_.hasLight()) sight.radiosity = LoadRadiosity(pixel);
     sight.occlusion = rules_.fades() ? hn::Load(d, FadedOf(pixel)) : sight.coverage;
     return sight;

@@ -61,7 +61,7 @@ struct alignas(64) Patch {
   float ribbonWidth() const { return -soft_peak; }
   float nested(float ribbon_nested) const {
     if (isRibbon() && thicket > 0) return ribbon_nested;
-    return nestedPart(facing_limit == kBothSides, thicket);
+    return nestedPart(is_solid && facing_limit != kBothSides, thicket);
   }
 };
 static_assert(sizeof(Patch) == 128);
@@ -102,12 +102,12 @@ struct SeenPixels {
 };
 
 // Where a packet is drawn: 16 rasters, interleaved by pixel as many at a time as a vector holds
-// (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage), and what is open
-// of it; with color red, green and blue; the faded coverage, when occlusion fades; then the hull
-// (FaceHull), and what was open and seen before the last layer.
+// (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage), what is open of
+// it and of its weight; with color red, green and blue; the faded coverage, when occlusion fades;
+// then the hull (FaceHull), and what was left and seen before the last layer.
 struct PacketCanvas {
-  static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3;  // places in a pixel
-  static constexpr std::size_t kCoverageChannels = 4, kHullChannels = 4;
+  static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3, kRest = 4;  // places
+  static constexpr std::size_t kCoverageChannels = 5, kHullChannels = 4;
   static std::size_t channels(const GatherRules& rules) {
     return kCoverageChannels + kHullChannels + 2 * rules.channels();
   }

@@ -73,6 +73,15 @@ inline V OpenBehind(V room, V layer, V nested) {
   return hn::MulAdd(nested, hn::Sub(hn::Min(room, rest), apart), apart);
 }
 
+// As takenWeight, of coverage_rules.h; zero where nothing is open.
+inline V TakenWeight(V covered, V open, V rest, V weight) {
+  const V zero = hn::Zero(D()), one = Splat(1);
+  const V part = hn::Div(covered, hn::Max(open, Splat(1e-30f)));
+  const V own = hn::Mul(hn::Mul(covered, hn::Sub(one, part)), weight);
+  const V taken = hn::MulAdd(hn::Mul(part, part), rest, own);
+  return hn::IfThenElseZero(hn::Gt(covered, zero), hn::Min(rest, hn::Max(zero, taken)));
+}
+
 using V3 = VectorsOf3<V>;
 inline V Axis(const V3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 inline V Axis(const glm::vec3& v, int axis) { return Splat(v[axis]); }

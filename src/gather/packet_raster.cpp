@@ -257,12 +257,11 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.normal = node.flatness * node.normal;
   patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   patch.shape = shapeOf(node.covariance);
-  patch.area = node.area;
   patch.thicket = thicketPart(node);
   patch.is_solid = false;
   const RoughCover cover =
       roughCover(node, direction, visible.perspective * round_area, patch.thicket);
-  patch.round_area = cover.area;
+  patch.area = patch.round_area = cover.area;
   patch.most_area = cover.most;
   patch.opacity = cover.opacity;
   patch.parts = parts;

@@ -96,7 +96,9 @@ RasterCube::RasterCube(const RasterGeometry& geometry, bool has_color, bool fade
       faded_before_(faded_.size()),
       is_seen_(geometry.pixels().size(), true) {}
 
-void RasterCube::clear(const glm::vec3& up) {
+void RasterCube::clear(const glm::vec3& up, bool weighs) {
+  up_ = up;
+  weighs_ = weighs;
   const std::span<const RasterGeometry::Pixel> pixels = geometry_->pixels();
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     is_seen_[i] = up == glm::vec3(0) || glm::dot(up, pixels[i].direction) > 0;
@@ -111,7 +113,7 @@ void RasterCube::clear(const glm::vec3& up) {
 }
 
 // A layer with less room than `amount` ends at exactly 1, and the pixel is exactly 1 then.
-inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
+inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch, float weight,
                                    const Texture& texture, const DepthRange& depth,
                                    const glm::vec3& radiosity) {
   Coverage& coverage = coverage_[pixel];
@@ -133,8 +135,10 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch,
   coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
   coverage.total = std::max(before, 1 - openBehind(coverage.room, coverage.layer, texture.nested));
-  if (!radiosity_.empty()) radiosity_[pixel] += (coverage.total - before) * radiosity;
-  if (!faded_.empty()) faded_[pixel] += (coverage.total - before) * depth.fade;
+  const float taken = takenWeight(coverage.total - before, 1 - before, coverage.rest, weight);
+  coverage.rest -= taken;
+  if (!radiosity_.empty()) radiosity_[pixel] += taken * radiosity;
+  if (!faded_.empty()) faded_[pixel] += taken * depth.fade;
   if (recorder_ != nullptr) {
     recorder_->add(pixel, coverage.total - before, is_new, 0.5f * (depth.begin + depth.end));
   }
@@ -162,7 +166,7 @@ void RasterCube::addHull(int face, const Parallelogram& shape, bool is_solid,
   const float x_middle = shape.u * scale + 0.5f * size, y_middle = shape.v * scale + 0.5f * size;
   const float half_x = shape.half_u * scale, half_y = shape.half_v * scale;
   const int widening = is_solid ? hullWidening(half_x, half_y) : 0;
-  const float wider = float(widening) / float(kHullSide);
+  const float wider = is_solid ? hullWider(float(widening)) : 0;
   const float y_begin = y_middle - half_y - wider, y_end = y_middle + half_y + wider;
   if (!(y_begin < size && y_end > 0)) return;
   const int row_last = std::min(resolution - 1, int(y_end));
@@ -207,12 +211,13 @@ bool RasterCube::isHeld(std::size_t pixel) const {
 // What is closed belongs to what its layer has brought.
 void RasterCube::closeLayer(std::size_t pixel) {
   Coverage& coverage = coverage_[pixel];
-  const float layer = coverage.total - coverage.total_before;
+  const float layer = coverage.rest_before - coverage.rest;
   if (coverage.is_closed || !(layer > 0) || coverage.total >= 1) return;
   coverage.is_closed = true;
   if (!isHeld(pixel)) return;
-  const float scale = (1 - coverage.total) / layer;
+  const float scale = coverage.rest / layer;
   coverage.total = 1;
+  coverage.rest = 0;
   if (recorder_ != nullptr) {
     recorder_->close(pixel, 0.5f * (coverage.hull.begin + coverage.layer_end));
   }
@@ -225,13 +230,26 @@ void RasterCube::closeLayer(std::size_t pixel) {
 void RasterCube::beginLayer(std::size_t pixel) {
   Coverage& coverage = coverage_[pixel];
   coverage.is_closed = false;
-  coverage.total_before = coverage.total;
+  coverage.rest_before = coverage.rest;
   if (!radiosity_.empty()) radiosity_before_[pixel] = radiosity_[pixel];
   if (!faded_.empty()) faded_before_[pixel] = faded_[pixel];
 }
 
 void RasterCube::close() {
   for (std::size_t i = 0; i < coverage_.size(); ++i) closeLayer(i);
+}
+
+// With q = (u, v, 1), the cosine over du dv / solid angle: q.n / |q| / |q|^3.
+float RasterCube::weightAt(int face, float x, float y) const {
+  if (!weighs_) return 1;
+  const float middle = 0.5f * float(geometry_->resolution()), scale = geometry_->pixelsPerSlope();
+  const float u = (x - middle) / scale, v = (y - middle) / scale;
+  const float square = u * u + v * v + 1;
+  if (up_ == glm::vec3(0)) return 1 / (square * std::sqrt(square));
+  const int axis = face / 2;
+  const float up_w = face % 2 == 0 ? up_[axis] : -up_[axis];
+  const float cosine = up_[(axis + 1) % 3] * u + up_[(axis + 2) % 3] * v + up_w;
+  return std::max(0.f, cosine) / (square * square);
 }
 
 // Covers pixels by the part of them that lies in the shape, row by row.
@@ -257,10 +275,14 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
     const std::size_t row_first = std::size_t((face * resolution + row) * resolution);
     const float height = texture.opacity * (top - bottom);
     for (int column = int(x_begin); column <= column_last; ++column) {
-      const float width = std::min(x_end, float(column + 1)) - std::max(x_begin, float(column));
-      const float amount = width * height;
-      coverPixel(row_first + std::size_t(column), amount, touchPart(amount, area), texture, depth,
-                 radiosity);
+      const std::size_t pixel = row_first + std::size_t(column);
+      if (!is_seen_[pixel] || coverage_[pixel].total >= 1) continue;
+      const float left = std::max(x_begin, float(column));
+      const float right = std::min(x_end, float(column + 1));
+      const float amount = (right - left) * height;
+      const float weight = weightAt(face, 0.5f * (left + right), 0.5f * (top + bottom)) /
+                           weightAt(face, float(column) + 0.5f, float(row) + 0.5f);
+      coverPixel(pixel, amount, touchPart(amount, area), weight, texture, depth, radiosity);
     }
   }
 }
@@ -343,7 +365,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
         const std::size_t pixel = row_first + std::size_t(column);
         const float amount = texture.opacity * amountOf(pixels[pixel].direction);
         if (!(amount > 0)) continue;
-        coverPixel(pixel, amount, touchPart(amount, 0), texture, depth, radiosity);
+        coverPixel(pixel, amount, touchPart(amount, 0), 1, texture, depth, radiosity);
         if (texture.thicket == 0 && amount >= kTracedHull) {
           addHull(pixel, kHullSamples, texture.is_solid ? kHullSide / 2 : 0, depth);
         }

@@ -105,8 +105,9 @@ class RasterCube {
   void setRecorder(PixelRecorder* recorder) { recorder_ = recorder; }
 
   // Uncovers every pixel. `up`: the receiver's normal in the frame of the raster, or zero; what
-  // lies below its horizon is not looked at.
-  void clear(const glm::vec3& up = glm::vec3(0));
+  // lies below its horizon is not looked at. `weighs`: what lies where in a pixel counts by its own
+  // cosine to `up` and solid angle; else by its area on the face.
+  void clear(const glm::vec3& up = glm::vec3(0), bool weighs = false);
 
   // How something covers its pixels.
   struct Texture {
@@ -127,7 +128,7 @@ class RasterCube {
     glm::vec3 normal;     // unit length for a disk, zero for a sphere, in between when partly flat
     SymmetricMatrix shape;  // covariance of its area, of trace 2; of a sphere the identity
     float solid_angle;
-    float spread = 0;  // area / distance^2
+    float spread = 0;  // area / distance^2, of a rough node what it shows of it
     Texture texture{};
   };
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
@@ -154,8 +155,8 @@ class RasterCube {
   void close();
 
   const RasterGeometry& geometry() const { return *geometry_; }
-  // Covered fraction of a pixel, 0..1.
-  float coverage(std::size_t pixel) const { return coverage_[pixel].total; }
+  // Covered part of the weight of a pixel, 0..1.
+  float coverage(std::size_t pixel) const { return 1 - coverage_[pixel].rest; }
   // Radiosity of a pixel times its coverage. Requires color.
   const glm::vec3& radiosity(std::size_t pixel) const { return radiosity_[pixel]; }
 
@@ -164,7 +165,7 @@ class RasterCube {
 
   // Bytes that a cube with color that fades holds for each pixel, with what it was when its last
   // layer began.
-  static constexpr std::size_t kPixelBytes = 16 * sizeof(float) + 2 * sizeof(glm::vec3);
+  static constexpr std::size_t kPixelBytes = 17 * sizeof(float) + 2 * sizeof(glm::vec3);
 
  private:
   struct Hull {
@@ -175,11 +176,12 @@ class RasterCube {
   };
   struct Coverage {
     float total = 0;      // of all layers together
+    float rest = 1;       // of its weight, what is open
     float room = 1;       // what the layers before the last one leave uncovered
     float layer = 0;      // of the last layer by itself
     float layer_end = 0;  // where the depth ranges of the last layer end
     Hull hull;
-    float total_before = 0;  // when the last layer began
+    float rest_before = 1;   // when the last layer began
     bool is_closed = false;  // that layer was asked for its hull
   };
   // On a face: rows of width 2 half_u around the line u + shear (row - v).
@@ -193,8 +195,11 @@ class RasterCube {
   void closeLayer(std::size_t pixel);
   void beginLayer(std::size_t pixel);
   // `touch`: how much it says about its layer, touchPart.
-  void coverPixel(std::size_t pixel, float amount, float touch, const Texture& texture,
-                  const DepthRange& depth, const glm::vec3& radiosity);
+  // `weight`: of the middle of what covers it, over that of its own middle.
+  void coverPixel(std::size_t pixel, float amount, float touch, float weight,
+                  const Texture& texture, const DepthRange& depth, const glm::vec3& radiosity);
+  // Of places on a face, in pixels, by their cosine and solid angle for their area there.
+  float weightAt(int face, float x, float y) const;
   void coverParallelogram(int face, const Parallelogram& shape, const Texture& texture,
                           const DepthRange& depth, const glm::vec3& radiosity);
   template <typename AmountOf>
@@ -209,6 +214,8 @@ class RasterCube {
   std::vector<glm::vec3> radiosity_before_;  // when the last layer began
   std::vector<float> faded_before_;
   std::vector<bool> is_seen_;
+  glm::vec3 up_{0};
+  bool weighs_ = false;
 };
 
 }  // namespace surfeit

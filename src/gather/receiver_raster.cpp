@@ -206,7 +206,7 @@ void ReceiverRaster::setRecorder(PixelRecorder* recorder) {
 
 GatherResult ReceiverRaster::finish() {
   sortByDistance();
-  cube_.clear(inRaster(receiver_.normal));
+  cube_.clear(inRaster(receiver_.normal), weights_.isPlainCosine() && !has_frame_);
   if (recorder_ != nullptr) recorder_->begin(geometry_.pixels().size());
   for (const std::uint64_t key : order_) {
     const Entry& entry = contributions_[std::uint32_t(key)];
