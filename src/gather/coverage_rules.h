@@ -86,8 +86,7 @@ inline constexpr std::uint32_t kHullSamples = 0xffff;
 // Patches are widened by this part of half their side, at least by 1 sample and at most by a pixel;
 // spheres, two-sided surfels and rough nodes, which may stand alone, are not. (AO RMSE and bias
 // with .7, .8, .9: scattered receivers around the bunny .0054 and -.0012, .0042 and -.0010, .0037
-// and
-// -.0009; city .0049 and +.0026, .0053 and +.0030, .0057 and +.0033; what arrives behind a ball
+// and -.0009; city .0049 and +.0026, .0053 and +.0030, .0057 and +.0033; what arrives behind a ball
 // .0000 of the light. With rough nodes widened, spheres .0128. bench/versus_embree, bench/leaks)
 inline constexpr float kHullWidening = 0.75f;
 inline int hullWidening(float half_width, float half_height) {  // in samples

@@ -52,14 +52,7 @@ class Brush {
     pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
     hull_ = Hull(pixels_, *seen_, resolution_);
     open_.Begin(*seen_);
-    if constexpr (!Kind::kFrame) {
-      weighs_ = canvas_.weights->isPlainCosine();
-      is_any_spherical_ = !hn::AllFalse(D(), receivers_.spherical);
-      const int axis = face / 2;
-      const V w = Axis(receivers_.normal, axis);
-      up_ = {Axis(receivers_.normal, (axis + 1) % 3), Axis(receivers_.normal, (axis + 2) % 3),
-             face % 2 == 0 ? w : hn::Neg(w)};
-    }
+    if constexpr (!Kind::kFrame) weights_ = FaceWeights(canvas_, receivers_, face);
     ClearFace();
   }
   // Nothing more is drawn to it.
@@ -289,44 +282,6 @@ class Brush {
     V begin, end, half_x;
     PixelRange range;
   };
-  // As RasterCube::weightAt of places in a row of pixels, over that of their middles.
-  class RowWeights {
-   public:
-    // `y`: of the places.
-    RowWeights(const Brush& brush, int row, V y) : brush_(brush), slope_(Splat(1 / brush.scale_)) {
-      if (!brush.weighs_) return;
-      const V middle = Splat(0.5f * float(brush.resolution_));
-      const V v = hn::Mul(slope_, hn::Sub(y, middle));
-      const V v_middle = hn::Mul(slope_, hn::Sub(Splat(float(row) + 0.5f), middle));
-      cosine_ = hn::MulAdd(brush.up_.v, v, brush.up_.w);
-      cosine_middle_ = hn::MulAdd(brush.up_.v, v_middle, brush.up_.w);
-      square_ = hn::MulAdd(v, v, Splat(1));
-      square_middle_ = hn::MulAdd(v_middle, v_middle, Splat(1));
-    }
-    HWY_INLINE V At(int column, V x) const {
-      if (!brush_.weighs_) return Splat(1);
-      const V middle = Splat(0.5f * float(brush_.resolution_));
-      const V u = hn::Mul(slope_, hn::Sub(x, middle));
-      const V u_middle = hn::Mul(slope_, hn::Sub(Splat(float(column) + 0.5f), middle));
-      const V square = hn::MulAdd(u, u, square_);
-      const V square_middle = hn::MulAdd(u_middle, u_middle, square_middle_);
-      V cosine = hn::MulAdd(brush_.up_.u, u, cosine_);
-      V cosine_middle = hn::MulAdd(brush_.up_.u, u_middle, cosine_middle_);
-      if (brush_.is_any_spherical_) {
-        const M spherical = brush_.receivers_.spherical;
-        cosine = hn::IfThenElse(spherical, hn::Sqrt(square), cosine);
-        cosine_middle = hn::IfThenElse(spherical, hn::Sqrt(square_middle), cosine_middle);
-      }
-      const V whole = hn::Mul(hn::Max(cosine_middle, Splat(1e-20f)), hn::Mul(square, square));
-      return hn::Div(hn::Mul(hn::Max(hn::Zero(D()), cosine), hn::Mul(square_middle, square_middle)),
-                     whole);
-    }
-
-   private:
-    const Brush& brush_;
-    const V slope_;
-    V cosine_, cosine_middle_, square_, square_middle_;
-  };
   template <bool kOverlaps>
   HWY_INLINE void CoverRows(const Parallelogram& shape, const Rows& rows, const Cover& cover) {
     const V zero = hn::Zero(D());
@@ -337,7 +292,7 @@ class Brush {
       const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
       const V x = hn::NegMulAdd(shape.shear, along, shape.x);
       const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
-      const RowWeights weights(*this, row, hn::Mul(Splat(0.5f), hn::Add(top, bottom)));
+      const FaceWeights::Row weights(weights_, row, hn::Mul(Splat(0.5f), hn::Add(top, bottom)));
       open_.DrawRow(rows.range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
         const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
                                               hn::Max(left, Splat(float(column)))));
@@ -515,11 +470,7 @@ class Brush {
   const SeenPixels::Face* seen_ = nullptr;
   FaceLanes pixels_;  // of the face
   OpenPixels open_;
-  struct FaceUp {
-    V u, v, w;
-  };
-  FaceUp up_;  // the receivers' normals along the axes of the face
-  bool weighs_ = false, is_any_spherical_ = false;
+  FaceWeights weights_;
   Hull hull_;
 };
 

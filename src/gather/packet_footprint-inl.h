@@ -1,5 +1,5 @@
-// The samples that patches, widened, add to the hulls of a packet's rasters; for one instruction
-// set (see packet_kernel-inl.h).
+// Where in its pixels a patch lies: what that weighs, and the samples that it adds, widened, to the
+// hulls of a packet's rasters; for one instruction set (see packet_kernel-inl.h).
 #if defined(SURFEIT_PACKET_FOOTPRINT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SURFEIT_PACKET_FOOTPRINT_INL_H_
 #undef SURFEIT_PACKET_FOOTPRINT_INL_H_
@@ -25,6 +25,64 @@ namespace {
 // As RasterCube::Parallelogram, in pixels.
 struct Parallelogram {
   V x, y, half_x, half_y, shear;
+};
+
+// As RasterCube::weightAt, over what the middles of the pixels weigh; 1 unless directions weigh by
+// the plain cosine. Of one face.
+class FaceWeights {
+ public:
+  FaceWeights() = default;
+  FaceWeights(const PacketCanvas& canvas, const Receivers& receivers, int face)
+      : weighs_(canvas.weights->isPlainCosine()),
+        is_any_spherical_(!hn::AllFalse(D(), receivers.spherical)),
+        spherical_(receivers.spherical),
+        slope_(1 / canvas.geometry->pixelsPerSlope()),
+        middle_(0.5f * float(canvas.geometry->resolution())) {
+    const int axis = face / 2;
+    const V w = Axis(receivers.normal, axis);
+    up_ = {Axis(receivers.normal, (axis + 1) % 3), Axis(receivers.normal, (axis + 2) % 3),
+           face % 2 == 0 ? w : hn::Neg(w)};
+  }
+
+  // Of places at `y` in a row of pixels.
+  class Row {
+   public:
+    Row(const FaceWeights& face, int row, V y) : face_(face) {
+      if (!face.weighs_) return;
+      const V v = face.Slope(y), v_middle = face.Slope(Splat(float(row) + 0.5f));
+      cosine_ = hn::MulAdd(face.up_.y, v, face.up_.z);
+      cosine_middle_ = hn::MulAdd(face.up_.y, v_middle, face.up_.z);
+      square_ = hn::MulAdd(v, v, Splat(1));
+      square_middle_ = hn::MulAdd(v_middle, v_middle, Splat(1));
+    }
+    HWY_INLINE V At(int column, V x) const {
+      if (!face_.weighs_) return Splat(1);
+      const V u = face_.Slope(x), u_middle = face_.Slope(Splat(float(column) + 0.5f));
+      const V square = hn::MulAdd(u, u, square_);
+      const V square_middle = hn::MulAdd(u_middle, u_middle, square_middle_);
+      V cosine = hn::MulAdd(face_.up_.x, u, cosine_);
+      V cosine_middle = hn::MulAdd(face_.up_.x, u_middle, cosine_middle_);
+      if (face_.is_any_spherical_) {
+        cosine = hn::IfThenElse(face_.spherical_, hn::Sqrt(square), cosine);
+        cosine_middle = hn::IfThenElse(face_.spherical_, hn::Sqrt(square_middle), cosine_middle);
+      }
+      const V whole = hn::Mul(hn::Max(cosine_middle, Splat(1e-20f)), hn::Mul(square, square));
+      return hn::Div(hn::Mul(hn::Max(hn::Zero(D()), cosine), hn::Mul(square_middle, square_middle)),
+                     whole);
+    }
+
+   private:
+    const FaceWeights& face_;
+    V cosine_, cosine_middle_, square_, square_middle_;
+  };
+
+ private:
+  V Slope(V place) const { return hn::Mul(Splat(slope_), hn::Sub(place, Splat(middle_))); }
+
+  bool weighs_ = false, is_any_spherical_ = false;
+  M spherical_;
+  float slope_ = 0, middle_ = 0;
+  V3 up_;  // the receivers' normals along the axes of the face
 };
 
 // The samples of rows, or columns, of a face that lie between `low` and `high`, in pixels; half
