@@ -109,7 +109,7 @@ class Brush {
     }
   }
 
-  // What a receiver does not look at is not open.
+  // What a receiver does not look at is not open. No layer has ended anywhere.
   void ClearFace() {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     const D d;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -280,8 +279,11 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
       const float left = std::max(x_begin, float(column));
       const float right = std::min(x_end, float(column + 1));
       const float amount = (right - left) * height;
-      const float weight = weightAt(face, 0.5f * (left + right), 0.5f * (top + bottom)) /
-                           weightAt(face, float(column) + 0.5f, float(row) + 0.5f);
+      // The horizon may run through the middle of a pixel
+      const float middle_weight =
+          std::max(1e-20f, weightAt(face, float(column) + 0.5f, float(row) + 0.5f));
+      const float weight =
+          weightAt(face, 0.5f * (left + right), 0.5f * (top + bottom)) / middle_weight;
       coverPixel(pixel, amount, touchPart(amount, area), weight, texture, depth, radiosity);
     }
   }

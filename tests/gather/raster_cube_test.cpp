@@ -438,6 +438,29 @@ TEST(RasterCube, SoftDiskCoversItsShare) {
   EXPECT_NEAR(coveredSolidAngle(cube) / double(kPi / 100), .5, .03);
 }
 
+// Of such pixels the middle weighs nothing, or what rounding leaves of it.
+TEST(RasterCube, HorizonsThroughTheMiddlesOfPixelsLeaveNumbers) {
+  const RasterGeometry geometry(12);
+  RasterCube cube(geometry, true);
+  const auto pixels = geometry.pixels();
+  for (std::size_t i = 0; i + 131 < pixels.size(); i += 7) {
+    const glm::vec3 up = glm::normalize(glm::cross(pixels[i].direction, pixels[i + 131].direction));
+    cube.clear(up, true);
+    for (const float solid_angle : {.004f, .4f}) {
+      for (const std::size_t at : {i, i + 131}) {
+        cube.splat(diskPatch(pixels[at].direction, kRound, solid_angle, solid_angle), kDepth,
+                   kWhite);
+      }
+    }
+    cube.close();
+    for (std::size_t at = 0; at < pixels.size(); ++at) {
+      ASSERT_GE(cube.coverage(at), 0) << i << ' ' << at;
+      ASSERT_LE(cube.coverage(at), 1) << i << ' ' << at;
+      ASSERT_LE(cube.radiosity(at).x, kWhite.x * 1.001f) << i << ' ' << at;
+    }
+  }
+}
+
 TEST(RasterCube, ClearForgetsEverything) {
   const RasterGeometry geometry(4);
   RasterCube cube(geometry, true);
