@@ -232,8 +232,7 @@ Status runBench(const std::string& scene_path, const std::string& receivers_path
                          .memory_bytes = input.receiverCount() * sizeof(SortedReceiver),
                          .temporary_directory = "."});
   Progress progress;
-  SURFEIT_RETURN_IF_ERROR(
-      input.sort(ReceiverOrder::kHilbert, header.cube, false, sorter, progress));
+  SURFEIT_RETURN_IF_ERROR(input.sort(ReceiverOrder::kHilbert, header, false, sorter, progress));
 
   std::vector<std::unique_ptr<Replay>> replays;
   replays.push_back(std::make_unique<Replay>(depthFirst(tree, header.node_group_capacity)));

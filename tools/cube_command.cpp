@@ -37,9 +37,9 @@ struct CubeArguments {
   int rays = 8;
 };
 
-glm::vec3 parsePlace(const std::string& option, const std::string& text) {
+glm::dvec3 parsePlace(const std::string& option, const std::string& text) {
   const std::array<double, 3> v = parseNumberList<3>(option, text, "three numbers X,Y,Z");
-  return {float(v[0]), float(v[1]), float(v[2])};
+  return {v[0], v[1], v[2]};
 }
 
 // Words between commas.
@@ -99,9 +99,10 @@ Status writeCube(const CubeViews& cubes, const CubeArguments& arguments) {
 }
 
 std::string describe(const CubeImage& cube, const CubeArguments& arguments) {
-  const glm::vec3 &at = cube.receiver.position, &n = cube.receiver.normal, &e = cube.irradiance;
+  const glm::dvec3& at = cube.receiver.position;
+  const glm::vec3 &n = cube.receiver.normal, &e = cube.irradiance;
   return fmt::format(
-      "{}: receiver at {:g},{:g},{:g} with normal {:g},{:g},{:g}\n"
+      "{}: receiver at {},{},{} with normal {:g},{:g},{:g}\n"
       "{} contributions, {} of them ray traced; occlusion {:.5f}, {} {:.5g} {:.5g} {:.5g}",
       arguments.picture, at.x, at.y, at.z, n.x, n.y, n.z, formatCount(cube.contributions),
       formatCount(cube.traced_surfels), cube.occlusion,
@@ -165,7 +166,9 @@ void addReceiverOptions(CLI::App& command, CubeArguments& arguments) {
   command
       .add_option_function<std::string>(
           "--normal",
-          [&](const std::string& text) { receiver.normal = parsePlace("--normal", text); },
+          [&](const std::string& text) {
+            receiver.normal = glm::vec3(parsePlace("--normal", text));
+          },
           "Its normal, of any length; without one it looks all around")
       ->type_name("X,Y,Z")
       ->needs(at)

@@ -73,7 +73,7 @@ void addDirectionOptions(CLI::App& command, GatherOptions& options) {
           "--camera",
           [&options](const std::string& text) {
             const auto at = parseNumberList<3>("--camera", text, "a position X,Y,Z");
-            options.eye = {float(at[0]), float(at[1]), float(at[2])};
+            options.eye = {at[0], at[1], at[2]};
           },
           "Where glossy surfaces are looked at from, else view_x view_y view_z of the receivers")
       ->type_name("X,Y,Z")

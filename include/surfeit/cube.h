@@ -18,7 +18,7 @@ namespace surfeit {
 
 // The place that is looked from.
 struct CubeReceiver {
-  glm::vec3 position{0};  // finite, scene units
+  glm::dvec3 position{0};  // finite, scene units, as the cloud has them
   // Finite, of any length; zero: the receiver gathers over the whole sphere.
   glm::vec3 normal{0};
   // With kGlossy, the direction that the receiver is looked along, of any length; zero: from

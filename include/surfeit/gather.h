@@ -118,7 +118,7 @@ struct GatherOptions {
   std::uint64_t groups = kAllGroups;
   // With kGlossy, receivers without view_x view_y view_z are looked at from here; NaN: all need
   // theirs.
-  glm::vec3 eye{std::numeric_limits<float>::quiet_NaN()};
+  glm::dvec3 eye{std::numeric_limits<double>::quiet_NaN()};
   // Budget of the process: its peak resident memory stays below this plus 64 MiB. 0: three quarters
   // of what the job may use.
   std::uint64_t memory_bytes = 0;

@@ -10,22 +10,31 @@
 namespace surfeit {
 
 // An axis-aligned box in world units; empty (min > max) until a point is added.
-struct Bounds3 {
-  glm::vec3 min{std::numeric_limits<float>::infinity()};
-  glm::vec3 max{-std::numeric_limits<float>::infinity()};
+template <typename T>
+struct Box3 {
+  using Vector = glm::vec<3, T>;
+  Vector min{std::numeric_limits<T>::infinity()};
+  Vector max{-std::numeric_limits<T>::infinity()};
 
   bool isEmpty() const { return !(min.x <= max.x && min.y <= max.y && min.z <= max.z); }
-  void add(const glm::vec3& point) {
+  void add(const Vector& point) {
     min = glm::min(min, point);
     max = glm::max(max, point);
   }
-  void add(const Bounds3& other) {
+  void add(const Box3& other) {
     min = glm::min(min, other.min);
     max = glm::max(max, other.max);
   }
-  glm::vec3 extent() const { return isEmpty() ? glm::vec3(0) : max - min; }
-  glm::vec3 centre() const { return isEmpty() ? glm::vec3(0) : min + 0.5f * (max - min); }
+  Vector extent() const { return isEmpty() ? Vector(0) : max - min; }
+  Vector centre() const { return isEmpty() ? Vector(0) : min + T(0.5) * (max - min); }
 };
+using Bounds3 = Box3<float>;
+using Bounds3d = Box3<double>;
+
+// The box of the points of another one, moved.
+inline Bounds3d movedBounds(const Bounds3& bounds, const glm::dvec3& shift) {
+  return {glm::dvec3(bounds.min) + shift, glm::dvec3(bounds.max) + shift};
+}
 
 // The octree's root cell. In double, so that a cloud far from the origin keeps all 21 bits of the
 // curve.
@@ -38,11 +47,9 @@ struct RootCube {
 
 // The cube for a box: its size is a power of two and its origin a multiple of a 16th of that, so
 // that a sample of a cloud nearly always gives the cube of the whole. A box of size zero gets 1.
-inline RootCube rootCube(const Bounds3& bounds) {
-  double extent = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    extent = std::max(extent, double(bounds.max[axis]) - double(bounds.min[axis]));
-  }
+inline RootCube rootCube(const Bounds3d& bounds) {
+  const glm::dvec3 sides = bounds.extent();
+  const double extent = std::max({sides.x, sides.y, sides.z});
   RootCube cube;
   if (extent > 0) {
     int exponent = 0;
@@ -53,12 +60,26 @@ inline RootCube rootCube(const Bounds3& bounds) {
     bool fits = true;
     for (int axis = 0; axis < 3; ++axis) {
       const double step = cube.size / 16;
-      cube.origin[axis] = std::floor(double(bounds.min[axis]) / step) * step;
-      fits = fits && double(bounds.max[axis]) <= cube.origin[axis] + cube.size;
+      cube.origin[axis] = std::floor(bounds.min[axis] / step) * step;
+      fits = fits && bounds.max[axis] <= cube.origin[axis] + cube.size;
     }
     if (fits) return cube;
     cube.size *= 2;
   }
+}
+inline RootCube rootCube(const Bounds3& bounds) {
+  return rootCube(movedBounds(bounds, glm::dvec3(0)));
+}
+
+// Where the places of a cloud with this box are counted from. Floats about 0 serve a box that is no
+// farther from 0 than twice its root cube is wide: they have all but two bits of the digits that
+// they could have. Others, on a map or a globe, are counted from a corner of their cube, so that a
+// cloud that is moved by steps of the cube keeps every coordinate.
+inline glm::dvec3 originFor(const Bounds3d& bounds) {
+  const RootCube cube = rootCube(bounds);
+  const glm::dvec3 farthest = glm::max(glm::abs(bounds.min), glm::abs(bounds.max));
+  if (std::max({farthest.x, farthest.y, farthest.z}) <= 3 * cube.size) return glm::dvec3(0);
+  return {cube.origin[0], cube.origin[1], cube.origin[2]};
 }
 
 }  // namespace surfeit

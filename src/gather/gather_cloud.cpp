@@ -39,7 +39,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
     return Status::invalidArgument(
         fmt::format("{}: the result would replace the scene", scene_path));
   }
-  const GatherOptions options = withDefaults(given);
+  GatherOptions options = withDefaults(given);
   GatherStats stats;
   stats.threads = options.threads;
   stats.memory_bytes = options.memory_bytes;
@@ -49,6 +49,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
+  options.eye -= scene.header().origin;
   SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
                            GatherInput::open(receivers_path, options.channels, options.part));
   SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
@@ -88,7 +89,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
                               .temporary_directory = temporary_directory});
   Status sorted;
   withThreads(stats.threads, [&] {
-    sorted = input.sort(options.order, scene.header().cube, options.strict, *sorter, progress);
+    sorted = input.sort(options.order, scene.header(), options.strict, *sorter, progress);
   });
   SURFEIT_RETURN_IF_ERROR(sorted);
   stats.invalid_receivers = input.defects().total();

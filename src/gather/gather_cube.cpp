@@ -35,15 +35,18 @@ glm::vec3 unitOrZero(const glm::vec3& v) {
   return length > 0 ? glm::vec3(glm::dvec3(v) / length) : glm::vec3(0);
 }
 
-Result<Receiver> checkedReceiver(const CubeReceiver& given, const GatherOptions& options) {
-  const auto refuse = [](const char* what, const glm::vec3& found) {
+// About the scene's origin.
+Result<Receiver> checkedReceiver(const CubeReceiver& given, const GatherOptions& options,
+                                 const glm::dvec3& origin) {
+  const auto refuse = [](const char* what, const auto& found) {
     return Status::invalidArgument(
         fmt::format("{} is {} {} {}, expected finite numbers", what, found.x, found.y, found.z));
   };
   if (!isFinite(given.position)) return refuse("position of the receiver", given.position);
   if (!isFinite(given.normal)) return refuse("normal of the receiver", given.normal);
   if (!isFinite(given.view)) return refuse("view of the receiver", given.view);
-  const Receiver receiver{given.position, unitOrZero(given.normal), unitOrZero(given.view)};
+  const Receiver receiver{glm::vec3(given.position - origin), unitOrZero(given.normal),
+                          unitOrZero(given.view)};
   if (options.mode != GatherMode::kGlossy) return receiver;
   if (receiver.isSpherical()) {
     return Status::invalidArgument("the receiver has no normal, expected one to reflect the view");
@@ -122,9 +125,11 @@ CubePixel pixelOf(const ResultSums::Pixel& seen, const PixelRecord& record) {
 Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const CubeReceiver& given,
                                     const GatherOptions& given_options, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(checkGatherOptions(given_options));
-  SURFEIT_ASSIGN_OR_RETURN(const Receiver receiver, checkedReceiver(given, given_options));
-  const GatherOptions options = withDefaults(given_options);
+  GatherOptions options = withDefaults(given_options);
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
+  const glm::dvec3 origin = scene.header().origin;
+  SURFEIT_ASSIGN_OR_RETURN(const Receiver receiver, checkedReceiver(given, options, origin));
+  options.eye -= origin;
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<const LoadedEnvironment> environment,
                            loadEnvironment(options, progress));
@@ -148,7 +153,7 @@ Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const CubeRec
   // Keep what the raster holds
   const ReceiverRaster& raster = gatherer.raster();
   CubeImage image;
-  image.receiver = {receiver.position, receiver.normal, receiver.view};
+  image.receiver = {given.position, receiver.normal, receiver.view};
   image.resolution = raster.geometry().resolution();
   image.faces = facesOf(raster, rules);
   image.pixels.reserve(recorder.records().size());
@@ -201,7 +206,7 @@ Result<CubeReceiver> readCubeReceiverOrThrow(const std::string& path, std::uint6
       return Status::corruption(
           fmt::format("{}: record {}: {}", path, number, mapping.describeDefect(row)));
     }
-    return CubeReceiver{receiver.position, receiver.normal, receiver.view};
+    return CubeReceiver{mapping.positionOf(row), receiver.normal, receiver.view};
   }
 }
 

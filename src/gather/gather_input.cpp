@@ -82,10 +82,11 @@ Result<Bytes> GatherInput::readSlice(Progress& progress) {
   return reader_->readRows(kSliceRows, slice_);
 }
 
-Status GatherInput::sort(ReceiverOrder order, const RootCube& cube, bool strict,
+Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool strict,
                          ReceiverSorter& sorter, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(reader_->rewind());
   defects_ = {};
+  mapping_.setOrigin(scene.origin);
   for (std::uint64_t record = 0;;) {
     SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, readSlice(progress));
     const std::size_t count = slice.size() / receivers().row_bytes;
@@ -95,7 +96,7 @@ Status GatherInput::sort(ReceiverOrder order, const RootCube& cube, bool strict,
       SortedReceiver receiver;
       if (mapping_.decode(row, record, receiver.receiver, defects_)) {
         receiver.index = record;
-        receiver.key = keyOf(receiver.receiver.position, record, order, cube);
+        receiver.key = keyOf(receiver.receiver.position, record, order, scene.cube);
         SURFEIT_RETURN_IF_ERROR(sorter.add(receiver));
       } else if (strict) {
         return Status::corruption(fmt::format("{}: record {}: {}", reader_->path(), record,

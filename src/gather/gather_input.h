@@ -7,13 +7,13 @@
 #include <memory>
 #include <string>
 
-#include "core/bounds.h"
 #include "gather/gather_rules.h"
 #include "gather/receiver_rows.h"
 #include "gather/receiver_sorter.h"
 #include "gather/result_store.h"
 #include "io/row_reader.h"
 #include "io/row_writer.h"
+#include "octree/scene_file.h"
 #include "surfeit/gather.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -38,9 +38,9 @@ class GatherInput {
   // Tells what of the input the result does not keep, and what the gather makes of the rest.
   void note(Progress& progress) const;
 
-  // Gives all valid receivers to the sorter, with keys of `order` in `cube`. Invalid ones are
-  // counted; kCorruption with `strict`.
-  Status sort(ReceiverOrder order, const RootCube& cube, bool strict, ReceiverSorter& sorter,
+  // Gives all valid receivers to the sorter, about the scene's origin and with keys of `order` in
+  // its cube. Invalid ones are counted; kCorruption with `strict`.
+  Status sort(ReceiverOrder order, const SceneHeader& scene, bool strict, ReceiverSorter& sorter,
               Progress& progress);
   // Of the last sort.
   const SurfelDefects& defects() const { return defects_; }

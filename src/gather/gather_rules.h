@@ -69,7 +69,7 @@ struct GatherRules {
   GatherQuality quality;
   GatherWeights weights;              // with the cone angle filled in
   std::uint64_t groups = kAllGroups;  // set of the groups of surfels that are seen
-  glm::vec3 eye{0};                   // with kGlossy: what receivers are looked at from
+  glm::vec3 eye{0};                   // with kGlossy: receivers are looked at from here
 
   bool has(std::uint32_t some) const { return (outputs & some) != 0; }
   // Whether the radiosity of surfels matters, and whether distance does.
@@ -93,7 +93,7 @@ inline GatherRules::GatherRules(const GatherOptions& options, const LoadedEnviro
       quality(options.quality),
       weights(withConeAngle(options.weights, options.mode)),
       groups(options.groups),
-      eye(options.eye) {}
+      eye(glm::vec3(options.eye)) {}
 
 // The raster that is drawn to.
 inline RasterGeometry rasterGeometry(const GatherRules& rules) {

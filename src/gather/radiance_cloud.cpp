@@ -50,7 +50,7 @@ constexpr std::uint32_t kSamplePages = 64;
 constexpr std::uint64_t kStreamBytes = std::uint64_t{6} << 20;
 // Stack and allocator of a thread, and the pages that it has under way.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{256} << 10;
-constexpr std::size_t kResultRowBytes = 14 * sizeof(float);
+constexpr std::size_t kResultRowBytes = 3 * sizeof(double) + 11 * sizeof(float);
 
 Status checkOptions(const RadianceOptions& options) {
   const auto refuse = [](const char* what, auto found, const std::string& expected) {
@@ -133,7 +133,8 @@ class RadianceJob {
   };
 
   Status planThreads();
-  Result<SurfelWriter> createWriter(const std::string& result_path, std::uint64_t most_surfels);
+  Result<SurfelWriter> createWriter(const std::string& result_path, std::uint64_t most_surfels,
+                                    const glm::dvec3& origin, Progress* told);
   Result<SceneFile> indexPhotons(PhotonCloud photons, const std::string& result_path);
   Result<std::unique_ptr<PagedOctree>> openOctree(SceneFile scene) const;
   Result<float> medianRadius(PagedOctree& octree) const;
@@ -161,9 +162,13 @@ Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
   SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons,
                            PhotonCloud::open(inputs, options_.channels, options_.part));
   SURFEIT_RETURN_IF_ERROR(planThreads());
-  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, createWriter(result_path, photons.recordCount()));
+  // A name that cannot be written is refused before the work
+  const std::uint64_t records = photons.recordCount();
+  SURFEIT_RETURN_IF_ERROR(createWriter(result_path, records, glm::dvec3(0), nullptr).status());
 
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, indexPhotons(std::move(photons), result_path));
+  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer,
+                           createWriter(result_path, records, scene.header().origin, &progress_));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree, openOctree(std::move(scene)));
   search_.max_distance = options_.max_radius;
   if (options_.max_radius == 0) {
@@ -202,15 +207,16 @@ Status RadianceJob::planThreads() {
 }
 
 Result<SurfelWriter> RadianceJob::createWriter(const std::string& result_path,
-                                               std::uint64_t most_surfels) {
+                                               std::uint64_t most_surfels, const glm::dvec3& origin,
+                                               Progress* told) {
   CloudChannels channels;
   channels.normal = channels.radius = channels.area = channels.radiosity = channels.albedo = true;
   held_bytes_ = heldWriterBytes(result_path, most_surfels, kResultRowBytes);
   RowWriterOptions writing;
   if (held_bytes_ > 0) writing.count = most_surfels;  // so that too many are refused at once
   writing.memory_bytes = stats_.memory_bytes / 2;
-  writing.progress = &progress_;
-  return SurfelWriter::create(result_path, channels, std::move(writing));
+  writing.progress = told;
+  return SurfelWriter::create(result_path, channels, std::move(writing), origin);
 }
 
 // The photons as a scene, open and without a name.

@@ -60,14 +60,14 @@ void count(SurfelDefects::Kind& kind, std::uint64_t record) {
 
 bool isValidPower(double value) { return value >= 0 && value <= double(kLargestColor); }
 
-// Position, normal, radius, area, radiosity, albedo: what the temporary file holds of a photon.
-constexpr std::size_t kRowFloats = 14;
+// Normal, radius, area, radiosity, albedo: what the temporary file holds of a photon behind its
+// position, which is of doubles.
+constexpr std::size_t kRowFloats = 11;
 
 std::array<float, kRowFloats> rowOf(const Surfel& photon) {
-  const glm::vec3 &p = photon.position, &n = photon.normal;
-  const glm::vec3 &power = photon.radiosity, &albedo = photon.albedo;
-  return {p.x, p.y,     p.z,     n.x,     n.y,      n.z,      kPlaceholderSize,
-          1,   power.x, power.y, power.z, albedo.x, albedo.y, albedo.z};
+  const glm::vec3 &n = photon.normal, &power = photon.radiosity, &albedo = photon.albedo;
+  return {n.x,     n.y,     n.z,      kPlaceholderSize, 1,       power.x,
+          power.y, power.z, albedo.x, albedo.y,         albedo.z};
 }
 
 // The header of the temporary file, filled up to kHeaderBytes.
@@ -75,12 +75,13 @@ std::string headerText(std::uint64_t row_count) {
   PlyElement element;
   element.name = "vertex";
   element.count = row_count;
-  const auto add = [&element](const char* name) {
+  const auto add = [&element](const char* name, PlyType type = PlyType::kFloat32) {
     PlyProperty property;
     property.name = name;
+    property.type = type;
     element.properties.push_back(property);
   };
-  for (const char* name : kPositionNames) add(name);
+  for (const char* name : kPositionNames) add(name, PlyType::kFloat64);
   for (const char* name : kNormalNames) add(name);
   add("radius");
   add("area");
@@ -226,7 +227,7 @@ Status PhotonCloud::write(const std::string& directory, const std::string& resul
   std::filesystem::remove(named.path, ignored);  // the descriptor is enough from now on
   file_ = PositionalFile(std::move(named.descriptor), directory + ": temporary file");
   file_bytes_ = kHeaderBytes;
-  buffer_.reserve(kWriteBytes + kRowFloats * sizeof(float));
+  buffer_.reserve(kWriteBytes + sizeof(glm::dvec3) + kRowFloats * sizeof(float));
 
   progress.beginPhase("read", record_count_, "photons");
   for (const std::string& input : inputs_) {
@@ -267,9 +268,8 @@ Status PhotonCloud::append(const std::string& input, const PhotonReading& readin
             fmt::format("{}: record {}: {}", input, record, file.mapping.describeDefect(row)));
       }
       if (!file.mapping.hasAlbedo()) photon.albedo = reading.default_albedo;
-      const auto values = rowOf(photon);
-      const std::span<const std::byte> bytes = std::as_bytes(std::span(values));
-      buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+      put(file.mapping.positionOf(row));
+      put(rowOf(photon));
       ++photon_count_;
       power_ += glm::dvec3(photon.radiosity);
       if (buffer_.size() >= kWriteBytes) SURFEIT_RETURN_IF_ERROR(flush());
@@ -278,6 +278,13 @@ Status PhotonCloud::append(const std::string& input, const PhotonReading& readin
   }
   if (defects.total() > 0) progress.note(fmt::format("{}: skipped {}", input, defects.describe()));
   return {};
+}
+
+template <typename T>
+void PhotonCloud::put(const T& value) {
+  const std::size_t at = buffer_.size();
+  buffer_.resize(at + sizeof value);
+  std::memcpy(&buffer_[at], &value, sizeof value);
 }
 
 Status PhotonCloud::flush() {

@@ -46,6 +46,9 @@ class PhotonMapping {
   bool decode(const std::byte* row, std::uint64_t record, Surfel& photon,
               PhotonDefects& defects) const;
 
+  // The position of a valid row, about no origin.
+  glm::dvec3 positionOf(const std::byte* row) const { return surfels_.positionOf(row); }
+
   // What is wrong with a row that decode refused, found and expected.
   std::string describeDefect(const std::byte* row) const;
 
@@ -91,6 +94,8 @@ class PhotonCloud {
  private:
   PhotonCloud() = default;
   Status append(const std::string& input, const PhotonReading& reading, Progress& progress);
+  template <typename T>
+  void put(const T& value);
   Status flush();
 
   std::vector<std::string> inputs_;

@@ -26,6 +26,9 @@ class ReceiverMapping {
   // kCorruption as SurfelMapping::create has it for these properties.
   static Result<ReceiverMapping> create(const PlyElement& element, const std::string& path);
 
+  // What positions of receivers are counted from: the origin of the scene. Before rows are decoded.
+  void setOrigin(const glm::dvec3& origin) { surfels_.setOrigin(origin); }
+
   // Without normals every receiver gathers over the whole sphere.
   bool hasNormals() const { return surfels_.channels().normal; }
   // Whether receivers say from where they are looked at: view_x view_y view_z, a direction of any
@@ -35,6 +38,9 @@ class ReceiverMapping {
   // Returns false, and counts the defect under `record`, when the row holds no valid receiver.
   bool decode(const std::byte* row, std::uint64_t record, Receiver& receiver,
               SurfelDefects& defects) const;
+
+  // The position of a valid row, about no origin.
+  glm::dvec3 positionOf(const std::byte* row) const { return surfels_.positionOf(row); }
 
   // What is wrong with a row that decode refused, found and expected.
   std::string describeDefect(const std::byte* row) const { return surfels_.describeDefect(row); }

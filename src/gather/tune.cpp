@@ -106,6 +106,7 @@ Result<TuneReport> Tuning::run() {
   {
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openScene());
     scene_ = std::make_unique<SceneFile>(std::move(scene));
+    gather_.eye -= scene_->header().origin;
     SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
                              GatherInput::open(receivers_path_, gather_.channels, gather_.part));
     input_ = std::make_unique<GatherInput>(std::move(input));
@@ -151,7 +152,7 @@ Status Tuning::sample(const GatherMemory& memory) {
                          .reading_bytes = memory.sorter_reading_bytes,
                          .temporary_directory = gather_.temporary_directory});
   SURFEIT_RETURN_IF_ERROR(
-      input_->sort(gather_.order, scene_->header().cube, gather_.strict, sorter, progress_));
+      input_->sort(gather_.order, scene_->header(), gather_.strict, sorter, progress_));
   report_.invalid_receivers = input_->defects().total();
   if (report_.invalid_receivers == report_.receivers) {
     return Status::corruption(
@@ -283,7 +284,7 @@ Result<TuneOutcome> Tuning::measure(std::uint64_t memory_bytes) const {
                          .temporary_directory = gather_.temporary_directory});
   progress.beginPhase("sort", work_.receivers, "receivers");
   SURFEIT_RETURN_IF_ERROR(
-      input_->sort(gather_.order, scene.header().cube, gather_.strict, sorter, progress));
+      input_->sort(gather_.order, scene.header(), gather_.strict, sorter, progress));
   GatherStats stats;
   stats.receivers = work_.receivers;
   stats.invalid_receivers = report_.invalid_receivers;

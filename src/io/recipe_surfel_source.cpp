@@ -28,6 +28,7 @@ class RecipeSurfelSource : public SurfelSource {
   const std::string& path() const override { return path_; }
   std::uint64_t recordCount() const override { return generator_.recordCount(); }
   CloudChannels channels() const override { return generator_.channels(); }
+  void setOrigin(const glm::dvec3& origin) override { origin_ = origin; }
   const SurfelDefects& defects() const override { return defects_; }
   std::size_t rowBytes() const override { return kRowBytes; }
   bool isSeekable() const override { return true; }
@@ -79,6 +80,7 @@ class RecipeSurfelSource : public SurfelSource {
     for (Surfel& surfel : surfels) {
       const glm::vec3 normal = surfel.normal;
       normalise(double(normal.x), double(normal.y), double(normal.z), surfel.normal);
+      surfel.position = glm::vec3(glm::dvec3(surfel.position) - origin_);
     }
   }
 
@@ -86,6 +88,7 @@ class RecipeSurfelSource : public SurfelSource {
   SceneGenerator generator_;
   SurfelDefects defects_;  // there are none
   std::uint64_t next_record_ = 0;
+  glm::dvec3 origin_{0};
 };
 
 }  // namespace

@@ -209,11 +209,17 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
   return mapping;
 }
 
-// The decoder of rows whose used properties are floats, but for colors of 8 bits and a two_sided of
-// a byte; nothing when there is any other, or long sides. Its limits are those of decodeRow.
+void SurfelMapping::setOrigin(const glm::dvec3& origin) {
+  origin_ = origin;
+  fast_decoder_ = makeFastDecoder();
+}
+
+// The decoder of rows whose used properties are floats about an origin of 0, but for colors of 8
+// bits and a two_sided of a byte; nothing when there is any other, or long sides. Its limits are
+// those of decodeRow.
 std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
   FloatRowDecoder decoder(row_bytes_);
-  bool is_fast = !channels_.long_side;
+  bool is_fast = !channels_.long_side && origin_ == glm::dvec3(0);
   const auto add = [&](const Field& field, std::size_t place, float least, float most) {
     if (!field.isPresent()) return;
     const std::size_t offset = static_cast<std::size_t>(field.offset);
@@ -261,6 +267,10 @@ double SurfelMapping::Field::read(const std::byte* row) const {
   if (!is_srgb) return plyValue(row + offset, type);
   if (type == PlyType::kUint8) return linearFromSrgb8()[std::to_integer<std::size_t>(row[offset])];
   return linearFromSrgbCode(plyValue(row + offset, type) / 65535);
+}
+
+glm::dvec3 SurfelMapping::positionOf(const std::byte* row) const {
+  return {position_[0].read(row), position_[1].read(row), position_[2].read(row)};
 }
 
 SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& surfel) const {
@@ -337,7 +347,7 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
       return {&SurfelDefects::out_of_range, "color", std::max(radiosity[i], albedo[i]),
               "at most 1e12"};
     }
-    surfel.position[i] = static_cast<float>(position[i]);
+    surfel.position[i] = static_cast<float>(position[i] - origin_[i]);
     surfel.radiosity[i] = static_cast<float>(radiosity[i]);
     surfel.albedo[i] = static_cast<float>(albedo[i]);
   }

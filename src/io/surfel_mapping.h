@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -75,6 +76,9 @@ class SurfelMapping {
   static Result<SurfelMapping> create(const PlyElement& element, const std::string& path);
 
   CloudChannels channels() const { return channels_; }
+  // Positions are counted from here, in double precision until they are floats; finite. Before rows
+  // are decoded.
+  void setOrigin(const glm::dvec3& origin);
   // Bytes of one packed row.
   std::size_t rowBytes() const { return row_bytes_; }
 
@@ -89,6 +93,9 @@ class SurfelMapping {
   // and 8-bit colors, it takes 8 ns a row instead of 25.
   std::size_t decodeRows(std::span<const std::byte> rows, std::uint64_t first_record,
                          std::span<Surfel> surfels, SurfelDefects& defects) const;
+
+  // The position of a valid row, about no origin.
+  glm::dvec3 positionOf(const std::byte* row) const;
 
   // What is wrong with a row that decode refused, found and expected: "radius is -1, expected more
   // than 0".
@@ -124,6 +131,7 @@ class SurfelMapping {
   Field position_[3], normal_[3], radius_, area_, radiosity_[3], albedo_[3], two_sided_, group_;
   Field long_side_[3];
   double radius_scale_ = 1;
+  glm::dvec3 origin_{0};
   std::optional<FloatRowDecoder> fast_decoder_;  // when the types of the properties allow it
 };
 

@@ -25,6 +25,7 @@ class RowSurfelSource final : public SurfelSource {
   const std::string& path() const override { return reader_->path(); }
   std::uint64_t recordCount() const override { return reader_->element().count; }
   CloudChannels channels() const override { return mapping_.channels(); }
+  void setOrigin(const glm::dvec3& origin) override { mapping_.setOrigin(origin); }
   const SurfelDefects& defects() const override { return defects_; }
   std::size_t rowBytes() const override { return mapping_.rowBytes(); }
   bool isSeekable() const override { return reader_->isSeekable(); }
@@ -107,7 +108,13 @@ Result<std::unique_ptr<SurfelSource>> openSurfelSource(const std::string& path, 
   SURFEIT_ASSIGN_OR_RETURN(const bool is_recipe, isRecipe(path));
   if (is_recipe) return openRecipeSource(path);
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, options));
-  SURFEIT_ASSIGN_OR_RETURN(SurfelMapping mapping, SurfelMapping::create(reader->element(), path));
+  return makeSurfelSource(std::move(reader), strict);
+}
+
+Result<std::unique_ptr<SurfelSource>> makeSurfelSource(std::unique_ptr<RowReader> reader,
+                                                       bool strict) {
+  SURFEIT_ASSIGN_OR_RETURN(SurfelMapping mapping,
+                           SurfelMapping::create(reader->element(), reader->path()));
   return std::unique_ptr<SurfelSource>(
       std::make_unique<RowSurfelSource>(std::move(reader), std::move(mapping), strict));
 }

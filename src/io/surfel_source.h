@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <memory>
 #include <span>
 #include <string>
@@ -30,6 +31,9 @@ class SurfelSource {
   // Records in the file, valid or not.
   virtual std::uint64_t recordCount() const = 0;
   virtual CloudChannels channels() const = 0;
+  // Positions of surfels are counted from here from now on: the records' doubles less this, as
+  // floats. 0 before. Finite.
+  virtual void setOrigin(const glm::dvec3& origin) = 0;
 
   // Fills the front of `surfels` and returns how many; 0 at the end. Invalid records are skipped
   // and counted, or with `strict` refused as kCorruption naming the record and the defect.
@@ -68,5 +72,9 @@ class SurfelSource {
 // takes a MiB more, or what window the file asks for, up to 9 MiB.
 Result<std::unique_ptr<SurfelSource>> openSurfelSource(const std::string& path, bool strict,
                                                        const RowReaderOptions& options = {});
+
+// The rows of an open reader as surfels.
+Result<std::unique_ptr<SurfelSource>> makeSurfelSource(std::unique_ptr<RowReader> reader,
+                                                       bool strict);
 
 }  // namespace surfeit

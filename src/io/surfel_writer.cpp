@@ -1,13 +1,12 @@
 #include "io/surfel_writer.h"
 
+#include <algorithm>
 #include <cstddef>
-#include <cstdint>
-#include <cstring>
 #include <utility>
+#include <vector>
 
-#include "core/long_side.h"
 #include "io/cloud_formats.h"
-#include "io/surfel_names.h"
+#include "io/surfel_rows.h"
 
 namespace surfeit {
 namespace {
@@ -18,38 +17,19 @@ constexpr std::size_t kRowBufferBytes = 256 << 10;
 
 struct SurfelWriter::State {
   std::unique_ptr<RowWriter> file;
-  CloudChannels channels;
+  SurfelRows packing;
   std::vector<std::byte> rows;
 };
 
 Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudChannels& channels,
-                                          RowWriterOptions options) {
-  // The order here is the order in which write packs the values
-  options.properties.clear();
-  const auto add = [&](const char* name, PlyType type) {
-    PlyProperty property;
-    property.name = name;
-    property.type = type;
-    options.properties.push_back(std::move(property));
-  };
-  const auto addTriple = [&](const char* const(&names)[3]) {
-    for (const char* name : names) add(name, PlyType::kFloat32);
-  };
-  addTriple(kPositionNames);
-  if (channels.normal) addTriple(kNormalNames);
-  if (channels.radius) add("radius", PlyType::kFloat32);
-  if (channels.area) add("area", PlyType::kFloat32);
-  if (channels.radiosity) addTriple(kRadiosityNames);
-  if (channels.albedo) addTriple(kAlbedoNames);
-  if (channels.two_sided) add("two_sided", PlyType::kUint8);
-  if (channels.group) add(kGroupNames[0], PlyType::kUint8);
-  if (channels.long_side) addTriple(kLongSideNames);
-
+                                          RowWriterOptions options, const glm::dvec3& origin) {
+  SurfelRows packing(channels, origin);
+  options.properties = packing.properties();
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> file, createRowWriter(path, options));
   if (options.progress != nullptr) {
     for (const std::string& note : file->notes()) options.progress->note(path + ": " + note);
   }
-  return SurfelWriter(std::make_unique<State>(State{std::move(file), channels, {}}));
+  return SurfelWriter(std::make_unique<State>(State{std::move(file), std::move(packing), {}}));
 }
 
 SurfelWriter::SurfelWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -58,33 +38,15 @@ SurfelWriter& SurfelWriter::operator=(SurfelWriter&&) noexcept = default;
 SurfelWriter::~SurfelWriter() = default;
 
 Status SurfelWriter::write(std::span<const Surfel> surfels) {
-  const CloudChannels& channels = state_->channels;
-  const std::size_t row_bytes = state_->file->element().row_bytes;
-  state_->rows.resize(kRowBufferBytes / row_bytes * row_bytes);
-  std::byte* const begin = state_->rows.data();
-  std::byte* const end = begin + state_->rows.size();
-  std::byte* next = begin;
-  const auto put = [&](const auto& value) {
-    std::memcpy(next, &value, sizeof value);
-    next += sizeof value;
-  };
-  for (const Surfel& surfel : surfels) {
-    put(surfel.position);
-    if (channels.normal) put(surfel.normal);
-    if (channels.radius) put(surfel.radius);
-    if (channels.area) put(surfel.area);
-    if (channels.radiosity) put(surfel.radiosity);
-    if (channels.albedo) put(surfel.albedo);
-    if (channels.two_sided) put(static_cast<std::uint8_t>(surfel.isTwoSided()));
-    if (channels.group) put(surfel.group);
-    if (channels.long_side) put(longSideOf(surfel));
-
-    // Hand over a full buffer, and the last
-    if (next == end || &surfel == &surfels.back()) {
-      const std::size_t size = static_cast<std::size_t>(next - begin);
-      SURFEIT_RETURN_IF_ERROR(state_->file->writeRows(std::span(state_->rows).first(size)));
-      next = begin;
-    }
+  const std::size_t row_bytes = state_->packing.rowBytes();
+  const std::size_t most = kRowBufferBytes / row_bytes;
+  state_->rows.resize(most * row_bytes);
+  while (!surfels.empty()) {
+    const std::size_t count = std::min(most, surfels.size());
+    state_->packing.pack(surfels.first(count), state_->rows.data());
+    SURFEIT_RETURN_IF_ERROR(
+        state_->file->writeRows(std::span(state_->rows).first(count * row_bytes)));
+    surfels = surfels.subspan(count);
   }
   return {};
 }

@@ -1,6 +1,7 @@
 // Surfels into clouds of any format, under the names that src/io/surfel_mapping.h reads.
 #pragma once
 
+#include <glm/vec3.hpp>
 #include <memory>
 #include <span>
 #include <string>
@@ -11,14 +12,16 @@
 
 namespace surfeit {
 
-// Writes surfels as floats (two_sided and group: uchar) into the format that the extension of the
-// name tells (io/cloud_formats.h). One thread at a time. The file appears when finish() succeeds.
+// Writes surfels as rows (io/surfel_rows.h) into the format that the extension of the name tells
+// (io/cloud_formats.h). One thread at a time. The file appears when finish() succeeds.
 class SurfelWriter {
  public:
   // `channels` says which optional properties the file gets. `options` has the rest; its
-  // properties are set here, and its progress is told what the format cannot keep.
+  // properties are set here, and its progress is told what the format cannot keep. Surfels are
+  // counted from `origin`.
   static Result<SurfelWriter> create(const std::string& path, const CloudChannels& channels,
-                                     RowWriterOptions options = {});
+                                     RowWriterOptions options = {},
+                                     const glm::dvec3& origin = glm::dvec3(0));
   SurfelWriter(SurfelWriter&&) noexcept;
   SurfelWriter& operator=(SurfelWriter&&) noexcept;
   ~SurfelWriter();

@@ -12,6 +12,7 @@
 #include "core/thread_scratch.h"
 #include "octree/parallel.h"
 #include "octree/row_fetcher.h"
+#include "octree/scene_rows.h"
 
 namespace surfeit {
 namespace {
@@ -124,7 +125,7 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
   reader.strict_ = strict;
   reader.read_bytes_ = read_bytes;
   for (const std::string& path : inputs) {
-    SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, strict, reading));
+    SURFEIT_ASSIGN_OR_RETURN(const auto source, openCloudSource(path, strict, reading));
     reader.records_.push_back(source->recordCount());
     reader.record_count_ += source->recordCount();
     reader.is_seekable_ = reader.is_seekable_ && source->isSeekable();
@@ -150,7 +151,8 @@ Result<std::vector<Surfel>> CloudReader::sample(std::uint64_t buckets) const {
     }
     // Bad records are refused, if they are to be, when all are read: then the first one is named
     SURFEIT_ASSIGN_OR_RETURN(const auto source,
-                             openSurfelSource(inputs_[i], /* strict= */ false, reading_));
+                             openCloudSource(inputs_[i], /* strict= */ false, reading_));
+    source->setOrigin(origin_);
     for (; record < records_[i]; record += step) {
       SURFEIT_RETURN_IF_ERROR(source->seekRow(record));
       SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, source->readRows(run_size, buffer));
@@ -168,7 +170,8 @@ Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& prog
   CloudTotals totals;
   const std::uint64_t sample_step = std::max<std::uint64_t>(1, record_count_ / kSampleSurfels);
   for (const std::string& path : inputs_) {
-    SURFEIT_ASSIGN_OR_RETURN(const auto source, openSurfelSource(path, strict_, reading_));
+    SURFEIT_ASSIGN_OR_RETURN(const auto source, openCloudSource(path, strict_, reading_));
+    source->setOrigin(origin_);
     InputPass pass(*source, consume, sample_step, progress);
     // Small inputs are read in parts too, so that all threads have some
     const std::uint64_t part_rows = source->recordCount() / (4 * RowFetcher::kSlots) + kReadBatch;

@@ -49,6 +49,10 @@ class CloudReader {
   // Whether sample() works: all inputs can be read at any place.
   bool isSeekable() const { return is_seekable_; }
 
+  // What positions are counted from (SurfelSource::setOrigin) when they are sampled and read.
+  const glm::dvec3& origin() const { return origin_; }
+  void setOrigin(const glm::dvec3& origin) { origin_ = origin; }
+
   // Whether an input has neither radii nor areas.
   bool lacksSizes() const { return lacks_sizes_; }
 
@@ -74,6 +78,7 @@ class CloudReader {
   std::vector<std::uint64_t> records_;  // by input
   RowReaderOptions reading_;
   bool strict_ = false;
+  glm::dvec3 origin_{0};
   std::size_t read_bytes_ = 0;
   std::uint64_t record_count_ = 0;
   std::uint64_t file_bytes_ = 0;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <exception>
 #include <memory>
@@ -57,6 +58,21 @@ bool contains(const RootCube& cube, const Bounds3& bounds) {
   return true;
 }
 
+Bounds3 boundsOf(std::span<const Surfel> surfels) {
+  Bounds3 bounds;
+  for (const Surfel& surfel : surfels) bounds.add(surfel.position);
+  return bounds;
+}
+
+glm::vec3 moved(const glm::vec3& position, const glm::dvec3& shift) {
+  return glm::vec3(glm::dvec3(position) + shift);
+}
+
+// The origin for a cloud of these bounds, which are counted from `origin`.
+glm::dvec3 originAsked(const Bounds3& bounds, const glm::dvec3& origin) {
+  return originFor(movedBounds(bounds, origin));
+}
+
 // The rules that need no neighbourhood (docs/format.md, "Rules for what is missing").
 void applySizeRules(Surfel& surfel, float overlap) {
   if (surfel.radius > 0 && surfel.area > 0) return;
@@ -93,6 +109,8 @@ class Indexer {
   Status checkOutputRoom() const;
   Result<std::unique_ptr<SurfelStore>> readInputs();
   Result<std::unique_ptr<SurfelStore>> readInto(const std::optional<RootCube>& cube);
+  Status takeSample();
+  bool moveOrigin(const glm::dvec3& origin);
   void noteRules() const;
   Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
   Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path, bool full_precision);
@@ -165,10 +183,7 @@ Status Indexer::openInputs() {
       reader_,
       CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes), reading));
   const std::uint64_t records = reader_->recordCount();
-  if (records > kReadBatch && reader_->isSeekable()) {
-    SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(usualBucketCount(records)));
-    for (Surfel& surfel : sample_) applySizeRules(surfel, options_.overlap);
-  }
+  if (records > kReadBatch && reader_->isSeekable()) SURFEIT_RETURN_IF_ERROR(takeSample());
   // The octree of bare positions is built at full precision
   const SlabForm form = {options_.leaf_capacity, options_.full_precision || reader_->lacksSizes()};
   const double packed_bytes = packedBytesPerSurfel(sample_);
@@ -178,6 +193,28 @@ Status Indexer::openInputs() {
   SURFEIT_RETURN_IF_ERROR(checkFreeSpace(sample_.empty() ? kLeastPackedBytes : packed_bytes));
   clock_.finish("sample");
   return {};
+}
+
+// A sample about the origin that it asks for.
+Status Indexer::takeSample() {
+  const std::uint64_t buckets = usualBucketCount(reader_->recordCount());
+  SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(buckets));
+  if (sample_.empty()) return {};
+  if (moveOrigin(originAsked(boundsOf(sample_), reader_->origin()))) {
+    SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(buckets));
+  }
+  for (Surfel& surfel : sample_) applySizeRules(surfel, options_.overlap);
+  return {};
+}
+
+// Counts positions from another origin from now on, those of the sample too; false when it is the
+// same one.
+bool Indexer::moveOrigin(const glm::dvec3& origin) {
+  const glm::dvec3 shift = reader_->origin() - origin;
+  if (shift == glm::dvec3(0)) return false;
+  for (Surfel& surfel : sample_) surfel.position = moved(surfel.position, shift);
+  reader_->setOrigin(origin);
+  return true;
 }
 
 // Refuses what cannot end well, before hours are spent on it. When temporary file and scene will
@@ -201,37 +238,43 @@ Status Indexer::checkOutputRoom() const {
                    "make room, or write the scene elsewhere");
 }
 
-// All surfels, distributed. The curve needs the bounds of the cloud: a sample nearly always gives
-// the right cube; when it did not, what was read tells the bounds, and all is read again.
+// All surfels, distributed. The curve needs the bounds of the cloud, and coordinates the origin
+// that these ask for: a sample nearly always gives the right ones; when it did not, what was read
+// tells the bounds, and all is read again. Bounds about a far origin are rough: that may happen
+// twice.
 Result<std::unique_ptr<SurfelStore>> Indexer::readInputs() {
+  constexpr int kMostPasses = 4;
   std::optional<RootCube> cube;
-  if (!sample_.empty()) {
-    Bounds3 bounds;
-    for (const Surfel& surfel : sample_) bounds.add(surfel.position);
-    cube = rootCube(bounds);
-  }
+  if (!sample_.empty()) cube = rootCube(boundsOf(sample_));
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInto(cube));
   if (totals_.surfels == 0) {
     return Status::corruption(
         fmt::format("{}: no valid surfel in {} records", inputs_.front(), reader_->recordCount()));
   }
   clock_.finish("read");
-  if (store != nullptr) return store;
-  sample_ = totals_.sample;
-  const CloudTotals first = std::move(totals_);
-  SURFEIT_ASSIGN_OR_RETURN(store, readInto(rootCube(first.bounds)));
-  clock_.finish("read again");
-  if (store == nullptr || totals_.content != first.content || totals_.surfels != first.surfels) {
-    return Status::failed(
-        fmt::format("{}: {} surfels in the second pass, {} in the first, or "
-                    "other ones: an input changed meanwhile",
-                    output_, totals_.surfels, first.surfels));
+  for (int pass = 1; store == nullptr; ++pass) {
+    sample_ = totals_.sample;
+    const CloudTotals before = std::move(totals_);
+    const glm::dvec3 old_origin = reader_->origin();
+    const bool is_moved = moveOrigin(originAsked(before.bounds, old_origin));
+    const Bounds3d bounds = movedBounds(before.bounds, old_origin - reader_->origin());
+    SURFEIT_ASSIGN_OR_RETURN(store, readInto(rootCube(bounds)));
+    clock_.finish("read again");
+    const bool is_same =
+        totals_.surfels == before.surfels && (is_moved || totals_.content == before.content);
+    if (!is_same || (store == nullptr && pass == kMostPasses)) {
+      return Status::failed(
+          fmt::format("{}: {} surfels when read again, {} before, or other ones: "
+                      "an input changed meanwhile",
+                      output_, totals_.surfels, before.surfels));
+    }
   }
   return store;
 }
 
 // Reads all inputs and distributes the surfels along the curve of `cube`, unless that turns out not
-// to be the cloud's cube: then no store. Without a cube this works as long as there is one bucket.
+// to be the cloud's cube, or the origin not to be the one that the cloud asks for: then no store.
+// Without a cube this works as long as there is one bucket.
 Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootCube>& cube) {
   SurfelStore::Plan store_plan;
   std::atomic<bool> distributing{plan_.bucket_count == 1 || cube.has_value()};
@@ -261,7 +304,9 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
   };
   progress_.beginPhase("read", reader_->recordCount(), "surfels");
   SURFEIT_ASSIGN_OR_RETURN(totals_, reader_->readAll(consume, progress_));
-  if (!distributing || (needs_cube && !(rootCube(totals_.bounds) == *cube))) {
+  if (totals_.surfels > 0 &&
+      (!distributing || (needs_cube && !(rootCube(totals_.bounds) == *cube)) ||
+       originAsked(totals_.bounds, reader_->origin()) != reader_->origin())) {
     return std::unique_ptr<SurfelStore>();
   }
   SURFEIT_RETURN_IF_ERROR(store->finish());
@@ -299,6 +344,7 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
   header.node_group_capacity = kDefaultNodeGroup;
   header.surfel_group_capacity = kDefaultSurfelGroup;
   header.flatness_limit = kDefaultFlatnessLimit;
+  header.origin = reader_->origin();
   header.bounds = totals_.bounds;
   header.cube = rootCube(totals_.bounds);
   header.channels = totals_.channels;
@@ -356,8 +402,12 @@ Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
 std::uint64_t Indexer::identity(bool full_precision) const {
   const CloudChannels& channels = totals_.channels;
   const std::string text = provenance();
+  const glm::dvec3 origin = reader_->origin();
   const std::uint64_t parts[] = {
       totals_.content,
+      std::bit_cast<std::uint64_t>(origin.x),
+      std::bit_cast<std::uint64_t>(origin.y),
+      std::bit_cast<std::uint64_t>(origin.z),
       totals_.surfels,
       kFormatVersion,
       full_precision ? 1u : 0u,

@@ -24,6 +24,10 @@ Result<SceneFile> SceneFile::open(PageFile pages) {
   }
   scene.header_ = *header;
   scene.header_.format_version = scene.pages_.formatVersion();
+  if (scene.header_.format_version < 2 && scene.header_.origin != glm::dvec3(0)) {
+    return Status::corruption(
+        fmt::format("{}: header: reserved space is not zero, expected zero", scene.path()));
+  }
   return scene;
 }
 

@@ -29,10 +29,13 @@ struct SceneHeader {
   std::uint32_t node_group_capacity = 0;    // most nodes on a page
   std::uint32_t surfel_group_capacity = 0;  // most surfels on a page
   float flatness_limit = 0;                 // nodes flatter than this carry kNodeFlat
-  Bounds3 bounds;                           // of the surfel positions
-  RootCube cube;                            // the root cell of octree and curve
-  CloudChannels channels;                   // what the input had, as opposed to filled in by rules
-  bool full_precision = false;              // pages hold floats instead of quantized values
+  // In the cloud's own coordinates: what positions in this file are counted from, bounds and cube
+  // among them. Finite.
+  glm::dvec3 origin{0};
+  Bounds3 bounds;               // of the surfel positions
+  RootCube cube;                // the root cell of octree and curve
+  CloudChannels channels;       // what the input had, as opposed to filled in by rules
+  bool full_precision = false;  // pages hold floats instead of quantized values
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 

@@ -30,6 +30,9 @@ enum FeatureBits : std::uint32_t { kFullPrecision = 1, kAllFeatures = 1 };
 constexpr std::uint32_t kMaxNodeGroup = 4096;
 constexpr std::uint32_t kMaxSurfelGroup = 16384;
 
+// As far from 0 as coordinates of clouds may be (docs/format.md, "Limits").
+constexpr double kLargestOrigin = 1e12;
+
 std::uint32_t channelBits(const CloudChannels& channels) {
   return (channels.normal ? kHasNormal : 0u) | (channels.radius ? kHasRadius : 0u) |
          (channels.area ? kHasArea : 0u) | (channels.radiosity ? kHasRadiosity : 0u) |
@@ -65,6 +68,9 @@ Status checkGeometry(const SceneHeader& header) {
     }
     if (!std::isfinite(header.cube.origin[axis])) {
       return wrongField("root cube origin", header.cube.origin[axis], "a finite number");
+    }
+    if (!(std::abs(header.origin[axis]) <= kLargestOrigin)) {
+      return wrongField("origin", header.origin[axis], "a number of at most 1e12");
     }
   }
   if (!std::isfinite(header.cube.size) || header.cube.size <= 0) {
@@ -126,6 +132,8 @@ std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
   for (const double origin : header.cube.origin) writer.put(origin);
   writer.put(header.cube.size);
   for (const std::uint32_t page : header.level_first_page) writer.put(page);
+  writer.put(std::uint32_t{0});  // reserved
+  for (int axis = 0; axis < 3; ++axis) writer.put(header.origin[axis]);
   return bytes;
 }
 
@@ -156,8 +164,11 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
   for (double& origin : header.cube.origin) origin = reader.get<double>();
   header.cube.size = reader.get<double>();
   for (std::uint32_t& page : header.level_first_page) page = reader.get<std::uint32_t>();
+  const std::uint32_t reserved = reader.get<std::uint32_t>();
+  for (int axis = 0; axis < 3; ++axis) header.origin[axis] = reader.get<double>();
   const std::span<const std::byte> unused = reader.take(reader.remaining());
-  if (!std::all_of(unused.begin(), unused.end(), [](std::byte b) { return b == std::byte{0}; })) {
+  if (reserved != 0 ||
+      !std::all_of(unused.begin(), unused.end(), [](std::byte b) { return b == std::byte{0}; })) {
     return wrongField("reserved space", "not zero", "zero");
   }
   SURFEIT_RETURN_IF_ERROR(checkGeometry(header));

@@ -41,7 +41,7 @@ CubeImage traceCube(const CubeImage& cube, const Mesh& mesh, const RayScene& ray
   const glm::vec3 normal = cube.receiver.normal;
   const bool has_horizon = normal != glm::vec3(0);
   const glm::vec3 origin =
-      cube.receiver.position + kOffset * glm::length(rays.bounds().extent()) * normal;
+      glm::vec3(cube.receiver.position) + kOffset * glm::length(rays.bounds().extent()) * normal;
   const int size = cube.resolution, places = size * options.rays;
   CubeImage traced;
   traced.receiver = cube.receiver;

@@ -49,8 +49,7 @@ class BrickRows final : public CloudRows {
   const std::string& path() const override { return rows_->path(); }
   const PlyElement& element() const override { return element_; }
   Status rewind() override { return rows_->rewind(); }
-  std::optional<Bounds3> statedBounds() const override { return rows_->statedBounds(); }
-  std::optional<CloudChannels> statedChannels() const override { return rows_->statedChannels(); }
+  std::optional<Bounds3d> statedBounds() const override { return rows_->statedBounds(); }
 
   Result<std::span<const std::byte>> next() override {
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const std::byte> batch, rows_->next());

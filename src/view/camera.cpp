@@ -73,13 +73,13 @@ Result<ViewFrame> Camera::createFrame(const CameraOptions& options, int width, i
   return ViewFrame(*axes, slope * width / height, slope);
 }
 
-Result<Camera> Camera::create(const CameraOptions& options, const Bounds3& bounds,
+Result<Camera> Camera::create(const CameraOptions& options, const Bounds3d& bounds,
                               const ViewFrame& frame, int width, int height) {
   SURFEIT_ASSIGN_OR_RETURN(const double slope, halfSlope(options));
-  const glm::dvec3 centre(bounds.centre());
+  const glm::dvec3 centre = bounds.centre();
   // A single place has a size all the same, one that doubles can still resolve there
   const double diagonal =
-      std::max({glm::length(glm::dvec3(bounds.extent())), 1e-6 * glm::length(centre), 1e-12});
+      std::max({glm::length(bounds.extent()), 1e-6 * glm::length(centre), 1e-12});
   Camera camera;
   camera.width_ = width;
   camera.height_ = height;

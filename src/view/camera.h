@@ -36,7 +36,7 @@ class Camera {
 
   // A camera that sees `width` x `height` samples, placed by `frame` where the options give no eye.
   // kInvalidArgument: eye on the look-at point, or as createFrame.
-  static Result<Camera> create(const CameraOptions& options, const Bounds3& bounds,
+  static Result<Camera> create(const CameraOptions& options, const Bounds3d& bounds,
                                const ViewFrame& frame, int width, int height);
 
   glm::dvec3 eye() const { return eye_; }

@@ -157,14 +157,14 @@ std::vector<std::string> Channel::list(const PlyElement& element) {
   return names;
 }
 
-std::string Channel::choose(const PlyElement& element, const std::optional<CloudChannels>& stated) {
+std::string Channel::choose(const PlyElement& element) {
   const auto has = [&](const char* name) { return findTriple(element, name).exists(); };
   if (has("irradiance") || has("environment")) return "lit";
   if (RowField::find(element, "occlusion").exists()) return "ao";
-  if (has("radiosity") && (!stated || stated->radiosity)) return "radiosity";
+  if (has("radiosity")) return "radiosity";
   if (has("color")) return "color";
-  if (has("albedo") && (!stated || stated->albedo)) return "albedo";
-  if (has("normal") && (!stated || stated->normal)) return "normal";
+  if (has("albedo")) return "albedo";
+  if (has("normal")) return "normal";
   return "position";
 }
 

@@ -46,9 +46,8 @@ class Channel {
   // The names that find() knows for this cloud, derived ones first. Members of a triple are
   // channels as well, but not listed.
   static std::vector<std::string> list(const PlyElement& element);
-  // The most telling one: lit, ao, radiosity, color, albedo, normal, position. `stated` tells
-  // which of them the cloud really came with.
-  static std::string choose(const PlyElement& element, const std::optional<CloudChannels>& stated);
+  // The most telling one: lit, ao, radiosity, color, albedo, normal, position.
+  static std::string choose(const PlyElement& element);
 
   const std::string& name() const { return name_; }
   ValueKind kind() const { return kind_; }

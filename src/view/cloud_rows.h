@@ -34,14 +34,12 @@ class CloudRows {
   virtual Status rewind() = 0;
 
   // Bounds of the positions where the file states them.
-  virtual std::optional<Bounds3> statedBounds() const { return std::nullopt; }
-  // What the cloud came with, where the file states it: the rest was filled in when indexing.
-  virtual std::optional<CloudChannels> statedChannels() const { return std::nullopt; }
+  virtual std::optional<Bounds3d> statedBounds() const { return std::nullopt; }
 };
 
 // Opens a file by its content: a scene, or any cloud that io/cloud_formats.h reads. kCorruption
 // when it is neither, or has no x, y and z.
-// `options`: what of a cloud is read, and under which names; a scene has none of these.
+// `options`: what of a cloud is read, and under which names.
 Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path,
                                                  const RowReaderOptions& options = {});
 

@@ -222,9 +222,8 @@ Status addRows(JoinedRows& rows, const Channel& channel, const CompositeOptions&
       value = kNonFiniteColor;
       ++stats.non_finite_values;
     }
-    extent.bounds.add(glm::vec3(float(position[0].read(rows.row())),
-                                float(position[1].read(rows.row())),
-                                float(position[2].read(rows.row()))));
+    extent.bounds.add(
+        {position[0].read(rows.row()), position[1].read(rows.row()), position[2].read(rows.row())});
     pixel.color += share * value;
     pixel.alpha += share;
     if (depth.exists()) pixel.depth = std::min(pixel.depth, float(depth.read(rows.row())));
@@ -239,8 +238,7 @@ Result<CompositeStats> compose(std::span<const std::string> inputs, const std::s
   if (inputs.empty()) return Status::invalidArgument("no picture to read");
   SURFEIT_ASSIGN_OR_RETURN(JoinedRows rows, JoinedRows::open(inputs));
   CompositeStats stats;
-  stats.channel =
-      options.channel.empty() ? Channel::choose(rows.element(), std::nullopt) : options.channel;
+  stats.channel = options.channel.empty() ? Channel::choose(rows.element()) : options.channel;
   SURFEIT_ASSIGN_OR_RETURN(const Channel channel,
                            Channel::find(rows.element(), stats.channel, inputs.front()));
   SURFEIT_ASSIGN_OR_RETURN(Picture picture,

@@ -23,10 +23,10 @@ constexpr float kMaxRadiusInMeans = 3;
 
 }  // namespace
 
-RadiusEstimate::RadiusEstimate(const Bounds3& bounds, std::uint64_t count)
+RadiusEstimate::RadiusEstimate(const Bounds3d& bounds, std::uint64_t count)
     : origin_(bounds.min), levels_(kLevels) {
   // The surface of the box stands in for the unknown area of the cloud
-  const glm::dvec3 extent = glm::max(glm::dvec3(bounds.extent()), glm::dvec3(1e-30));
+  const glm::dvec3 extent = glm::max(bounds.extent(), glm::dvec3(1e-30));
   const double area =
       2 * (extent.x * extent.y + extent.y * extent.z + extent.z * extent.x) / kCellsPerArea;
   double cell_size = std::sqrt(kRecordsPerCell * area / double(std::max<std::uint64_t>(count, 1)));

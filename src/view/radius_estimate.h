@@ -25,7 +25,7 @@ class RadiusEstimate {
   static constexpr std::uint64_t kMaxBytes = 40u << 20;
 
   // A grid over `bounds` for a cloud of `count` records.
-  RadiusEstimate(const Bounds3& bounds, std::uint64_t count);
+  RadiusEstimate(const Bounds3d& bounds, std::uint64_t count);
 
   void add(const glm::dvec3& position);
   // Turns counts into radii.

@@ -29,9 +29,9 @@ ValueMap chooseValueMap(const std::optional<glm::dvec2>& range, const Channel& c
     case ValueKind::kNormal:
       return stretch(-1, 1);
     case ValueKind::kPosition: {
-      const glm::vec3 size = extent.bounds.extent();
-      const float scale = 1 / std::max({size.x, size.y, size.z, 1e-30f});
-      return {glm::vec3(scale), -scale * extent.bounds.min};
+      const glm::dvec3 size = extent.bounds.extent();
+      const double scale = 1 / std::max({size.x, size.y, size.z, 1e-30});
+      return {glm::vec3(float(scale)), glm::vec3(-scale * extent.bounds.min)};
     }
   }
   return {};

@@ -22,7 +22,7 @@ struct ValueMap {
 
 // Where a cloud is, and which finite values a channel takes.
 struct ValueExtent {
-  Bounds3 bounds;
+  Bounds3d bounds;
   double lowest = std::numeric_limits<double>::infinity();
   double highest = -std::numeric_limits<double>::infinity();
 

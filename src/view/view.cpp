@@ -81,7 +81,7 @@ Result<ValueExtent> findExtent(CloudRows& rows, const RecordDecoder& decoder,
         CloudRecord record;
         for (std::size_t at = 0; at < batch.size(); at += row_bytes) {
           if (!decoder.decode(&batch[at], record)) continue;
-          extent.bounds.add(glm::vec3(record.position));
+          extent.bounds.add(record.position);
           frame.add(record.position);
           if (!needs_range) continue;
           const double value = double(channel.value(&batch[at]).x);
@@ -192,7 +192,7 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
   SURFEIT_ASSIGN_OR_RETURN(const RecordDecoder decoder, RecordDecoder::create(element, input));
   const bool is_normal_map = options.mode == ViewMode::kNormals || !has_picture;
   stats.channel = is_normal_map             ? "normal"
-                  : options.channel.empty() ? Channel::choose(element, rows->statedChannels())
+                  : options.channel.empty() ? Channel::choose(element)
                                             : options.channel;
   SURFEIT_ASSIGN_OR_RETURN(
       const Channel channel,

@@ -37,7 +37,7 @@ Status gatherInFrames(const FramesGather& gather, GatherStats& stats, Take&& tak
                          .memory_bytes = stats.receivers * sizeof(SortedReceiver),
                          .temporary_directory = gather.temporary_directory});
   SURFEIT_RETURN_IF_ERROR(
-      input.sort(ReceiverOrder::kHilbert, scene.header().cube, true, sorter, progress));
+      input.sort(ReceiverOrder::kHilbert, scene.header(), true, sorter, progress));
   GatherMemory memory;
   memory.caches = {.node_frames = gather.frames,
                    .surfel_frames = gather.frames,

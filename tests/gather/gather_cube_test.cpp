@@ -79,7 +79,8 @@ void expectIntegratesToTheGather(Scene& scene, const CubeReceiver& given,
   ASSERT_TRUE(environment.ok()) << environment.status().message();
   const GatherRules rules(withDefaults(options), environment->get());
   const CubeImage cube = cubeOf(scene, given, options);
-  const Receiver receiver = {cube.receiver.position, cube.receiver.normal, cube.receiver.view};
+  const Receiver receiver = {glm::vec3(cube.receiver.position), cube.receiver.normal,
+                             cube.receiver.view};
   const GatherResult gathered = scene.gather(receiver, rules);
   EXPECT_EQ(cube.occlusion, gathered.occlusion);
   EXPECT_EQ(cube.irradiance, gathered.irradiance);
@@ -332,7 +333,7 @@ TEST(ReadCubeReceiver, FindsTheRowOrTellsWhatIsWrong) {
   for (const std::uint64_t number : {0u, 6u, 4999u}) {
     const auto receiver = readCubeReceiver(path, number, "", "", progress);
     ASSERT_TRUE(receiver.ok()) << receiver.status().message();
-    EXPECT_EQ(receiver->position, glm::vec3(float(number), 2, 3));
+    EXPECT_EQ(receiver->position, glm::dvec3(double(number), 2, 3));
     EXPECT_EQ(receiver->normal, glm::vec3(0, 1, 0));
   }
   const auto codeOf = [&](const std::string& name, std::uint64_t number) {

@@ -214,6 +214,9 @@ TEST_F(IndexHostileInputTest, SurfelsOnAGridMoveByNoMoreThanAThousandthOfTheirRa
     return std::pair(p.y, p.x) < std::pair(q.y, q.x);
   };
   std::vector<Surfel> stored = scene->surfels;
+  for (Surfel& surfel : stored) {
+    surfel.position = glm::vec3(glm::dvec3(surfel.position) + scene->header.origin);
+  }
   std::sort(stored.begin(), stored.end(), byPlace);
   ASSERT_EQ(stored.size(), cloud.size());
   double shift = 0;

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -142,9 +143,12 @@ TEST_F(VerifyTest, PagesOfAnotherVersionThanTheHeaderSaysAreCorruption) {
 }
 
 TEST_F(VerifyTest, ReservedBytesOfTheSceneFieldsAreZero) {
-  for (const std::string& sound :
-       {bytesOf(smallScene()), bytesOf(SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft")}) {
-    for (std::size_t at = 252; at < kHeaderChecksumAt; ++at) {
+  constexpr std::size_t kReservedAt = 252, kOriginAt = 256, kOriginEnd = 280;
+  for (const bool is_old : {false, true}) {
+    const std::string sound =
+        bytesOf(is_old ? SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft" : smallScene());
+    for (std::size_t at = kReservedAt; at < kHeaderChecksumAt; ++at) {
+      if (!is_old && at >= kOriginAt && at < kOriginEnd) continue;
       std::string file = sound;
       ASSERT_EQ(file[at], 0);
       file[at] = 1;
@@ -152,6 +156,17 @@ TEST_F(VerifyTest, ReservedBytesOfTheSceneFieldsAreZero) {
       replaceContents(path("reserved.sft"), file);
       EXPECT_THAT(findingsOf(path("reserved.sft")), Contains(HasSubstr("reserved space")));
     }
+  }
+}
+
+TEST_F(VerifyTest, OriginsAreFiniteAndInReach) {
+  for (const double origin :
+       {1.1e12, -1e300, std::numeric_limits<double>::infinity(), std::nan("")}) {
+    std::string file = bytesOf(smallScene());
+    std::memcpy(&file[256 + 8], &origin, sizeof origin);
+    sealFile(file);
+    replaceContents(path("far.sft"), file);
+    EXPECT_THAT(findingsOf(path("far.sft")), Contains(HasSubstr("header: origin is")));
   }
 }
 

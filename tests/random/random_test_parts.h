@@ -88,7 +88,7 @@ inline void dropTurnedAway(RandomScene& scene, const GatherOptions& options) {
   if (options.mode != GatherMode::kGlossy || std::isnan(options.eye.x)) return;
   std::erase_if(scene.receivers, [&](const RandomReceiver& one) {
     const Receiver& receiver = one.receiver;
-    return !(glm::dot(options.eye - receiver.position, receiver.normal) > 0);
+    return !(glm::dot(glm::vec3(options.eye) - receiver.position, receiver.normal) > 0);
   });
 }
 

@@ -10,19 +10,19 @@ namespace {
 
 constexpr int kWidth = 200, kHeight = 100;
 
-Bounds3 box(const glm::vec3& min, const glm::vec3& max) {
-  Bounds3 bounds;
+Bounds3d box(const glm::vec3& min, const glm::vec3& max) {
+  Bounds3d bounds;
   bounds.add(min);
   bounds.add(max);
   return bounds;
 }
 
-Result<Camera> makeCamera(const CameraOptions& options, const Bounds3& bounds) {
+Result<Camera> makeCamera(const CameraOptions& options, const Bounds3d& bounds) {
   SURFEIT_ASSIGN_OR_RETURN(ViewFrame frame, Camera::createFrame(options, kWidth, kHeight));
   for (int corner = 0; corner < 8; ++corner) {
-    frame.add({double((corner & 1) ? bounds.max.x : bounds.min.x),
-               double((corner & 2) ? bounds.max.y : bounds.min.y),
-               double((corner & 4) ? bounds.max.z : bounds.min.z)});
+    frame.add({(corner & 1) ? bounds.max.x : bounds.min.x,
+               (corner & 2) ? bounds.max.y : bounds.min.y,
+               (corner & 4) ? bounds.max.z : bounds.min.z});
   }
   return Camera::create(options, bounds, frame, kWidth, kHeight);
 }
@@ -66,7 +66,7 @@ TEST(Camera, DefaultViewShowsTheWholeBoundsAndFillsThePicture) {
   for (const UpAxis up : {UpAxis::kX, UpAxis::kY, UpAxis::kZ}) {
     CameraOptions options;
     options.up_axis = up;
-    const Bounds3 bounds = box({100, 200, 300}, {130, 210, 340});
+    const Bounds3d bounds = box({100, 200, 300}, {130, 210, 340});
     const Result<Camera> camera = makeCamera(options, bounds);
     ASSERT_TRUE(camera.ok()) << camera.status().message();
     float left = 1e9f, right = -1e9f, top = 1e9f, bottom = -1e9f;
@@ -97,7 +97,7 @@ TEST(Camera, StraysDoNotShrinkTheView) {
 }
 
 TEST(Camera, RefusesViewsThatHaveNoDirection) {
-  const Bounds3 bounds = box(glm::vec3(-1), glm::vec3(1));
+  const Bounds3d bounds = box(glm::vec3(-1), glm::vec3(1));
   CameraOptions on_target;
   on_target.eye = on_target.look_at = glm::dvec3(1, 2, 3);
   EXPECT_EQ(makeCamera(on_target, bounds).status().code(), StatusCode::kInvalidArgument);

@@ -71,7 +71,7 @@ TEST(Channel, LitAddsTheLightOfTheEnvironment) {
   // Without color bleeding there is still the environment
   const PlyElement alone = floats({names.begin(), names.begin() + 9});
   EXPECT_EQ(valueOf(alone, "lit", row), glm::vec3(0.5f, 0.5f, 3));
-  EXPECT_EQ(Channel::choose(alone, {}), "lit");
+  EXPECT_EQ(Channel::choose(alone), "lit");
 }
 
 TEST(Channel, TriplesOfAGatherAreChannels) {
@@ -117,17 +117,10 @@ TEST(Channel, ListFoldsTriplesAndKeepsScalars) {
 }
 
 TEST(Channel, ChoosesTheMostTellingOne) {
-  EXPECT_EQ(Channel::choose(floats(kGathered), {}), "lit");
-  EXPECT_EQ(Channel::choose(floats({"x", "y", "z", "occlusion", "red", "green", "blue"}), {}),
-            "ao");
-  EXPECT_EQ(Channel::choose(floats({"x", "y", "z", "nx", "ny", "nz"}), {}), "normal");
-  EXPECT_EQ(Channel::choose(floats({"x", "y", "z"}), {}), "position");
-  CloudChannels stated;
-  stated.normal = true;  // radiosity was filled in
-  EXPECT_EQ(Channel::choose(floats({"x", "y", "z", "nx", "ny", "nz", "radiosity_r", "radiosity_g",
-                                    "radiosity_b"}),
-                            stated),
-            "normal");
+  EXPECT_EQ(Channel::choose(floats(kGathered)), "lit");
+  EXPECT_EQ(Channel::choose(floats({"x", "y", "z", "occlusion", "red", "green", "blue"})), "ao");
+  EXPECT_EQ(Channel::choose(floats({"x", "y", "z", "nx", "ny", "nz"})), "normal");
+  EXPECT_EQ(Channel::choose(floats({"x", "y", "z"})), "position");
 }
 
 TEST(Srgb, HalfIsOneHundredEightyEight) {

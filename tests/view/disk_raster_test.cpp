@@ -17,9 +17,9 @@ Camera testCamera() {
   CameraOptions options;
   options.eye = glm::dvec3(0, 0, 10);
   options.look_at = glm::dvec3(0);
-  Bounds3 bounds;
-  bounds.add(glm::vec3(-1));
-  bounds.add(glm::vec3(1));
+  Bounds3d bounds;
+  bounds.add(glm::dvec3(-1));
+  bounds.add(glm::dvec3(1));
   Result<ViewFrame> frame = Camera::createFrame(options, kSize, kSize);
   return *Camera::create(options, bounds, *frame, kSize, kSize);
 }
