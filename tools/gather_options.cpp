@@ -121,7 +121,7 @@ void addModeOption(CLI::App& command, GatherMode& mode) {
 
 void addGatherOptions(CLI::App& command, GatherOptions& options) {
   addModeOption(command, options.mode);
-  addChannelOptions(command, options.channels, options.part);
+  addChannelOptions(command, options.channels, options.part, options.filter);
   command.add_flag("--strict", options.strict,
                    "Refuse invalid receivers instead of writing NaN for them");
   addQualityOptions(command, options.quality);

@@ -64,7 +64,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
                    "Surfel clouds (docs/files.md, or recipes of generate), in any order")
       ->required();
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
-  addChannelOptions(*command, options.channels, options.part);
+  addChannelOptions(*command, options.channels, options.part, options.filter);
   command->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();

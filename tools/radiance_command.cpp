@@ -94,7 +94,7 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
       ->required();
   addCloudOutputOption(*command, arguments->output, "Cloud to write");
   addEstimateOptions(*command, options);
-  addChannelOptions(*command, options.channels, options.part);
+  addChannelOptions(*command, options.channels, options.part, options.filter);
   addTemporaryOption(*command, options.temporary_directory);
   command->add_flag("--strict", options.strict, "Refuse invalid photons instead of skipping them");
   context.addCommonOptions(*command);

@@ -158,8 +158,8 @@ class RadianceJob {
 Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
                                        const std::string& result_path) {
   // Everything that can be refused is, before work starts
-  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons,
-                           PhotonCloud::open(inputs, options_.channels, options_.part));
+  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons, PhotonCloud::open(inputs, options_.channels,
+                                                                  options_.part, options_.filter));
   SURFEIT_RETURN_IF_ERROR(planThreads());
   SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, createWriter(result_path, photons.recordCount()));
 

@@ -141,6 +141,8 @@ class Converter {
   Result<ConvertStats> run() {
     SURFEIT_ASSIGN_OR_RETURN(reading_.channels, parseChannelRenames(options_.channels));
     reading_.part = options_.part;
+    reading_.filter = options_.filter;
+    reading_.selections = std::make_shared<RowSelections>();
     SURFEIT_RETURN_IF_ERROR(openInputs());
     SURFEIT_RETURN_IF_ERROR(createWriter());
     progress_.beginPhase("convert", stats_.records, "records");
@@ -189,7 +191,9 @@ class Converter {
     writing.progress = &progress_;
     std::unique_ptr<RowReader> like;
     if (!options_.like.empty()) {
-      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like));
+      RowReaderOptions all;
+      all.filter = "true";  // its rows are not read, so nothing is to be counted
+      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like, all));
       writing.like = like.get();
     } else if (transform_.isIdentity() && inputs_.size() == 1) {
       writing.like = first_.get();

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "core/long_side.h"
@@ -20,6 +22,17 @@ struct SurfelWriter::State {
   std::unique_ptr<RowWriter> file;
   CloudChannels channels;
   std::vector<std::byte> rows;
+  std::string path;
+  Progress* progress = nullptr;
+  std::set<std::string> told;  // notes of the file
+
+  // What the file has not said yet.
+  void note() {
+    if (progress == nullptr) return;
+    for (const std::string& line : file->notes()) {
+      if (told.insert(line).second) progress->note(path + ": " + line);
+    }
+  }
 };
 
 Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudChannels& channels,
@@ -46,10 +59,10 @@ Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudCh
   if (channels.long_side) addTriple(kLongSideNames);
 
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> file, createRowWriter(path, options));
-  if (options.progress != nullptr) {
-    for (const std::string& note : file->notes()) options.progress->note(path + ": " + note);
-  }
-  return SurfelWriter(std::make_unique<State>(State{std::move(file), channels, {}}));
+  SurfelWriter writer(
+      std::make_unique<State>(State{std::move(file), channels, {}, path, options.progress, {}}));
+  writer.state_->note();
+  return writer;
 }
 
 SurfelWriter::SurfelWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -89,6 +102,10 @@ Status SurfelWriter::write(std::span<const Surfel> surfels) {
   return {};
 }
 
-Status SurfelWriter::finish() { return state_->file->finish(); }
+Status SurfelWriter::finish() {
+  SURFEIT_RETURN_IF_ERROR(state_->file->finish());
+  state_->note();
+  return {};
+}
 
 }  // namespace surfeit

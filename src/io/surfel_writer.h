@@ -16,7 +16,8 @@ namespace surfeit {
 class SurfelWriter {
  public:
   // `channels` says which optional properties the file gets. `options` has the rest; its
-  // properties are set here, and its progress is told what the format cannot keep.
+  // properties are set here, and its progress is told what the format cannot keep, here and in
+  // finish().
   static Result<SurfelWriter> create(const std::string& path, const CloudChannels& channels,
                                      RowWriterOptions options = {});
   SurfelWriter(SurfelWriter&&) noexcept;

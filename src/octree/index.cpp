@@ -161,6 +161,8 @@ Status Indexer::openInputs() {
   RowReaderOptions reading;
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options_.channels));
   reading.part = options_.part;
+  reading.filter = options_.filter;
+  reading.selections = std::make_shared<RowSelections>();
   SURFEIT_ASSIGN_OR_RETURN(
       reader_,
       CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes), reading));

@@ -141,6 +141,10 @@ Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path,
                              file.readSome(0, std::as_writable_bytes(std::span(magic))));
   }
   if (isSceneFile({magic.data(), magic.size()})) {
+    if (!options.filter.empty()) {
+      return Status::invalidArgument(fmt::format(
+          "{}: a scene, whose surfels are not filtered: give the filter to `surfeit index`", path));
+    }
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(path));
     return std::unique_ptr<CloudRows>(std::make_unique<SceneRows>(std::move(scene)));
   }
