@@ -59,7 +59,7 @@ scansAreFilteredAndWritten() {
   run 0 info scan.las
   says "330 of 3000 points are left out: 30 withheld, 300 of noise"
   run 0 info scan.las --filter "return == 1 and class != 7 and not withheld"
-  says "1,500 points"
+  says "1,200 points"
   run 0 index scan.las -o scan.sft --filter "class == 2"
   run 0 info scan.sft
   says "2,700"
