@@ -2,6 +2,8 @@
 // the specification, without any code of ours.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -127,6 +129,45 @@ inline void fillPoint(std::string& las, std::size_t index) {
   if (format != 4 && format != 5 && format != 9 && format != 10) return;
   putLas(las, at + wave + 1, std::uint64_t(123456789012 + index));
   for (std::size_t i = 0; i < 4; ++i) putLas(las, at + wave + 13 + 4 * i, float(index) / 3);
+}
+
+// What the header says, in the way that other programs read it.
+struct LasSummary {
+  unsigned minor, format;
+  std::uint64_t count;
+  double scale, origin;  // of x
+  double least[3], most[3];
+};
+inline LasSummary lasSummaryOf(const std::string& las) {
+  LasSummary summary{};
+  EXPECT_EQ(las.substr(0, 4), "LASF");
+  summary.minor = std::uint8_t(las[25]);
+  summary.format = std::uint8_t(las[104]);
+  summary.count =
+      summary.minor >= 4 ? getLas<std::uint64_t>(las, 247) : getLas<std::uint32_t>(las, 107);
+  summary.scale = getLas<double>(las, 131);
+  summary.origin = getLas<double>(las, 155);
+  for (std::size_t i = 0; i < 3; ++i) {
+    summary.most[i] = getLas<double>(las, 179 + 16 * i);
+    summary.least[i] = getLas<double>(las, 187 + 16 * i);
+  }
+  const std::size_t size = getLas<std::uint16_t>(las, 105);
+  EXPECT_EQ(getLas<std::uint32_t>(las, 96) + summary.count * size, las.size());
+  return summary;
+}
+
+// The data of a record before the points; empty when there is none.
+inline std::string lasRecordOf(const std::string& las, const std::string& user, int number) {
+  std::size_t at = getLas<std::uint16_t>(las, 94);
+  for (std::uint32_t i = 0; i < getLas<std::uint32_t>(las, 100); ++i) {
+    const std::uint16_t length = getLas<std::uint16_t>(las, at + 20);
+    if (las.substr(at + 2, user.size()) == user && getLas<std::uint16_t>(las, at + 18) == number) {
+      return las.substr(at + 54, length);
+    }
+    at += 54u + length;
+  }
+  EXPECT_LE(at, getLas<std::uint32_t>(las, 96));
+  return "";
 }
 
 }  // namespace surfeit

@@ -37,46 +37,6 @@ class LasWriterTest : public ConvertTest {
     options.filter = "true";
     return options;
   }
-
-  // What the header says, in the way that other programs read it.
-  struct Summary {
-    unsigned minor, format;
-    std::uint64_t count;
-    double scale, origin;  // of x
-    double least[3], most[3];
-  };
-  static Summary summaryOf(const std::string& las) {
-    Summary summary{};
-    EXPECT_EQ(las.substr(0, 4), "LASF");
-    summary.minor = std::uint8_t(las[25]);
-    summary.format = std::uint8_t(las[104]);
-    summary.count =
-        summary.minor >= 4 ? getLas<std::uint64_t>(las, 247) : getLas<std::uint32_t>(las, 107);
-    summary.scale = getLas<double>(las, 131);
-    summary.origin = getLas<double>(las, 155);
-    for (std::size_t i = 0; i < 3; ++i) {
-      summary.most[i] = getLas<double>(las, 179 + 16 * i);
-      summary.least[i] = getLas<double>(las, 187 + 16 * i);
-    }
-    const std::size_t size = getLas<std::uint16_t>(las, 105);
-    EXPECT_EQ(getLas<std::uint32_t>(las, 96) + summary.count * size, las.size());
-    return summary;
-  }
-
-  // The data of a record before the points; empty when there is none.
-  static std::string recordOf(const std::string& las, const std::string& user, int number) {
-    std::size_t at = getLas<std::uint16_t>(las, 94);
-    for (std::uint32_t i = 0; i < getLas<std::uint32_t>(las, 100); ++i) {
-      const std::uint16_t length = getLas<std::uint16_t>(las, at + 20);
-      if (las.substr(at + 2, user.size()) == user &&
-          getLas<std::uint16_t>(las, at + 18) == number) {
-        return las.substr(at + 54, length);
-      }
-      at += 54u + length;
-    }
-    EXPECT_LE(at, getLas<std::uint32_t>(las, 96));
-    return "";
-  }
 };
 
 // --- From LAS to LAS
@@ -98,12 +58,12 @@ TEST_F(LasWriterTest, PointsOfEveryFormatStayTheSameBytes) {
       EXPECT_EQ(std::uint8_t(copy[104]), format);
       EXPECT_EQ(copy[25], text[25]);
       EXPECT_TRUE(lasPoints(copy, 90) == lasPoints(text, 90));
-      EXPECT_EQ(summaryOf(copy).count, 90u);
+      EXPECT_EQ(lasSummaryOf(copy).count, 90u);
       EXPECT_EQ(copy.substr(131, 48), text.substr(131, 48));
       if (extra > 0) {
-        EXPECT_EQ(recordOf(copy, "LASF_Projection", 2112), "PROJCS[1]");
-        EXPECT_EQ(recordOf(copy, "me", 9), std::string(5000, 'm'));
-        EXPECT_EQ(recordOf(copy, "LASF_Spec", 4).substr(0, 192),
+        EXPECT_EQ(lasRecordOf(copy, "LASF_Projection", 2112), "PROJCS[1]");
+        EXPECT_EQ(lasRecordOf(copy, "me", 9), std::string(5000, 'm'));
+        EXPECT_EQ(lasRecordOf(copy, "LASF_Spec", 4).substr(0, 192),
                   lasDescriptor("Deviation", 4, 8, 0.25));
       }
       // Once more, it is the same file
@@ -121,7 +81,7 @@ TEST_F(LasWriterTest, HeadersCountAndBoundWhatIsWritten) {
   options.filter = "return_number <= 2";
   convertOk({"a.las"}, "b.las", options);
   const std::string las = bytesOf("b.las");
-  const Summary summary = summaryOf(las);
+  const LasSummary summary = lasSummaryOf(las);
   EXPECT_EQ(summary.count, 14u);  // of 15 numbers in turn
   EXPECT_EQ(getLas<std::uint64_t>(las, 255), 7u);
   EXPECT_EQ(getLas<std::uint64_t>(las, 263), 7u);
@@ -211,7 +171,7 @@ TEST_F(LasWriterTest, ResultsAreExtraBytesOfTheSamePoints) {
   // 34 bytes as they were, then 4 floats, a byte and a double
   const std::string las = bytesOf("b.las");
   ASSERT_EQ(getLas<std::uint16_t>(las, 105), 34 + 16 + 1 + 8);
-  const std::string described = recordOf(las, "LASF_Spec", 4);
+  const std::string described = lasRecordOf(las, "LASF_Spec", 4);
   ASSERT_EQ(described.size(), 6 * 192u);
   const int types[] = {9, 9, 9, 9, 1, 10};
   for (std::size_t i = 0; i < 6; ++i) {
@@ -270,7 +230,7 @@ TEST_F(LasWriterTest, OtherCloudsBecomeVersion14WithExtraBytes) {
   writeTable("a.ply", table);
   convertOk({"a.ply"}, "b.las");
   const std::string las = bytesOf("b.las");
-  const Summary summary = summaryOf(las);
+  const LasSummary summary = lasSummaryOf(las);
   EXPECT_EQ(summary.minor, 4u);
   EXPECT_EQ(summary.format, 7u);
   EXPECT_EQ(summary.scale, 1e-4);
@@ -282,7 +242,7 @@ TEST_F(LasWriterTest, OtherCloudsBecomeVersion14WithExtraBytes) {
   EXPECT_EQ(point[14], char(1 | 1 << 4));
   EXPECT_EQ(point[16], 3);
   EXPECT_EQ(getLas<float>(point, 36 + 8), -1);
-  EXPECT_EQ(std::string(&recordOf(las, "LASF_Spec", 4)[4]), "NormalX");
+  EXPECT_EQ(std::string(&lasRecordOf(las, "LASF_Spec", 4)[4]), "NormalX");
   EXPECT_EQ(getLas<std::uint64_t>(las, 255), 100u);
   EXPECT_THAT(notes_,
               AllOf(Contains(HasSubstr("1 comments are not kept")),
@@ -395,8 +355,8 @@ TEST_F(LasWriterTest, PointsWithoutAPositionAreWithheld) {
   convertOk({"a.ply"}, "b.las");
   EXPECT_THAT(notes_,
               Contains(HasSubstr("2 points without a finite position are written as with")));
-  EXPECT_EQ(summaryOf(bytesOf("b.las")).count, 3u);
-  EXPECT_EQ(summaryOf(bytesOf("b.las")).most[0], 1);
+  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).count, 3u);
+  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).most[0], 1);
   EXPECT_THAT(column(readTable("b.las"), "x"), ElementsAre(1));
 }
 
@@ -405,7 +365,7 @@ TEST_F(LasWriterTest, CoordinateReferenceSystemsGoThroughPly) {
   write("a.las", withRecords(makeLas(4, 6, 3), {lasRecord("LASF_Projection", 2112, text)}));
   convertOk({"a.las"}, "b.ply", all());
   convertOk({"b.ply"}, "c.las");
-  EXPECT_EQ(recordOf(bytesOf("c.las"), "LASF_Projection", 2112).substr(0, text.size()), text);
+  EXPECT_EQ(lasRecordOf(bytesOf("c.las"), "LASF_Projection", 2112).substr(0, text.size()), text);
   EXPECT_EQ(getLas<std::uint16_t>(bytesOf("c.las"), 6), 16);
   EXPECT_THAT(notes_, Not(Contains(HasSubstr("comment"))));
 
@@ -414,15 +374,15 @@ TEST_F(LasWriterTest, CoordinateReferenceSystemsGoThroughPly) {
   write("a.las", withRecords(makeLas(2, 3, 3), {lasRecord("LASF_Projection", 34735, key_bytes)}));
   convertOk({"a.las"}, "b.ply", all());
   convertOk({"b.ply"}, "c.las");
-  EXPECT_EQ(recordOf(bytesOf("c.las"), "LASF_Projection", 34735), key_bytes);
-  EXPECT_EQ(summaryOf(bytesOf("c.las")).minor, 2u);  // later formats know text alone
-  EXPECT_EQ(summaryOf(bytesOf("c.las")).format, 3u);
+  EXPECT_EQ(lasRecordOf(bytesOf("c.las"), "LASF_Projection", 34735), key_bytes);
+  EXPECT_EQ(lasSummaryOf(bytesOf("c.las")).minor, 2u);  // later formats know text alone
+  EXPECT_EQ(lasSummaryOf(bytesOf("c.las")).format, 3u);
 
   // Tiles are merged with the system of the first
   write("d.las", bytesOf("a.las"));
   convertOk({"a.las", "d.las"}, "e.las", all());
-  EXPECT_EQ(recordOf(bytesOf("e.las"), "LASF_Projection", 34735), key_bytes);
-  EXPECT_EQ(summaryOf(bytesOf("e.las")).count, 6u);
+  EXPECT_EQ(lasRecordOf(bytesOf("e.las"), "LASF_Projection", 34735), key_bytes);
+  EXPECT_EQ(lasSummaryOf(bytesOf("e.las")).count, 6u);
 }
 
 TEST_F(LasWriterTest, LongNamesAreToldApart) {
@@ -458,8 +418,8 @@ TEST_F(LasWriterTest, WhatDoesNotFitIsRefused) {
 TEST_F(LasWriterTest, EmptyAndCompressedFilesAreWritten) {
   writeTable("a.ply", pointsOf({}));
   convertOk({"a.ply"}, "b.las");
-  EXPECT_EQ(summaryOf(bytesOf("b.las")).count, 0u);
-  EXPECT_EQ(summaryOf(bytesOf("b.las")).most[0], 0);
+  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).count, 0u);
+  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).most[0], 0);
   EXPECT_EQ(readTable("b.las").rows.size(), 0u);
   writeTable("a.ply", pointsOf({{1, 2, 3}, {4, 5, 6}}));
   convertOk({"a.ply"}, "b.las.gz");
@@ -492,8 +452,8 @@ TEST_F(SharedLasTest, FilesOfOthersStayTheSameBytes) {
     EXPECT_EQ(getLas<std::uint32_t>(after, 107), count);
     EXPECT_TRUE(lasPoints(after, count) == lasPoints(before, count));
     for (int number : {34735, 34736, 34737, 2112}) {
-      EXPECT_EQ(recordOf(after, "LASF_Projection", number),
-                recordOf(before, "LASF_Projection", number));
+      EXPECT_EQ(lasRecordOf(after, "LASF_Projection", number),
+                lasRecordOf(before, "LASF_Projection", number));
     }
   }
 }
