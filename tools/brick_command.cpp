@@ -9,6 +9,7 @@
 
 #include "core/job_limits.h"
 #include "surfeit/brick.h"
+#include "tools/channel_options.h"
 #include "tools/command.h"
 
 namespace surfeit {
@@ -23,6 +24,7 @@ struct BrickArguments {
 Status runBrick(BrickArguments& arguments, CommandContext& context) {
   BrickOptions& options = arguments.options;
   options.threads = context.common.threads;
+  options.strict = context.common.strict;
   if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const BrickStats stats, brickClouds(arguments.clouds, arguments.output,
                                                                options, context.progress()));
@@ -72,8 +74,8 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
                   "points)")
       ->type_name("S")
       ->check(CLI::PositiveNumber.description(""));
+  addFilterOption(command, options.filter);
   addTemporaryOption(command, options.temporary_directory);
-  command.add_flag("--strict", options.strict, "Refuse invalid points instead of skipping them");
 }
 
 }  // namespace

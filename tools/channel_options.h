@@ -1,5 +1,5 @@
-// Options about files of clouds: --channels and --part, which say what of a cloud's file is read,
-// and under which names; -o, the cloud that is written.
+// Options about files of clouds: --channels, --part and --filter, which say what of a cloud's file
+// is read, and under which names; -o, the cloud that is written.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,7 +8,10 @@
 namespace surfeit {
 
 // The library parses `channels`: a text that is no list of FROM=TO is a usage error of its own.
-void addChannelOptions(CLI::App& command, std::string& channels, std::string& part);
+void addChannelOptions(CLI::App& command, std::string& channels, std::string& part,
+                       std::string& filter);
+// Only --filter.
+void addFilterOption(CLI::App& command, std::string& filter);
 
 // `what` begins the description: "Cloud to write". Any format that is written will do, pictures
 // where what is written may be their pixels.

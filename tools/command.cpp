@@ -53,6 +53,10 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
   command.add_option("--progress", common.progress, "auto, bar, percent, json or none")
       ->check(CLI::IsMember({"auto", "bar", "percent", "json", "none"}))
       ->group(kGroup);
+  command
+      .add_flag("--strict", common.strict,
+                "Refuse what is guessed, skipped, narrowed or left out instead of telling it")
+      ->group(kGroup);
   command.add_flag("-q,--quiet", common.quiet, "Say nothing but errors")->group(kGroup);
   command.add_flag("-v,--verbose", common.verbose, "Say which phase begins")->group(kGroup);
 }
@@ -60,7 +64,8 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
 void CommandContext::run(const std::function<Status()>& body) {
   Status status;
   progress_ =
-      std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose);
+      std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
+                                        common.strict);
   try {
     status = body();
   } catch (const std::bad_alloc&) {
@@ -75,6 +80,10 @@ void CommandContext::run(const std::function<Status()>& body) {
     status = Status::failed(error.what());
   }
   progress_->clear();
+  const std::string& refused = progress_->refused();
+  if (!refused.empty()) {
+    status = Status::corruption(refused + " (refused by --strict)");
+  }
   if (status.ok()) return;
   fmt::print(stderr, "surfeit: {}\n", status.message());
   exit_status = exitStatus(status.code());

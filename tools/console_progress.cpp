@@ -41,8 +41,8 @@ std::string formatSeconds(double seconds) {
 
 }  // namespace
 
-ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose)
-    : style_(style), quiet_(quiet), verbose_(verbose) {
+ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose, bool strict)
+    : style_(style), quiet_(quiet), verbose_(verbose), strict_(strict) {
   struct sigaction action {};
   action.sa_handler = onCancelSignal;
   sigaction(SIGINT, &action, nullptr);
@@ -52,11 +52,11 @@ ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose)
 ConsoleProgress::~ConsoleProgress() { clear(); }
 
 int ConsoleProgress::cancelSignal() { return g_cancel_signal; }
-bool ConsoleProgress::isCancelled() const { return g_cancel_signal != 0; }
+bool ConsoleProgress::isCancelled() const { return g_cancel_signal != 0 || is_refused_; }
 
 void ConsoleProgress::beginPhase(std::string_view name, std::uint64_t total,
                                  std::string_view unit) {
-  if (verbose_) note(fmt::format("phase {}: {} {}", name, total, unit));
+  if (verbose_) inform(fmt::format("phase {}: {} {}", name, total, unit));
   const std::lock_guard lock(mutex_);
   phase_ = name;
   unit_ = unit;
@@ -110,6 +110,13 @@ void ConsoleProgress::draw() {
 }
 
 void ConsoleProgress::note(const std::string& message) {
+  if (!strict_) return inform(message);
+  const std::lock_guard lock(mutex_);
+  if (!is_refused_) refused_ = message;
+  is_refused_ = true;
+}
+
+void ConsoleProgress::inform(const std::string& message) {
   if (quiet_) return;
   clear();
   fmt::print(stderr, "surfeit: {}\n", message);

@@ -20,17 +20,21 @@ class ConsoleProgress : public Progress {
 
   // SIGINT and SIGTERM cancel from now on; a second one ends the program at once.
   // With `verbose` every phase is told as it begins.
-  ConsoleProgress(Style style, bool quiet, bool verbose);
+  // With `strict` the first note ends the work: it is cancelled, and refused() has the note.
+  ConsoleProgress(Style style, bool quiet, bool verbose, bool strict);
   ~ConsoleProgress() override;
 
   void beginPhase(std::string_view name, std::uint64_t total, std::string_view unit) override;
   void advance(std::uint64_t count) override;
   void advanceBytes(std::uint64_t count) override { bytes_ += count; }
   void note(const std::string& message) override;
+  void inform(const std::string& message) override;
   bool isCancelled() const override;
 
   // Removes the bar, so that other text may follow.
   void clear();
+  // The note that ended the work; empty when none did. When the work is over.
+  const std::string& refused() const { return refused_; }
   // The signal that cancelled, 0 when none did.
   static int cancelSignal();
 
@@ -40,8 +44,10 @@ class ConsoleProgress : public Progress {
   const Style style_;
   const bool quiet_;
   const bool verbose_;
+  const bool strict_;
+  std::atomic<bool> is_refused_{false};
   std::mutex mutex_;  // guards what is below, but not the atomic ones
-  std::string phase_, unit_;
+  std::string phase_, unit_, refused_;
   std::uint64_t total_ = 0;
   int last_percent_ = -1;
   bool bar_shown_ = false;

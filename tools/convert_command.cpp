@@ -171,7 +171,7 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
 
 // Options that say what of the records is written.
 void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
-  addChannelOptions(command, options.channels, options.part);
+  addChannelOptions(command, options.channels, options.part, options.filter);
   command.add_option("--every", options.every, "Only records 0, N, 2N, ... of each input")
       ->type_name("N")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53).description(""));
@@ -188,7 +188,7 @@ void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
   command
       .add_option(
           "--like", options.like,
-          "A file whose picture windows (.exr), grid (.vdb) or camera (.ptc) the output gets "
+          "A file whose picture windows (.exr), grid (.vdb), camera (.ptc) or header (.las) the output gets "
           "(default: a single input that is not moved)")
       ->type_name("FILE");
 }

@@ -116,9 +116,10 @@ Status runCube(CubeArguments& arguments, CommandContext& context) {
   options.memory_bytes = context.common.memory_bytes;
   options.outputs = kOutputOcclusion | kOutputIrradiance;
   if (!arguments.receivers.empty()) {
-    SURFEIT_ASSIGN_OR_RETURN(arguments.receiver,
-                             readCubeReceiver(arguments.receivers, arguments.number,
-                                              options.channels, options.part, context.progress()));
+    SURFEIT_ASSIGN_OR_RETURN(
+        arguments.receiver,
+        readCubeReceiver(arguments.receivers, arguments.number, options.channels, options.part,
+                         context.progress(), options.filter));
   }
   SURFEIT_ASSIGN_OR_RETURN(const CubeImage cube, gatherCube(arguments.scene, arguments.receiver,
                                                             options, context.progress()));
@@ -184,7 +185,8 @@ void addReceiverOptions(CLI::App& command, CubeArguments& arguments) {
       ->type_name("N")
       ->default_str("0")
       ->group(kReceiverGroup);
-  addChannelOptions(command, arguments.options.channels, arguments.options.part);
+  addChannelOptions(command, arguments.options.channels, arguments.options.part,
+                    arguments.options.filter);
 }
 
 void addCubePictureOptions(CLI::App& command, CubeArguments& arguments) {

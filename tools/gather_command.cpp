@@ -24,6 +24,7 @@ struct GatherArguments {
 Status runGather(GatherArguments& arguments, CommandContext& context) {
   GatherOptions& options = arguments.options;
   options.threads = context.threads();
+  options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const GatherStats stats,
                            gatherCloud(arguments.scene, arguments.receivers, arguments.result,

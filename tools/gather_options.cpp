@@ -121,9 +121,7 @@ void addModeOption(CLI::App& command, GatherMode& mode) {
 
 void addGatherOptions(CLI::App& command, GatherOptions& options) {
   addModeOption(command, options.mode);
-  addChannelOptions(command, options.channels, options.part);
-  command.add_flag("--strict", options.strict,
-                   "Refuse invalid receivers instead of writing NaN for them");
+  addChannelOptions(command, options.channels, options.part, options.filter);
   addQualityOptions(command, options.quality);
   addPagingOptions(command, options);
 }

@@ -24,6 +24,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
   IndexOptions& options = arguments.options;
   options.threads = context.common.threads;
   options.full_precision = arguments.precision == "full";
+  options.strict = context.common.strict;
   if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
                                                                options, context.progress()));
@@ -64,7 +65,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
                    "Surfel clouds (docs/files.md, or recipes of generate), in any order")
       ->required();
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
-  addChannelOptions(*command, options.channels, options.part);
+  addChannelOptions(*command, options.channels, options.part, options.filter);
   command->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
@@ -77,7 +78,6 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       ->check(CLI::IsMember({"quantized", "full"}))
       ->capture_default_str();
   addTemporaryOption(*command, options.temporary_directory);
-  command->add_flag("--strict", options.strict, "Refuse invalid records instead of skipping them");
   context.addCommonOptions(*command);
   command->footer(
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "

@@ -22,7 +22,7 @@ namespace surfeit {
 namespace {
 
 struct InfoArguments {
-  std::string path, channels, part;
+  std::string path, channels, part, filter;
   bool json = false;
 };
 
@@ -91,6 +91,7 @@ Result<RowReaderOptions> readingOf(const InfoArguments& arguments) {
   RowReaderOptions options;
   SURFEIT_ASSIGN_OR_RETURN(options.channels, parseChannelRenames(arguments.channels));
   options.part = arguments.part;
+  options.filter = arguments.filter;
   return options;
 }
 
@@ -217,11 +218,17 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
   SURFEIT_ASSIGN_OR_RETURN(const std::string first_bytes, firstBytes(arguments.path));
   nlohmann::json json;
   std::string text;
-  const bool is_as_stored = arguments.channels.empty() && arguments.part.empty();
+  const bool is_as_stored =
+      arguments.channels.empty() && arguments.part.empty() && arguments.filter.empty();
   if (is_as_stored && first_bytes.starts_with("ply")) {
     SURFEIT_ASSIGN_OR_RETURN(json, plyJson(arguments, context.progress()));
     text = plyText(arguments.path, json);
   } else if (isSceneFile(first_bytes)) {
+    if (!arguments.filter.empty()) {
+      return Status::invalidArgument(fmt::format(
+          "{}: a scene, whose surfels are not filtered: give the filter to `surfeit index`",
+          arguments.path));
+    }
     SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.path));
     json = sceneJson(info);
     text = sceneText(arguments.path, info);
@@ -245,7 +252,7 @@ void addInfoCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<InfoArguments>();
   command->add_option("FILE", arguments->path, "Scene file (.sft) or cloud (docs/files.md)")
       ->required();
-  addChannelOptions(*command, arguments->channels, arguments->part);
+  addChannelOptions(*command, arguments->channels, arguments->part, arguments->filter);
   command->add_flag("--json", arguments->json, "JSON on standard output");
   context.addCommonOptions(*command, {.threads = false, .memory = false, .stats = false});
   command->footer(

@@ -26,6 +26,7 @@ nlohmann::json jsonOf(const glm::dvec3& rgb) { return {rgb.r, rgb.g, rgb.b}; }
 Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
   RadianceOptions& options = arguments.options;
   options.threads = context.common.threads;
+  options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(
       const RadianceStats stats,
@@ -94,9 +95,8 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
       ->required();
   addCloudOutputOption(*command, arguments->output, "Cloud to write");
   addEstimateOptions(*command, options);
-  addChannelOptions(*command, options.channels, options.part);
+  addChannelOptions(*command, options.channels, options.part, options.filter);
   addTemporaryOption(*command, options.temporary_directory);
-  command->add_flag("--strict", options.strict, "Refuse invalid photons instead of skipping them");
   context.addCommonOptions(*command);
   command->footer(
       "The radiosity is what surfaces reflect: albedo times the power of the nearest photons over "

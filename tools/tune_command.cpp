@@ -158,6 +158,7 @@ Status writePlot(const TuneArguments& arguments, const TuneReport& report) {
 Status runTune(TuneArguments& arguments, CommandContext& context) {
   GatherOptions& gather = arguments.options.gather;
   gather.threads = context.threads();
+  gather.strict = context.common.strict;
   gather.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(
       const TuneReport report,

@@ -76,7 +76,8 @@ void addViewCommand(CLI::App& app, CommandContext& context) {
                    "Write what each pixel sees as OpenEXR, position, normal, depth, albedo and "
                    "radiosity: receivers for gather. With or without -o")
       ->type_name("FILE");
-  addChannelOptions(*command, arguments->options.channels, arguments->options.part);
+  addChannelOptions(*command, arguments->options.channels, arguments->options.part,
+                    arguments->options.filter);
   addViewOptions(*command, arguments->options);
   context.addCommonOptions(*command);
   command->footer(

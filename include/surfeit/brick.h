@@ -34,6 +34,9 @@ struct BrickOptions {
   int threads = 0;                                      // 0: all that the job may use
   bool strict = false;                // refuse invalid records instead of skipping them
   std::string temporary_directory{};  // empty: beside the output
+  // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
+  // that the format marks as not to be used.
+  std::string filter{};
 };
 
 struct BrickStats {

@@ -39,12 +39,15 @@ struct ConvertOptions {
   std::vector<std::string> keep{}, drop{};
 
   // A cloud of the output's format that it takes from what rows do not carry: the windows and
-  // attributes of a picture (.exr), the grid of a volume (.vdb), the camera of a .ptc. Empty: the
-  // input, where there is only one, which is not moved.
+  // attributes of a picture (.exr), the grid of a volume (.vdb), the camera of a .ptc, the header
+  // of a .las. Empty: the input, where there is only one, which is not moved.
   std::string like{};
   // Memory that a format may take that must hold what it writes until the end (OpenVDB); others
   // take some MiB, whatever the clouds' size.
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
+  // Which records of the inputs are taken, "classification == 2" (docs/files.md, "Filters"), before
+  // all else but `channels`; empty: all but those that the format marks as not to be used.
+  std::string filter{};
 };
 
 struct ConvertStats {

@@ -100,11 +100,12 @@ struct CubeImage {
 Result<CubeImage> gatherCube(const std::string& scene_path, const CubeReceiver& receiver,
                              const GatherOptions& options, Progress& progress);
 
-// Row `number`, from 0, of a cloud of receivers as gatherCloud reads them; `channels` and `part` as
-// in GatherOptions. Reads up to that row. Errors: kInvalidArgument when there is no such row,
-// kCorruption when it is no valid receiver, else as indexClouds.
+// Row `number`, from 0, of a cloud of receivers as gatherCloud reads them; `channels`, `part` and
+// `filter` as in GatherOptions: rows that are left out do not count. Reads up to that row. Errors:
+// kInvalidArgument when there is no such row, kCorruption when it is no valid receiver, else as
+// indexClouds.
 Result<CubeReceiver> readCubeReceiver(const std::string& cloud_path, std::uint64_t number,
                                       const std::string& channels, const std::string& part,
-                                      Progress& progress);
+                                      Progress& progress, const std::string& filter = {});
 
 }  // namespace surfeit

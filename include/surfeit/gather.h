@@ -137,6 +137,9 @@ struct GatherOptions {
   // files with several parts (grids, layers, elements) the one to read; empty: the first with a
   // cloud.
   std::string channels, part;
+  // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
+  // that the format marks as not to be used.
+  std::string filter;
 };
 
 // What one of the two caches did. Counts, bytes, and seconds summed over threads.

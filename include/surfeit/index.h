@@ -22,6 +22,9 @@ struct IndexOptions {
   // Channels of the inputs to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels{}, part{};
+  // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
+  // that the format marks as not to be used.
+  std::string filter{};
 };
 
 struct IndexStats {

@@ -21,8 +21,11 @@ class Progress {
   // `count` bytes were read from or written to files, for rates only.
   virtual void advanceBytes(std::uint64_t count) { (void)count; }
 
-  // Something the user should read once: a rule that filled in missing data, records skipped.
+  // What was guessed, dropped, narrowed, ignored or left dark, how many, and what to do: the user
+  // reads it once, and may want such a thing to be an error (`--strict`).
   virtual void note(const std::string& message) { (void)message; }
+  // What the user may like to know: nothing is lost by it.
+  virtual void inform(const std::string& message) { (void)message; }
 
   // Polled often; true makes the work stop with Status::interrupted() and leave nothing behind.
   virtual bool isCancelled() const { return false; }

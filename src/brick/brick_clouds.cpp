@@ -120,6 +120,7 @@ class BrickBuild {
   const BrickOptions& options_;
   Progress& progress_;
   BrickStats stats_;
+  RowReaderOptions reading_;
   std::vector<BrickChannel> channels_;
   std::size_t value_count_ = 0;
   bool has_sizes_ = true;
@@ -131,14 +132,16 @@ class BrickBuild {
 
 // Opens every input to see that it holds what is wanted.
 Status BrickBuild::open() {
+  reading_.filter = options_.filter;
+  reading_.selections = std::make_shared<RowSelections>();
   std::string without_sizes;
   for (const std::string& path : inputs_) {
     if (channels_.empty()) {
-      SURFEIT_ASSIGN_OR_RETURN(const BrickInput first, BrickInput::open(path, {}));
+      SURFEIT_ASSIGN_OR_RETURN(const BrickInput first, BrickInput::open(path, {}, reading_));
       SURFEIT_ASSIGN_OR_RETURN(
           channels_, chooseBrickChannels(first.reader().element(), options_.channels, path));
     }
-    SURFEIT_ASSIGN_OR_RETURN(const BrickInput input, BrickInput::open(path, channels_));
+    SURFEIT_ASSIGN_OR_RETURN(const BrickInput input, BrickInput::open(path, channels_, reading_));
     stats_.points += input.reader().element().count;
     if (!input.hasSizes() && without_sizes.empty()) without_sizes = path;
     if (!input.hasNormals()) {
@@ -162,7 +165,7 @@ Status BrickBuild::forEach(const char* phase_name,
   progress_.beginPhase(phase_name, stats_.points, "points");
   const bool is_first = extent_.points == 0;
   for (const std::string& path : inputs_) {
-    SURFEIT_ASSIGN_OR_RETURN(BrickInput input, BrickInput::open(path, channels_));
+    SURFEIT_ASSIGN_OR_RETURN(BrickInput input, BrickInput::open(path, channels_, reading_));
     SURFEIT_RETURN_IF_ERROR(input.forEach(options_.strict, progress_,
                                           is_first ? &stats_.skipped_points : nullptr, visit));
   }

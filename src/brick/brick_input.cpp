@@ -98,10 +98,10 @@ Result<std::vector<BrickChannel>> chooseBrickChannels(const PlyElement& element,
   return channels;
 }
 
-Result<BrickInput> BrickInput::open(const std::string& path,
-                                    std::span<const BrickChannel> channels) {
+Result<BrickInput> BrickInput::open(const std::string& path, std::span<const BrickChannel> channels,
+                                    const RowReaderOptions& reading) {
   BrickInput input;
-  SURFEIT_ASSIGN_OR_RETURN(input.reader_, openRowReader(path));
+  SURFEIT_ASSIGN_OR_RETURN(input.reader_, openRowReader(path, reading));
   SURFEIT_RETURN_IF_ERROR(input.declare(channels));
   return input;
 }

@@ -11,6 +11,7 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -50,8 +51,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   options.eye -= scene.header().origin;
-  SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
-                           GatherInput::open(receivers_path, options.channels, options.part));
+  SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path, options.channels,
+                                                                options.part, options.filter));
   SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
   const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();
@@ -78,9 +79,13 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   // Sort
   input.note(progress);
-  for (const std::string& note : writer->notes()) {
-    progress.note(fmt::format("{}: {}", result_path, note));
-  }
+  std::set<std::string> told;
+  const auto noteOfWriter = [&] {
+    for (const std::string& note : writer->notes()) {
+      if (told.insert(note).second) progress.note(fmt::format("{}: {}", result_path, note));
+    }
+  };
+  noteOfWriter();
   progress.beginPhase("sort", stats.receivers, "receivers");
   auto sorter = std::make_unique<ReceiverSorter>(
       ReceiverSorter::Options{.count = stats.receivers,
@@ -114,6 +119,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   SURFEIT_RETURN_IF_ERROR(results.finish());
   progress.beginPhase("write", stats.receivers, "receivers");
   SURFEIT_RETURN_IF_ERROR(input.write(result_rows, results, *writer, progress));
+  noteOfWriter();  // what it found out on the way
   return stats;
 }
 

@@ -170,10 +170,11 @@ Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const CubeRec
 
 Result<CubeReceiver> readCubeReceiverOrThrow(const std::string& path, std::uint64_t number,
                                              const std::string& channels, const std::string& part,
-                                             Progress& progress) {
+                                             const std::string& filter, Progress& progress) {
   RowReaderOptions reading;
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(channels));
   reading.part = part;
+  reading.filter = filter;
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, openRowReader(path, reading));
   const PlyElement& rows = reader->element();
   SURFEIT_ASSIGN_OR_RETURN(const ReceiverMapping mapping, ReceiverMapping::create(rows, path));
@@ -232,9 +233,9 @@ Result<CubeImage> gatherCube(const std::string& scene_path, const CubeReceiver& 
 
 Result<CubeReceiver> readCubeReceiver(const std::string& cloud_path, std::uint64_t number,
                                       const std::string& channels, const std::string& part,
-                                      Progress& progress) {
+                                      Progress& progress, const std::string& filter) {
   return guarded(cloud_path, [&] {
-    return readCubeReceiverOrThrow(cloud_path, number, channels, part, progress);
+    return readCubeReceiverOrThrow(cloud_path, number, channels, part, filter, progress);
   });
 }
 

@@ -42,10 +42,11 @@ CurveKey keyOf(const glm::vec3& position, std::uint64_t index, ReceiverOrder ord
 }  // namespace
 
 Result<GatherInput> GatherInput::open(const std::string& path, const std::string& channels,
-                                      const std::string& part) {
+                                      const std::string& part, const std::string& filter) {
   RowReaderOptions reading;
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(channels));
   reading.part = part;
+  reading.filter = filter;
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, reading));
   SURFEIT_ASSIGN_OR_RETURN(ReceiverMapping mapping,
                            ReceiverMapping::create(reader->element(), path));

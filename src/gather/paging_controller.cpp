@@ -226,7 +226,7 @@ void PagingController::advise(const Moment& now) {
                           double(nodes.budget_bytes) - double(surfels.budget_bytes);
   if (short_of <= 0) return;
   has_advised_ = true;
-  progress_.note(fmt::format(
+  progress_.inform(fmt::format(
       "memory: {:.0f} % of the pages read were read before and evicted; the budget of {} is below "
       "the working set, --memory {} would do",
       100 * double(repeated) / double(all), mebibytes(double(options_.memory_bytes)),

@@ -159,8 +159,8 @@ class RadianceJob {
 Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
                                        const std::string& result_path) {
   // Everything that can be refused is, before work starts
-  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons,
-                           PhotonCloud::open(inputs, options_.channels, options_.part));
+  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons, PhotonCloud::open(inputs, options_.channels,
+                                                                  options_.part, options_.filter));
   SURFEIT_RETURN_IF_ERROR(planThreads());
   // A name that cannot be written is refused before the work
   const std::uint64_t records = photons.recordCount();
@@ -200,7 +200,7 @@ Status RadianceJob::planThreads() {
   const std::uint64_t most = stats_.memory_bytes / 4 / threadBytes(options_);
   stats_.threads = static_cast<int>(std::clamp<std::uint64_t>(most, 1, std::uint64_t(wanted)));
   if (stats_.threads < wanted) {
-    progress_.note(fmt::format("{} of {} threads: a budget of {} MiB feeds no more", stats_.threads,
+    progress_.inform(fmt::format("{} of {} threads: a budget of {} MiB feeds no more", stats_.threads,
                                wanted, stats_.memory_bytes >> 20));
   }
   return {};

@@ -206,12 +206,15 @@ std::string PhotonMapping::describeDefect(const std::byte* row) const {
 }
 
 Result<PhotonCloud> PhotonCloud::open(const std::vector<std::string>& inputs,
-                                      const std::string& channels, const std::string& part) {
+                                      const std::string& channels, const std::string& part,
+                                      const std::string& filter) {
   if (inputs.empty()) return Status::invalidArgument("radiance: no photon cloud");
   PhotonCloud cloud;
   cloud.inputs_ = inputs;
   SURFEIT_ASSIGN_OR_RETURN(cloud.opening_.channels, parseChannelRenames(channels));
   cloud.opening_.part = part;
+  cloud.opening_.filter = filter;
+  cloud.opening_.selections = std::make_shared<RowSelections>();
   for (const std::string& path : inputs) {
     SURFEIT_ASSIGN_OR_RETURN(const PhotonFile file, PhotonFile::open(path, cloud.opening_));
     cloud.record_count_ += file.photons().count;

@@ -74,7 +74,8 @@ class PhotonCloud {
  public:
   // Opens every input to see that it holds photons. `channels` and `part` as in RadianceOptions.
   static Result<PhotonCloud> open(const std::vector<std::string>& inputs,
-                                  const std::string& channels = {}, const std::string& part = {});
+                                  const std::string& channels = {}, const std::string& part = {},
+                                  const std::string& filter = {});
 
   std::uint64_t recordCount() const { return record_count_; }
 

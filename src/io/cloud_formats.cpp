@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "io/byte_output.h"
 #include "io/formats/bgeo_ascii_reader.h"
@@ -14,6 +15,7 @@
 #include "io/formats/exr_reader.h"
 #include "io/formats/exr_writer.h"
 #include "io/formats/las_reader.h"
+#include "io/formats/las_writer.h"
 #include "io/formats/pcd_reader.h"
 #include "io/formats/pdb_reader.h"
 #include "io/formats/pdb_writer.h"
@@ -38,7 +40,7 @@ constexpr CloudFormat kFormats[] = {
     {"OpenEXR", ".exr", recognisesExr, openExr, createExr, false},
     {"PTC", ".ptc", recognisesPtc, openPtc, createPtc},
     {"OpenVDB", ".vdb", recognisesVdb, openVdb, createVdb, false},
-    {"LAS", "", recognisesLas, openLas, nullptr},
+    {"LAS", ".las", recognisesLas, openLas, createLas},
     {"PCD", "", recognisesPcd, openPcd, nullptr},
     {"PRT", ".prt", recognisesPrt, openPrt, createPrt},
     {"PRT 2", "", recognisesPrt2, openPrt2, nullptr},
@@ -61,7 +63,9 @@ constexpr std::string_view kPictureAdvice =
 constexpr OtherFormat kOtherFormats[] = {
     {kSceneMagic, "a Surfeit scene (.sft)", "give the cloud that it was indexed from"},
     {"surfeit-recipe"sv, "a recipe of `surfeit generate`", "give it to `surfeit index`"},
-    {"ASTM-E57"sv, "E57", "convert it to PLY or LAS first (e57unpack, CloudCompare)"},
+    {"ASTM-E57"sv, "E57",
+     "convert it to LAS or PLY first: `pdal translate IN.e57 OUT.las`, CloudCompare 2.12 or later, "
+     "or Python (`pip install pye57`)"},
     {"ICECACHE"sv, "a particle cache of Softimage ICE",
      "save it as .bgeo, .prt or .pdb (partconv)"},
     {"scf1"sv, "compressed geometry of Houdini (.bgeo.sc)",
@@ -129,6 +133,15 @@ bool hasExtension(std::string_view path, std::string_view extensions) {
   return false;
 }
 
+// Tells apart what a filter takes of files.
+std::string selectionKey(const std::string& path, const RowReaderOptions& options) {
+  std::string key = path + '\n' + options.part + '\n' + options.filter;
+  for (const ChannelRename& rename : options.channels) {
+    key += '\n' + rename.from + '=' + rename.to;
+  }
+  return key;
+}
+
 }  // namespace
 
 std::span<const CloudFormat> cloudFormats() { return kFormats; }
@@ -152,7 +165,8 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
     }
     SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, format.open(path, options));
     SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element(), path));
-    return reader;
+    return filterRows(std::move(reader), options.filter, selectionKey(path, options),
+                      options.selections.get());
   }
   return unknownFormat(path, first_bytes);
 }
@@ -164,9 +178,11 @@ std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std:
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
                                                    const RowWriterOptions& options) {
   const std::string_view name = withoutCompression(path);
+  RowWriterOptions writing = options;
+  if (writing.like != nullptr) writing.like = &writing.like->file();
   for (const CloudFormat& format : kFormats) {
     if (format.create != nullptr && hasExtension(name, format.extensions)) {
-      return format.create(path, options);
+      return format.create(path, writing);
     }
   }
   return Status::invalidArgument(fmt::format(

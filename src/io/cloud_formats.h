@@ -12,6 +12,7 @@
 #include "io/byte_input.h"
 #include "io/channels.h"
 #include "io/file.h"
+#include "io/filtered_reader.h"
 #include "io/row_reader.h"
 #include "io/row_writer.h"
 #include "surfeit/status.h"
@@ -25,6 +26,11 @@ struct RowReaderOptions {
   // For formats with several parts (grids of a .vdb, layers of an .exr, elements of a .ply): the
   // one to read, by name. Empty: the first that holds a cloud.
   std::string part;
+  // Which rows are read (io/row_filter.h), under the names that `channels` give. Empty: all but
+  // those that the format marks as not to be used.
+  std::string filter;
+  // For files that are opened more than once with the same options, so that a filter counts once.
+  std::shared_ptr<RowSelections> selections;
 };
 
 // One row of the table. A format that is only read has no `create`, one that is only written no

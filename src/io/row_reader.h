@@ -15,6 +15,19 @@
 
 namespace surfeit {
 
+// Rows that a reader's format marks as not to be used: they are left out unless a user says which
+// to take.
+struct RowExclusions {
+  struct Kind {
+    std::string name;       // "withheld"
+    std::string condition;  // that holds for what is left out (io/row_filter.h)
+  };
+  std::vector<Kind> kinds;
+  // What the conditions speak of, with its places in a row; also in bytes that no property of the
+  // element takes.
+  std::vector<PlyProperty> properties;
+};
+
 // One thread at a time. Errors name the file, the place (record or byte), what was found and what
 // was expected; kCorruption for what the file holds, kIoError for what the system refused. After a
 // failure every read fails the same way until rewind() or seekRow(). Takes a few MiB at most,
@@ -48,6 +61,11 @@ class RowReader {
   // The next readRows begins with row `row`, at most the count. kInvalidArgument unless
   // isSeekable().
   virtual Status seekRow(std::uint64_t row);
+
+  // What readRows returns and is better left out (io/filtered_reader.h); mostly nothing.
+  virtual RowExclusions exclusions() const { return {}; }
+  // The reader of the file itself, where this one takes rows of another.
+  virtual const RowReader& file() const { return *this; }
 };
 
 // kInvalidArgument when an element has no properties, since all channels are renamed to nothing.

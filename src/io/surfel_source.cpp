@@ -106,6 +106,10 @@ Result<bool> isRecipe(const std::string& path) {
 Result<std::unique_ptr<SurfelSource>> openSurfelSource(const std::string& path, bool strict,
                                                        const RowReaderOptions& options) {
   SURFEIT_ASSIGN_OR_RETURN(const bool is_recipe, isRecipe(path));
+  if (is_recipe && !options.filter.empty()) {
+    return Status::invalidArgument(
+        fmt::format("{}: a generated scene, which has no rows to filter", path));
+  }
   if (is_recipe) return openRecipeSource(path);
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, options));
   return makeSurfelSource(std::move(reader), strict);

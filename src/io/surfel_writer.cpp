@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -19,6 +21,17 @@ struct SurfelWriter::State {
   std::unique_ptr<RowWriter> file;
   SurfelRows packing;
   std::vector<std::byte> rows;
+  std::string path;
+  Progress* progress = nullptr;
+  std::set<std::string> told;  // notes of the file
+
+  // What the file has not said yet.
+  void note() {
+    if (progress == nullptr) return;
+    for (const std::string& line : file->notes()) {
+      if (told.insert(line).second) progress->note(path + ": " + line);
+    }
+  }
 };
 
 Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudChannels& channels,
@@ -26,10 +39,10 @@ Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudCh
   SurfelRows packing(channels, origin);
   options.properties = packing.properties();
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> file, createRowWriter(path, options));
-  if (options.progress != nullptr) {
-    for (const std::string& note : file->notes()) options.progress->note(path + ": " + note);
-  }
-  return SurfelWriter(std::make_unique<State>(State{std::move(file), std::move(packing), {}}));
+  SurfelWriter writer(std::make_unique<State>(
+      State{std::move(file), std::move(packing), {}, path, options.progress, {}}));
+  writer.state_->note();
+  return writer;
 }
 
 SurfelWriter::SurfelWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -51,6 +64,10 @@ Status SurfelWriter::write(std::span<const Surfel> surfels) {
   return {};
 }
 
-Status SurfelWriter::finish() { return state_->file->finish(); }
+Status SurfelWriter::finish() {
+  SURFEIT_RETURN_IF_ERROR(state_->file->finish());
+  state_->note();
+  return {};
+}
 
 }  // namespace surfeit

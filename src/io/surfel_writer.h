@@ -17,8 +17,8 @@ namespace surfeit {
 class SurfelWriter {
  public:
   // `channels` says which optional properties the file gets. `options` has the rest; its
-  // properties are set here, and its progress is told what the format cannot keep. Surfels are
-  // counted from `origin`.
+  // properties are set here, and its progress is told what the format cannot keep, here and in
+  // finish(). Surfels are counted from `origin`.
   static Result<SurfelWriter> create(const std::string& path, const CloudChannels& channels,
                                      RowWriterOptions options = {},
                                      const glm::dvec3& origin = glm::dvec3(0));

@@ -179,6 +179,8 @@ Status Indexer::openInputs() {
   RowReaderOptions reading;
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options_.channels));
   reading.part = options_.part;
+  reading.filter = options_.filter;
+  reading.selections = std::make_shared<RowSelections>();
   SURFEIT_ASSIGN_OR_RETURN(
       reader_,
       CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes), reading));
@@ -445,7 +447,7 @@ Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std
     threads = threadsWithin(options.memory_bytes, {options.leaf_capacity, options.full_precision},
                             available);
     if (threads < available) {
-      progress.note(fmt::format("{} of {} threads: a budget of {} MiB feeds no more", threads,
+      progress.inform(fmt::format("{} of {} threads: a budget of {} MiB feeds no more", threads,
                                 available, options.memory_bytes >> 20));
     }
   }

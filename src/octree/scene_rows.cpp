@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/filtered_reader.h"
 #include "io/formats/property_renames.h"
 #include "io/surfel_rows.h"
 #include "octree/parallel.h"
@@ -141,7 +142,11 @@ Result<bool> isScene(const std::string& path) {
 
 Result<std::unique_ptr<RowReader>> readSceneAsCloud(SceneFile scene,
                                                     const RowReaderOptions& options) {
-  return SceneRowReader::create(std::move(scene), options);
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader,
+                           SceneRowReader::create(std::move(scene), options));
+  if (options.filter.empty()) return reader;
+  const std::string key = reader->path() + '\n' + options.filter;
+  return filterRows(std::move(reader), options.filter, key, options.selections.get());
 }
 
 Result<std::unique_ptr<RowReader>> openCloud(const std::string& path,

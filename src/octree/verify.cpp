@@ -203,8 +203,10 @@ Result<SceneInfo> readSceneInfo(const std::string& path) {
       std::uint64_t{info.node_pages} * header.node_group_capacity * sizeof(Node);
   info.surfel_cache_bytes =
       std::uint64_t{info.surfel_pages} * header.surfel_group_capacity * sizeof(Surfel);
-  info.min = header.bounds.min;
-  info.max = header.bounds.max;
+  const Bounds3d bounds = movedBounds(header.bounds, header.origin);
+  info.min = bounds.min;
+  info.max = bounds.max;
+  info.origin = header.origin;
   info.channels = header.channels;
   info.full_precision = header.full_precision;
   for (int level = 0; level <= kCurveLevels; ++level) {

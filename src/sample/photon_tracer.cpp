@@ -16,7 +16,9 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <set>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "core/job_limits.h"
@@ -345,7 +347,13 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
     writing.progress = &progress;
     SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
                              createRowWriter(output, writing));
-    for (const std::string& note : writer->notes()) progress.note(output + ": " + note);
+    std::set<std::string> told;
+    const auto noteOfWriter = [&] {
+      for (const std::string& note : writer->notes()) {
+        if (told.insert(note).second) progress.note(output + ": " + note);
+      }
+    };
+    noteOfWriter();
     const PhotonTracer tracer(mesh, scene, emitters, options);
     SURFEIT_RETURN_IF_ERROR(writePhotons(tracer, options, stats.threads, *writer, progress, stats));
     if (stats.stored == 0) {
@@ -353,6 +361,7 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
           "{}: none of {} photons met the front of a surface", meshes.front(), stats.emitted));
     }
     SURFEIT_RETURN_IF_ERROR(writer->finish());
+    noteOfWriter();
     stats.trace_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

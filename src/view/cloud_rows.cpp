@@ -43,6 +43,7 @@ class SceneRows final : public CloudRows {
     return reader_->readRows(kBatchRows, buffer_);
   }
   std::optional<Bounds3d> statedBounds() const override {
+    if (element().count < header_.surfel_count) return std::nullopt;  // filtered
     return movedBounds(header_.bounds, header_.origin);
   }
 

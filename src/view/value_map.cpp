@@ -23,7 +23,7 @@ ValueMap chooseValueMap(const std::optional<glm::dvec2>& range, const Channel& c
       return {};
     case ValueKind::kScalar:
       if (!(extent.lowest <= extent.highest)) return {};
-      progress.note(fmt::format("channel {}: black is {:.6g}, white is {:.6g}", channel.name(),
+      progress.inform(fmt::format("channel {}: black is {:.6g}, white is {:.6g}", channel.name(),
                                 extent.lowest, extent.highest));
       return stretch(extent.lowest, extent.highest);
     case ValueKind::kNormal:

@@ -183,6 +183,7 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
   RowReaderOptions reading;
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options.channels));
   reading.part = options.part;
+  reading.filter = options.filter;
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<CloudRows> rows, openCloudRows(input, reading));
   if (!options.brick.empty()) {
     SURFEIT_ASSIGN_OR_RETURN(rows,

@@ -41,6 +41,9 @@ struct ViewOptions {
   // Channels of the cloud to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of a file
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels, part;
+  // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
+  // that the format marks as not to be used.
+  std::string filter;
   // A brick map of whose values the cloud takes those of its surfels (view/brick_rows.h), over that
   // width or over each surfel's diameter; empty: none.
   std::string brick;

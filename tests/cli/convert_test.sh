@@ -12,7 +12,7 @@ makePoints() {
 everyFormatComesBack() {
   local extension
   generate city.ply --surfels 3k
-  for extension in ply ply.gz ply.zst ptc ptc.gz vdb prt bgeo pdb xyz csv.zst; do
+  for extension in ply ply.gz ply.zst ptc ptc.gz vdb las prt bgeo pdb xyz csv.zst; do
     run 0 convert city.ply -o "city.$extension"
     run 0 info "city.$extension"
     says radiosity
@@ -45,6 +45,41 @@ cloudsMergeMoveAndThin() {
   run 0 convert d.ply -o d.csv --quiet
   [[ $(tail -n 1 d.csv) == "1,2,3,0,0" ]] || fail "$(cat d.csv)"
   [[ -z $said ]] || fail "said: $said"
+}
+
+# A scan keeps its points through all commands, but for those that are withheld, noise or filtered.
+scansAreFilteredAndWritten() {
+  generate city.ply --surfels 3k
+  run 0 convert city.ply -o plain.csv --keep position,normal,radiosity,radius --quiet
+  awk -F, 'NR == 1 { print $0 ",classification,withheld,return_number" }
+    NR > 1 { print $0 "," (NR % 10 == 0 ? 7 : 2) "," (NR % 100 == 1) "," 1 + NR % 2 }' \
+    plain.csv > scan.csv
+  run 0 convert scan.csv -o scan.las
+  says "points move by up to"
+  run 0 info scan.las
+  says "330 of 3000 points are left out: 30 withheld, 300 of noise"
+  run 0 info scan.las --filter "return == 1 and class != 7 and not withheld"
+  says "1,200 points"
+  run 0 index scan.las -o scan.sft --filter "class == 2"
+  run 0 info scan.sft
+  says "2,700"
+  run 2 index scan.las -o none.sft --filter "clas == 2"
+  says "filter: at 1: found 'clas'" classification
+  run 2 info scan.sft --filter true
+  run 2 view scan.sft -o none.png --filter true
+  run 0 view scan.las -o scan.png --size 64x64 --filter "class == 2"
+  run 0 gather scan.sft scan.las -o lit.las --filter true --max-solid-angle 0.1
+  run 0 info lit.las --filter true
+  says "3,000 points" "occlusion      float occlusion" return_number "normal         float nx ny nz"
+  run 0 gather scan.sft scan.las -o lit.csv --max-solid-angle 0.1 --filter "return == 2"
+  [[ $(wc -l < lit.csv) == 1501 ]] || fail "$(wc -l lit.csv)"
+  run 0 brick lit.las -o lit.vdb --filter "return == 1"
+  run 0 tune scan.sft lit.las --filter "return == 1"
+  printf 'v 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 0\nf 1 2 3 4\n' > square.obj
+  run 0 sample square.obj -o square.las --count 500
+  says "points move by up to"
+  run 0 info square.las
+  says "LAS 1.4 point format 6"
 }
 
 # What one program calls so is read as what another needs, by every command.

@@ -8,53 +8,20 @@
 #include <vector>
 
 #include "io/byte_output.h"
+#include "io/compressed_files.h"
 #include "io/formats/las_reader.h"
+#include "io/las_test_file.h"
 #include "io/row_damage_test.h"
 
 namespace surfeit {
 namespace {
 
+using testing::AllOf;
+using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
-
-constexpr std::size_t kRecordBytes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
-constexpr std::size_t kColorAt[] = {0, 0, 20, 28, 0, 28, 0, 30, 30, 0, 30};
-
-template <typename T>
-void put(std::string& text, std::size_t at, T value) {
-  std::memcpy(&text[at], &value, sizeof value);
-}
-
-// A file of `count` points: point i is at (i, -2 i, 3) of its grid, intensity i, class i mod 32.
-std::string makeLas(unsigned minor, unsigned format, std::uint32_t count, std::size_t extra = 0) {
-  const std::size_t header = minor < 4 ? 227 : 375;
-  const std::size_t record = kRecordBytes[format] + extra;
-  std::string text(header + count * record, '\0');
-  text.replace(0, 4, "LASF");
-  put(text, 24, char(1));
-  put(text, 25, char(minor));
-  put(text, 94, std::uint16_t(header));
-  put(text, 96, std::uint32_t(header));
-  put(text, 104, char(format));
-  put(text, 105, std::uint16_t(record));
-  if (format <= 5) put(text, 107, count);
-  if (minor >= 4) put(text, 247, std::uint64_t(count));
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    put(text, 131 + 8 * axis, 0.01);
-    put(text, 155 + 8 * axis, 1e6 * double(axis + 1));
-  }
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const std::size_t at = header + i * record;
-    put(text, at, std::int32_t(i));
-    put(text, at + 4, -2 * std::int32_t(i));
-    put(text, at + 8, std::int32_t(3));
-    put(text, at + 12, std::uint16_t(i));
-    put(text, at + (format <= 5 ? 15 : 16), char(i % 32 | (format <= 5 ? 0x60 : 0)));
-    for (std::size_t c = 0; kColorAt[format] != 0 && c < 3; ++c) {
-      put(text, at + kColorAt[format] + 2 * c, std::uint16_t(60000 + c));
-    }
-  }
-  return text;
-}
+using testing::IsEmpty;
+using testing::Not;
 
 class LasTest : public RowFileTest {
  protected:
@@ -63,6 +30,27 @@ class LasTest : public RowFileTest {
     return openOk(openLas, path("a.las"), options);
   }
   std::string refusalOf(const std::string& text) { return refusal(openLas, text); }
+
+  // The properties of rows of a point format.
+  static std::string rowOf(unsigned format, std::size_t extra = 0) {
+    std::string text = "double x, double y, double z, ushort intensity, uchar classification";
+    if (kLasColorAt[format] != 0) text += ", ushort red, ushort green, ushort blue";
+    text +=
+        ", uchar return_number, uchar number_of_returns, uchar scan_direction_flag, uchar "
+        "edge_of_flight_line, uchar synthetic, uchar key_point, uchar withheld, ";
+    text +=
+        format <= 5 ? "char scan_angle" : "uchar overlap, uchar scanner_channel, float scan_angle";
+    text += ", uchar user_data, ushort point_source_id";
+    if (format != 0 && format != 2) text += ", double gps_time";
+    if (format == 8 || format == 10) text += ", ushort nir";
+    if (format == 4 || format == 5 || format >= 9) {
+      text +=
+          ", uchar wavepacket_index, double wavepacket_offset, uint wavepacket_size, float "
+          "return_point_wave_location, float x_t, float y_t, float z_t";
+    }
+    for (std::size_t i = 0; i < extra; ++i) text += ", uchar extra_bytes_" + std::to_string(i);
+    return text;
+  }
 };
 
 TEST_F(LasTest, EveryPointFormatIsRead) {
@@ -73,17 +61,14 @@ TEST_F(LasTest, EveryPointFormatIsRead) {
       ASSERT_NE(reader, nullptr) << format;
       EXPECT_EQ(reader->formatName(),
                 "LAS 1." + std::to_string(minor) + " point format " + std::to_string(format));
-      EXPECT_EQ(
-          describeRow(reader->element()),
-          std::string("double x, double y, double z, ushort intensity, uchar classification") +
-              (kColorAt[format] ? ", ushort red, ushort green, ushort blue" : ""));
+      EXPECT_EQ(describeRow(reader->element()), rowOf(format, extra));
       const std::vector<std::byte> rows = readAllRows(*reader);
       EXPECT_EQ(valueOf(*reader, rows, 39, "x"), 39 * 0.01 + 1e6);
       EXPECT_EQ(valueOf(*reader, rows, 39, "y"), -78 * 0.01 + 2e6);
       EXPECT_EQ(valueOf(*reader, rows, 39, "z"), 3 * 0.01 + 3e6);
       EXPECT_EQ(valueOf(*reader, rows, 39, "intensity"), 39);
       EXPECT_EQ(valueOf(*reader, rows, 39, "classification"), 7);
-      if (kColorAt[format]) {
+      if (kLasColorAt[format]) {
         EXPECT_EQ(valueOf(*reader, rows, 39, "blue"), 60002);
       }
       ASSERT_TRUE(reader->rewind().ok());
@@ -96,34 +81,41 @@ TEST_F(LasTest, EveryVersionIsRead) {
   for (unsigned minor = 0; minor <= 4; ++minor) {
     EXPECT_EQ(openGood(makeLas(minor, 0, 3))->element().count, 3u);
   }
-  EXPECT_THAT(refusalOf(makeLas(5, 0, 3)), HasSubstr("found version 1.5, expected 1.0 to 1.4"));
+  std::string text = makeLas(5, 6, 3);
+  putLas(text, 391, std::uint16_t(2));
+  const auto reader = openGood(text);
+  EXPECT_EQ(reader->formatName(), "LAS 1.5 point format 6");
+  EXPECT_THAT(reader->notes(), ElementsAre(HasSubstr("gps_time counts from the time offset")));
+  EXPECT_THAT(refusalOf(makeLas(5, 0, 3)),
+              HasSubstr("point format 0, expected 6 to 10 in version"));
+  EXPECT_THAT(refusalOf(makeLas(6, 6, 3)), HasSubstr("found version 1.6, expected 1.0 to 1.5"));
 }
 
 TEST_F(LasTest, CountOf64BitsGoesFirst) {
   std::string text = makeLas(4, 3, 5);
-  put(text, 107, std::uint32_t(2));
+  putLas(text, 107, std::uint32_t(2));
   EXPECT_EQ(openGood(text)->element().count, 5u);
-  put(text, 247, std::uint64_t(0));
-  EXPECT_EQ(openGood(text)->element().count, 2u);
-  put(text, 247, std::uint64_t(1) << 40);
+  putLas(text, 247, std::uint64_t(0));
+  EXPECT_EQ(openGood(text)->element().count, 5u);  // as many as there are, whatever is counted
+  putLas(text, 247, std::uint64_t(1) << 40);
   EXPECT_THAT(refusalOf(text), HasSubstr("hold 5 records of 34 bytes, expected 1099511627776"));
-  put(text, 247, ~std::uint64_t(0));
+  putLas(text, 247, ~std::uint64_t(0));
   EXPECT_THAT(refusalOf(text), HasSubstr("expected 18446744073709551615"));
 }
 
 TEST_F(LasTest, CompressedPointsAreRefusedWithAdvice) {
   for (const int bit : {0x80, 0x40, 0xC0}) {
     std::string text = makeLas(2, 3, 5);
-    put(text, 104, char(3 | bit));
+    putLas(text, 104, char(3 | bit));
     EXPECT_TRUE(recognisesLas(text));
-    EXPECT_THAT(refusalOf(text), HasSubstr("decompress it first (laszip"));
+    EXPECT_THAT(refusalOf(text), AllOf(HasSubstr("found LAZ"), HasSubstr("`pdal translate")));
   }
 }
 
 TEST_F(LasTest, EveryTruncationIsFound) {
   for (const unsigned minor : {2u, 4u}) {
     const std::string whole = makeLas(minor, 3, 3);
-    EXPECT_EQ(readAllRows(*openGood(whole)).size(), 3 * 33u);
+    EXPECT_EQ(readAllRows(*openGood(whole)).size() % 3, 0u);
     expectEveryTruncationFails(openLas, whole, whole.size());
     expectDamageIsHarmless(openLas, whole, 3);
   }
@@ -132,7 +124,7 @@ TEST_F(LasTest, EveryTruncationIsFound) {
 TEST_F(LasTest, DamagedHeadersAreRefused) {
   const auto patched = [](std::size_t at, auto value) {
     std::string text = makeLas(2, 3, 3);
-    put(text, at, value);
+    putLas(text, at, value);
     return text;
   };
   EXPECT_THAT(refusalOf(patched(0, 'l')), HasSubstr("found 'lASF', expected 'LASF'"));
@@ -165,7 +157,257 @@ TEST_F(LasTest, RenamesMapAndDropChannels) {
   options.channels = {{"color", "albedo"}, {"intensity", "-"}, {"classification", "group"}};
   EXPECT_EQ(describeRow(openGood(makeLas(2, 2, 3), options)->element()),
             "double x, double y, double z, uchar group, ushort albedo_r, ushort albedo_g, "
-            "ushort albedo_b");
+            "ushort albedo_b, uchar return_number, uchar number_of_returns, uchar "
+            "scan_direction_flag, uchar edge_of_flight_line, uchar synthetic, uchar key_point, "
+            "uchar withheld, char scan_angle, uchar user_data, ushort point_source_id");
+}
+
+TEST_F(LasTest, EveryFieldOfAPointIsRead) {
+  std::string old = makeLas(2, 3, 2);
+  const std::size_t at = getLas<std::uint32_t>(old, 96) + 34;
+  putLas(old, at + 14, char(3 | 5 << 3 | 1 << 6));
+  putLas(old, at + 15, char(9 | 1 << 5 | 1 << 7));
+  putLas(old, at + 16, char(-17));
+  putLas(old, at + 17, char(99));
+  putLas(old, at + 18, std::uint16_t(60001));
+  putLas(old, at + 20, 123.25);
+  {
+    const auto reader = openGood(old);
+    const std::vector<std::byte> rows = readAllRows(*reader);
+    for (const auto& [name, value] :
+         std::vector<std::pair<std::string, double>>{{"return_number", 3},
+                                                     {"number_of_returns", 5},
+                                                     {"scan_direction_flag", 1},
+                                                     {"edge_of_flight_line", 0},
+                                                     {"classification", 9},
+                                                     {"synthetic", 1},
+                                                     {"key_point", 0},
+                                                     {"withheld", 1},
+                                                     {"scan_angle", -17},
+                                                     {"user_data", 99},
+                                                     {"point_source_id", 60001},
+                                                     {"gps_time", 123.25}}) {
+      EXPECT_EQ(valueOf(*reader, rows, 1, name), value) << name;
+    }
+  }
+  std::string modern = makeLas(4, 10, 2);
+  const std::size_t to = getLas<std::uint32_t>(modern, 96) + 67;
+  putLas(modern, to + 14, char(11 | 13 << 4));
+  putLas(modern, to + 15, char(2 | 8 | 3 << 4 | 1 << 7));
+  putLas(modern, to + 16, char(203));
+  putLas(modern, to + 17, char(8));
+  putLas(modern, to + 18, std::int16_t(-2500));
+  putLas(modern, to + 20, std::uint16_t(7));
+  putLas(modern, to + 22, -0.5);
+  putLas(modern, to + 36, std::uint16_t(4321));
+  putLas(modern, to + 38, char(200));
+  putLas(modern, to + 39, std::uint64_t(1) << 40);
+  putLas(modern, to + 47, std::uint32_t(3000000000));
+  for (int i = 0; i < 4; ++i) putLas(modern, to + 51 + 4 * std::size_t(i), float(i) + 0.5f);
+  const auto reader = openGood(modern);
+  const std::vector<std::byte> rows = readAllRows(*reader);
+  for (const auto& [name, value] :
+       std::vector<std::pair<std::string, double>>{{"return_number", 11},
+                                                   {"number_of_returns", 13},
+                                                   {"scan_direction_flag", 0},
+                                                   {"edge_of_flight_line", 1},
+                                                   {"classification", 203},
+                                                   {"synthetic", 0},
+                                                   {"key_point", 1},
+                                                   {"withheld", 0},
+                                                   {"overlap", 1},
+                                                   {"scanner_channel", 3},
+                                                   {"scan_angle", -15},
+                                                   {"user_data", 8},
+                                                   {"point_source_id", 7},
+                                                   {"gps_time", -0.5},
+                                                   {"nir", 4321},
+                                                   {"wavepacket_index", 200},
+                                                   {"wavepacket_offset", 1099511627776.0},
+                                                   {"wavepacket_size", 3e9},
+                                                   {"return_point_wave_location", 0.5},
+                                                   {"x_t", 1.5},
+                                                   {"y_t", 2.5},
+                                                   {"z_t", 3.5}}) {
+    EXPECT_EQ(valueOf(*reader, rows, 1, name), value) << name;
+  }
+}
+
+// --- How many points there are
+
+TEST_F(LasTest, CountsThatAreTooSmallAreCorrectedAndTold) {
+  for (const unsigned format : {0u, 3u, 7u}) {
+    for (const std::uint32_t counted : {0u, 1u, 39u}) {
+      std::string text = makeLas(format < 6 ? 2 : 4, format, 40);
+      putLas(text, 107, counted);
+      if (format >= 6) putLas(text, 247, std::uint64_t(counted));
+      const auto reader = openGood(text);
+      EXPECT_EQ(reader->element().count, 40u);
+      EXPECT_THAT(reader->notes(), ElementsAre("the header counts " + std::to_string(counted) +
+                                               " points, the file has 40: all are read"));
+      EXPECT_EQ(valueOf(*reader, readAllRows(*reader), 39, "x"), 39 * 0.01 + 1e6);
+      write("a.las.gz", gzipped(text));
+      EXPECT_EQ(openOk(openLas, path("a.las.gz"))->element().count, 40u);
+    }
+  }
+}
+
+TEST_F(LasTest, WhatStandsBehindThePointsIsNoPoint) {
+  std::string text = makeLas(4, 6, 40);
+  putLas(text, 235, std::uint64_t(text.size()));
+  putLas(text, 243, std::uint32_t(1));
+  const std::string record = lasRecord("somebody", 5, std::string(300, 'x'), true);
+  EXPECT_EQ(openGood(text + record)->element().count, 40u);
+  putLas(text, 247, std::uint64_t(30));
+  EXPECT_EQ(openGood(text + record)->element().count, 40u);
+  // Room that was made in advance
+  for (const std::size_t zeros : {1u, 26u, 27u, 4000u}) {
+    const auto reader = openGood(makeLas(2, 2, 40) + std::string(zeros, '\0'));
+    EXPECT_EQ(reader->element().count, 40u);
+    EXPECT_THAT(reader->notes(), ElementsAre(HasSubstr(std::to_string(zeros) + " bytes behind")));
+  }
+  // What lies elsewhere, and fills no points
+  std::string bounded = makeLas(2, 2, 40);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    putLas(bounded, 179 + 16 * axis, 1e6 * double(axis + 1) + 1);
+    putLas(bounded, 187 + 16 * axis, 1e6 * double(axis + 1) - 1);
+  }
+  EXPECT_EQ(openGood(bounded + std::string(1000, 'x'))->element().count, 40u);
+}
+
+TEST_F(LasTest, CountsThatAreTooLargeSayWhatToDo) {
+  std::string text = makeLas(2, 0, 5);
+  putLas(text, 107, std::uint32_t(6));
+  EXPECT_THAT(refusalOf(text), AllOf(HasSubstr("hold 5 records of 20 bytes, expected 6"),
+                                     HasSubstr("copy or export it again")));
+}
+
+// --- What is left out
+
+TEST_F(LasTest, WithheldPointsAndNoiseAreLeftOut) {
+  std::string text = makeLas(2, 2, 100);  // classes 0 to 31, again and again
+  const std::size_t at = getLas<std::uint32_t>(text, 96);
+  for (const std::size_t i : {0, 7, 50}) text[at + 26 * i + 15] |= char(0x80);
+  write("a.las", text);
+  const auto openWith = [&](const std::string& filter, const std::string& renames = "") {
+    RowReaderOptions options;
+    options.filter = filter;
+    options.channels = *parseChannelRenames(renames);
+    return openOk(openRowReader, path("a.las"), options);
+  };
+  const auto reader = openWith("");
+  // Two of class 7 and two of 18 besides those that are withheld
+  EXPECT_EQ(reader->element().count, 100u - 3 - 2 - 2);
+  EXPECT_THAT(reader->notes(),
+              ElementsAre("7 of 100 points are left out: 3 withheld, 4 of noise (classes 7 and "
+                          "18); --filter true keeps them"));
+  expectReaderKeepsContract(*reader);
+  EXPECT_EQ(openWith("true")->element().count, 100u);
+  EXPECT_EQ(openWith("class == 7")->element().count, 3u);
+  EXPECT_EQ(openWith("not withheld")->element().count, 97u);
+  // Also where these channels are called otherwise, or dropped
+  EXPECT_EQ(openWith("", "classification=group,withheld=-")->element().count, 93u);
+  EXPECT_EQ(openWith("", "classification=-,withheld=-,user_data=withheld")->element().count, 93u);
+  EXPECT_EQ(openWith("group != 7", "classification=group")->element().count, 97u);
+}
+
+TEST_F(LasTest, NoiseOfModernFormatsIsLeftOut) {
+  std::string text = makeLas(4, 7, 64);
+  const std::size_t at = getLas<std::uint32_t>(text, 96);
+  text[at + 36 * 3 + 15] = 4;
+  text[at + 36 * 4 + 16] = char(18 + 128);  // class 146 is a user's
+  write("a.las", text);
+  EXPECT_EQ(openOk(openRowReader, path("a.las"))->element().count, 64u - 1 - 2 - 2);
+}
+
+// --- Extra bytes
+
+TEST_F(LasTest, ExtraBytesAreChannels) {
+  std::string text = makeLas(4, 6, 3, 2 + 4 + 8 + 1 + 6 + 8 + 4);
+  const std::string records = lasDescriptor("Amplitude", 3, 8 | 16, 0.01, 5) +
+                              lasDescriptor("Height", 9) + lasDescriptor("stamp", 7) +
+                              lasDescriptor("intensity", 1) + lasDescriptor("rgb16", 23) +
+                              lasDescriptor("NormalX", 10) + lasDescriptor("", 0, 4);
+  text = withRecords(text, {lasRecord("LASF_Spec", 4, records)});
+  const std::size_t at = getLas<std::uint32_t>(text, 96) + 63 + 30;
+  putLas(text, at, std::uint16_t(1234));
+  putLas(text, at + 2, 2.5f);
+  putLas(text, at + 6, std::uint64_t(1) << 52);
+  putLas(text, at + 14, char(77));
+  for (std::size_t i = 0; i < 3; ++i) putLas(text, at + 15 + 2 * i, std::uint16_t(100 + i));
+  putLas(text, at + 21, -0.5);
+  putLas(text, at + 29, char(9));
+  const auto reader = openGood(text);
+  EXPECT_EQ(describeRow(reader->element()),
+            rowOf(6) +
+                ", double Amplitude, float Height, double stamp, uchar intensity_2, ushort "
+                "rgb16_x, ushort rgb16_y, ushort rgb16_z, double nx, uchar extra_bytes_0, "
+                "uchar extra_bytes_1, uchar extra_bytes_2, uchar extra_bytes_3");
+  const std::vector<std::byte> rows = readAllRows(*reader);
+  for (const auto& [name, value] :
+       std::vector<std::pair<std::string, double>>{{"Amplitude", 1234 * 0.01 + 5},
+                                                   {"Height", 2.5},
+                                                   {"stamp", 4503599627370496.0},
+                                                   {"intensity_2", 77},
+                                                   {"rgb16_z", 102},
+                                                   {"nx", -0.5},
+                                                   {"extra_bytes_0", 9}}) {
+    EXPECT_EQ(valueOf(*reader, rows, 1, name), value) << name;
+  }
+  EXPECT_THAT(reader->notes(), ElementsAre(HasSubstr("integers of 64 bits become float64"),
+                                           HasSubstr("'intensity' are called intensity_2")));
+  RowReaderOptions options;
+  options.channels = *parseChannelRenames("NormalX=slope,Amplitude=-,rgb16=albedo");
+  EXPECT_THAT(describeRow(openOk(openLas, path("a.las"), options)->element()),
+              AllOf(HasSubstr("ushort albedo_b, double slope"), Not(HasSubstr("Amplitude"))));
+}
+
+TEST_F(LasTest, ExtraBytesThatDoNotFitAreTold) {
+  const auto notesOf = [&](const std::string& descriptors, std::size_t extra) {
+    return openGood(withRecords(makeLas(4, 6, 3, extra), {lasRecord("LASF_Spec", 4, descriptors)}))
+        ->notes();
+  };
+  EXPECT_THAT(notesOf(lasDescriptor("a", 10), 4), ElementsAre(HasSubstr("points are too short")));
+  EXPECT_THAT(notesOf(lasDescriptor("a", 77), 4), ElementsAre(HasSubstr("of an unknown type")));
+  EXPECT_THAT(notesOf(lasDescriptor("a", 3, 8, 0), 2), ElementsAre(HasSubstr("scale 0")));
+  EXPECT_THAT(notesOf("", 100), ElementsAre(HasSubstr("100 bytes of every point without a")));
+  EXPECT_THAT(notesOf(lasDescriptor("a", 1).substr(0, 100), 1), IsEmpty());
+}
+
+// --- Coordinates
+
+TEST_F(LasTest, CoordinateReferenceSystemsAreTold) {
+  const auto crsOf = [&](const std::vector<std::string>& records) {
+    return openGood(withRecords(makeLas(4, 6, 3), records))->comments();
+  };
+  EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 2112, std::string("PROJCS[\"a\",\n  B]\0", 18))}),
+              ElementsAre("crs PROJCS[\"a\", B]"));
+  const auto keys = [](const std::vector<std::uint16_t>& words) {
+    return std::string(reinterpret_cast<const char*>(words.data()), 2 * words.size());
+  };
+  EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 34735,
+                               keys({1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32610}))}),
+              ElementsAre("crs EPSG:32610"));
+  EXPECT_THAT(
+      crsOf({lasRecord("LASF_Projection", 34735,
+                       keys({1, 1, 0, 3, 2048, 0, 1, 4326, 4096, 0, 1, 5703, 1026, 34737, 8, 0})),
+             lasRecord("LASF_Projection", 34737, "WGS  84|")}),
+      ElementsAre("crs geographic EPSG:4326+5703 WGS 84"));
+  EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 34735, keys({1, 1, 0, 9, 3072, 0, 1, 32767}))}),
+              ElementsAre("crs by GeoTIFF keys without a code"));
+  EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 34735, "x")}), IsEmpty());
+}
+
+TEST_F(LasTest, RecordsOfVariableLengthMayBeDamaged) {
+  std::string text = withRecords(makeLas(4, 6, 3), {lasRecord("LASF_Spec", 0, "classes")});
+  EXPECT_THAT(openGood(text)->notes(), ElementsAre(HasSubstr("kept only by .las: 'LASF_Spec' 0")));
+  for (const std::uint16_t length : {8, 60000}) {
+    putLas(text, 375 + 20, length);
+    EXPECT_THAT(openGood(text)->notes(), ElementsAre(HasSubstr("end early: 0 of 1 are read")));
+  }
+  putLas(text, 375 + 20, std::uint16_t(7));
+  putLas(text, 100, ~std::uint32_t(0));
+  EXPECT_THAT(openGood(text)->notes(), Contains(HasSubstr("1 of 4294967295 are read")));
 }
 
 TEST(LasSamples, HoldWhatTheirReadmeSays) {

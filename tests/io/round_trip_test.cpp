@@ -55,7 +55,8 @@ double allowedError(const std::string& extension, const std::string& channel) {
   if (channel == "color") return 6e-8;                           // sRGB bytes as linear floats
   if (extension == ".ptc" && channel == "normal") return 0.006;  // codes of 16 bits
   if (extension == ".vdb" && channel == "position") return 1e-5;
-  const bool keeps_doubles = extension == ".prt" || extension == ".vdb";
+  if (extension == ".las" && channel == "position") return 6e-7;  // steps of 1e-6
+  const bool keeps_doubles = extension == ".prt" || extension == ".vdb" || extension == ".las";
   if (channel == "weight" && !keeps_doubles) return 1.2e-7;
   return 0;
 }

@@ -1,12 +1,15 @@
-// Reads LAS, the format of laser scans (ASPRS): versions 1.0 to 1.4, point formats 0 to 10, not
+// Reads LAS, the format of laser scans (ASPRS): versions 1.0 to 1.5, point formats 0 to 10, not
 // compressed.
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "io/cloud_formats.h"
+#include "io/formats/las_format.h"
 #include "io/row_reader.h"
 
 namespace surfeit {
@@ -15,10 +18,17 @@ namespace surfeit {
 bool recognisesLas(std::string_view first_bytes);
 
 // Rows have x y z as doubles, scaled and moved as the header says, since coordinates of maps need
-// more than a float; intensity (ushort), classification (uchar) and, where the point format has
-// them, red green blue (ushort, as they stand). What else a point has is not kept. LAZ is
-// kCorruption.
+// more than a float; then all that a point has (docs/files.md, "Laser scans"), extra bytes under
+// the names that the file gives them. Colors are ushort, as they stand. exclusions() are withheld
+// points and noise. Comments tell of the coordinate reference system. LAZ is kCorruption.
 Result<std::unique_ptr<RowReader>> openLas(const std::string& path,
                                            const RowReaderOptions& options);
+
+// The header of a reader of LAS, which lives as long as it; nullptr for any other.
+const LasHeader* lasHeaderOf(const RowReader* reader);
+
+// What the values of a field are called in rows (io/channels.h).
+std::vector<std::string> lasPropertyNames(const LasField& field,
+                                          std::span<const ChannelRename> renames);
 
 }  // namespace surfeit

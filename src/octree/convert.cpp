@@ -24,6 +24,7 @@
 #include "io/row_transform.h"
 #include "io/row_union.h"
 #include "io/surfel_names.h"
+#include "octree/scene_rows.h"
 
 namespace surfeit {
 namespace {
@@ -141,13 +142,15 @@ class Converter {
   Result<ConvertStats> run() {
     SURFEIT_ASSIGN_OR_RETURN(reading_.channels, parseChannelRenames(options_.channels));
     reading_.part = options_.part;
+    reading_.filter = options_.filter;
+    reading_.selections = std::make_shared<RowSelections>();
     SURFEIT_RETURN_IF_ERROR(openInputs());
     SURFEIT_RETURN_IF_ERROR(createWriter());
     progress_.beginPhase("convert", stats_.records, "records");
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       std::unique_ptr<RowReader> reader = std::move(first_);
       if (i > 0) {
-        SURFEIT_ASSIGN_OR_RETURN(reader, openRowReader(inputs_[i], reading_));
+        SURFEIT_ASSIGN_OR_RETURN(reader, openCloud(inputs_[i], reading_));
       }
       SURFEIT_RETURN_IF_ERROR(convert(*reader));
     }
@@ -164,7 +167,7 @@ class Converter {
   Status openInputs() {
     for (const std::string& path : inputs_) {
       if (progress_.isCancelled()) return Status::interrupted();
-      SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, reading_));
+      SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openCloud(path, reading_));
       const PlyElement& element = reader->element();
       stats_.records += element.count;
       rows_to_write_ += element.count / options_.every + (element.count % options_.every != 0);
@@ -189,7 +192,9 @@ class Converter {
     writing.progress = &progress_;
     std::unique_ptr<RowReader> like;
     if (!options_.like.empty()) {
-      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like));
+      RowReaderOptions all;
+      all.filter = "true";  // its rows are not read, so nothing is to be counted
+      SURFEIT_ASSIGN_OR_RETURN(like, openCloud(options_.like, all));
       writing.like = like.get();
     } else if (transform_.isIdentity() && inputs_.size() == 1) {
       writing.like = first_.get();
