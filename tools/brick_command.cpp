@@ -9,6 +9,7 @@
 
 #include "core/job_limits.h"
 #include "surfeit/brick.h"
+#include "tools/channel_options.h"
 #include "tools/command.h"
 
 namespace surfeit {
@@ -72,6 +73,7 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
                   "points)")
       ->type_name("S")
       ->check(CLI::PositiveNumber.description(""));
+  addColorRangeOption(command, options.color_range);
   addTemporaryOption(command, options.temporary_directory);
   command.add_flag("--strict", options.strict, "Refuse invalid points instead of skipping them");
 }

@@ -122,6 +122,7 @@ void addModeOption(CLI::App& command, GatherMode& mode) {
 void addGatherOptions(CLI::App& command, GatherOptions& options) {
   addModeOption(command, options.mode);
   addChannelOptions(command, options.channels, options.part);
+  addColorRangeOption(command, options.color_range);
   command.add_flag("--strict", options.strict,
                    "Refuse invalid receivers instead of writing NaN for them");
   addQualityOptions(command, options.quality);

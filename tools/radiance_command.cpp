@@ -95,6 +95,7 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
   addCloudOutputOption(*command, arguments->output, "Cloud to write");
   addEstimateOptions(*command, options);
   addChannelOptions(*command, options.channels, options.part);
+  addColorRangeOption(*command, options.color_range);
   addTemporaryOption(*command, options.temporary_directory);
   command->add_flag("--strict", options.strict, "Refuse invalid photons instead of skipping them");
   context.addCommonOptions(*command);

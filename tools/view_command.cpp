@@ -77,6 +77,7 @@ void addViewCommand(CLI::App& app, CommandContext& context) {
                    "radiosity: receivers for gather. With or without -o")
       ->type_name("FILE");
   addChannelOptions(*command, arguments->options.channels, arguments->options.part);
+  addColorRangeOption(*command, arguments->options.color_range);
   addViewOptions(*command, arguments->options);
   context.addCommonOptions(*command);
   command->footer(

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -34,6 +35,8 @@ struct BrickOptions {
   int threads = 0;                                      // 0: all that the job may use
   bool strict = false;                // refuse invalid records instead of skipping them
   std::string temporary_directory{};  // empty: beside the output
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct BrickStats {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -45,6 +46,8 @@ struct ConvertOptions {
   // Memory that a format may take that must hold what it writes until the end (OpenVDB); others
   // take some MiB, whatever the clouds' size.
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct ConvertStats {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
@@ -137,6 +138,9 @@ struct GatherOptions {
   // files with several parts (grids, layers, elements) the one to read; empty: the first with a
   // cloud.
   std::string channels, part;
+  // How colors of the receivers, which results keep, are read whose numbers do not say what they
+  // mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 // What one of the two caches did. Counts, bytes, and seconds summed over threads.

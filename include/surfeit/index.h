@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -22,6 +23,8 @@ struct IndexOptions {
   // Channels of the inputs to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels{}, part{};
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct IndexStats {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -32,6 +33,8 @@ struct RadianceOptions {
   // Channels of the photons to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels{}, part{};
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct RadianceStats {

@@ -134,12 +134,17 @@ Status BrickBuild::open() {
   std::string without_sizes;
   for (const std::string& path : inputs_) {
     if (channels_.empty()) {
-      SURFEIT_ASSIGN_OR_RETURN(const BrickInput first, BrickInput::open(path, {}));
+      SURFEIT_ASSIGN_OR_RETURN(const BrickInput first,
+                               BrickInput::open(path, {}, options_.color_range));
       SURFEIT_ASSIGN_OR_RETURN(
           channels_, chooseBrickChannels(first.reader().element(), options_.channels, path));
     }
-    SURFEIT_ASSIGN_OR_RETURN(const BrickInput input, BrickInput::open(path, channels_));
+    SURFEIT_ASSIGN_OR_RETURN(const BrickInput input,
+                             BrickInput::open(path, channels_, options_.color_range));
     stats_.points += input.reader().element().count;
+    for (const std::string& note : input.reader().notes()) {
+      progress_.note(fmt::format("{}: {}", path, note));
+    }
     if (!input.hasSizes() && without_sizes.empty()) without_sizes = path;
     if (!input.hasNormals()) {
       progress_.note(
@@ -162,7 +167,8 @@ Status BrickBuild::forEach(const char* phase_name,
   progress_.beginPhase(phase_name, stats_.points, "points");
   const bool is_first = extent_.points == 0;
   for (const std::string& path : inputs_) {
-    SURFEIT_ASSIGN_OR_RETURN(BrickInput input, BrickInput::open(path, channels_));
+    SURFEIT_ASSIGN_OR_RETURN(BrickInput input,
+                             BrickInput::open(path, channels_, options_.color_range));
     SURFEIT_RETURN_IF_ERROR(input.forEach(options_.strict, progress_,
                                           is_first ? &stats_.skipped_points : nullptr, visit));
   }

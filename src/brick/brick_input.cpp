@@ -98,10 +98,12 @@ Result<std::vector<BrickChannel>> chooseBrickChannels(const PlyElement& element,
   return channels;
 }
 
-Result<BrickInput> BrickInput::open(const std::string& path,
-                                    std::span<const BrickChannel> channels) {
+Result<BrickInput> BrickInput::open(const std::string& path, std::span<const BrickChannel> channels,
+                                    ColorRange color_range) {
   BrickInput input;
-  SURFEIT_ASSIGN_OR_RETURN(input.reader_, openRowReader(path));
+  RowReaderOptions reading;
+  reading.color_range = color_range;
+  SURFEIT_ASSIGN_OR_RETURN(input.reader_, openRowReader(path, reading));
   SURFEIT_RETURN_IF_ERROR(input.declare(channels));
   return input;
 }

@@ -16,6 +16,7 @@
 #include "io/channels.h"
 #include "io/row_reader.h"
 #include "surfeit/brick.h"
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -38,7 +39,8 @@ Result<std::vector<BrickChannel>> chooseBrickChannels(const PlyElement& element,
 class BrickInput {
  public:
   // kInvalidArgument when the cloud lacks a channel, kCorruption when it has no positions.
-  static Result<BrickInput> open(const std::string& path, std::span<const BrickChannel> channels);
+  static Result<BrickInput> open(const std::string& path, std::span<const BrickChannel> channels,
+                                 ColorRange color_range);
 
   const std::string& path() const { return reader_->path(); }
   const RowReader& reader() const { return *reader_; }

@@ -25,6 +25,7 @@
 #include "octree/group_set.h"
 #include "octree/parallel.h"
 #include "octree/scene_file.h"
+#include "octree/scene_light.h"
 #include "surfeit/gather.h"
 
 namespace surfeit {
@@ -49,8 +50,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
-  SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
-                           GatherInput::open(receivers_path, options.channels, options.part));
+  SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path, options.channels,
+                                                                options.part, options.color_range));
   SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
   const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();
@@ -77,6 +78,9 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   // Sort
   input.note(progress);
+  if (options.mode != GatherMode::kOcclusion && environment == nullptr) {
+    SURFEIT_RETURN_IF_ERROR(noteDarkness(scene, progress));
+  }
   for (const std::string& note : writer->notes()) {
     progress.note(fmt::format("{}: {}", result_path, note));
   }

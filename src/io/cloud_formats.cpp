@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "io/byte_output.h"
+#include "io/color_reader.h"
 #include "io/formats/bgeo_ascii_reader.h"
 #include "io/formats/bgeo_json_reader.h"
 #include "io/formats/bgeo_reader.h"
@@ -152,6 +153,7 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
     }
     SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, format.open(path, options));
     SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element(), path));
+    if (options.color_range) return readColors(std::move(reader), *options.color_range);
     return reader;
   }
   return unknownFormat(path, first_bytes);

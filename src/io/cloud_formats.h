@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +15,7 @@
 #include "io/file.h"
 #include "io/row_reader.h"
 #include "io/row_writer.h"
+#include "surfeit/color_range.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -25,6 +27,8 @@ struct RowReaderOptions {
   // For formats with several parts (grids of a .vdb, layers of an .exr, elements of a .ply): the
   // one to read, by name. Empty: the first that holds a cloud.
   std::string part;
+  // How colors are read (io/color_reader.h); nothing: their numbers stay as the file has them.
+  std::optional<ColorRange> color_range = ColorRange::kAuto;
 };
 
 // One row of the table. A format that is only read has no `create`, one that is only written no

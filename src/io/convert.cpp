@@ -141,6 +141,7 @@ class Converter {
   Result<ConvertStats> run() {
     SURFEIT_ASSIGN_OR_RETURN(reading_.channels, parseChannelRenames(options_.channels));
     reading_.part = options_.part;
+    reading_.color_range = options_.color_range;
     SURFEIT_RETURN_IF_ERROR(openInputs());
     SURFEIT_RETURN_IF_ERROR(createWriter());
     progress_.beginPhase("convert", stats_.records, "records");
@@ -189,7 +190,9 @@ class Converter {
     writing.progress = &progress_;
     std::unique_ptr<RowReader> like;
     if (!options_.like.empty()) {
-      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like));
+      RowReaderOptions as_stored;
+      as_stored.color_range.reset();
+      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like, as_stored));
       writing.like = like.get();
     } else if (transform_.isIdentity() && inputs_.size() == 1) {
       writing.like = first_.get();

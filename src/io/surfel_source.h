@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "io/cloud_formats.h"
 #include "io/file.h"
@@ -30,6 +31,11 @@ class SurfelSource {
   // Records in the file, valid or not.
   virtual std::uint64_t recordCount() const = 0;
   virtual CloudChannels channels() const = 0;
+  // What the file has that surfels do not, and rules by which values were read, one sentence each.
+  virtual std::vector<std::string> notes() const { return {}; }
+
+  // Whether surfels come with a coverage: then their area is minus that (io/surfel_mapping.h).
+  virtual bool hasCoverage() const { return false; }
 
   // Fills the front of `surfels` and returns how many; 0 at the end. Invalid records are skipped
   // and counted, or with `strict` refused as kCorruption naming the record and the defect.

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "view/camera.h"
@@ -41,6 +42,8 @@ struct ViewOptions {
   // Channels of the cloud to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of a file
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels, part;
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
   // A brick map of whose values the cloud takes those of its surfels (view/brick_rows.h), over that
   // width or over each surfel's diameter; empty: none.
   std::string brick;
