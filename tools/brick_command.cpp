@@ -75,6 +75,7 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
       ->type_name("S")
       ->check(CLI::PositiveNumber.description(""));
   addFilterOption(command, options.filter);
+  addColorRangeOption(command, options.color_range);
   addTemporaryOption(command, options.temporary_directory);
 }
 

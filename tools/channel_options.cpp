@@ -1,6 +1,22 @@
 #include "tools/channel_options.h"
 
+#include <map>
+
 namespace surfeit {
+
+void addColorRangeOption(CLI::App& command, ColorRange& color_range) {
+  static const std::map<std::string, ColorRange> kRanges = {{"auto", ColorRange::kAuto},
+                                                            {"8", ColorRange::k8},
+                                                            {"16", ColorRange::k16},
+                                                            {"unit", ColorRange::kUnit}};
+  command
+      .add_option("--color-range", color_range,
+                  "Colors that are no bytes: 8 or 16 bits of sRGB, unit (reals are scene-linear), "
+                  "or auto: by a sample of the cloud (docs/files.md)")
+      ->type_name("8|16|unit|auto")
+      ->transform(CLI::CheckedTransformer(kRanges).description(""))
+      ->default_str("auto");
+}
 
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part,
                        std::string& filter) {

@@ -5,9 +5,15 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "surfeit/color_range.h"
+
 namespace surfeit {
 
-// The library parses `channels`: a text that is no list of FROM=TO is a usage error of its own.
+// --color-range: how colors are read whose numbers do not say what they mean.
+void addColorRangeOption(CLI::App& command, ColorRange& color_range);
+
+// --channels, --part and --filter. The library parses `channels`: a text that is no list of FROM=TO
+// is a usage error of its own.
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part,
                        std::string& filter);
 // Only --filter.

@@ -172,6 +172,7 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
 // Options that say what of the records is written.
 void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
   addChannelOptions(command, options.channels, options.part, options.filter);
+  addColorRangeOption(command, options.color_range);
   command.add_option("--every", options.every, "Only records 0, N, 2N, ... of each input")
       ->type_name("N")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53).description(""));

@@ -122,6 +122,7 @@ void addModeOption(CLI::App& command, GatherMode& mode) {
 void addGatherOptions(CLI::App& command, GatherOptions& options) {
   addModeOption(command, options.mode);
   addChannelOptions(command, options.channels, options.part, options.filter);
+  addColorRangeOption(command, options.color_range);
   addQualityOptions(command, options.quality);
   addPagingOptions(command, options);
 }

@@ -66,6 +66,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       ->required();
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
   addChannelOptions(*command, options.channels, options.part, options.filter);
+  addColorRangeOption(*command, options.color_range);
   command->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();

@@ -24,6 +24,7 @@ namespace {
 struct InfoArguments {
   std::string path, channels, part, filter;
   bool json = false;
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 nlohmann::json vectorJson(const glm::vec3& v) { return {v.x, v.y, v.z}; }
@@ -92,6 +93,7 @@ Result<RowReaderOptions> readingOf(const InfoArguments& arguments) {
   SURFEIT_ASSIGN_OR_RETURN(options.channels, parseChannelRenames(arguments.channels));
   options.part = arguments.part;
   options.filter = arguments.filter;
+  options.color_range = arguments.color_range;
   return options;
 }
 
@@ -115,11 +117,21 @@ Status addSurfels(const InfoArguments& arguments, nlohmann::json& json, Progress
     progress.advance(count);
   }
   json["surfels"] = surfels;
+  json["notes"] = (*source)->notes();
   json["input_channels"] = channelNames((*source)->channels());
   if (!bounds.isEmpty()) json["bounds"] = {vectorJson(bounds.min), vectorJson(bounds.max)};
   const std::string defects = (*source)->defects().describe();
   if (!defects.empty()) json["defects"] = defects;
   return {};
+}
+
+std::string notesText(const nlohmann::json& json) {
+  std::string text;
+  if (!json.contains("notes")) return text;
+  for (const nlohmann::json& line : json["notes"]) {
+    text += fmt::format("\n  note           {}", line.get<std::string>());
+  }
+  return text;
 }
 
 std::string surfelsText(const nlohmann::json& json) {
@@ -159,7 +171,7 @@ std::string plyText(const std::string& path, const nlohmann::json& json) {
     text += fmt::format("\n  {:14} {}: {}", element["name"].get<std::string>(),
                         formatCount(element["count"].get<std::uint64_t>()), properties);
   }
-  return text + surfelsText(json);
+  return text + notesText(json) + surfelsText(json);
 }
 
 // Any other cloud, and a PLY whose channels are renamed: what a row holds, and what of the file it
@@ -194,14 +206,10 @@ std::string cloudText(const std::string& path, const nlohmann::json& json) {
                         channel["type"].get<std::string>(),
                         fmt::join(channel["properties"].get<std::vector<std::string>>(), " "));
   }
-  for (const char* kind : {"comments", "notes"}) {
-    for (const nlohmann::json& line : json[kind]) {
-      text += fmt::format("\n  {:14} {}",
-                          std::string_view(kind).substr(0, std::string_view(kind).size() - 1),
-                          line.get<std::string>());
-    }
+  for (const nlohmann::json& line : json["comments"]) {
+    text += fmt::format("\n  comment        {}", line.get<std::string>());
   }
-  return text + surfelsText(json);
+  return text + notesText(json) + surfelsText(json);
 }
 
 // The first bytes of a file, decompressed.
@@ -253,6 +261,7 @@ void addInfoCommand(CLI::App& app, CommandContext& context) {
   command->add_option("FILE", arguments->path, "Scene file (.sft) or cloud (docs/files.md)")
       ->required();
   addChannelOptions(*command, arguments->channels, arguments->part, arguments->filter);
+  addColorRangeOption(*command, arguments->color_range);
   command->add_flag("--json", arguments->json, "JSON on standard output");
   context.addCommonOptions(*command, {.threads = false, .memory = false, .stats = false});
   command->footer(

@@ -96,6 +96,7 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
   addCloudOutputOption(*command, arguments->output, "Cloud to write");
   addEstimateOptions(*command, options);
   addChannelOptions(*command, options.channels, options.part, options.filter);
+  addColorRangeOption(*command, options.color_range);
   addTemporaryOption(*command, options.temporary_directory);
   context.addCommonOptions(*command);
   command->footer(

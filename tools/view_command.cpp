@@ -78,6 +78,7 @@ void addViewCommand(CLI::App& app, CommandContext& context) {
       ->type_name("FILE");
   addChannelOptions(*command, arguments->options.channels, arguments->options.part,
                     arguments->options.filter);
+  addColorRangeOption(*command, arguments->options.color_range);
   addViewOptions(*command, arguments->options);
   context.addCommonOptions(*command);
   command->footer(

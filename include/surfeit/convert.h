@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -48,6 +49,8 @@ struct ConvertOptions {
   // Which records of the inputs are taken, "classification == 2" (docs/files.md, "Filters"), before
   // all else but `channels`; empty: all but those that the format marks as not to be used.
   std::string filter{};
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct ConvertStats {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
@@ -140,6 +141,9 @@ struct GatherOptions {
   // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
   // that the format marks as not to be used.
   std::string filter;
+  // How colors of the receivers, which results keep, are read whose numbers do not say what they
+  // mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 // What one of the two caches did. Counts, bytes, and seconds summed over threads.

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -35,6 +36,8 @@ struct RadianceOptions {
   // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
   // that the format marks as not to be used.
   std::string filter{};
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct RadianceStats {

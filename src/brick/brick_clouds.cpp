@@ -134,6 +134,7 @@ class BrickBuild {
 Status BrickBuild::open() {
   reading_.filter = options_.filter;
   reading_.selections = std::make_shared<RowSelections>();
+  reading_.color_range = options_.color_range;
   std::string without_sizes;
   for (const std::string& path : inputs_) {
     if (channels_.empty()) {
@@ -143,6 +144,9 @@ Status BrickBuild::open() {
     }
     SURFEIT_ASSIGN_OR_RETURN(const BrickInput input, BrickInput::open(path, channels_, reading_));
     stats_.points += input.reader().element().count;
+    for (const std::string& note : input.reader().notes()) {
+      progress_.note(fmt::format("{}: {}", path, note));
+    }
     if (!input.hasSizes() && without_sizes.empty()) without_sizes = path;
     if (!input.hasNormals()) {
       progress_.note(

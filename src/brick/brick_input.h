@@ -17,6 +17,7 @@
 #include "io/cloud_formats.h"
 #include "io/row_reader.h"
 #include "surfeit/brick.h"
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 

@@ -32,6 +32,7 @@
 #include "octree/parallel.h"
 #include "octree/radiosity_rewriter.h"
 #include "octree/scene_file.h"
+#include "octree/scene_light.h"
 
 namespace surfeit {
 namespace {
@@ -118,6 +119,7 @@ Result<BounceStats> Bouncer::run() {
   SURFEIT_ASSIGN_OR_RETURN(scene_, SceneFile::open(scene_path_, sceneAccess(gather_options_)));
   SURFEIT_RETURN_IF_ERROR(checkScene());
   SURFEIT_RETURN_IF_ERROR(checkMemory());
+  SURFEIT_RETURN_IF_ERROR(noteDarkness(*scene_, progress_));
   {
     // A result that cannot be written should not take hours to be refused
     SURFEIT_ASSIGN_OR_RETURN(const AtomicFile probe, AtomicFile::create(result_path_));

@@ -26,6 +26,7 @@
 #include "octree/group_set.h"
 #include "octree/parallel.h"
 #include "octree/scene_file.h"
+#include "octree/scene_light.h"
 #include "surfeit/gather.h"
 
 namespace surfeit {
@@ -51,8 +52,9 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   options.eye -= scene.header().origin;
-  SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path, options.channels,
-                                                                options.part, options.filter));
+  SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
+                           GatherInput::open(receivers_path, options.channels, options.part,
+                                             options.filter, options.color_range));
   SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
   const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();
@@ -79,6 +81,9 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   // Sort
   input.note(progress);
+  if (options.mode != GatherMode::kOcclusion && environment == nullptr) {
+    SURFEIT_RETURN_IF_ERROR(noteDarkness(scene, progress));
+  }
   std::set<std::string> told;
   const auto noteOfWriter = [&] {
     for (const std::string& note : writer->notes()) {

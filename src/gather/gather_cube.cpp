@@ -175,12 +175,17 @@ Result<CubeReceiver> readCubeReceiverOrThrow(const std::string& path, std::uint6
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(channels));
   reading.part = part;
   reading.filter = filter;
+  reading.color_range.reset();  // a receiver has none
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, openRowReader(path, reading));
   const PlyElement& rows = reader->element();
   SURFEIT_ASSIGN_OR_RETURN(const ReceiverMapping mapping, ReceiverMapping::create(rows, path));
   if (number >= rows.count) {
     return Status::invalidArgument(
         fmt::format("{}: receiver number {}, expected less than {}", path, number, rows.count));
+  }
+
+  for (const std::string& note : reader->notes()) {
+    progress.note(fmt::format("{}: {}", path, note));
   }
 
   AlignedBuffer buffer;

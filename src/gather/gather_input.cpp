@@ -11,6 +11,7 @@
 #include "gather/gather_memory.h"
 #include "io/channels.h"
 #include "io/cloud_formats.h"
+#include "io/property_aliases.h"
 
 namespace surfeit {
 namespace {
@@ -42,11 +43,13 @@ CurveKey keyOf(const glm::vec3& position, std::uint64_t index, ReceiverOrder ord
 }  // namespace
 
 Result<GatherInput> GatherInput::open(const std::string& path, const std::string& channels,
-                                      const std::string& part, const std::string& filter) {
+                                      const std::string& part, const std::string& filter,
+                                      ColorRange color_range) {
   RowReaderOptions reading;
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(channels));
   reading.part = part;
   reading.filter = filter;
+  reading.color_range = color_range;
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, reading));
   SURFEIT_ASSIGN_OR_RETURN(ReceiverMapping mapping,
                            ReceiverMapping::create(reader->element(), path));
@@ -72,6 +75,10 @@ Status GatherInput::check(const GatherRules& rules) const {
 void GatherInput::note(Progress& progress) const {
   if (!mapping_.hasNormals()) {
     progress.note(fmt::format("{}: no normals: gathering over the whole sphere", reader_->path()));
+  }
+  for (const std::string& note :
+       notesOfLookalikes(receivers(), /* lacks_color= */ false, !mapping_.hasNormals())) {
+    progress.note(fmt::format("{}: {}", reader_->path(), note));
   }
   for (const std::string& note : reader_->notes()) {
     progress.note(fmt::format("{}: {}", reader_->path(), note));

@@ -23,10 +23,11 @@ namespace surfeit {
 // One thread at a time.
 class GatherInput {
  public:
-  // Opens the cloud and finds its receivers. `channels`, `part` and `filter` as in GatherOptions.
-  // Errors as of parseChannelRenames, openRowReader and ReceiverMapping.
+  // Opens the cloud and finds its receivers. `channels`, `part`, `filter` and `color_range` as in
+  // GatherOptions. Errors as of parseChannelRenames, openRowReader and ReceiverMapping.
   static Result<GatherInput> open(const std::string& path, const std::string& channels = {},
-                                  const std::string& part = {}, const std::string& filter = {});
+                                  const std::string& part = {}, const std::string& filter = {},
+                                  ColorRange color_range = ColorRange::kAuto);
 
   std::uint64_t receiverCount() const { return receivers().count; }
   const PlyElement& receivers() const { return reader_->element(); }

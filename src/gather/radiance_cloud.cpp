@@ -159,8 +159,9 @@ class RadianceJob {
 Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
                                        const std::string& result_path) {
   // Everything that can be refused is, before work starts
-  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons, PhotonCloud::open(inputs, options_.channels,
-                                                                  options_.part, options_.filter));
+  SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons,
+                           PhotonCloud::open(inputs, options_.channels, options_.part,
+                                             options_.filter, options_.color_range));
   SURFEIT_RETURN_IF_ERROR(planThreads());
   // A name that cannot be written is refused before the work
   const std::uint64_t records = photons.recordCount();
@@ -229,6 +230,12 @@ Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::stri
       {.default_albedo = options_.default_albedo, .strict = options_.strict}, progress_));
   stats_.skipped_photons = photons.skippedCount();
   stats_.power = photons.power();
+  if (stats_.power == glm::dvec3(0)) {
+    progress_.note(fmt::format(
+        "{}: all photons have a power of 0, so the result is black: give photons with power_r "
+        "power_g power_b (--channels FROM=power reads another channel)",
+        result_path));
+  }
   finishPhase("read");
 
   IndexOptions index_options;

@@ -207,7 +207,7 @@ std::string PhotonMapping::describeDefect(const std::byte* row) const {
 
 Result<PhotonCloud> PhotonCloud::open(const std::vector<std::string>& inputs,
                                       const std::string& channels, const std::string& part,
-                                      const std::string& filter) {
+                                      const std::string& filter, ColorRange color_range) {
   if (inputs.empty()) return Status::invalidArgument("radiance: no photon cloud");
   PhotonCloud cloud;
   cloud.inputs_ = inputs;
@@ -215,6 +215,7 @@ Result<PhotonCloud> PhotonCloud::open(const std::vector<std::string>& inputs,
   cloud.opening_.part = part;
   cloud.opening_.filter = filter;
   cloud.opening_.selections = std::make_shared<RowSelections>();
+  cloud.opening_.color_range = color_range;
   for (const std::string& path : inputs) {
     SURFEIT_ASSIGN_OR_RETURN(const PhotonFile file, PhotonFile::open(path, cloud.opening_));
     cloud.record_count_ += file.photons().count;
@@ -249,6 +250,9 @@ Status PhotonCloud::write(const std::string& directory, const std::string& resul
 Status PhotonCloud::append(const std::string& input, const PhotonReading& reading,
                            Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(PhotonFile file, PhotonFile::open(input, opening_));
+  for (const std::string& note : file.reader->notes()) {
+    progress.note(fmt::format("{}: {}", input, note));
+  }
   if (!file.mapping.hasAlbedo()) {
     const glm::vec3& albedo = reading.default_albedo;
     progress.note(

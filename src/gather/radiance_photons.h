@@ -72,10 +72,12 @@ struct PhotonReading {
 // their positions. One thread at a time.
 class PhotonCloud {
  public:
-  // Opens every input to see that it holds photons. `channels` and `part` as in RadianceOptions.
+  // Opens every input to see that it holds photons. `channels`, `part` and
+  // `color_range` as in RadianceOptions.
   static Result<PhotonCloud> open(const std::vector<std::string>& inputs,
                                   const std::string& channels = {}, const std::string& part = {},
-                                  const std::string& filter = {});
+                                  const std::string& filter = {},
+                                  ColorRange color_range = ColorRange::kAuto);
 
   std::uint64_t recordCount() const { return record_count_; }
 

@@ -107,8 +107,9 @@ Result<TuneReport> Tuning::run() {
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openScene());
     scene_ = std::make_unique<SceneFile>(std::move(scene));
     gather_.eye -= scene_->header().origin;
-    SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path_, gather_.channels,
-                                                                  gather_.part, gather_.filter));
+    SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
+                             GatherInput::open(receivers_path_, gather_.channels, gather_.part,
+                                               gather_.filter, gather_.color_range));
     input_ = std::make_unique<GatherInput>(std::move(input));
   }
   SURFEIT_RETURN_IF_ERROR(checkGroups(*scene_, gather_.groups));

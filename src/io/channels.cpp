@@ -257,6 +257,8 @@ Result<std::vector<ChannelRename>> parseChannelRenames(std::string_view text) {
   return renames;
 }
 
+bool isKnownChannel(std::string_view name) { return findKnown(name) != nullptr; }
+
 std::vector<std::string> propertyNames(std::string_view name, std::size_t components,
                                        ChannelKind kind, std::span<const ChannelRename> renames) {
   // Our name

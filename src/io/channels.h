@@ -34,6 +34,9 @@ Result<std::vector<ChannelRename>> parseChannelRenames(std::string_view text);
 std::vector<std::string> propertyNames(std::string_view name, std::size_t components,
                                        ChannelKind kind, std::span<const ChannelRename> renames);
 
+// Whether a channel of our name means something to us (docs/files.md, "Channels").
+bool isKnownChannel(std::string_view name);
+
 // Appends the properties of such a channel to an element, all of one type, and packs them after
 // what is there (offsets and row_bytes). kCorruption when a name is taken twice, naming `path` and
 // the channel.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "io/byte_output.h"
+#include "io/color_reader.h"
 #include "io/formats/bgeo_ascii_reader.h"
 #include "io/formats/bgeo_json_reader.h"
 #include "io/formats/bgeo_reader.h"
@@ -165,8 +166,11 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
     }
     SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, format.open(path, options));
     SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element(), path));
-    return filterRows(std::move(reader), options.filter, selectionKey(path, options),
-                      options.selections.get());
+    SURFEIT_ASSIGN_OR_RETURN(reader, filterRows(std::move(reader), options.filter,
+                                                selectionKey(path, options),
+                                                options.selections.get()));
+    if (options.color_range) return readColors(std::move(reader), *options.color_range);
+    return reader;
   }
   return unknownFormat(path, first_bytes);
 }

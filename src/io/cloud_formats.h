@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "io/filtered_reader.h"
 #include "io/row_reader.h"
 #include "io/row_writer.h"
+#include "surfeit/color_range.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -31,6 +33,8 @@ struct RowReaderOptions {
   std::string filter;
   // For files that are opened more than once with the same options, so that a filter counts once.
   std::shared_ptr<RowSelections> selections;
+  // How colors are read (io/color_reader.h); nothing: their numbers stay as the file has them.
+  std::optional<ColorRange> color_range = ColorRange::kAuto;
 };
 
 // One row of the table. A format that is only read has no `create`, one that is only written no

@@ -75,7 +75,7 @@ class HeaderParser {
 
   Result<PlyHeader> parse() {
     SURFEIT_RETURN_IF_ERROR(nextLine());
-    if (line_ != "ply") return unexpected("'ply'");
+    if (line_.substr(0, line_.find_last_not_of(kBlanks) + 1) != "ply") return unexpected("'ply'");
     for (;;) {
       SURFEIT_RETURN_IF_ERROR(nextLine());
       std::string_view rest = line_;

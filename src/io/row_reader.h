@@ -50,6 +50,10 @@ class RowReader {
   // What the file has that rows do not, one sentence each: "list property faces is not kept".
   virtual std::vector<std::string> notes() const { return {}; }
 
+  // The reader of the file itself, for what a format has beside rows (cameras, windows of
+  // pictures).
+  virtual const RowReader& original() const { return *this; }
+
   // The next rows, max_rows (at least 1) or as many as are left; empty at the end. The view lies in
   // `buffer`, which grows as needed, and lasts as long as the buffer is not used again.
   virtual Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) = 0;

@@ -69,7 +69,7 @@ bool isSurfelProperty(std::string_view name) {
   };
   return holds(kPositionNames) || holds(kNormalNames) || holds(kRadiosityNames) ||
          holds(kAlbedoNames) || holds(kColorNames) || holds(kRadiusNames) || holds(kGroupNames) ||
-         holds(kLongSideNames) || name == "area" || name == "two_sided";
+         holds(kLongSideNames) || name == "area" || name == "coverage" || name == "two_sided";
 }
 
 std::uint64_t SurfelDefects::total() const {
@@ -166,6 +166,9 @@ Result<SurfelMapping> SurfelMapping::create(const PlyElement& element, const std
   }
   SURFEIT_ASSIGN_OR_RETURN(mapping.area_, findField(element, "area", path));
   channels.area = mapping.area_.isPresent();
+  if (channels.radius && !channels.area) {
+    SURFEIT_ASSIGN_OR_RETURN(mapping.coverage_, findField(element, "coverage", path));
+  }
 
   // Radiosity and albedo; colors stand in for what is absent
   SURFEIT_ASSIGN_OR_RETURN(channels.radiosity,
@@ -219,7 +222,8 @@ void SurfelMapping::setOrigin(const glm::dvec3& origin) {
 // those of decodeRow.
 std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
   FloatRowDecoder decoder(row_bytes_);
-  bool is_fast = !channels_.long_side && origin_ == glm::dvec3(0);
+  bool is_fast =
+      !channels_.long_side && !coverage_.isPresent() && origin_ == glm::dvec3(0);
   const auto add = [&](const Field& field, std::size_t place, float least, float most) {
     if (!field.isPresent()) return;
     const std::size_t offset = static_cast<std::size_t>(field.offset);
@@ -295,6 +299,7 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
   const double radius = radius_scale_ * read(radius_);
   const double area = read(area_);
   const bool is_two_sided = read(two_sided_) != 0;
+  const double coverage = read(coverage_);
   const double group = read(group_);
   if (defect.kind != nullptr) return defect;
 
@@ -307,6 +312,13 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
   surfel.area = static_cast<float>(area);
   if (area_.isPresent() && surfel.area <= 0) {
     return {&SurfelDefects::bad_area, area_.name, area, "more than 0"};
+  }
+
+  if (coverage_.isPresent()) {
+    if (!(coverage > 0 && coverage <= 1)) {
+      return {&SurfelDefects::bad_area, coverage_.name, coverage, "more than 0 and at most 1"};
+    }
+    surfel.area = -static_cast<float>(coverage);
   }
 
   if (surfel.radius > kLargestLength) {

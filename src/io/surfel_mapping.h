@@ -58,6 +58,9 @@ bool isSurfelProperty(std::string_view name);
 //   nx ny nz                   normal, normalised here; zero means sphere; absent: sphere
 //   radius | pscale            radius; width: twice the radius
 //   area
+//   coverage                   part of the disk's area that it covers, above 0 and at most 1; where
+//                              there is a radius and no area: area is minus that, and the indexer
+//                              finds the area by the neighbourhood
 //   radiosity_r _g _b          radiant exitance, scene-linear
 //   albedo_r _g _b             reflectance, scene-linear
 //   red green blue             sRGB of 8 bits (uchar) or 16 bits (ushort), turned scene-linear
@@ -76,6 +79,7 @@ class SurfelMapping {
   static Result<SurfelMapping> create(const PlyElement& element, const std::string& path);
 
   CloudChannels channels() const { return channels_; }
+  bool hasCoverage() const { return coverage_.isPresent(); }
   // Positions are counted from here, in double precision until they are floats; finite. Before rows
   // are decoded.
   void setOrigin(const glm::dvec3& origin);
@@ -129,7 +133,7 @@ class SurfelMapping {
   CloudChannels channels_;
   std::size_t row_bytes_ = 0;
   Field position_[3], normal_[3], radius_, area_, radiosity_[3], albedo_[3], two_sided_, group_;
-  Field long_side_[3];
+  Field long_side_[3], coverage_;
   double radius_scale_ = 1;
   glm::dvec3 origin_{0};
   std::optional<FloatRowDecoder> fast_decoder_;  // when the types of the properties allow it

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "io/cloud_formats.h"
+#include "io/property_aliases.h"
 #include "io/recipe_surfel_source.h"
 #include "io/row_reader.h"
 #include "io/scene_recipe.h"
@@ -26,7 +27,19 @@ class RowSurfelSource final : public SurfelSource {
   std::uint64_t recordCount() const override { return reader_->element().count; }
   CloudChannels channels() const override { return mapping_.channels(); }
   void setOrigin(const glm::dvec3& origin) override { mapping_.setOrigin(origin); }
+  bool hasCoverage() const override { return mapping_.hasCoverage(); }
   const SurfelDefects& defects() const override { return defects_; }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = reader_->notes();
+    const CloudChannels& has = mapping_.channels();
+    const bool lacks_color = !has.radiosity && !has.albedo;
+    for (std::string& note : notesOfLookalikes(reader_->element(), lacks_color, !has.normal)) {
+      notes.push_back(std::move(note));
+    }
+    return notes;
+  }
+
   std::size_t rowBytes() const override { return mapping_.rowBytes(); }
   bool isSeekable() const override { return reader_->isSeekable(); }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "io/cloud_formats.h"
 #include "io/file.h"
@@ -34,6 +35,11 @@ class SurfelSource {
   // Positions of surfels are counted from here from now on: the records' doubles less this, as
   // floats. 0 before. Finite.
   virtual void setOrigin(const glm::dvec3& origin) = 0;
+  // What the file has that surfels do not, and rules by which values were read, one sentence each.
+  virtual std::vector<std::string> notes() const { return {}; }
+
+  // Whether surfels come with a coverage: then their area is minus that (io/surfel_mapping.h).
+  virtual bool hasCoverage() const { return false; }
 
   // Fills the front of `surfels` and returns how many; 0 at the end. Invalid records are skipped
   // and counted, or with `strict` refused as kCorruption naming the record and the defect.

@@ -94,7 +94,8 @@ CloudChannels unionOf(const CloudChannels& a, const CloudChannels& b) {
 void CloudTotals::add(std::span<const Surfel> added) {
   for (const Surfel& surfel : added) {
     missing_both += surfel.radius <= 0 && surfel.area <= 0 ? 1 : 0;
-    missing_area += surfel.radius > 0 && surfel.area <= 0 ? 1 : 0;
+    missing_area += surfel.radius > 0 && surfel.area == 0 ? 1 : 0;
+    covering += surfel.radius > 0 && surfel.area < 0 ? 1 : 0;
     missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
     spheres += surfel.isSphere() ? 1 : 0;
     bounds.add(surfel.position);
@@ -111,6 +112,7 @@ void CloudTotals::add(const CloudTotals& other) {
   channels = unionOf(channels, other.channels);
   missing_both += other.missing_both;
   missing_area += other.missing_area;
+  covering += other.covering;
   missing_radius += other.missing_radius;
   spheres += other.spheres;
   sample.insert(sample.end(), other.sample.begin(), other.sample.end());
@@ -129,8 +131,12 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     reader.records_.push_back(source->recordCount());
     reader.record_count_ += source->recordCount();
     reader.is_seekable_ = reader.is_seekable_ && source->isSeekable();
+    for (const std::string& note : source->notes()) {
+      reader.notes_.push_back(fmt::format("{}: {}", path, note));
+    }
     const CloudChannels channels = source->channels();
-    reader.lacks_sizes_ = reader.lacks_sizes_ || (!channels.radius && !channels.area);
+    reader.lacks_sizes_ =
+        reader.lacks_sizes_ || (!channels.radius && !channels.area) || source->hasCoverage();
     SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
     reader.file_bytes_ += file.size();
   }

@@ -30,6 +30,7 @@ struct CloudTotals {
   std::uint64_t content = 0;  // sum of the surfels' hashes
   CloudChannels channels;
   std::uint64_t missing_both = 0, missing_area = 0, missing_radius = 0, spheres = 0;
+  std::uint64_t covering = 0;  // surfels that have a coverage instead of an area
   std::vector<Surfel> sample;  // surfels from all over the inputs
 
   void add(std::span<const Surfel> surfels);
@@ -53,7 +54,10 @@ class CloudReader {
   const glm::dvec3& origin() const { return origin_; }
   void setOrigin(const glm::dvec3& origin) { origin_ = origin; }
 
-  // Whether an input has neither radii nor areas.
+  // What is to be told of the inputs, with their paths.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+  // Whether an input has neither radii nor areas, or coverages.
   bool lacksSizes() const { return lacks_sizes_; }
 
   // A sample of the surfels, from places spread evenly over all inputs, enough to tell `buckets`
@@ -84,6 +88,7 @@ class CloudReader {
   std::uint64_t file_bytes_ = 0;
   bool is_seekable_ = true;
   bool lacks_sizes_ = false;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace surfeit

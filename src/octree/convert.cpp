@@ -144,6 +144,7 @@ class Converter {
     reading_.part = options_.part;
     reading_.filter = options_.filter;
     reading_.selections = std::make_shared<RowSelections>();
+    reading_.color_range = options_.color_range;
     SURFEIT_RETURN_IF_ERROR(openInputs());
     SURFEIT_RETURN_IF_ERROR(createWriter());
     progress_.beginPhase("convert", stats_.records, "records");
@@ -192,9 +193,10 @@ class Converter {
     writing.progress = &progress_;
     std::unique_ptr<RowReader> like;
     if (!options_.like.empty()) {
-      RowReaderOptions all;
-      all.filter = "true";  // its rows are not read, so nothing is to be counted
-      SURFEIT_ASSIGN_OR_RETURN(like, openCloud(options_.like, all));
+      RowReaderOptions as_stored;
+      as_stored.filter = "true";  // its rows are not read, so nothing is to be counted
+      as_stored.color_range.reset();
+      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like, as_stored));
       writing.like = like.get();
     } else if (transform_.isIdentity() && inputs_.size() == 1) {
       writing.like = first_.get();

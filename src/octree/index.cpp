@@ -77,7 +77,12 @@ glm::dvec3 originAsked(const Bounds3& bounds, const glm::dvec3& origin) {
 void applySizeRules(Surfel& surfel, float overlap) {
   if (surfel.radius > 0 && surfel.area > 0) return;
   if (surfel.radius > 0) {
-    surfel.area = areaOfDisk(surfel.radius, overlap);
+    if (surfel.area < 0) {  // a coverage
+      surfel.area *= -kPlaceholderSize;
+      surfel.flags |= kSurfelNeedsSize;
+    } else {
+      surfel.area = areaOfDisk(surfel.radius, overlap);
+    }
   } else if (surfel.area > 0) {
     surfel.radius = std::sqrt(surfel.area * overlap / kPi);
   } else {
@@ -147,7 +152,7 @@ Result<IndexStats> Indexer::run() {
       BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
                             temporary_directory_},
       progress_);
-  if (totals_.missing_both > 0) {
+  if (totals_.missing_both + totals_.covering > 0) {
     SURFEIT_RETURN_IF_ERROR(buildWithDensity(std::move(buckets)));
     return stats_;
   }
@@ -181,9 +186,11 @@ Status Indexer::openInputs() {
   reading.part = options_.part;
   reading.filter = options_.filter;
   reading.selections = std::make_shared<RowSelections>();
+  reading.color_range = options_.color_range;
   SURFEIT_ASSIGN_OR_RETURN(
       reader_,
       CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes), reading));
+  for (const std::string& note : reader_->notes()) progress_.note(note);
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) SURFEIT_RETURN_IF_ERROR(takeSample());
   // The octree of bare positions is built at full precision
@@ -322,6 +329,12 @@ void Indexer::noteRules() const {
         fmt::format("{} surfels have neither radius nor area: both follow from the "
                     "distance to their neighbours",
                     totals.missing_both));
+  }
+  if (totals.covering > 0) {
+    progress_.note(fmt::format(
+        "{} surfels have a coverage: it is multiplied by the area of the disk, or of the "
+        "place that the distance to their neighbours leaves, whichever is smaller",
+        totals.covering));
   }
   if (totals.missing_area > 0) {
     progress_.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area,

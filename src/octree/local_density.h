@@ -22,6 +22,8 @@ namespace surfeit {
 inline constexpr std::uint32_t kSurfelNeedsSize = 1u << 7;
 // Radius and area of such a surfel meanwhile: positive, because pages hold nothing else.
 inline constexpr float kPlaceholderSize = 1e-30f;
+// Surfels with a coverage keep their radius and have the coverage times the placeholder as area:
+// what is found is the area.
 
 // The surfels of a scene in curve order, with sizes filled in. The neighbour search goes through
 // the scene's own caches, so memory stays within their budget. `overlap`: disk area over surfel
@@ -50,6 +52,7 @@ class SizedSurfelStream : public SortedSurfelStream {
     Result<float> areaAt(const glm::vec3& position);
   };
 
+  float coveringArea(float coverage, float radius, float local_area) const;
   Status readPages(std::uint32_t end_page);
   Status fillSizes(Searcher& searcher, std::span<Surfel> surfels) const;
 

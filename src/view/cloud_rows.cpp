@@ -21,6 +21,7 @@ class FileRows final : public CloudRows {
 
   const std::string& path() const override { return reader_->path(); }
   const PlyElement& element() const override { return reader_->element(); }
+  std::vector<std::string> notes() const override { return reader_->notes(); }
   Status rewind() override { return reader_->rewind(); }
   Result<std::span<const std::byte>> next() override {
     return reader_->readRows(kBatchRows, buffer_);

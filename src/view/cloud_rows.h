@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/bounds.h"
 #include "io/cloud_formats.h"
@@ -28,6 +29,8 @@ class CloudRows {
   virtual const std::string& path() const = 0;
   // Names, types and offsets of a row's properties; row_bytes apart.
   virtual const PlyElement& element() const = 0;
+  // What is to be told of the file, one sentence each.
+  virtual std::vector<std::string> notes() const { return {}; }
   // The next rows, empty at the end. Valid until the next call on this object.
   virtual Result<std::span<const std::byte>> next() = 0;
   // Back to the first row.

@@ -42,7 +42,9 @@ class PixelRows {
  public:
   static Result<PixelRows> open(const std::string& path) {
     PixelRows rows;
-    SURFEIT_ASSIGN_OR_RETURN(rows.reader_, openRowReader(path));
+    RowReaderOptions as_stored;
+    as_stored.color_range.reset();
+    SURFEIT_ASSIGN_OR_RETURN(rows.reader_, openRowReader(path, as_stored));
     if (exrHeaderOf(rows.reader_.get()) == nullptr) {
       return Status::invalidArgument(
           fmt::format("{}: {}, expected an OpenEXR picture", path, rows.reader_->formatName()));

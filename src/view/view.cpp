@@ -184,7 +184,11 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options.channels));
   reading.part = options.part;
   reading.filter = options.filter;
+  reading.color_range = options.color_range;
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<CloudRows> rows, openCloudRows(input, reading));
+  for (const std::string& note : rows->notes()) {
+    progress.note(fmt::format("{}: {}", input, note));
+  }
   if (!options.brick.empty()) {
     SURFEIT_ASSIGN_OR_RETURN(rows,
                              addBrickValues(std::move(rows), options.brick, options.filter_width));

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "view/camera.h"
@@ -44,6 +45,8 @@ struct ViewOptions {
   // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
   // that the format marks as not to be used.
   std::string filter;
+  // How colors are read whose numbers do not say what they mean.
+  ColorRange color_range = ColorRange::kAuto;
   // A brick map of whose values the cloud takes those of its surfels (view/brick_rows.h), over that
   // width or over each surfel's diameter; empty: none.
   std::string brick;

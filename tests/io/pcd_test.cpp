@@ -56,10 +56,10 @@ TEST_F(PcdTest, AsciiAndBinaryGiveTheSameRows) {
       "float x, float y, float z, uchar red, uchar green, uchar blue, float nx, float ny, "
       "float nz, ushort label, double stamp, float hist_0, float hist_1, double curvature";
 
-  // 1.1754945e-38 and 4.2108e+06 are 0x00800001 and 0x4a807fc0 as bits
+  // 1.1754945e-38 and -1.70804499e+38 are 0x00800001 and 0xff007fc0 as bits
   const std::string text = head.text() +
                            "1 2 3 1.1754945e-38 0 0 1 7 7 7 9 -5 0.5 0.25 1e-3\n"
-                           "nan 2 3 4.210656e+06 1 0 0 0 0 0 65535 9007199254740992 1 2 3\n";
+                           "nan 2 3 -1.70804499e+38 1 0 0 0 0 0 65535 9007199254740992 1 2 3\n";
   const std::unique_ptr<RowReader> ascii = openGood(text);
   ASSERT_NE(ascii, nullptr);
   EXPECT_EQ(ascii->formatName(), "PCD 0.7 ascii");
@@ -69,7 +69,7 @@ TEST_F(PcdTest, AsciiAndBinaryGiveTheSameRows) {
   EXPECT_EQ(valueOf(*ascii, rows, 0, "red"), 0x80);
   EXPECT_EQ(valueOf(*ascii, rows, 0, "green"), 0);
   EXPECT_EQ(valueOf(*ascii, rows, 0, "blue"), 1);
-  EXPECT_EQ(valueOf(*ascii, rows, 1, "red"), 0x80);
+  EXPECT_EQ(valueOf(*ascii, rows, 1, "red"), 0);
   EXPECT_EQ(valueOf(*ascii, rows, 1, "green"), 0x7f);
   EXPECT_EQ(valueOf(*ascii, rows, 1, "stamp"), 9007199254740992.0);
   EXPECT_TRUE(std::isnan(valueOf(*ascii, rows, 1, "x")));
@@ -82,7 +82,7 @@ TEST_F(PcdTest, AsciiAndBinaryGiveTheSameRows) {
       head.text() +
       bytesOfAll(1.f, 2.f, 3.f, 0x00800001u, 0.f, 0.f, 1.f, pad, pad, pad, std::uint16_t(9),
                  std::int64_t(-5), 0.5f, 0.25f, 1e-3) +
-      bytesOfAll(float(NAN), 2.f, 3.f, 4.210656e+06f, 1.f, 0.f, 0.f, pad, pad, pad,
+      bytesOfAll(float(NAN), 2.f, 3.f, 0xff007fc0u, 1.f, 0.f, 0.f, pad, pad, pad,
                  std::uint16_t(65535), std::int64_t(1) << 53, 1.f, 2.f, 3.0);
   const std::unique_ptr<RowReader> packed = openGood(binary);
   ASSERT_NE(packed, nullptr);
@@ -144,10 +144,132 @@ TEST_F(PcdTest, ViewPointIsNoted) {
               ElementsAre(HasSubstr("view point")));
 }
 
-TEST_F(PcdTest, CompressedPointsAreRefusedWithAdvice) {
+TEST_F(PcdTest, WholeNumbersInFieldsOfFloatsAreTheColor) {
   Head head;
-  head.data = "binary_compressed";
-  EXPECT_THAT(refusalOf(head.text() + "abc"), HasSubstr("pcl_convert_pcd_ascii_binary IN OUT 1"));
+  head.fields = "x y z rgb";
+  head.sizes = "4 4 4 4";
+  head.types = "F F F F";
+  head.counts = "";
+  const std::unique_ptr<RowReader> reader =
+      openGood(head.text() + "1 2 3 4568635\n4 5 6 4278255361\n");  // and with an alpha of 255
+  ASSERT_NE(reader, nullptr);
+  const std::vector<std::byte> rows = readAllRows(*reader);
+  EXPECT_EQ(valueOf(*reader, rows, 0, "red"), 69);
+  EXPECT_EQ(valueOf(*reader, rows, 0, "green"), 182);
+  EXPECT_EQ(valueOf(*reader, rows, 0, "blue"), 59);
+  EXPECT_EQ(valueOf(*reader, rows, 1, "green"), 255);
+  EXPECT_EQ(valueOf(*reader, rows, 1, "blue"), 1);
+  EXPECT_EQ(valueOf(*reader, rows, 1, "y"), 5);
+}
+
+TEST_F(PcdTest, CapitalsAndColorsApartAreOurNames) {
+  Head head;
+  head.fields = "X Y Z R G B Normal_X Normal_Y Normal_Z Intensity";
+  head.sizes = "4 4 4 1 1 1 4 4 4 4";
+  head.types = "F F F U U U F F F F";
+  head.counts = "";
+  const std::string points = "1 2 3 4 5 6 0 0 1 7\n1 2 3 4 5 6 0 0 1 7\n";
+  EXPECT_EQ(describeRow(openGood(head.text() + points)->element()),
+            "float x, float y, float z, uchar red, uchar green, uchar blue, float nx, float ny, "
+            "float nz, float intensity");
+}
+
+TEST_F(PcdTest, PositionsOfTextsKeepTheirDigits) {
+  const std::unique_ptr<RowReader> reader =
+      openGood(Head().text() + "289814.15 4320978.61 170.76\n289814.64 4320978.84 170.76\n");
+  ASSERT_NE(reader, nullptr);
+  EXPECT_EQ(valueOf(*reader, readAllRows(*reader), 1, "y"), 4320978.84);
+}
+
+// Compressed as PCL does it: field by field, by LZF.
+class CompressedPcdTest : public PcdTest {
+ protected:
+  static std::string literals(const std::string& bytes) {
+    std::string lzf;
+    for (std::size_t at = 0; at < bytes.size(); at += 32) {
+      const std::string piece = bytes.substr(at, 32);
+      lzf += static_cast<char>(piece.size() - 1);
+      lzf += piece;
+    }
+    return lzf;
+  }
+  // 10 to 265 zeros: one, and a copy of it that overlaps itself.
+  static std::string zeros(std::size_t count) {
+    std::string lzf = literals(std::string(1, '\0'));
+    lzf += static_cast<char>(7 << 5);
+    lzf += static_cast<char>(count - 1 - 9);
+    lzf += '\0';
+    return lzf;
+  }
+  static std::string data(const std::string& lzf, std::uint32_t size) {
+    return bytesOfAll(std::uint32_t(lzf.size()), size) + lzf;
+  }
+  static Head head() {
+    Head head;
+    head.fields = "x y z rgb label";
+    head.sizes = "4 4 4 4 2";
+    head.types = "F F F U U";
+    head.counts = "COUNT 1 1 1 1 2\n";
+    head.data = "binary_compressed";
+    return head;
+  }
+  static std::string points() {
+    const std::string values =
+        bytesOfAll(1.f, 4.f, 2.f, 5.f, 3.f, 6.f, 0x45b63bu, 0x010203u, std::uint16_t(7),
+                   std::uint16_t(8), std::uint16_t(9), std::uint16_t(10));
+    return head().text() + data(literals(values), 40);
+  }
+};
+
+TEST_F(CompressedPcdTest, FieldsBecomeRows) {
+  const std::unique_ptr<RowReader> reader = openGood(points());
+  ASSERT_NE(reader, nullptr);
+  EXPECT_EQ(reader->formatName(), "PCD 0.7 binary_compressed");
+  const std::vector<std::byte> rows = readAllRows(*reader);
+  EXPECT_EQ(valueOf(*reader, rows, 0, "z"), 3);
+  EXPECT_EQ(valueOf(*reader, rows, 1, "x"), 4);
+  EXPECT_EQ(valueOf(*reader, rows, 0, "red"), 69);
+  EXPECT_EQ(valueOf(*reader, rows, 1, "blue"), 3);
+  EXPECT_EQ(valueOf(*reader, rows, 0, "label_1"), 8);
+  EXPECT_EQ(valueOf(*reader, rows, 1, "label_0"), 9);
+  ASSERT_TRUE(reader->rewind().ok());
+  expectReaderKeepsContract(*reader);
+}
+
+TEST_F(CompressedPcdTest, ManyPointsAreReadInParts) {
+  Head many;
+  many.data = "binary_compressed";
+  const std::size_t count = 100'000;
+  many.size = "WIDTH 100000\nHEIGHT 1\n";
+  many.points = "";
+  std::string lzf;
+  std::size_t left = count * 12;
+  for (; left > 300; left -= 200) lzf += zeros(200);
+  std::string last(left, '\0');
+  const float end = 5;
+  std::memcpy(&last[left - 4], &end, 4);
+  lzf += literals(last);
+  const std::unique_ptr<RowReader> reader = openGood(many.text() + data(lzf, count * 12));
+  ASSERT_NE(reader, nullptr);
+  const std::vector<std::byte> rows = readAllRows(*reader);
+  EXPECT_EQ(valueOf(*reader, rows, count - 1, "z"), 5);
+  EXPECT_EQ(valueOf(*reader, rows, count - 1, "x"), 0);
+  EXPECT_EQ(valueOf(*reader, rows, count / 2, "z"), 0);
+}
+
+TEST_F(CompressedPcdTest, WhatIsNoLzfIsRefused) {
+  const std::string start = head().text();
+  EXPECT_THAT(refusalOf(start + data(literals("abc"), 40)), HasSubstr("3 bytes come out"));
+  EXPECT_THAT(refusalOf(start + data(literals(std::string(41, 'a')), 40)),
+              HasSubstr("more than 40 bytes"));
+  EXPECT_THAT(refusalOf(start + data("\x20\x05", 40)), HasSubstr("copy of what came 6"));
+  EXPECT_THAT(refusalOf(start + data("\x1f", 40)), HasSubstr("ends in the middle"));
+  EXPECT_THAT(refusalOf(start + data(literals("abc"), 60)), HasSubstr("2 points of 20"));
+}
+
+TEST_F(CompressedPcdTest, TruncationsAndDamageAreHarmless) {
+  expectEveryTruncationFails(openPcd, points(), points().size());
+  expectDamageIsHarmless(openPcd, points(), 3);
 }
 
 TEST_F(PcdTest, CountComesFromPointsOrWidthAndHeight) {
@@ -183,7 +305,8 @@ TEST_F(PcdTest, DamagedHeadersAreRefused) {
   EXPECT_THAT(failure([](Head& h) { h.counts = "COUNT 1 1 99999999999\n"; }),
               HasSubstr("at most 4096"));
   EXPECT_THAT(failure([](Head& h) { h.counts = "COUNT 1 1 4095\n"; }), HasSubstr("at most 4096"));
-  EXPECT_THAT(failure([](Head& h) { h.data = "text"; }), HasSubstr("DATA ascii or binary"));
+  EXPECT_THAT(failure([](Head& h) { h.data = "text"; }),
+              HasSubstr("DATA ascii, binary or binary_compressed"));
   EXPECT_THAT(failure([](Head& h) { h.view = "0\nFOO 1"; }), HasSubstr("found 'FOO 1'"));
 }
 

@@ -181,8 +181,8 @@ TEST_F(SurfelSourceTest, PropertiesThatMakeNoSenseAreRefused) {
               HasSubstr("element vertex: found property y without z"));
   EXPECT_THAT(refusal(cloud({"float a"}, {"1"})), HasSubstr("found no properties x, y, z"));
   EXPECT_THAT(refusal(cloud(xyzAnd({"float nx"}), {"1 2 3 4"})), HasSubstr("nx without nz"));
-  EXPECT_THAT(refusal(cloud(xyzAnd({"int red", "int green", "int blue"}), {"1 2 3 4 5 6"})),
-              HasSubstr("property red is int, expected uchar, ushort, float or double"));
+  EXPECT_THAT(refusal(cloud(xyzAnd({"int red", "int green", "int blue"}), {"1 2 3 4 5 70000"})),
+              HasSubstr("found 4 to 70000 in property red of type int"));
   EXPECT_THAT(refusal(cloud(xyzAnd({"list uchar float area"}), {"1 2 3 0"})),
               HasSubstr("property area is a list"));
 }

@@ -310,7 +310,8 @@ Result<std::unique_ptr<RowReader>> openExr(const std::string& path,
 }
 
 const Imf::Header* exrHeaderOf(const RowReader* reader) {
-  const auto* const exr = dynamic_cast<const ExrReader*>(reader);
+  const auto* const exr =
+      reader == nullptr ? nullptr : dynamic_cast<const ExrReader*>(&reader->original());
   return exr != nullptr ? &exr->header() : nullptr;
 }
 

@@ -10,6 +10,7 @@
 
 #include "io/formats/text_rows.h"
 #include "io/ply_format.h"
+#include "io/ply_number.h"
 
 namespace surfeit {
 namespace {
@@ -97,9 +98,14 @@ class HeaderParser {
       return {};
     }
     if (key == "VIEWPOINT") {
-      constexpr std::string_view kOrigin[] = {"0", "0", "0", "1", "0", "0", "0"};
+      constexpr double kOrigin[] = {0, 0, 0, 1, 0, 0, 0};
       header_.has_view_point =
-          !std::equal(words.begin(), words.end(), std::begin(kOrigin), std::end(kOrigin));
+          !std::equal(words.begin(), words.end(), std::begin(kOrigin), std::end(kOrigin),
+                      [](std::string_view word, double expected) {
+                        std::byte value[8];
+                        return parsePlyNumber(word, PlyType::kFloat64, value) &&
+                               plyValue(value, PlyType::kFloat64) == expected;
+                      });
       return {};
     }
     if (key == "DATA") {
@@ -111,13 +117,10 @@ class HeaderParser {
   }
 
   Status parseData(std::string_view encoding) {
-    if (encoding == "binary_compressed") {
-      return Status::corruption(
-          fmt::format("{}: found compressed PCD, which is not read: save it as binary first "
-                      "(pcl_convert_pcd_ascii_binary IN OUT 1)",
-                      path_));
+    header_.is_compressed = encoding == "binary_compressed";
+    if (encoding != "ascii" && encoding != "binary" && !header_.is_compressed) {
+      return unexpected("DATA ascii, binary or binary_compressed");
     }
-    if (encoding != "ascii" && encoding != "binary") return unexpected("DATA ascii or binary");
     header_.is_text = encoding == "ascii";
     return {};
   }

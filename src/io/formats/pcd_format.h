@@ -34,13 +34,13 @@ struct PcdHeader {
   std::uint64_t count = 0;
   bool has_view_point = false;  // other than the origin
   bool is_text = false;
+  bool is_compressed = false;                    // by LZF, field by field; then no text
   std::uint64_t data_offset = 0, data_line = 1;  // of the first point
 };
 
 bool recognisesPcd(std::string_view first_bytes);
 
-// kCorruption naming the line, what was found and what was expected; for compressed files, what to
-// do instead.
+// kCorruption naming the line, what was found and what was expected.
 Result<PcdHeader> readPcdHeader(ByteInput& input);
 
 }  // namespace surfeit

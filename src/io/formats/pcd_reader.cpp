@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <utility>
@@ -10,8 +12,11 @@
 
 #include "io/formats/counted_row_reader.h"
 #include "io/formats/fixed_record_reader.h"
+#include "io/formats/lzf_stream.h"
 #include "io/formats/property_renames.h"
+#include "io/formats/spooled_input.h"
 #include "io/formats/text_rows.h"
+#include "io/formats/xyz_layout.h"
 
 namespace surfeit {
 namespace {
@@ -21,11 +26,14 @@ constexpr std::size_t kTextBlockRows = 4096;
 // How records become rows.
 class PcdLayout {
  public:
-  // Of points as `header` has them. In a text, 64-bit integers stand in records as doubles.
+  // Of points as `header` has them. In a text, 64-bit integers stand in records as doubles, and so
+  // do floats that code a color, and positions that floats would not hold, by `first_lines`.
   static Result<PcdLayout> create(const PcdHeader& header, std::span<const ChannelRename> renames,
-                                  const std::string& path, PlyElement& element) {
+                                  const std::string& path, PlyElement& element,
+                                  std::string_view first_lines = {}) {
     PcdLayout layout;
-    for (const PcdField& field : header.fields) layout.addField(field, header.is_text, renames);
+    layout.needs_doubles_ = header.is_text && !holdFloats(header, first_lines);
+    for (const PcdField& field : header.fields) layout.addField(field, header.is_text);
 
     // Names after renames, then places in a row
     const std::vector<std::string> names = renamedProperties(layout.all_, renames);
@@ -57,6 +65,19 @@ class PcdLayout {
                        [](const Move& move) { return move.from == move.to; });
   }
 
+  // What a text has for packed colors becomes their four bytes.
+  void packColors(std::byte* records, std::size_t count) const {
+    for (const std::size_t offset : packed_reals_) {
+      std::byte* at = records + offset;
+      for (std::size_t i = 0; i < count; ++i, at += record_bytes_) {
+        double value;
+        std::memcpy(&value, at, sizeof value);
+        const std::uint32_t bits = packedBits(value);
+        std::memcpy(at, &bits, sizeof bits);
+      }
+    }
+  }
+
   void decode(const std::byte* records, std::size_t count, std::byte* rows) const {
     for (const Move& move : moves_) {
       const StoredPlace place{move.type, false, move.components, record_bytes_};
@@ -74,8 +95,43 @@ class PcdLayout {
     std::size_t from = 0, to = 0, components = 1;
   };
 
-  void addField(const PcdField& field, bool is_text, std::span<const ChannelRename> renames) {
-    const PlyType row_type = plyTypeOf(field.type);
+  // Whether floats give the positions of these lines back.
+  static bool holdFloats(const PcdHeader& header, std::string_view lines) {
+    const std::vector<XyzColumn> columns = sampleXyz(lines);
+    std::size_t column = 0;
+    for (const PcdField& field : header.fields) {
+      if (column >= columns.size()) break;
+      if (isPosition(field.name) && !columns[column].are_floats) return false;
+      column += field.count;
+    }
+    return true;
+  }
+
+  // A number in a field of floats is the color itself, or a float that has its bits: these are
+  // below 1e-30 or above 2^32.
+  static std::uint32_t packedBits(double value) {
+    if (std::abs(value) >= 1 && value == std::floor(value)) {
+      if (value > 0 && value <= 4294967295.0) return static_cast<std::uint32_t>(value);
+      if (value < 0 && value >= -2147483648.0) {
+        return static_cast<std::uint32_t>(static_cast<std::int32_t>(value));
+      }
+    }
+    return std::isnan(value) ? 0 : std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  }
+
+  static bool isPosition(std::string_view name) {
+    return name == "x" || name == "y" || name == "z" || name == "X" || name == "Y" || name == "Z";
+  }
+
+  void addField(const PcdField& field, bool is_text) {
+    PlyType row_type = plyTypeOf(field.type);
+    const bool is_float_text = is_text && row_type == PlyType::kFloat32;
+    if (is_float_text && field.isPackedColor()) {
+      row_type = PlyType::kFloat64;
+      packed_reals_.push_back(record_bytes_);
+    } else if (is_float_text && needs_doubles_ && isPosition(field.name)) {
+      row_type = PlyType::kFloat64;
+    }
     const StoredType type = is_text ? surfeit::storedTypeOf(row_type) : field.type;
     const std::size_t bytes = field.count * storedBytes(type);
     if (is_text) {
@@ -94,20 +150,14 @@ class PcdLayout {
       for (std::size_t i = 0; i < field.count; ++i) {
         const std::string name =
             field.count == 1 ? field.name : fmt::format("{}_{}", field.name, i);
-        addProperty(propertyName(name, renames), {type, record_bytes_ + i * storedBytes(type)});
+        addProperty(propertyName(name), {type, record_bytes_ + i * storedBytes(type)});
       }
     }
     record_bytes_ += bytes;
   }
 
-  static std::string propertyName(const std::string& name, std::span<const ChannelRename> renames) {
-    const bool is_renamed = std::any_of(renames.begin(), renames.end(),
-                                        [&](const auto& rename) { return rename.from == name; });
-    if (!is_renamed && name.starts_with("normal_") && name.size() == 8 && name.back() >= 'x' &&
-        name.back() <= 'z') {
-      return fmt::format("n{}", name.back());
-    }
-    // The letters of the file, made fit for a property
+  // The letters of the file, made fit for a property.
+  static std::string propertyName(const std::string& name) {
     std::string fit = name.substr(0, 56);
     std::replace_if(
         fit.begin(), fit.end(), [](char c) { return !(c > ' ' && c < '\x7f'); }, '_');
@@ -145,10 +195,15 @@ class PcdLayout {
   std::size_t record_bytes_ = 0, row_bytes_ = 0;
   std::vector<Move> moves_;
   bool moves_are_plain_ = true;
+  bool needs_doubles_ = false;
+  std::vector<std::size_t> packed_reals_;  // where doubles stand in records that code colors
 };
 
 std::string nameOfFormat(const PcdHeader& header) {
-  return fmt::format("PCD {} {}", header.version, header.is_text ? "ascii" : "binary");
+  return fmt::format("PCD {} {}", header.version,
+                     header.is_text         ? "ascii"
+                     : header.is_compressed ? "binary_compressed"
+                                            : "binary");
 }
 
 std::vector<std::string> notesOf(const PcdHeader& header) {
@@ -198,7 +253,9 @@ class PcdTextReader final : public CountedRowReader {
     notes_ = notesOf(header_);
     element_.name = "vertex";
     element_.count = header_.count;
-    SURFEIT_ASSIGN_OR_RETURN(layout_, PcdLayout::create(header_, renames, path(), element_));
+    source_.jumpTo(header_.data_offset, header_.data_line);
+    SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source_.lines());
+    SURFEIT_ASSIGN_OR_RETURN(layout_, PcdLayout::create(header_, renames, path(), element_, lines));
     parser_.emplace(layout_.columns(), layout_.recordBytes(), false);
     SURFEIT_RETURN_IF_ERROR(checkCount());
     return moveTo(0);
@@ -222,6 +279,7 @@ class PcdTextReader final : public CountedRowReader {
     for (std::size_t done = 0; done < count;) {
       const std::size_t block = std::min(kTextBlockRows, count - done);
       SURFEIT_RETURN_IF_ERROR(parser_->readRows(source_, row() + done, block, records_.data()));
+      layout_.packColors(records_.data(), block);
       layout_.decode(records_.data(), block, rows + done * element_.row_bytes);
       done += block;
     }
@@ -242,6 +300,82 @@ class PcdTextReader final : public CountedRowReader {
   std::vector<std::byte> records_;
 };
 
+// Points that are compressed as one stream, field by field: they are decoded to a temporary file,
+// where the values of each field stand together.
+class PcdCompressedReader final : public CountedRowReader {
+ public:
+  PcdCompressedReader(ByteInput input, PcdHeader header)
+      : input_(std::move(input)), header_(std::move(header)) {}
+
+  Status open(std::span<const ChannelRename> renames) {
+    path_ = input_.path();
+    format_name_ = nameOfFormat(header_);
+    notes_ = notesOf(header_);
+    element_.name = "vertex";
+    element_.count = header_.count;
+    SURFEIT_ASSIGN_OR_RETURN(layout_, PcdLayout::create(header_, renames, path(), element_));
+    return unpack();
+  }
+
+  bool isSeekable() const override { return true; }
+
+ private:
+  // [ bytes that follow : u32 ] [ bytes that come out : u32 ] LZF
+  Status unpack() {
+    std::uint32_t sizes[2];
+    SURFEIT_RETURN_IF_ERROR(
+        input_.readAt(header_.data_offset, std::as_writable_bytes(std::span(sizes))));
+    const std::uint64_t begin = header_.data_offset + sizeof sizes;
+    if (header_.count != sizes[1] / layout_.recordBytes() ||
+        sizes[1] % layout_.recordBytes() != 0) {
+      return damagedAt(header_.data_offset,
+                       fmt::format("{} bytes of points, expected {} points of {} bytes", sizes[1],
+                                   header_.count, layout_.recordBytes()));
+    }
+    if (input_.size() && *input_.size() - std::min(*input_.size(), begin) < sizes[0]) {
+      return Status::corruption(fmt::format("{}: file ends early: {} bytes, expected {} at {}",
+                                            path_, *input_.size(), sizes[0], begin));
+    }
+    SURFEIT_ASSIGN_OR_RETURN(TemporaryFile spool, TemporaryFile::create(spoolDirectory()));
+    spool_.emplace(std::move(spool));
+    return decodeLzf(input_, begin, sizes[0], sizes[1], *spool_);
+  }
+
+  Status decodeRows(std::size_t count, std::byte* rows) override {
+    const std::size_t record_bytes = layout_.recordBytes();
+    const std::size_t block_rows = std::max<std::size_t>(1, kBlockBytes / record_bytes);
+    for (std::size_t done = 0; done < count;) {
+      const std::size_t block = std::min(count - done, block_rows);
+      records_.resize(block * record_bytes);
+      std::size_t place = 0;  // of a field in a record, and of its values for one point
+      for (const PcdField& field : header_.fields) {
+        const std::size_t bytes = field.count * storedBytes(field.type);
+        SURFEIT_ASSIGN_OR_RETURN(const Bytes values,
+                                 spool_->readView(header_.count * place + (row() + done) * bytes,
+                                                  block * bytes, values_));
+        for (std::size_t i = 0; i < block; ++i) {
+          std::memcpy(&records_[i * record_bytes + place], &values[i * bytes], bytes);
+        }
+        place += bytes;
+      }
+      layout_.decode(records_.data(), block, rows + done * element_.row_bytes);
+      done += block;
+    }
+    return {};
+  }
+
+  Status checkEnd() override { return input_.checkUnchanged(); }
+
+  static constexpr std::size_t kBlockBytes = 256 << 10;
+
+  ByteInput input_;
+  PcdHeader header_;
+  PcdLayout layout_;
+  std::optional<TemporaryFile> spool_;
+  std::vector<std::byte> records_;
+  AlignedBuffer values_;
+};
+
 template <typename Reader>
 Result<std::unique_ptr<RowReader>> openAs(ByteInput input, PcdHeader header,
                                           std::span<const ChannelRename> renames) {
@@ -258,6 +392,9 @@ Result<std::unique_ptr<RowReader>> openPcd(const std::string& path,
   SURFEIT_ASSIGN_OR_RETURN(PcdHeader header, readPcdHeader(input));
   if (header.is_text) {
     return openAs<PcdTextReader>(std::move(input), std::move(header), options.channels);
+  }
+  if (header.is_compressed) {
+    return openAs<PcdCompressedReader>(std::move(input), std::move(header), options.channels);
   }
   return openAs<PcdBinaryReader>(std::move(input), std::move(header), options.channels);
 }

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "io/formats/packed_splat_reader.h"
 #include "io/formats/property_renames.h"
 #include "io/formats/splat_reader.h"
 #include "io/ply_reader.h"
@@ -108,12 +109,19 @@ class PlyRowWriter final : public RowWriter {
 }  // namespace
 
 bool recognisesPly(std::string_view first_bytes) {
-  return first_bytes.starts_with("ply\n") || first_bytes.starts_with("ply\r");
+  if (!first_bytes.starts_with("ply")) return false;
+  const std::size_t end = first_bytes.find_first_not_of(" \t", 3);
+  return end != first_bytes.npos && (first_bytes[end] == '\n' || first_bytes[end] == '\r');
 }
 
 Result<std::unique_ptr<RowReader>> openPlyRows(const std::string& path,
                                                const RowReaderOptions& options) {
   SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path, options.access));
+  if (options.part.empty() && arePackedSplats(reader.header())) {
+    SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> splats,
+                             openPackedSplats(path, options.access));
+    return readSplatsAsDisks(std::move(splats));
+  }
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t index, findPart(reader.header(), options.part, path));
   SURFEIT_ASSIGN_OR_RETURN(PlyElement element,
                            rowElement(reader.header().elements[index], options.channels, path));

@@ -3,10 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
+#include <utility>
+
+#include "io/property_aliases.h"
 
 namespace surfeit {
 namespace {
 
+const std::string kColor = "color";
 constexpr std::size_t kTwinNameChars = 48;  // what tells twins apart is kept
 
 }  // namespace
@@ -17,22 +22,42 @@ std::vector<std::string> renamedProperties(const PlyElement& element,
     return std::any_of(renames.begin(), renames.end(),
                        [&](const ChannelRename& rename) { return rename.from == name; });
   };
+
+  // As we call them, but for properties that the user calls otherwise
+  PlyElement known = element;
+  for (PlyProperty& property : known.properties) {
+    if (is_renamed(property.name)) property.is_list = true;  // out of sight
+  }
+  const std::vector<std::string> known_names = knownNames(known);
+  known.properties = element.properties;
+  for (std::size_t i = 0; i < known_names.size(); ++i) known.properties[i].name = known_names[i];
+
+  // Whole channels, by our name or the file's, then single properties
   std::vector<std::string> names(element.properties.size());
-  for (const RowChannel& channel : channelsOf(element)) {
-    const std::vector<std::size_t>& properties = channel.properties;
-    if (is_renamed(channel.name)) {
-      const std::vector<std::string> given =
-          propertyNames(channel.name, properties.size(), channel.kind, renames);
-      for (std::size_t i = 0; i < given.size(); ++i) names[properties[i]] = given[i];
-      continue;
+  const auto rename = [&](const RowChannel& channel, std::string_view from) {
+    const std::vector<std::string> given =
+        propertyNames(from, channel.properties.size(), channel.kind, renames);
+    for (std::size_t i = 0; i < given.size(); ++i) names[channel.properties[i]] = given[i];
+  };
+  std::vector<bool> is_done(element.properties.size(), false);
+  for (const PlyElement& names_of : {std::cref(element), std::cref(std::as_const(known))}) {
+    for (const RowChannel& channel : channelsOf(names_of)) {
+      // A color packed into one number is a color, too
+      const bool is_packed = channel.name == "rgb" || channel.name == "rgba";
+      const std::string& from = is_packed && !is_renamed(channel.name) ? kColor : channel.name;
+      const bool is_any_done = std::any_of(channel.properties.begin(), channel.properties.end(),
+                                           [&](std::size_t i) -> bool { return is_done[i]; });
+      if (!is_renamed(from) || is_any_done) continue;
+      rename(channel, from);
+      for (const std::size_t i : channel.properties) is_done[i] = true;
     }
-    for (const std::size_t i : properties) {
-      names[i] = element.properties[i].name;
-      if (!is_renamed(names[i])) continue;
-      const std::vector<std::string> given =
-          propertyNames(names[i], 1, ChannelKind::kFloat, renames);
-      names[i] = given.empty() ? "" : given.front();
-    }
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (is_done[i] || element.properties[i].is_list) continue;
+    names[i] = known.properties[i].name;
+    if (!is_renamed(names[i])) continue;
+    const std::vector<std::string> given = propertyNames(names[i], 1, ChannelKind::kFloat, renames);
+    names[i] = given.empty() ? "" : given.front();
   }
   return names;
 }

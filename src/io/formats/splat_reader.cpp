@@ -17,7 +17,7 @@ namespace surfeit {
 namespace {
 
 constexpr std::size_t kBlockRows = 4096;
-constexpr double kColorFactor = 0.28209479177387814;  // 1 / (2 sqrt(pi)), the constant harmonic
+constexpr double kLeastCoverage = 1e-6;
 
 constexpr const char* kNeeded[] = {"x",      "y",       "z",       "f_dc_0",  "f_dc_1",
                                    "f_dc_2", "opacity", "scale_0", "scale_1", "rot_0",
@@ -25,7 +25,8 @@ constexpr const char* kNeeded[] = {"x",      "y",       "z",       "f_dc_0",  "f
 constexpr const char* kThirdScale = "scale_2";
 
 // What disks have instead; files bring normals that mean nothing.
-constexpr const char* kFloats[] = {"nx", "ny", "nz", "radius", "red", "green", "blue", "opacity"};
+constexpr const char* kFloats[] = {"nx",    "ny",   "nz",      "radius",  "red",
+                                   "green", "blue", "opacity", "coverage"};
 constexpr const char* kTwoSided = "two_sided";
 
 bool isReplaced(std::string_view name) {
@@ -80,6 +81,7 @@ class SplatReader final : public RowReader {
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = splats_->notes();
     notes.push_back("Gaussian splats are read as disks of radius sqrt(2 s1 s2), two-sided");
+    notes.push_back("their opacity becomes the part of its area that a disk covers");
     notes.push_back("splats of an opacity below 1/255 keep their rows");
     if (rest_count_ > 0) {
       notes.push_back(
@@ -138,10 +140,12 @@ class SplatReader final : public RowReader {
     std::array<float, std::size(kFloats)> values;
     decodeShape(splat, values.data());
     for (std::size_t c = 0; c < 3; ++c) {
-      const double code = std::max(0.0, 0.5 + kColorFactor * valueOf(splat, 3 + c));
+      const double code = std::max(0.0, 0.5 + kSplatColorFactor * valueOf(splat, 3 + c));
       values[4 + c] = static_cast<float>(linearFromSrgbCode(code));
     }
-    values[7] = static_cast<float>(1 / (1 + std::exp(-valueOf(splat, 6))));
+    const double opacity = 1 / (1 + std::exp(-valueOf(splat, 6)));
+    values[7] = static_cast<float>(opacity);
+    values[8] = static_cast<float>(std::max(opacity, kLeastCoverage));
     std::byte* const floats = disk + element_.properties[copies_.size()].offset;
     std::memcpy(floats, values.data(), sizeof values);
     floats[sizeof values] = std::byte{1};  // two_sided

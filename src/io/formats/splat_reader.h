@@ -9,6 +9,9 @@
 // - red green blue: 0.5 + f_dc / (2 sqrt(pi)), not below 0. Splats are fitted to pictures that are
 //   coded as sRGB, so this is decoded to scene-linear light.
 // - opacity: 1 / (1 + exp(-opacity)). Splats below 1/255, which viewers leave out, keep their rows.
+// - coverage: the opacity, at least 1e-6, for a surfel has an area. Splats overlap as their
+// training
+//   left them, so the indexer finds by the neighbourhood how much of a disk's area is its own.
 // - position and properties that splats do not use: as they are.
 //
 // What depends on the direction (f_rest) is not kept. The quaternion need not have length 1; where
@@ -21,6 +24,10 @@
 #include "surfeit/status.h"
 
 namespace surfeit {
+
+// f_dc times this is what a splat's color differs from one half: 1 / (2 sqrt(pi)), the constant
+// harmonic.
+inline constexpr double kSplatColorFactor = 0.28209479177387814;
 
 // Whether the vertices of a PLY file are splats: f_dc_0 to f_dc_2, opacity, scale_0 and scale_1,
 // rot_0 to rot_3.

@@ -59,7 +59,8 @@ Result<std::unique_ptr<RowWriter>> createVdb(const std::string& path,
   element.properties = options.properties;
   packPlyRow(element);
   SURFEIT_RETURN_IF_ERROR(checkProperties(path, element));
-  const auto* like = dynamic_cast<const VdbVolumeReader*>(options.like);
+  const RowReader* const original = options.like ? &options.like->original() : nullptr;
+  const auto* like = dynamic_cast<const VdbVolumeReader*>(original);
   if (like != nullptr && hasAll(element, kVoxelNames)) {
     return createVdbVolumes(path, std::move(element), *like, options);
   }
