@@ -1,13 +1,32 @@
 #include "tools/channel_options.h"
 
+#include <fmt/format.h>
+
+#include <string>
+
+#include "io/channels.h"
+
 namespace surfeit {
 
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part) {
+  const auto append = [&channels](const std::string& more) {
+    channels += (channels.empty() ? "" : ",") + more;
+  };
   command
-      .add_option(
-          "--channels", channels,
-          "Channels of the clouds to be called otherwise: FROM=TO,FROM=TO; FROM=- drops one")
+      .add_option_function<std::string>(
+          "--channels", append,
+          "Channels of the clouds to be called otherwise: FROM=TO,FROM=TO; FROM=- drops one; in "
+          "text, FROM may be the number of a column")
       ->type_name("FROM=TO,...");
+  command
+      .add_option_function<std::string>(
+          "--text",
+          [append](const std::string& reading) {
+            append(fmt::format("{}={}", kTextChannel, reading));
+          },
+          "How commas in text are read (default: as the lines tell)")
+      ->check(CLI::IsMember({std::string(kDecimalComma), std::string(kDecimalPoint)}))
+      ->type_name("decimal-comma|decimal-point");
   command
       .add_option("--part", part,
                   "Of files with several: the grid (.vdb), layer (.exr) or element (PLY) to read "

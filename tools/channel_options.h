@@ -7,7 +7,8 @@
 
 namespace surfeit {
 
-// The library parses `channels`: a text that is no list of FROM=TO is a usage error of its own.
+// --channels, --part, and --text, which goes into `channels` (io/channels.h, kTextChannel). The
+// library parses `channels`: a text that is no list of FROM=TO is a usage error of its own.
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part);
 
 // `what` begins the description: "Cloud to write". Any format that is written will do, pictures

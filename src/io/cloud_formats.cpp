@@ -23,6 +23,7 @@
 #include "io/formats/prt_writer.h"
 #include "io/formats/ptc_reader.h"
 #include "io/formats/ptc_writer.h"
+#include "io/formats/ptx_reader.h"
 #include "io/formats/vdb_output.h"
 #include "io/formats/vdb_reader.h"
 #include "io/formats/vdb_writer.h"
@@ -47,6 +48,7 @@ constexpr CloudFormat kFormats[] = {
     {"GEO", "", recognisesBgeoAscii, openBgeoAscii, nullptr},
     {"PDB", ".pdb", recognisesPdb, openPdb, createPdb},
     // Text stands last
+    {"PTX", "", recognisesPtx, openPtx, nullptr},
     {"xyz text", ".xyz .txt .asc .csv", recognisesXyz, openXyz, createXyz},
 };
 
@@ -78,6 +80,8 @@ constexpr OtherFormat kOtherFormats[] = {
     {"#?RGBE"sv, "a Radiance picture", kPictureAdvice},
     {"\xFF\xD8\xFF"sv, "a JPEG picture", kPictureAdvice},
     {"\x89PNG"sv, "a PNG picture", kPictureAdvice},
+    {"\xFF\xFE"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
+    {"\xFE\xFF"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
     {"PK\x03\x04"sv, "a ZIP archive", "unpack it first"},
     {"BZh"sv, "bzip2", "unpack it first; gzip and zstd are read as they are"},
     {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},

@@ -199,7 +199,7 @@ class PcdTextReader final : public CountedRowReader {
     element_.name = "vertex";
     element_.count = header_.count;
     SURFEIT_ASSIGN_OR_RETURN(layout_, PcdLayout::create(header_, renames, path(), element_));
-    parser_.emplace(layout_.columns(), layout_.recordBytes(), false);
+    parser_.emplace(layout_.columns(), layout_.recordBytes(), TextExtras{});
     SURFEIT_RETURN_IF_ERROR(checkCount());
     return moveTo(0);
   }
