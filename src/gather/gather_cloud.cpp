@@ -22,6 +22,7 @@
 #include "gather/result_store.h"
 #include "io/cloud_formats.h"
 #include "io/file.h"
+#include "io/output_target.h"
 #include "octree/group_set.h"
 #include "octree/parallel.h"
 #include "octree/scene_file.h"
@@ -43,8 +44,9 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   GatherStats stats;
   stats.threads = options.threads;
   stats.memory_bytes = options.memory_bytes;
-  const std::string temporary_directory =
-      options.temporary_directory.empty() ? directoryOf(result_path) : options.temporary_directory;
+  const std::string temporary_directory = options.temporary_directory.empty()
+                                              ? scratchDirectoryOf(result_path)
+                                              : options.temporary_directory;
 
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));

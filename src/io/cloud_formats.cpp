@@ -167,15 +167,17 @@ std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std:
 
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
                                                    const RowWriterOptions& options) {
-  const std::string_view name = withoutCompression(path);
+  // Standard output has no name: it is PLY, or what follows the dash (-.csv)
+  const std::string_view name = path == "-" ? std::string_view("-.ply") : withoutCompression(path);
   for (const CloudFormat& format : kFormats) {
     if (format.create != nullptr && hasExtension(name, format.extensions)) {
       return format.create(path, options);
     }
   }
   return Status::invalidArgument(fmt::format(
-      "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it", path,
-      extensionsWritten()));
+      "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it; - "
+      "is PLY to standard output, -.csv CSV",
+      path, extensionsWritten()));
 }
 
 }  // namespace surfeit
