@@ -27,6 +27,7 @@
 #include "io/formats/prt2_reader.h"
 #include "io/formats/prt_reader.h"
 #include "io/formats/ptc_reader.h"
+#include "io/formats/ptx_reader.h"
 #include "io/formats/vdb_reader.h"
 #include "io/formats/xyz_reader.h"
 #include "io/picture_reader.h"
@@ -89,6 +90,7 @@ constexpr Probe kProbes[] = {
     {"las", readCloud<openLas>},
     {"pcd", readCloud<openPcd>},
     {"xyz", readCloud<openXyz>},
+    {"ptx", readCloud<openPtx>},
     {"vdb", readCloud<openVdb>},
     {"prt", readCloud<openPrt>},
     {"prt2", readCloud<openPrt2>},

@@ -1,6 +1,11 @@
 #include "tools/channel_options.h"
 
+#include <fmt/format.h>
+
 #include <map>
+#include <string>
+
+#include "io/channels.h"
 
 namespace surfeit {
 
@@ -20,11 +25,24 @@ void addColorRangeOption(CLI::App& command, ColorRange& color_range) {
 
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part,
                        std::string& filter) {
+  const auto append = [&channels](const std::string& more) {
+    channels += (channels.empty() ? "" : ",") + more;
+  };
   command
-      .add_option(
-          "--channels", channels,
-          "Channels of the clouds to be called otherwise: FROM=TO,FROM=TO; FROM=- drops one")
+      .add_option_function<std::string>(
+          "--channels", append,
+          "Channels of the clouds to be called otherwise: FROM=TO,FROM=TO; FROM=- drops one; in "
+          "text, FROM may be the number of a column")
       ->type_name("FROM=TO,...");
+  command
+      .add_option_function<std::string>(
+          "--text",
+          [append](const std::string& reading) {
+            append(fmt::format("{}={}", kTextChannel, reading));
+          },
+          "How commas in text are read (default: as the lines tell)")
+      ->check(CLI::IsMember({std::string(kDecimalComma), std::string(kDecimalPoint)}))
+      ->type_name("decimal-comma|decimal-point");
   command
       .add_option("--part", part,
                   "Of files with several: the grid (.vdb), layer (.exr) or element (PLY) to read "

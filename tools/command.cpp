@@ -13,6 +13,7 @@
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "io/file.h"
+#include "tools/output_check.h"
 
 namespace surfeit {
 namespace {
@@ -35,6 +36,7 @@ CommandContext::CommandContext() : start_(std::chrono::steady_clock::now()) {}
 CommandContext::~CommandContext() = default;
 
 void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& set) {
+  commands_.push_back({&command, set.works_in_place});
   constexpr const char* kGroup = "Common";
   if (set.threads) {
     command.add_option("--threads", common.threads, "Threads (default: what the job may use)")
@@ -67,7 +69,8 @@ void CommandContext::run(const std::function<Status()>& body) {
       std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
                                         common.strict);
   try {
-    status = body();
+    status = checkParsed();
+    if (status.ok()) status = body();
   } catch (const std::bad_alloc&) {
     // Told without a Status, whose text would take some
     progress_->clear();
@@ -92,7 +95,19 @@ void CommandContext::run(const std::function<Status()>& body) {
   }
 }
 
+Status CommandContext::checkParsed() const {
+  for (const Command& command : commands_) {
+    if (command.app->parsed()) return checkOutputs(*command.app, command.works_in_place);
+  }
+  return {};
+}
+
 Progress& CommandContext::progress() { return *progress_; }
+
+void CommandContext::answer(const std::string& text) {
+  progress_->clear();
+  fmt::print("{}\n", text);
+}
 
 void CommandContext::say(const std::string& line) {
   if (common.quiet) return;

@@ -34,6 +34,7 @@ struct CommonOptionSet {
   bool threads = true;
   bool memory = true;
   bool stats = true;
+  bool works_in_place = false;  // the output may be one of the inputs
 };
 
 class CommandContext {
@@ -53,6 +54,9 @@ class CommandContext {
   // Progress of the running command; cancelled by SIGINT and SIGTERM.
   Progress& progress();
 
+  // What the command was asked for, on stdout, --quiet or not.
+  void answer(const std::string& text);
+
   // A line for people, on stderr; not with --quiet.
   void say(const std::string& line);
 
@@ -66,6 +70,13 @@ class CommandContext {
   int threads() const;
 
  private:
+  Status checkParsed() const;
+
+  struct Command {
+    const CLI::App* app;
+    bool works_in_place;
+  };
+  std::vector<Command> commands_;
   std::unique_ptr<ConsoleProgress> progress_;
   std::chrono::steady_clock::time_point start_;
 };

@@ -205,7 +205,7 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
   addCloudOutputOption(*command, arguments->output, "Cloud to write", true);
   addChoiceOptions(*command, arguments->options);
   addPlaceOptions(*command, *arguments);
-  context.addCommonOptions(*command, {.threads = false});
+  context.addCommonOptions(*command, {.threads = false, .works_in_place = true});
   command->footer(
       "Several clouds become one with the properties of all; what one of them lacks is 0 there.\n"
       "Memory is some MiB, whatever the size of the clouds; only .vdb holds what it writes, up to\n"

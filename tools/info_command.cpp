@@ -246,9 +246,9 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
   }
   json["path"] = arguments.path;
   if (arguments.json) {
-    fmt::print("{}\n", json.dump(2));
+    context.answer(json.dump(2));
   } else {
-    context.say(text);
+    context.answer(text);
   }
   return {};
 }

@@ -169,7 +169,7 @@ Status runTune(TuneArguments& arguments, CommandContext& context) {
         "\nhit rates are off by {:.4f} percentage points in the mean, but for the least budget",
         *report.hitRateError());
   }
-  context.say(fmt::format(
+  context.answer(fmt::format(
       "{}: {} of {} receivers sampled in {:.1f} s; {:.1f} us per receiver with {} threads, {:.0f} "
       "us to load a node page, {:.0f} us a surfel page\n{}{}\n{}",
       arguments.receivers, formatCount(report.sampled_receivers), formatCount(report.receivers),

@@ -19,9 +19,9 @@ Status runVerify(const std::string& path, CommandContext& context) {
                                               {"finding_count", report.finding_count},
                                               {"findings", report.findings}}));
   if (report.finding_count == 0) {
-    context.say(fmt::format("{}: sound: {} pages, {} in {:.1f} s", path,
-                            formatCount(report.pages_checked), formatBytes(report.bytes_checked),
-                            context.wallSeconds()));
+    context.answer(fmt::format("{}: sound: {} pages, {} in {:.1f} s", path,
+                               formatCount(report.pages_checked), formatBytes(report.bytes_checked),
+                               context.wallSeconds()));
     return {};
   }
   // All findings but the last; the last is the command's error

@@ -16,6 +16,7 @@
 #include "brick/brick_writer.h"
 #include "brick/record_sorter.h"
 #include "core/job_limits.h"
+#include "io/output_target.h"
 #include "octree/parallel.h"
 #include "surfeit/brick.h"
 
@@ -237,9 +238,9 @@ Status BrickBuild::chooseVoxelSize(const AreaMedian& areas) {
 }
 
 RecordSorter::Options BrickBuild::sorterOptions(std::size_t record_bytes) const {
-  return {
-      record_bytes, (options_.memory_bytes - kFixedMemory) / 2,
-      options_.temporary_directory.empty() ? directoryOf(output_) : options_.temporary_directory};
+  return {record_bytes, (options_.memory_bytes - kFixedMemory) / 2,
+          options_.temporary_directory.empty() ? scratchDirectoryOf(output_)
+                                               : options_.temporary_directory};
 }
 
 // The finest level whose voxels are as large as a point of that area: the points between those of a

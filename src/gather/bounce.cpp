@@ -28,6 +28,7 @@
 #include "gather/paging_controller.h"
 #include "io/block_writer.h"
 #include "io/file.h"
+#include "io/output_target.h"
 #include "octree/group_set.h"
 #include "octree/parallel.h"
 #include "octree/radiosity_rewriter.h"
@@ -82,7 +83,7 @@ class Bouncer {
         options_(options),
         gather_options_(withDefaults(gatherOptions(options))),
         progress_(progress),
-        temporary_directory_(options.temporary_directory.empty() ? directoryOf(result_path)
+        temporary_directory_(options.temporary_directory.empty() ? scratchDirectoryOf(result_path)
                                                                  : options.temporary_directory) {}
 
   Result<BounceStats> run();

@@ -23,6 +23,7 @@
 #include "gather/result_store.h"
 #include "io/cloud_formats.h"
 #include "io/file.h"
+#include "io/output_target.h"
 #include "octree/group_set.h"
 #include "octree/parallel.h"
 #include "octree/scene_file.h"
@@ -45,16 +46,18 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   GatherStats stats;
   stats.threads = options.threads;
   stats.memory_bytes = options.memory_bytes;
-  const std::string temporary_directory =
-      options.temporary_directory.empty() ? directoryOf(result_path) : options.temporary_directory;
+  const std::string temporary_directory = options.temporary_directory.empty()
+                                              ? scratchDirectoryOf(result_path)
+                                              : options.temporary_directory;
 
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   options.eye -= scene.header().origin;
-  SURFEIT_ASSIGN_OR_RETURN(GatherInput input,
-                           GatherInput::open(receivers_path, options.channels, options.part,
-                                             options.filter, options.color_range));
+  SURFEIT_ASSIGN_OR_RETURN(
+      GatherInput input,
+      GatherInput::open(receivers_path, options.channels, options.part, options.filter,
+                        colorRangeFor(result_path, options.color_range)));
   SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
   const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();

@@ -44,7 +44,7 @@ CurveKey keyOf(const glm::vec3& position, std::uint64_t index, ReceiverOrder ord
 
 Result<GatherInput> GatherInput::open(const std::string& path, const std::string& channels,
                                       const std::string& part, const std::string& filter,
-                                      ColorRange color_range) {
+                                      std::optional<ColorRange> color_range) {
   RowReaderOptions reading;
   SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(channels));
   reading.part = part;

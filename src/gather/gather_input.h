@@ -27,7 +27,7 @@ class GatherInput {
   // GatherOptions. Errors as of parseChannelRenames, openRowReader and ReceiverMapping.
   static Result<GatherInput> open(const std::string& path, const std::string& channels = {},
                                   const std::string& part = {}, const std::string& filter = {},
-                                  ColorRange color_range = ColorRange::kAuto);
+                                  std::optional<ColorRange> color_range = ColorRange::kAuto);
 
   std::uint64_t receiverCount() const { return receivers().count; }
   const PlyElement& receivers() const { return reader_->element(); }

@@ -28,6 +28,7 @@
 #include "gather/radiance_photons.h"
 #include "io/cloud_formats.h"
 #include "io/file.h"
+#include "io/output_target.h"
 #include "io/surfel_writer.h"
 #include "io/temporary_name.h"
 #include "octree/index_plan.h"
@@ -222,8 +223,9 @@ Result<SurfelWriter> RadianceJob::createWriter(const std::string& result_path,
 
 // The photons as a scene, open and without a name.
 Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::string& result_path) {
-  const std::string directory = options_.temporary_directory.empty() ? directoryOf(result_path)
-                                                                     : options_.temporary_directory;
+  const std::string directory = options_.temporary_directory.empty()
+                                    ? scratchDirectoryOf(result_path)
+                                    : options_.temporary_directory;
   stats_.photons = photons.recordCount();
   SURFEIT_RETURN_IF_ERROR(photons.write(
       directory, result_path,

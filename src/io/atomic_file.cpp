@@ -1,4 +1,5 @@
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -8,6 +9,7 @@
 #include "core/assert.h"
 #include "io/block_writer.h"
 #include "io/file.h"
+#include "io/output_target.h"
 #include "io/system_calls.h"
 #include "io/temporary_name.h"
 
@@ -27,7 +29,8 @@ FileDescriptor openUnnamed(const std::string& path) {
 }  // namespace
 
 struct AtomicFile::State {
-  explicit State(std::string final_path) : path(std::move(final_path)) {}
+  State(std::string given_path, OutputTarget resolved)
+      : path(std::move(given_path)), target(std::move(resolved)) {}
   ~State() {
     if (!removeTemporary().ok()) return;  // the next writer of the path tries again
   }
@@ -39,7 +42,13 @@ struct AtomicFile::State {
   // Gives thread and memory back.
   void endWriting();
 
-  std::string path;
+  // Where the file lies until it is complete, as a path beside it.
+  std::string besidePath() const {
+    return target.is_stream ? spoolDirectory() + "/surfeit-output" : target.path;
+  }
+
+  std::string path;  // as it was given, for messages
+  OutputTarget target;
   std::string temporary_path;  // empty while the file has no name, and when it has the final one
   PositionalFile file;
   std::optional<BlockWriter> writer{std::in_place,
@@ -49,10 +58,10 @@ struct AtomicFile::State {
 };
 
 Status AtomicFile::State::openTemporary() {
-  FileDescriptor descriptor = openUnnamed(path);
+  FileDescriptor descriptor = openUnnamed(besidePath());
   if (!descriptor.isOpen()) {
     // Not every file system has files without names
-    SURFEIT_ASSIGN_OR_RETURN(NamedFile named, createTemporary(path, path));
+    SURFEIT_ASSIGN_OR_RETURN(NamedFile named, createTemporary(besidePath(), path));
     descriptor = std::move(named.descriptor);
     temporary_path = std::move(named.path);
   }
@@ -71,17 +80,25 @@ Status AtomicFile::State::complete() {
 
 Status AtomicFile::State::publish() {
   SURFEIT_RETURN_IF_ERROR(complete());
+  if (target.is_stream) {
+    SURFEIT_RETURN_IF_ERROR(writeToStream(target, file.descriptor(), writer->size()));
+    return removeTemporary();
+  }
+  // Permissions of the file that was there stay
+  if (target.mode && ::fchmod(file.descriptor(), *target.mode) != 0) {
+    return file.systemError("give the finished file the permissions of the one before");
+  }
   if (system_calls::fsync(file.descriptor()) != 0) return file.systemError("sync");
 
   // What can fail is done before the file that was there is replaced
   const FileDescriptor directory(
-      system_calls::open(directoryOf(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+      system_calls::open(directoryOf(target.path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!directory.isOpen()) return file.systemError("open the directory of the finished file");
   if (temporary_path.empty()) {
     // A new name cannot replace an old one; only rename can
-    SURFEIT_ASSIGN_OR_RETURN(temporary_path, nameTemporary(file.descriptor(), path));
+    SURFEIT_ASSIGN_OR_RETURN(temporary_path, nameTemporary(file.descriptor(), target.path));
   }
-  if (system_calls::rename(temporary_path.c_str(), path.c_str()) != 0) {
+  if (system_calls::rename(temporary_path.c_str(), target.path.c_str()) != 0) {
     return file.systemError("rename the finished file to its final name");
   }
   temporary_path.clear();
@@ -113,8 +130,9 @@ AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept = default;
 AtomicFile::~AtomicFile() = default;
 
 Result<AtomicFile> AtomicFile::create(const std::string& path) {
-  removeStaleTemporaries(path);
-  auto state = std::make_unique<State>(path);
+  SURFEIT_ASSIGN_OR_RETURN(OutputTarget target, resolveOutput(path));
+  auto state = std::make_unique<State>(path, std::move(target));
+  removeStaleTemporaries(state->besidePath());
   SURFEIT_RETURN_IF_ERROR(state->openTemporary());
   return AtomicFile(std::move(state));
 }
@@ -143,7 +161,7 @@ Status AtomicFile::commit() {
   state_->endWriting();
   state_->file.close();
   // A writer of the same path may have been killed meanwhile
-  removeStaleTemporaries(state_->path);
+  removeStaleTemporaries(state_->besidePath());
   return {};
 }
 

@@ -22,6 +22,9 @@ enum class ChannelKind { kFloat, kPoint, kVector, kNormal, kColor, kMatrix };
 struct ChannelRename {
   std::string from, to;
 };
+// In place of a channel: how text is read, "--text=decimal-comma" or "--text=decimal-point".
+inline constexpr std::string_view kTextChannel = "--text", kDecimalComma = "decimal-comma",
+                                  kDecimalPoint = "decimal-point";
 // Parses "from=to,from=to"; kInvalidArgument naming the part that is not of that form.
 Result<std::vector<ChannelRename>> parseChannelRenames(std::string_view text);
 

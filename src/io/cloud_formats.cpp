@@ -26,6 +26,7 @@
 #include "io/formats/prt_writer.h"
 #include "io/formats/ptc_reader.h"
 #include "io/formats/ptc_writer.h"
+#include "io/formats/ptx_reader.h"
 #include "io/formats/vdb_output.h"
 #include "io/formats/vdb_reader.h"
 #include "io/formats/vdb_writer.h"
@@ -50,6 +51,7 @@ constexpr CloudFormat kFormats[] = {
     {"GEO", "", recognisesBgeoAscii, openBgeoAscii, nullptr},
     {"PDB", ".pdb", recognisesPdb, openPdb, createPdb},
     // Text stands last
+    {"PTX", "", recognisesPtx, openPtx, nullptr},
     {"xyz text", ".xyz .txt .asc .csv", recognisesXyz, openXyz, createXyz},
 };
 
@@ -83,6 +85,8 @@ constexpr OtherFormat kOtherFormats[] = {
     {"#?RGBE"sv, "a Radiance picture", kPictureAdvice},
     {"\xFF\xD8\xFF"sv, "a JPEG picture", kPictureAdvice},
     {"\x89PNG"sv, "a PNG picture", kPictureAdvice},
+    {"\xFF\xFE"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
+    {"\xFE\xFF"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
     {"PK\x03\x04"sv, "a ZIP archive", "unpack it first"},
     {"BZh"sv, "bzip2", "unpack it first; gzip and zstd are read as they are"},
     {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},
@@ -175,13 +179,19 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
   return unknownFormat(path, first_bytes);
 }
 
+std::optional<ColorRange> colorRangeFor(const std::string& path, ColorRange asked) {
+  if (asked == ColorRange::kAuto && hasExtension(withoutCompression(path), ".las")) return {};
+  return asked;
+}
+
 std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes) {
   return hasExtension(path, ".vdb") ? count * (row_bytes + sizeof(VdbEntry)) : 0;
 }
 
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
                                                    const RowWriterOptions& options) {
-  const std::string_view name = withoutCompression(path);
+  // Standard output has no name: it is PLY, or what follows the dash (-.csv)
+  const std::string_view name = path == "-" ? std::string_view("-.ply") : withoutCompression(path);
   RowWriterOptions writing = options;
   if (writing.like != nullptr) writing.like = &writing.like->file();
   for (const CloudFormat& format : kFormats) {
@@ -190,8 +200,9 @@ Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
     }
   }
   return Status::invalidArgument(fmt::format(
-      "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it", path,
-      extensionsWritten()));
+      "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it; - "
+      "is PLY to standard output, -.csv CSV",
+      path, extensionsWritten()));
 }
 
 }  // namespace surfeit

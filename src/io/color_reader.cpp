@@ -160,7 +160,7 @@ class ColorReader final : public RowReader {
   std::string formatName() const override { return reader_->formatName(); }
   const PlyElement& element() const override { return element_; }
   std::vector<std::string> comments() const override { return reader_->comments(); }
-  const RowReader& original() const override { return reader_->original(); }
+  const RowReader& file() const override { return reader_->file(); }
 
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = reader_->notes();

@@ -2,9 +2,11 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <utility>
 
+#include "io/input_spool.h"
 #include "io/system_calls.h"
 
 namespace surfeit {
@@ -17,8 +19,13 @@ std::int64_t writtenNs(const struct ::stat& info) {
 }  // namespace
 
 Result<InputFile> InputFile::open(const std::string& path, Access access) {
-  FileDescriptor descriptor(system_calls::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  FileDescriptor descriptor(system_calls::open(inputPath(path).c_str(), O_RDONLY | O_CLOEXEC));
   if (!descriptor.isOpen()) return systemError(path, "open");
+  struct ::stat info {};
+  if (system_calls::fstat(descriptor.get(), &info) != 0) return systemError(path, "stat");
+  if (S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode)) {
+    SURFEIT_ASSIGN_OR_RETURN(descriptor, openSpooled(descriptor.get(), path));
+  }
   return fromOpen(PositionalFile(std::move(descriptor), path), access);
 }
 
@@ -30,7 +37,11 @@ Result<InputFile> InputFile::fromOpen(PositionalFile file, Access access) {
     return input.file_.systemError("stat");
   }
   if (!S_ISREG(info.st_mode)) {
-    return Status::ioError(fmt::format("{}: not a regular file", input.path()));
+    return Status::ioError(fmt::format("{}: found a {}, expected a regular file or a pipe",
+                                       input.path(),
+                                       S_ISDIR(info.st_mode)              ? "directory"
+                                       : isatty(input.file_.descriptor()) ? "terminal"
+                                                                          : "device"));
   }
   input.size_ = static_cast<std::uint64_t>(info.st_size);
   input.written_ns_ = writtenNs(info);

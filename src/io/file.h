@@ -16,7 +16,9 @@ namespace surfeit {
 // A file open for reading. Reads are safe from any thread.
 class InputFile {
  public:
-  // kIoError when the path cannot be opened or is not a regular file. `access` decides how readView
+  // "-" is standard input. What comes from a pipe or socket is kept in a temporary file
+  // (io/input_spool.h). kIoError when the path cannot be opened or is a directory or device.
+  // `access` decides how readView
   // reads; the other reads, which have no alignment, are cached.
   static Result<InputFile> open(const std::string& path, Access access = Access::kCached);
 
@@ -56,8 +58,13 @@ class InputFile {
 // commit() it leaves nothing; killed, it leaves at most the temporary file, which the next writer
 // of the path removes. Of two writers of one path at once, the last to commit wins. Takes up to
 // BlockWriter::kDefaultBlocks blocks of memory. One thread at a time.
+//
+// A symbolic link stays and what it leads to is replaced; a file that was there keeps its
+// permissions. Devices, FIFOs, sockets and standard output ("-") are written to by commit(), from
+// a temporary file (io/output_target.h).
 class AtomicFile {
  public:
+  // kInvalidArgument for a directory, kIoError where nothing can be written.
   static Result<AtomicFile> create(const std::string& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&& other) noexcept;

@@ -94,9 +94,6 @@ struct PlyWriter::State {
 Result<PlyWriter> PlyWriter::create(const std::string& path, PlyEncoding encoding,
                                     std::vector<PlyProperty> properties,
                                     std::vector<std::string> comments, Progress* progress) {
-  if (path == "-") {
-    return Status::invalidArgument("-: a PLY file cannot be written to the standard output");
-  }
   SURFEIT_RETURN_IF_ERROR(checkProperties(path, properties));
   PlyElement element;
   element.name = "vertex";

@@ -50,10 +50,6 @@ class RowReader {
   // What the file has that rows do not, one sentence each: "list property faces is not kept".
   virtual std::vector<std::string> notes() const { return {}; }
 
-  // The reader of the file itself, for what a format has beside rows (cameras, windows of
-  // pictures).
-  virtual const RowReader& original() const { return *this; }
-
   // The next rows, max_rows (at least 1) or as many as are left; empty at the end. The view lies in
   // `buffer`, which grows as needed, and lasts as long as the buffer is not used again.
   virtual Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) = 0;
@@ -68,7 +64,8 @@ class RowReader {
 
   // What readRows returns and is better left out (io/filtered_reader.h); mostly nothing.
   virtual RowExclusions exclusions() const { return {}; }
-  // The reader of the file itself, where this one takes rows of another.
+  // The reader of the file itself, where this one takes rows of another: for what a format has
+  // beside rows (cameras, windows of pictures).
   virtual const RowReader& file() const { return *this; }
 };
 

@@ -21,6 +21,7 @@
 #include "io/channels.h"
 #include "io/cloud_formats.h"
 #include "io/file.h"
+#include "io/output_target.h"
 #include "io/row_transform.h"
 #include "io/row_union.h"
 #include "io/surfel_names.h"
@@ -144,7 +145,7 @@ class Converter {
     reading_.part = options_.part;
     reading_.filter = options_.filter;
     reading_.selections = std::make_shared<RowSelections>();
-    reading_.color_range = options_.color_range;
+    reading_.color_range = colorRangeFor(output_, options_.color_range);
     SURFEIT_RETURN_IF_ERROR(openInputs());
     SURFEIT_RETURN_IF_ERROR(createWriter());
     progress_.beginPhase("convert", stats_.records, "records");
@@ -158,8 +159,11 @@ class Converter {
     progress_.beginPhase("finish", 0, "records");
     SURFEIT_RETURN_IF_ERROR(writer_->finish());
     noteOfWriter();
-    SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(output_));
-    stats_.output_bytes = file.size();
+    SURFEIT_ASSIGN_OR_RETURN(const OutputTarget target, resolveOutput(output_));
+    if (!target.is_stream) {
+      SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(output_));
+      stats_.output_bytes = file.size();
+    }
     return std::move(stats_);
   }
 

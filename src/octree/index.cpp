@@ -17,6 +17,7 @@
 #include "core/thread_scratch.h"
 #include "io/channels.h"
 #include "io/cloud_formats.h"
+#include "io/output_target.h"
 #include "octree/bucket_stream.h"
 #include "octree/cloud_reader.h"
 #include "octree/index_plan.h"
@@ -101,8 +102,8 @@ class Indexer {
         threads_(threads),
         progress_(progress),
         clock_(stats_) {
-    temporary_directory_ =
-        options.temporary_directory.empty() ? directoryOf(output) : options.temporary_directory;
+    temporary_directory_ = options.temporary_directory.empty() ? scratchDirectoryOf(output)
+                                                               : options.temporary_directory;
   }
 
   Result<IndexStats> run();
@@ -243,7 +244,7 @@ Status Indexer::checkFreeSpace(double packed_bytes) {
 
 Status Indexer::checkOutputRoom() const {
   const double records = double(reader_->recordCount());
-  return checkRoom(directoryOf(output_), records * kLeastOutputBytes,
+  return checkRoom(scratchDirectoryOf(output_), records * kLeastOutputBytes,
                    "make room, or write the scene elsewhere");
 }
 

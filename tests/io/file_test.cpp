@@ -227,14 +227,16 @@ TEST_F(AtomicFileTest, MissingDirectoryIsAnIoError) {
 }
 
 TEST_F(AtomicFileTest, DirectoryUnderTheFinalNameIsAnIoError) {
-  fs::create_directory(path("a"));
   {
     Result<AtomicFile> file = AtomicFile::create(path("a"));
     ASSERT_TRUE(file.ok());
     ASSERT_TRUE(file->append(bytesOf("hello")).ok());
+    fs::create_directory(path("a"));
     EXPECT_EQ(file->commit().code(), StatusCode::kIoError);
   }
   EXPECT_EQ(fileCount(), 1);
+  // One that is there already is told at once
+  EXPECT_EQ(AtomicFile::create(path("a")).status().code(), StatusCode::kInvalidArgument);
 }
 
 // Calls `check` for files without a name while they are written, and with one.

@@ -311,7 +311,7 @@ Result<std::unique_ptr<RowReader>> openExr(const std::string& path,
 
 const Imf::Header* exrHeaderOf(const RowReader* reader) {
   const auto* const exr =
-      reader == nullptr ? nullptr : dynamic_cast<const ExrReader*>(&reader->original());
+      reader == nullptr ? nullptr : dynamic_cast<const ExrReader*>(&reader->file());
   return exr != nullptr ? &exr->header() : nullptr;
 }
 

@@ -27,12 +27,10 @@ constexpr std::size_t kTextBlockRows = 4096;
 class PcdLayout {
  public:
   // Of points as `header` has them. In a text, 64-bit integers stand in records as doubles, and so
-  // do floats that code a color, and positions that floats would not hold, by `first_lines`.
+  // do floats that code a color, and all positions: a text may have more digits than floats.
   static Result<PcdLayout> create(const PcdHeader& header, std::span<const ChannelRename> renames,
-                                  const std::string& path, PlyElement& element,
-                                  std::string_view first_lines = {}) {
+                                  const std::string& path, PlyElement& element) {
     PcdLayout layout;
-    layout.needs_doubles_ = header.is_text && !holdFloats(header, first_lines);
     for (const PcdField& field : header.fields) layout.addField(field, header.is_text);
 
     // Names after renames, then places in a row
@@ -95,18 +93,6 @@ class PcdLayout {
     std::size_t from = 0, to = 0, components = 1;
   };
 
-  // Whether floats give the positions of these lines back.
-  static bool holdFloats(const PcdHeader& header, std::string_view lines) {
-    const std::vector<XyzColumn> columns = sampleXyz(lines);
-    std::size_t column = 0;
-    for (const PcdField& field : header.fields) {
-      if (column >= columns.size()) break;
-      if (isPosition(field.name) && !columns[column].are_floats) return false;
-      column += field.count;
-    }
-    return true;
-  }
-
   // A number in a field of floats is the color itself, or a float that has its bits: these are
   // below 1e-30 or above 2^32.
   static std::uint32_t packedBits(double value) {
@@ -129,7 +115,7 @@ class PcdLayout {
     if (is_float_text && field.isPackedColor()) {
       row_type = PlyType::kFloat64;
       packed_reals_.push_back(record_bytes_);
-    } else if (is_float_text && needs_doubles_ && isPosition(field.name)) {
+    } else if (is_float_text && isPosition(field.name)) {
       row_type = PlyType::kFloat64;
     }
     const StoredType type = is_text ? surfeit::storedTypeOf(row_type) : field.type;
@@ -195,7 +181,6 @@ class PcdLayout {
   std::size_t record_bytes_ = 0, row_bytes_ = 0;
   std::vector<Move> moves_;
   bool moves_are_plain_ = true;
-  bool needs_doubles_ = false;
   std::vector<std::size_t> packed_reals_;  // where doubles stand in records that code colors
 };
 
@@ -254,9 +239,8 @@ class PcdTextReader final : public CountedRowReader {
     element_.name = "vertex";
     element_.count = header_.count;
     source_.jumpTo(header_.data_offset, header_.data_line);
-    SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source_.lines());
-    SURFEIT_ASSIGN_OR_RETURN(layout_, PcdLayout::create(header_, renames, path(), element_, lines));
-    parser_.emplace(layout_.columns(), layout_.recordBytes(), false);
+    SURFEIT_ASSIGN_OR_RETURN(layout_, PcdLayout::create(header_, renames, path(), element_));
+    parser_.emplace(layout_.columns(), layout_.recordBytes(), TextExtras{});
     SURFEIT_RETURN_IF_ERROR(checkCount());
     return moveTo(0);
   }

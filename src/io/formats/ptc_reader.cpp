@@ -136,7 +136,7 @@ Result<std::unique_ptr<RowReader>> openPtc(const std::string& path,
 }
 
 const PtcCamera* ptcCameraOf(const RowReader& reader) {
-  const auto* const ptc = dynamic_cast<const PtcReader*>(&reader.original());
+  const auto* const ptc = dynamic_cast<const PtcReader*>(&reader.file());
   return ptc ? &ptc->camera() : nullptr;
 }
 

@@ -2,18 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 namespace surfeit {
-
-std::string spoolDirectory() {
-  std::error_code error;
-  const std::filesystem::path directory = std::filesystem::temp_directory_path(error);
-  return error ? std::string("/tmp") : directory.string();
-}
 
 Result<SpooledInput> SpooledInput::open(const std::string& path, Access access) {
   SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path, access));

@@ -9,12 +9,10 @@
 
 #include "io/byte_input.h"
 #include "io/file.h"
+#include "io/output_target.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
-
-// The directory for temporary files of readers: TMPDIR, else /tmp.
-std::string spoolDirectory();
 
 // One thread at a time. Offsets are those of the bytes after decompression.
 class SpooledInput {

@@ -106,17 +106,12 @@ const char* parseInteger(const char* at, const char* end, PlyType type, std::byt
   const auto [number_end, error] = std::from_chars(at, end, value);
   if (error != std::errc{}) return parseAnyNumber(at, end, type, out);
   std::memcpy(out, &value, sizeof value);
-  return number_end;
-}
-
-// The end of the number, or nullptr.
-const char* parseNumber(const char* at, const char* end, PlyType type, std::byte* out) {
-  return visitPlyType(type, [=]<typename T>(std::type_identity<T>) {
-    if constexpr (std::is_integral_v<T>)
-      return parseInteger<T>(at, end, type, out);
-    else
-      return parseReal<T>(at, end, type, out);
-  });
+  const char* value_end = number_end;
+  if (value_end < end && *value_end == '.') {
+    do ++value_end;
+    while (value_end < end && *value_end == '0');
+  }
+  return value_end;
 }
 
 std::string_view withoutEnd(std::string_view lines, std::size_t& bytes) {
@@ -128,6 +123,24 @@ std::string_view withoutEnd(std::string_view lines, std::size_t& bytes) {
 }
 
 }  // namespace
+
+const char* parseTextNumber(const char* at, const char* end, PlyType type, std::byte* out) {
+  return visitPlyType(type, [=]<typename T>(std::type_identity<T>) {
+    if constexpr (std::is_integral_v<T>)
+      return parseInteger<T>(at, end, type, out);
+    else
+      return parseReal<T>(at, end, type, out);
+  });
+}
+
+bool isTextNumber(std::string_view word) {
+  std::byte value[8];
+  return parsePlyNumber(word, PlyType::kFloat64, value);
+}
+
+bool isTextCount(std::string_view word) {
+  return !word.empty() && word.size() <= 18 && std::all_of(word.begin(), word.end(), isDigit);
+}
 
 std::string_view trimmedLine(std::string_view line) {
   while (!line.empty() && (isTextBlank(line.back()) || line.back() == '\n')) line.remove_suffix(1);
@@ -175,6 +188,7 @@ Result<std::string_view> LineSource::lines() {
         const std::size_t got,
         input_.readSome(offset_ + rest, std::as_writable_bytes(std::span(buffer_).subspan(rest))));
     end_ = rest + got;
+    adapt(rest);
     const std::string_view text(buffer_.data(), end_);
     const std::size_t last_end = text.rfind('\n');
     lines_end_ = last_end == std::string_view::npos ? 0 : last_end + 1;
@@ -189,6 +203,28 @@ Result<std::string_view> LineSource::lines() {
   return std::string_view(buffer_.data() + begin_, lines_end_ - begin_);
 }
 
+// A CR that no LF follows ends a line, and substitutions are made, from byte `begin` of the buffer
+// on. The CR that ended the part before is looked at again.
+void LineSource::adapt(std::size_t begin) {
+  char* const data = buffer_.data();
+  std::size_t at = begin > 0 && data[begin - 1] == '\r' ? begin - 1 : begin;
+  while (at + 1 < end_) {
+    const void* const found = std::memchr(data + at, '\r', end_ - 1 - at);
+    if (found == nullptr) break;
+    at = static_cast<std::size_t>(static_cast<const char*>(found) - data);
+    if (data[at + 1] != '\n') data[at] = '\n';
+    ++at;
+  }
+  for (const Substitution& substitution : substitutions_) {
+    std::replace(data + begin, data + end_, substitution.from, substitution.to);
+  }
+}
+
+void LineSource::substitute(char from, char to) {
+  substitutions_.push_back({from, to});
+  std::replace(buffer_.data() + begin_, buffer_.data() + end_, from, to);
+}
+
 void LineSource::consume(std::size_t bytes, std::uint64_t line_count) {
   begin_ += bytes;
   offset_ += bytes;
@@ -201,11 +237,16 @@ bool parseTextRow(std::string_view line, std::span<const TextColumn> columns, st
   bool is_first = true;
   for (const TextColumn& column : columns) {
     at = skipBlanks(at, end);
-    if (!is_first && at < end && isTextComma(*at)) at = skipBlanks(at + 1, end);
+    const bool has_comma = !is_first && at < end && isTextComma(*at);
+    if (has_comma) at = skipBlanks(at + 1, end);
     is_first = false;
     const char* const word = at;
-    at =
-        column.is_kept ? parseNumber(at, end, column.type, row + column.offset) : skipWord(at, end);
+    if (!column.is_kept) {
+      if (at == end && !has_comma) return false;
+      at = skipWord(at, end);
+      continue;
+    }
+    at = parseTextNumber(at, end, column.type, row + column.offset);
     if (at == nullptr || at == word || (at < end && !endsWord(*at))) return false;
   }
 
@@ -222,17 +263,21 @@ std::string describeTextRow(std::string_view line, std::span<const TextColumn> c
         fmt::format("{} of type {}", columns[i].name, plyTypeName(columns[i].type));
     if (i >= words.size()) return fmt::format("line ends early, expected {}", expected);
     std::byte value[8];
-    const bool is_good =
-        columns[i].is_kept ? parsePlyNumber(words[i], columns[i].type, value) : !words[i].empty();
-    if (!is_good) return fmt::format("found {}, expected {}", quotePlyText(words[i]), expected);
+    const char* const word_end = words[i].data() + words[i].size();
+    if (columns[i].is_kept &&
+        (words[i].empty() ||
+         parseTextNumber(words[i].data(), word_end, columns[i].type, value) != word_end)) {
+      return fmt::format("found {}, expected {}", quotePlyText(words[i]), expected);
+    }
   }
   const std::string_view found = words.size() > columns.size() ? words.back() : line;
   return fmt::format("found {}, expected the end of the line", quotePlyText(found));
 }
 
-bool TextRowParser::isSkipped(std::string_view line) const {
+bool isTextExtra(std::string_view line, TextExtras extras) {
   const std::string_view text = trimmedLine(line);
-  return text.empty() || (has_comments_ && isTextComment(text));
+  return text.empty() || (extras.has_comments && isTextComment(text)) ||
+         (extras.has_counts && isTextCount(text));
 }
 
 Status TextRowParser::readRows(LineSource& source, std::uint64_t first_row, std::size_t count,
@@ -252,7 +297,7 @@ Status TextRowParser::readRows(LineSource& source, std::uint64_t first_row, std:
       const std::string_view line = withoutEnd(lines.substr(used), bytes);
       if (parseTextRow(line, columns_, rows + done * row_bytes_)) {
         ++done;
-      } else if (!isSkipped(line)) {
+      } else if (!isTextExtra(line, extras_)) {
         return Status::corruption(fmt::format("{}: row {} at line {}: {}", source.input().path(),
                                               first_row + done, source.lineNumber() + line_count,
                                               describeTextRow(line, columns_)));
@@ -271,7 +316,7 @@ Status TextRowParser::checkEnd(LineSource& source) const {
     if (lines.empty()) return source.input().checkUnchanged();
     std::size_t bytes = 0;
     const std::string_view line = withoutEnd(lines, bytes);
-    if (!isSkipped(line)) {
+    if (!isTextExtra(line, extras_)) {
       return Status::corruption(
           fmt::format("{}: line {}: found {} after the last row, expected the end of the file",
                       source.input().path(), source.lineNumber(), quotePlyText(line)));

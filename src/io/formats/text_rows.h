@@ -26,7 +26,12 @@ bool isTextComment(std::string_view line);
 // The words of a line; an empty one between two commas. No more than `most`.
 std::vector<std::string_view> wordsOf(std::string_view line, std::size_t most);
 
-// The lines of a file in order. One thread at a time; takes 256 KiB.
+// Whether a word is a number, by the rules of ascii PLY.
+bool isTextNumber(std::string_view word);
+// Whether a word is digits only, 18 at most: a count.
+bool isTextCount(std::string_view word);
+
+// The lines of a file in order: they end with LF, CR LF or CR. One thread at a time; takes 256 KiB.
 class LineSource {
  public:
   static constexpr std::size_t kMostLineBytes = 256 << 10;
@@ -47,8 +52,16 @@ class LineSource {
   Result<std::string_view> lines();
   // Passes over the first `bytes` of lines(): `line_count` whole lines.
   void consume(std::size_t bytes, std::uint64_t line_count);
+  // From here on, every `from` is seen as `to`: decimal commas as points.
+  void substitute(char from, char to);
 
  private:
+  void adapt(std::size_t begin);
+
+  struct Substitution {
+    char from, to;
+  };
+  std::vector<Substitution> substitutions_;
   ByteInput input_;
   std::uint64_t offset_ = 0, line_number_ = 1;
   // buffer_[begin_, lines_end_) are whole lines, up to end_ follows what has been read of the next
@@ -56,7 +69,8 @@ class LineSource {
   std::size_t begin_ = 0, lines_end_ = 0, end_ = 0;
 };
 
-// A value of every line. Words of columns that are not kept are passed over unseen.
+// A value of every line. Words of columns that are not kept are passed over unseen; they may be
+// empty between commas.
 struct TextColumn {
   std::string name;  // for messages
   PlyType type = PlyType::kFloat32;
@@ -66,29 +80,39 @@ struct TextColumn {
 
 // Turns a line, without its end, into a row; false when it is not as the columns say. Reals are
 // rounded to nearest, and are infinite or zero where too large or too small; nan and inf are read.
+// Integers may be written with zeros after a point: 235.000.
 bool parseTextRow(std::string_view line, std::span<const TextColumn> columns, std::byte* row);
+// The number at the begin of [at, end): returns its end, or nullptr.
+const char* parseTextNumber(const char* at, const char* end, PlyType type, std::byte* out);
 // Why parseTextRow refused a line: "found 'a', expected y of type float".
 std::string describeTextRow(std::string_view line, std::span<const TextColumn> columns);
 
-// Reads rows from lines. Empty lines are skipped, and comments where there may be some.
+// Lines between rows besides empty ones.
+struct TextExtras {
+  bool has_comments = false;
+  bool has_counts = false;  // lines of one whole number, the counts of PTS; rows have more values
+};
+
+// Whether a line holds no row.
+bool isTextExtra(std::string_view line, TextExtras extras);
+
+// Reads rows from lines. Empty lines and extras are skipped.
 class TextRowParser {
  public:
-  TextRowParser(std::vector<TextColumn> columns, std::size_t row_bytes, bool has_comments)
-      : columns_(std::move(columns)), row_bytes_(row_bytes), has_comments_(has_comments) {}
+  TextRowParser(std::vector<TextColumn> columns, std::size_t row_bytes, TextExtras extras)
+      : columns_(std::move(columns)), row_bytes_(row_bytes), extras_(extras) {}
 
   // The next `count` rows; the first is row `first_row` of the file in messages. kCorruption for
   // lines that are not as the columns say, and when the file ends early.
   Status readRows(LineSource& source, std::uint64_t first_row, std::size_t count,
                   std::byte* rows) const;
-  // kCorruption unless nothing but empty lines and comments is left.
+  // kCorruption unless nothing but empty lines and extras is left.
   Status checkEnd(LineSource& source) const;
 
  private:
-  bool isSkipped(std::string_view line) const;
-
   std::vector<TextColumn> columns_;
   std::size_t row_bytes_;
-  bool has_comments_;
+  TextExtras extras_;
 };
 
 }  // namespace surfeit

@@ -59,7 +59,7 @@ Result<std::unique_ptr<RowWriter>> createVdb(const std::string& path,
   element.properties = options.properties;
   packPlyRow(element);
   SURFEIT_RETURN_IF_ERROR(checkProperties(path, element));
-  const RowReader* const original = options.like ? &options.like->original() : nullptr;
+  const RowReader* const original = options.like ? &options.like->file() : nullptr;
   const auto* like = dynamic_cast<const VdbVolumeReader*>(original);
   if (like != nullptr && hasAll(element, kVoxelNames)) {
     return createVdbVolumes(path, std::move(element), *like, options);

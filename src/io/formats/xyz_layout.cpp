@@ -1,99 +1,20 @@
 #include "io/formats/xyz_layout.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cctype>
-#include <cmath>
-#include <cstring>
-#include <iterator>
+#include <initializer_list>
 
 #include "io/formats/property_renames.h"
-#include "io/ply_number.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kSampleRows = 1000;
-constexpr std::size_t kMaxNameChars = 56;
-constexpr std::uint64_t kLargestExactFloat = 1 << 24;
-
-constexpr std::string_view kOurNames[] = {"x",    "y",     "z",      "nx",    "ny",        "nz",
-                                          "red",  "green", "blue",   "alpha", "intensity", "radius",
-                                          "area", "width", "pscale", "group"};
-struct Alias {
-  std::string_view alias, name;
-};
-constexpr Alias kAliases[] = {{"r", "red"},       {"g", "green"},     {"b", "blue"},
-                              {"normal_x", "nx"}, {"normal_y", "ny"}, {"normal_z", "nz"},
-                              {"i", "intensity"}};
-
-std::string lowerOf(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
-}
-
-std::string ourName(std::string_view word) {
-  if (word.size() >= 2 && word.front() == '"' && word.back() == '"') {
-    word = word.substr(1, word.size() - 2);
-  }
-  const std::string lower = lowerOf(word);
-  for (const Alias& alias : kAliases) {
-    if (alias.alias == lower) return std::string(alias.name);
-  }
-  if (std::find(std::begin(kOurNames), std::end(kOurNames), lower) != std::end(kOurNames)) {
-    return lower;
-  }
-  std::string name(word.substr(0, kMaxNameChars));
-  std::replace_if(
-      name.begin(), name.end(), [](char c) { return !(c > ' ' && c < '\x7f'); }, '_');
-  return name.empty() ? "_" : name;
-}
+constexpr double kLargestExactFloat = 1 << 24;
+constexpr double kByteColor = 255, kWordColor = 65535;
 
 bool contains(std::span<const std::string> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-// Whether the float next to a number gives it back, written with as many decimals. So do floats
-// that a program wrote with more decimals than they have.
-bool isFloat(std::string_view word, double value) {
-  std::byte single[4];
-  if (!std::isfinite(value) || !parsePlyNumber(word, PlyType::kFloat32, single)) return true;
-  const std::size_t exponent_at = std::min(word.find_first_of("eE"), word.size());
-  const std::size_t point_at = std::min(word.find('.'), exponent_at);
-  double decimals = point_at < exponent_at ? double(exponent_at - point_at - 1) : 0;
-  std::byte exponent[8];
-  if (exponent_at < word.size() &&
-      parsePlyNumber(word.substr(exponent_at + 1), PlyType::kFloat64, exponent)) {
-    decimals -= plyValue(exponent, PlyType::kFloat64);
-  }
-  // A little more than half a unit: floats are often exactly half way, and both sides are rounded
-  const double half_unit = (0.5 + 1e-6) * std::pow(10.0, -decimals);
-  return std::abs(plyValue(single, PlyType::kFloat32) - value) <= half_unit;
-}
-
-bool isWhole(std::string_view word) {
-  return !word.empty() && word.size() <= 18 &&
-         std::all_of(word.begin(), word.end(), [](char c) { return c >= '0' && c <= '9'; });
-}
-
-bool areUnitVectors(std::span<const XyzColumn> triple) {
-  bool has_any = false;
-  for (std::size_t row = 0; row < triple[0].values.size(); ++row) {
-    const double length =
-        std::hypot(triple[0].values[row], triple[1].values[row], triple[2].values[row]);
-    if (length == 0) continue;
-    if (!(std::abs(length - 1) <= 0.01)) return false;
-    has_any = true;
-  }
-  return has_any;
-}
-
-bool areBytes(std::span<const XyzColumn> triple) {
-  return std::all_of(triple.begin(), triple.end(), [](const XyzColumn& column) {
-    return column.are_wholes && std::all_of(column.values.begin(), column.values.end(),
-                                            [](double value) { return value <= 255; });
-  });
 }
 
 bool isPlace(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
@@ -102,169 +23,164 @@ bool isSmallCount(std::string_view name) {
   return name == "group" || name == "light_group" || name == "two_sided";
 }
 
-// Looks at the words of one line that are asked for.
-void scanLine(std::string_view line, std::vector<XyzScan::Column>& columns) {
-  const char* at = line.data();
-  const char* const end = at + line.size();
-  std::size_t column = 0;
-  for (XyzScan::Column& wanted : columns) {
-    for (;; ++column) {
-      while (at < end && isTextBlank(*at)) ++at;
-      if (column > 0 && at < end && isTextComma(*at)) ++at;
-      while (at < end && isTextBlank(*at)) ++at;
-      if (column == wanted.column) break;
-      while (at < end && !isTextBlank(*at) && !isTextComma(*at)) ++at;
-    }
-    const char* const word = at;
-    std::uint64_t value = 0;
-    for (; at < end && *at >= '0' && *at <= '9'; ++at) {
-      value = value * 10 + static_cast<std::uint64_t>(*at - '0');
-    }
-    const bool is_word_end = at == end || isTextBlank(*at) || isTextComma(*at);
-    if (at == word || at - word > 18 || !is_word_end) wanted.are_wholes = false;
-    wanted.largest = std::max(wanted.largest, value);
-    while (at < end && !isTextBlank(*at) && !isTextComma(*at)) ++at;
-    ++column;
+// Whether columns are colors of one range: its end, else 0.
+double colorRange(std::span<const XyzColumn> columns) {
+  double least = 0, largest = 0;
+  bool are_wholes = true, are_reals = true;
+  for (const XyzColumn& column : columns) {
+    if (!column.are_numbers || column.least > column.largest) return 0;
+    least = std::min(least, column.least);
+    largest = std::max(largest, column.largest);
+    are_wholes = are_wholes && column.are_wholes;
+    are_reals = are_reals && !column.are_wholes;
   }
+  if (least < 0 || largest > kWordColor) return 0;
+  if (are_wholes) return largest > kByteColor ? kWordColor : kByteColor;
+  if (largest <= 1) return 1;
+  return are_reals && largest <= kByteColor ? kByteColor : 0;
+}
+
+using Names = std::vector<const char*>;
+
+// Readings of columns that are no normals, between normals or the ends.
+class Readings {
+ public:
+  explicit Readings(std::span<const XyzColumn> columns) {
+    if (columns.size() < 3) return;
+    for (std::size_t i = 0; i + 3 <= columns.size(); ++i) {
+      const double range = colorRange(columns.subspan(i, 3));
+      if (range == 0) continue;
+      // What follows colors may be their alpha
+      const bool has_alpha =
+          i + 3 < columns.size() && i + 4 == columns.size() && isAlpha(columns[i + 3], range);
+      if (has_alpha) add(i, columns.size(), true);
+      if (!has_alpha || columns.size() != 4) add(i, columns.size(), false);
+    }
+    if (columns.size() == 4) settleFour(columns);
+  }
+
+  const std::vector<Names>& all() const { return all_; }
+
+ private:
+  static bool isAlpha(const XyzColumn& column, double range) {
+    return column.are_numbers && column.least >= 0 && column.largest <= range;
+  }
+
+  void add(std::size_t color, std::size_t count, bool has_alpha) {
+    Names names(count, "scalar");
+    names[color] = "red";
+    names[color + 1] = "green";
+    names[color + 2] = "blue";
+    if (has_alpha) names[color + 3] = "alpha";
+    all_.push_back(std::move(names));
+  }
+
+  // A column of one value beside three that vary: the full range is opaque, any other an intensity
+  void settleFour(std::span<const XyzColumn> columns) {
+    if (all_.size() != 2) return;
+    const bool is_first_constant = columns[0].isConstant(),
+               is_last_constant = columns[3].isConstant();
+    const double range = colorRange(columns.first(3));
+    const double last_range = colorRange(columns.last(3));
+    if (last_range > 0 && last_range < range) {  // bytes behind an intensity that is none
+      all_.erase(all_.begin());
+    } else if (is_last_constant && !is_first_constant && columns[3].largest == range) {
+      all_.pop_back();
+    } else if (is_first_constant && !is_last_constant) {
+      all_.erase(all_.begin());
+    }
+  }
+
+  std::vector<Names> all_;
+};
+
+// "red green blue alpha"
+std::string joined(const Names& names) { return fmt::format("{}", fmt::join(names, " ")); }
+
+Status severalReadings(std::size_t first, std::size_t count, const std::vector<Names>& readings) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min<std::size_t>(readings.size(), 3); ++i) {
+    text += fmt::format("{}'{}'", i == 0 ? "" : ", or ", joined(readings[i]));
+  }
+  std::string choice;
+  const Names example = readings.empty() ? Names(count, "NAME") : readings.front();
+  for (std::size_t i = 0; i < example.size(); ++i) {
+    choice += fmt::format("{}{}={}", i == 0 ? "" : ",", first + i + 1, example[i]);
+  }
+  if (readings.empty()) {
+    text = "neither normals of unit length nor colors";
+  }
+  return Status::corruption(
+      fmt::format("columns {} to {} have no names, and their values may be {}; say which: "
+                  "--channels {} (NUMBER=NAME, NUMBER=- drops a column)",
+                  first + 1, first + count, text, choice));
 }
 
 }  // namespace
 
-std::vector<std::string> xyzHeaderNames(std::string_view line) {
-  line = trimmedLine(line);
-  while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
-  const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns + 1);
-  if (words.size() > kMaxXyzColumns) return {};
+Result<std::vector<std::string>> nameXyzColumns(const XyzTable& table, bool is_pts) {
+  const std::span<const XyzColumn> columns = table.columns;
   std::vector<std::string> names;
-  for (const std::string_view word : words) names.push_back(ourName(word));
-  for (const std::string_view name : {"x", "y", "z"}) {
-    if (std::count(names.begin(), names.end(), name) != 1) return {};
-  }
   DistinctNames distinct;
-  for (std::string& name : names) name = distinct.add(name);
-  return names;
-}
-
-bool isXyzNumber(std::string_view word) {
-  std::byte value[8];
-  return parsePlyNumber(word, PlyType::kFloat64, value);
-}
-
-std::vector<XyzColumn> sampleXyz(std::string_view lines) {
-  std::vector<XyzColumn> columns;
-  std::size_t rows = 0;
-  while (!lines.empty() && rows < kSampleRows) {
-    const std::size_t end = std::min(lines.find('\n'), lines.size());
-    const std::string_view line = trimmedLine(lines.substr(0, end));
-    lines.remove_prefix(std::min(end + 1, lines.size()));
-    if (line.empty() || isTextComment(line)) continue;
-    const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns + 1);
-    if (columns.empty()) columns.resize(words.size());
-    if (words.size() != columns.size() || !std::all_of(words.begin(), words.end(), isXyzNumber)) {
+  const auto add = [&](std::span<const char* const> more) {
+    for (const char* const name : more) {
+      const bool is_intensity = names.size() == 3 && std::string_view(name) == "scalar";
+      names.push_back(distinct.add(is_intensity ? "intensity" : name));
+    }
+  };
+  constexpr const char* kPlace[] = {"x", "y", "z"};
+  constexpr const char* kNormal[] = {"nx", "ny", "nz"};
+  add(kPlace);
+  while (names.size() < columns.size()) {
+    const std::size_t first = names.size();
+    const auto is_normal = [&](std::size_t i) {
+      return !contains(names, "nx") && i + 3 <= columns.size() && table.are_unit_vectors[i];
+    };
+    if (is_normal(first)) {
+      add(kNormal);
       continue;
     }
-    ++rows;
-    for (std::size_t i = 0; i < words.size(); ++i) {
-      std::byte bytes[8];
-      parsePlyNumber(words[i], PlyType::kFloat64, bytes);
-      const double value = plyValue(bytes, PlyType::kFloat64);
-      columns[i].values.push_back(value);
-      columns[i].are_floats = columns[i].are_floats && isFloat(words[i], value);
-      columns[i].are_wholes = columns[i].are_wholes && isWhole(words[i]);
+    std::size_t end = first + 1;
+    while (end < columns.size() && !is_normal(end)) ++end;
+    const std::size_t count = end - first;
+    const bool may_be_color = count >= 3 && !contains(names, "red");
+    std::vector<Names> readings;
+    if (may_be_color) readings = Readings(columns.subspan(first, count)).all();
+    if (is_pts && count == 4 && readings.size() == 2) readings.erase(readings.begin());
+    if (readings.size() > 1 || (may_be_color && count == 3 && readings.empty())) {
+      return severalReadings(first, count, readings);
     }
-  }
-  return columns;
-}
-
-std::vector<std::string> nameXyzColumns(std::span<const XyzColumn> sample) {
-  std::vector<std::string> names;
-  DistinctNames distinct;
-  const auto add = [&](std::initializer_list<const char*> more) {
-    for (const char* const name : more) names.push_back(distinct.add(name));
-  };
-  add({"x", "y", "z"});
-  while (names.size() < sample.size()) {
-    const std::size_t left = sample.size() - names.size();
-    const std::span<const XyzColumn> rest = sample.subspan(names.size());
-    const bool has_color = contains(names, "red");
-    if (left >= 3 && !contains(names, "nx") && areUnitVectors(rest.first(3))) {
-      add({"nx", "ny", "nz"});
-    } else if (left == 4 && !has_color && areBytes(rest.last(3))) {
-      add({"intensity", "red", "green", "blue"});
-    } else if (left >= 3 && !has_color && (left == 3 || areBytes(rest.first(3)))) {
-      add({"red", "green", "blue"});
-    } else {
-      add({names.size() == 3 ? "intensity" : "scalar"});
-    }
+    add(readings.empty() ? Names(count, "scalar") : readings.front());
   }
   return names;
 }
 
-Result<XyzScan> scanXyz(LineSource& source, std::span<const std::size_t> columns) {
-  XyzScan scan;
-  for (const std::size_t column : columns) scan.columns.push_back({column, true, 0});
-  for (;;) {
-    SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source.lines());
-    if (lines.empty()) return scan;
-    const char* at = lines.data();
-    const char* const end = at + lines.size();
-    std::uint64_t line_count = 0;
-    while (at < end) {
-      const void* const found = std::memchr(at, '\n', static_cast<std::size_t>(end - at));
-      const char* const line_end = found ? static_cast<const char*>(found) : end;
-      while (at < line_end && isTextBlank(*at)) ++at;
-      const std::string_view line(at, static_cast<std::size_t>(line_end - at));
-      if (!line.empty() && !isTextComment(line)) {
-        ++scan.row_count;
-        if (!scan.columns.empty()) scanLine(line, scan.columns);
-      }
-      at = line_end + (found ? 1 : 0);
-      ++line_count;
-    }
-    source.consume(lines.size(), line_count);
-  }
-}
-
-std::vector<std::size_t> wholeColumns(std::span<const XyzColumn> sample,
-                                      std::span<const std::string> names) {
-  std::vector<std::size_t> columns;
-  for (std::size_t i = 0; i < sample.size(); ++i) {
-    if (sample[i].are_wholes && !isPlace(names[i])) columns.push_back(i);
-  }
-  return columns;
-}
-
-std::vector<PlyType> typeXyzColumns(std::span<const XyzColumn> sample,
-                                    std::span<const std::string> names, const XyzScan& scan) {
-  // By the first rows
+std::vector<PlyType> typeXyzColumns(const XyzTable& table, std::span<const std::string> names) {
   std::vector<PlyType> types;
-  bool are_places_floats = true;
+  bool are_places_floats = true, are_colors_wholes = true;
+  double largest_color = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    types.push_back(sample[i].are_floats ? PlyType::kFloat32 : PlyType::kFloat64);
-    if (isPlace(names[i]) && !sample[i].are_floats) are_places_floats = false;
-  }
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (isPlace(names[i]) && !are_places_floats) types[i] = PlyType::kFloat64;
-  }
-
-  // By all rows
-  std::size_t whole_colors = 0;
-  std::uint64_t largest_color = 0;
-  for (const XyzScan::Column& column : scan.columns) {
-    if (!column.are_wholes) continue;
-    if (isColor(names[column.column])) {
-      ++whole_colors;
-      largest_color = std::max(largest_color, column.largest);
-    } else if (isSmallCount(names[column.column]) && column.largest <= 255) {
-      types[column.column] = PlyType::kUint8;
-    } else if (column.largest > kLargestExactFloat) {
-      types[column.column] = PlyType::kFloat64;
+    const XyzColumn& column = table.columns[i];
+    const bool is_large_count = column.are_wholes && column.largest > kLargestExactFloat;
+    const bool is_float = column.are_floats && !is_large_count;
+    types.push_back(is_float ? PlyType::kFloat32 : PlyType::kFloat64);
+    if (isSmallCount(names[i]) && column.are_wholes && column.least >= 0 && column.largest <= 255) {
+      types[i] = PlyType::kUint8;
     }
+    if (isPlace(names[i]) && !column.are_floats) are_places_floats = false;
+    if (!isColor(names[i])) continue;
+    are_colors_wholes = are_colors_wholes && column.are_wholes && column.least >= 0;
+    largest_color = std::max(largest_color, column.largest);
   }
-  if (whole_colors == 3 && largest_color > 1 && largest_color <= 65535) {
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (!isColor(names[i])) continue;
-      types[i] = largest_color <= 255 ? PlyType::kUint8 : PlyType::kUint16;
+  const bool are_coded = are_colors_wholes && largest_color > 1 && largest_color <= kWordColor;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (isPlace(names[i])) types[i] = are_places_floats ? PlyType::kFloat32 : PlyType::kFloat64;
+    const XyzColumn& column = table.columns[i];
+    const double range = largest_color <= kByteColor ? kByteColor : kWordColor;
+    const bool is_coded_alpha = names[i] == "alpha" && column.are_wholes && column.least >= 0 &&
+                                column.largest > 1 && column.largest <= range;
+    if (are_coded && (isColor(names[i]) || is_coded_alpha)) {
+      types[i] = range == kByteColor ? PlyType::kUint8 : PlyType::kUint16;
     }
   }
   return types;

@@ -3,92 +3,31 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "core/assert.h"
 #include "io/formats/counted_row_reader.h"
 #include "io/formats/property_renames.h"
 #include "io/formats/text_rows.h"
+#include "io/formats/xyz_decimals.h"
+#include "io/formats/xyz_head.h"
 #include "io/formats/xyz_layout.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kMaxComments = 64, kMaxCommentChars = 1024;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-bool beginsWithNumbers(std::string_view line, std::size_t count) {
-  const std::vector<std::string_view> words = wordsOf(line, count);
-  return words.size() == count && std::all_of(words.begin(), words.end(), isXyzNumber);
-}
-
-// The count in front of the points of a PTS file.
-bool isPtsCount(std::string_view line) {
-  return beginsWithNumbers(line, 1) && line.find_first_not_of("0123456789") == line.npos;
-}
-
-std::string textOfComment(std::string_view line) {
-  line = line.substr(0, kMaxCommentChars);
-  while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
-  std::string text(trimmedLine(line));
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c < ' ' && c > '\0'; }, ' ');
-  return text;
-}
-
-// Takes the lines in front of the data, one by one.
-class HeadParser {
- public:
-  enum class Line { kHead, kData, kUnknown };
-
-  // What a line is: of the head, the first of the data, or neither.
-  Line take(std::string_view line) {
-    line = trimmedLine(line);
-    if (line.empty()) return Line::kHead;
-    if (isTextComment(line)) {
-      endNames();
-      named_in_comment_ = true;
-      last_comment_ = textOfComment(line);
-      names_ = xyzHeaderNames(line);
-      return Line::kHead;
-    }
-    if (beginsWithNumbers(line, 3)) return Line::kData;
-    if (isPtsCount(line) && !has_count_) {
-      has_count_ = true;
-      return Line::kHead;
-    }
-    std::vector<std::string> names = xyzHeaderNames(line);
-    if (names.empty()) return Line::kUnknown;
-    endNames();
-    named_in_comment_ = false;
-    names_ = std::move(names);
-    return Line::kHead;
+bool hasCommasInAndOutOfQuotes(std::string_view line) {
+  bool is_quoted = false, has_inner = false, has_outer = false;
+  for (const char c : line) {
+    if (c == '"') is_quoted = !is_quoted;
+    if (c == ',') (is_quoted ? has_inner : has_outer) = true;
   }
-
-  // With the number of columns of the data, 0 when there is none: a comment that names others is
-  // none that names columns.
-  void end(std::size_t column_count) {
-    if (named_in_comment_ && column_count > 0 && names_.size() != column_count) endNames();
-  }
-
-  bool hasNames() const { return !names_.empty(); }
-  const std::vector<std::string>& names() const { return names_; }
-  const std::vector<std::string>& comments() const { return comments_; }
-
- private:
-  // The last comment turned out to be one
-  void endNames() {
-    names_.clear();
-    if (!last_comment_.empty() && comments_.size() < kMaxComments) {
-      comments_.push_back(std::move(last_comment_));
-    }
-    last_comment_.clear();
-  }
-
-  std::vector<std::string> names_, comments_;
-  std::string last_comment_;
-  bool named_in_comment_ = false, has_count_ = false;
-};
+  return has_inner && has_outer;
+}
 
 class XyzReader final : public CountedRowReader {
  public:
@@ -99,28 +38,25 @@ class XyzReader final : public CountedRowReader {
   }
 
   Status open(const RowReaderOptions& options) {
+    renames_ = options.channels;
     SURFEIT_RETURN_IF_ERROR(readHead());
-    SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source_.lines());
-    std::vector<XyzColumn> sample = sampleXyz(lines);
-    if (sample.size() > kMaxXyzColumns) {
-      return Status::corruption(fmt::format("{}: line {}: more than {} values, expected fewer",
-                                            path_, data_line_, kMaxXyzColumns));
+    SURFEIT_RETURN_IF_ERROR(chooseDecimals());
+    SURFEIT_RETURN_IF_ERROR(readFirstRow());
+    SURFEIT_ASSIGN_OR_RETURN(XyzTable table, scan());
+    if (!table.refusal.ok() && table.has_comma_in_refused && decimals_ == TextDecimals::kUnknown) {
+      // Commas that come late may be decimal commas as well
+      SURFEIT_RETURN_IF_ERROR(moveTo(0));
+      SURFEIT_ASSIGN_OR_RETURN(decimals_, judgeDecimals(source_, head_.hasNames(), true));
+      if (decimals_ == TextDecimals::kComma) {
+        takeDecimalCommas();
+        SURFEIT_ASSIGN_OR_RETURN(table, scan());
+      }
     }
-    head_.end(sample.size());
-    if (!sample.empty() && head_.hasNames() && head_.names().size() != sample.size()) {
-      return Status::corruption(fmt::format("{}: line {}: {} values, expected {} as the header has",
-                                            path_, data_line_, sample.size(),
-                                            head_.names().size()));
-    }
-    if (sample.empty()) sample.resize(head_.names().size());
-    const std::vector<std::string> names =
-        head_.hasNames() ? head_.names() : nameXyzColumns(sample);
-    comments_ = head_.comments();
-
-    SURFEIT_ASSIGN_OR_RETURN(const XyzScan scan, scanXyz(source_, wholeColumns(sample, names)));
-    element_.count = scan.row_count;
-    SURFEIT_RETURN_IF_ERROR(
-        setColumns(names, typeXyzColumns(sample, names, scan), options.channels));
+    SURFEIT_RETURN_IF_ERROR(table.refusal);
+    SURFEIT_RETURN_IF_ERROR(nameColumns(table));
+    noteScans(table);
+    element_.count = table.row_count;
+    SURFEIT_RETURN_IF_ERROR(setColumns(names_, typeXyzColumns(table, names_)));
     return moveTo(0);
   }
 
@@ -133,29 +69,222 @@ class XyzReader final : public CountedRowReader {
       std::string_view line = lines.substr(0, end);
       if (source_.offset() == 0 && line.starts_with(kByteOrderMark)) {
         line.remove_prefix(kByteOrderMark.size());
-        if (!lines.empty()) source_.consume(kByteOrderMark.size(), 0);
+        source_.consume(kByteOrderMark.size(), 0);
       }
-      const HeadParser::Line kind = lines.empty() ? HeadParser::Line::kData : head_.take(line);
+      const XyzHead::Line kind = lines.empty() ? XyzHead::Line::kData : head_.take(line);
       if (lines.empty() && !head_.hasNames()) {
         return Status::corruption(fmt::format("{}: found no line of numbers", path_));
       }
-      if (kind == HeadParser::Line::kUnknown) {
+      if (kind == XyzHead::Line::kUnknown) {
         return Status::corruption(
             fmt::format("{}: line {}: found {}, expected three numbers or names of columns with x, "
                         "y and z",
                         path_, source_.lineNumber(), quotePlyText(line)));
       }
-      if (kind == HeadParser::Line::kData) {
+      if (kind == XyzHead::Line::kData) {
         data_offset_ = source_.offset();
         data_line_ = source_.lineNumber();
+        extras_.has_counts = head_.hasCount();
         return {};
       }
       source_.consume(line.size() + (end < lines.size() ? 1 : 0), 1);
     }
   }
 
-  Status setColumns(const std::vector<std::string>& names, const std::vector<PlyType>& types,
-                    std::span<const ChannelRename> renames) {
+  // What --text says, else what the lines tell.
+  Status chooseDecimals() {
+    SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source_.lines());
+    const std::string_view line = lines.substr(0, lines.find('\n'));
+    if (line.find('"') != line.npos) {
+      if (hasCommasInAndOutOfQuotes(line)) {
+        return Status::corruption(fmt::format(
+            "{}: line {}: found {}: commas stand within quotes and between values, expected other "
+            "separators",
+            path_, data_line_, quotePlyText(line)));
+      }
+      source_.substitute('"', ' ');
+    }
+    for (const ChannelRename& rename : renames_) {
+      if (rename.from != kTextChannel) continue;
+      if (rename.to != kDecimalComma && rename.to != kDecimalPoint) {
+        return Status::invalidArgument(fmt::format("text: found {}, expected {} or {}",
+                                                   quotePlyText(rename.to), kDecimalComma,
+                                                   kDecimalPoint));
+      }
+      decimals_ = rename.to == kDecimalComma ? TextDecimals::kComma : TextDecimals::kPoint;
+    }
+    if (decimals_ == TextDecimals::kComma) {
+      source_.substitute(',', '.');
+    } else if (decimals_ == TextDecimals::kUnknown) {
+      SURFEIT_ASSIGN_OR_RETURN(decimals_, judgeDecimals(source_, head_.hasNames()));
+      if (decimals_ == TextDecimals::kComma) takeDecimalCommas();
+    }
+    return {};
+  }
+
+  void takeDecimalCommas() {
+    SURFEIT_ASSERT(source_.offset() == data_offset_);
+    source_.substitute(',', '.');
+    notes_.push_back(
+        "commas are decimal commas (1,5 is 1.5): --text decimal-point if they are not");
+  }
+
+  // How many columns there are, what they are called until all rows are known, and which of them
+  // hold no numbers.
+  Status readFirstRow() {
+    SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source_.lines());
+    const std::string_view line = trimmedLine(lines.substr(0, lines.find('\n')));
+    std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns + 1);
+    const bool ends_with_empty = !line.empty() && isTextComma(line.back()) &&
+                                 head_.header().file_names.size() == words.size() + 1;
+    if (ends_with_empty) words.emplace_back();
+    if (words.size() > kMaxXyzColumns) {
+      return Status::corruption(fmt::format("{}: line {}: more than {} values, expected fewer",
+                                            path_, data_line_, kMaxXyzColumns));
+    }
+    if (decimals_ == TextDecimals::kComma && !words.empty() && words.size() < 3) {
+      return Status::corruption(fmt::format(
+          "{}: line {}: {} values, expected three or more, parted by semicolons, tabs or blanks "
+          "where commas stand before decimals",
+          path_, data_line_, words.size()));
+    }
+    head_.end(words.size());
+    comments_ = head_.comments();
+    if (!head_.note().empty()) notes_.push_back(head_.note());
+    SURFEIT_RETURN_IF_ERROR(checkHead(words.size()));
+    names_ = head_.header().names;
+    if (names_.empty()) {
+      for (std::size_t i = 0; i < words.size(); ++i) {
+        names_.push_back(i < 3 ? std::string(1, static_cast<char>('x' + i))
+                               : fmt::format("column {}", i + 1));
+      }
+    }
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      const bool is_text = i < words.size() && !isTextNumber(words[i]) && !words[i].empty();
+      first_row_.push_back({names_[i], PlyType::kFloat32, 0, !is_text && !isDropped(i)});
+    }
+    return {};
+  }
+
+  // The column is not wanted: FROM=- with its name or number.
+  bool isDropped(std::size_t column) const {
+    return std::any_of(renames_.begin(), renames_.end(), [&](const ChannelRename& rename) {
+      return rename.to == "-" &&
+             (rename.from == fmt::format("{}", column + 1) ||
+              (head_.hasNames() && (rename.from == names_[column] ||
+                                    rename.from == head_.header().file_names[column])));
+    });
+  }
+
+  Status checkHead(std::size_t column_count) const {
+    const XyzHeader& header = head_.header();
+    const std::size_t named = header.file_names.size();
+    if (!header.refusal.empty() && !hasNumbers()) {
+      return Status::corruption(
+          fmt::format("{}: the names of the columns: {}", path_, header.refusal));
+    }
+    if (!head_.otherNames().empty() && header.names.empty() && !hasNumbers()) {
+      return Status::corruption(fmt::format(
+          "{}: found columns named {}, expected x, y and z among them: say which are the position: "
+          "--channels 1=x,2=y,3=z (numbers of columns)",
+          path_, quotePlyText(fmt::format("{}", fmt::join(head_.otherNames(), " ")))));
+    }
+    if (column_count == 0 || header.names.empty() || named == column_count) return {};
+    return Status::corruption(fmt::format("{}: line {}: {} values, expected {} as the header has",
+                                          path_, data_line_, column_count, named));
+  }
+
+  // Whether --channels names columns by number.
+  bool hasNumbers() const {
+    return std::any_of(renames_.begin(), renames_.end(),
+                       [](const ChannelRename& rename) { return isTextCount(rename.from); });
+  }
+
+  Result<XyzTable> scan() {
+    SURFEIT_RETURN_IF_ERROR(moveTo(0));
+    return scanXyz(source_, first_row_, extras_, head_.count());
+  }
+
+  // By the header, by numbers in --channels, or by the values.
+  Status nameColumns(XyzTable& table) {
+    if (head_.hasNames()) {
+      const XyzHeader& header = head_.header();
+      for (ChannelRename& rename : renames_) {
+        for (std::size_t i = 0; i < header.names.size(); ++i) {
+          if (rename.from == header.file_names[i]) rename.from = header.names[i];
+        }
+      }
+      return nameNumbered();
+    }
+    if (hasNumbers()) {
+      // A position named by numbers is nowhere else
+      const bool has_place =
+          std::any_of(renames_.begin(), renames_.end(), [](const ChannelRename& rename) {
+            return isTextCount(rename.from) &&
+                   (rename.to == "x" || rename.to == "y" || rename.to == "z");
+          });
+      for (std::size_t i = has_place ? 0 : 3; i < names_.size(); ++i) {
+        names_[i] = fmt::format("column_{}", i + 1);
+      }
+      return nameNumbered();
+    }
+    SURFEIT_RETURN_IF_ERROR(checkTexts());
+    Result<std::vector<std::string>> names = nameXyzColumns(table, head_.hasCount());
+    if (!names.ok()) {
+      return Status::corruption(fmt::format("{}: {}", path_, names.status().message()));
+    }
+    names_ = std::move(*names);
+    if (names_.size() > 3) {
+      notes_.push_back(fmt::format(
+          "columns have no names and are taken, by their values, for {}: --channels 4=NAME,... "
+          "names them otherwise",
+          fmt::join(names_, " ")));
+    }
+    return {};
+  }
+
+  // Columns that --channels names by their numbers.
+  Status nameNumbered() {
+    for (ChannelRename& rename : renames_) {
+      for (std::size_t i = 0; i < names_.size(); ++i) {
+        if (rename.from != fmt::format("{}", i + 1)) continue;
+        if (rename.to == "-") {
+          rename.from = names_[i];
+        } else {
+          names_[i] = rename.to;
+        }
+        break;
+      }
+    }
+    return checkTexts();
+  }
+
+  // Only numbers become values of rows.
+  Status checkTexts() const {
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (first_row_[i].is_kept) continue;
+      const bool is_dropped =
+          std::any_of(renames_.begin(), renames_.end(), [&](const ChannelRename& rename) {
+            return rename.to == "-" && rename.from == names_[i];
+          });
+      if (is_dropped) continue;
+      return Status::corruption(
+          fmt::format("{}: line {}: found no number in column {} ({}), expected one: --channels "
+                      "{}=- leaves the column out",
+                      path_, data_line_, i + 1, names_[i], i + 1));
+    }
+    return {};
+  }
+
+  void noteScans(const XyzTable& table) {
+    if (table.scan_count > 1) {
+      notes_.push_back(
+          fmt::format("{} scans, one after another, are read as one cloud", table.scan_count));
+    }
+    if (!table.count_note.empty()) notes_.push_back(table.count_note);
+  }
+
+  Status setColumns(const std::vector<std::string>& names, const std::vector<PlyType>& types) {
     // As the file has them
     PlyElement all;
     for (std::size_t i = 0; i < names.size(); ++i) {
@@ -166,7 +295,7 @@ class XyzReader final : public CountedRowReader {
     }
 
     // As they are called
-    const std::vector<std::string> called = renamedProperties(all, renames);
+    const std::vector<std::string> called = renamedProperties(all, renames_);
     std::vector<TextColumn> columns;
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (!called[i].empty() && element_.find(called[i]) != nullptr) {
@@ -180,7 +309,7 @@ class XyzReader final : public CountedRowReader {
       packPlyRow(element_);
     }
     SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(element_, path_));
-    parser_.emplace(std::move(columns), element_.row_bytes, true);
+    parser_.emplace(std::move(columns), element_.row_bytes, extras_);
     return {};
   }
 
@@ -196,7 +325,12 @@ class XyzReader final : public CountedRowReader {
   Status checkEnd() override { return parser_->checkEnd(source_); }
 
   LineSource source_;
-  HeadParser head_;
+  XyzHead head_;
+  std::vector<ChannelRename> renames_;
+  TextDecimals decimals_ = TextDecimals::kUnknown;
+  TextExtras extras_{true, false};
+  std::vector<std::string> names_;
+  std::vector<TextColumn> first_row_;
   std::uint64_t data_offset_ = 0, data_line_ = 1;
   std::optional<TextRowParser> parser_;
 };
@@ -209,21 +343,22 @@ bool recognisesXyz(std::string_view first_bytes) {
   for (const char c : first_bytes) {
     if ((c >= '\0' && c < ' ' && c != '\t' && c != '\r' && c != '\n') || c == '\x7f') return false;
   }
-  HeadParser head;
+  XyzHead head;
   bool has_any = false;
   while (!first_bytes.empty()) {
-    const std::size_t end = first_bytes.find('\n');
+    const std::size_t end = first_bytes.find_first_of("\r\n");
     if (end == first_bytes.npos && is_cut) {
       // Who knows what the rest of the line is, but for a comment it does not matter
       has_any = has_any || isTextComment(trimmedLine(first_bytes));
       break;
     }
-    const HeadParser::Line kind = head.take(first_bytes.substr(0, end));
-    if (kind != HeadParser::Line::kHead) return kind == HeadParser::Line::kData;
-    has_any = true;
+    const std::string_view line = first_bytes.substr(0, end);
+    const XyzHead::Line kind = head.take(line);
+    if (kind != XyzHead::Line::kHead) return kind == XyzHead::Line::kData;
+    if (!line.empty()) has_any = true;
     first_bytes.remove_prefix(std::min(end, first_bytes.size() - 1) + 1);
   }
-  return head.hasNames() || (has_any && is_cut);
+  return !head.header().file_names.empty() || (has_any && is_cut);
 }
 
 Result<std::unique_ptr<RowReader>> openXyz(const std::string& path,

@@ -1,0 +1,34 @@
+// What a path to be written to stands for: a file, through symbolic links, or a stream (standard
+// output, a device, a FIFO).
+#pragma once
+
+#include <sys/types.h>
+
+#include <optional>
+#include <string>
+
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+struct OutputTarget {
+  // Of the file to be replaced or made, behind all links; of a stream as it was given.
+  std::string path;
+  bool is_stream = false;      // written to as it is, never replaced
+  std::optional<mode_t> mode;  // permissions of the file that is there, which stay
+};
+
+// "-", and "-.EXTENSION" where the name tells a format, are standard output. kInvalidArgument for a
+// directory; kIoError where the directory is missing or not to be written to, or a device, FIFO or
+// socket may not be.
+Result<OutputTarget> resolveOutput(const std::string& path);
+
+// Writes the first `size` bytes of the open file `from` to a stream.
+Status writeToStream(const OutputTarget& target, int from, std::uint64_t size);
+
+// The directory for temporary files (TMPDIR, else /tmp), and that beside an output: the former
+// where the output is a stream.
+std::string spoolDirectory();
+std::string scratchDirectoryOf(const std::string& output);
+
+}  // namespace surfeit

@@ -1,0 +1,75 @@
+#include "tools/output_check.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/output_target.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::string_view kOutputs[] = {"output", "passes", "plot", "stats"};
+
+struct Output {
+  std::string option, path;
+  struct ::stat info {};
+  bool is_file = false;  // there is a file that would be replaced
+};
+
+bool isOutput(const CLI::Option& option) {
+  const std::vector<std::string>& names = option.get_lnames();
+  return std::any_of(names.begin(), names.end(), [](const std::string& name) {
+    return std::find(std::begin(kOutputs), std::end(kOutputs), name) != std::end(kOutputs);
+  });
+}
+
+Status checkAgainst(const Output& output, const std::string& other, std::string_view what) {
+  struct ::stat info {};
+  if (!output.is_file || ::stat(other.c_str(), &info) != 0) return {};
+  if (info.st_dev != output.info.st_dev || info.st_ino != output.info.st_ino) return {};
+  return Status::invalidArgument(fmt::format("{}: {} would replace {} {}: give another name",
+                                             output.path, output.option, what, other));
+}
+
+}  // namespace
+
+Status checkOutputs(const CLI::App& command, bool works_in_place) {
+  // What is to be written
+  std::vector<Output> outputs;
+  for (const CLI::Option* const option : command.get_options()) {
+    if (option->count() == 0 || !isOutput(*option)) continue;
+    Output output{"--" + option->get_lnames().front(), option->results().back(), {}, false};
+    SURFEIT_ASSIGN_OR_RETURN(const OutputTarget target, resolveOutput(output.path));
+    output.is_file = !target.is_stream && ::stat(target.path.c_str(), &output.info) == 0;
+    for (const Output& earlier : outputs) {
+      const bool is_same = output.path == earlier.path && !target.is_stream;
+      if (is_same) {
+        return Status::invalidArgument(fmt::format("{}: {} and {} would write the same file",
+                                                   output.path, earlier.option, output.option));
+      }
+      SURFEIT_RETURN_IF_ERROR(checkAgainst(output, earlier.path, earlier.option));
+    }
+    outputs.push_back(std::move(output));
+  }
+
+  // What may be read
+  for (const CLI::Option* const option : command.get_options()) {
+    if (option->count() == 0 || isOutput(*option)) continue;
+    for (const Output& output : outputs) {
+      const bool is_allowed =
+          works_in_place && option->get_positional() && output.option == "--output";
+      for (const std::string& input : option->results()) {
+        if (!is_allowed) SURFEIT_RETURN_IF_ERROR(checkAgainst(output, input, "its input"));
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace surfeit

@@ -1,0 +1,17 @@
+// Looks at what a command is to write, before it works: an output that is an input as well, or that
+// cannot be written, costs no time and no file.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// Of a parsed command: its outputs are the options --output, --passes, --plot and --stats, all others may
+// name inputs. kInvalidArgument when an output is the same file as an input, by whatever name, or
+// as another output, or is a directory; kIoError when it cannot be written. `works_in_place`: the
+// file of --output may be one of the inputs given by position.
+Status checkOutputs(const CLI::App& command, bool works_in_place);
+
+}  // namespace surfeit
