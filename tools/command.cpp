@@ -65,9 +65,8 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
 
 void CommandContext::run(const std::function<Status()>& body) {
   Status status;
-  progress_ =
-      std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
-                                        common.strict);
+  progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
+                                                common.strict);
   try {
     status = checkParsed();
     if (status.ok()) status = body();

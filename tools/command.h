@@ -25,7 +25,7 @@ struct CommonOptions {
   std::string stats_path;          // empty: no statistics file
   std::string progress = "auto";   // auto, bar, percent, json or none
   bool quiet = false;
-  bool strict = false;             // what would be told as a note ends the command
+  bool strict = false;  // what would be told as a note ends the command
   bool verbose = false;
 };
 

@@ -187,10 +187,10 @@ void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
       ->allow_extra_args(false)
       ->excludes(keep);
   command
-      .add_option(
-          "--like", options.like,
-          "A file whose picture windows (.exr), grid (.vdb), camera (.ptc) or header (.las) the output gets "
-          "(default: a single input that is not moved)")
+      .add_option("--like", options.like,
+                  "A file whose picture windows (.exr), grid (.vdb), camera (.ptc) or header "
+                  "(.las) the output gets "
+                  "(default: a single input that is not moved)")
       ->type_name("FILE");
 }
 

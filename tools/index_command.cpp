@@ -9,6 +9,7 @@
 #include "surfeit/index.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/number_list.h"
 
 namespace surfeit {
 namespace {
@@ -78,6 +79,15 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->add_option("--precision", arguments->precision, "quantized, or full (floats)")
       ->check(CLI::IsMember({"quantized", "full"}))
       ->capture_default_str();
+  command
+      ->add_option_function<std::string>(
+          "--origin",
+          [&options](const std::string& text) {
+            const auto at = parseNumberList<3>("--origin", text, "three numbers X,Y,Z");
+            options.origin = glm::dvec3(at[0], at[1], at[2]);
+          },
+          "What places in the scene are counted from (default: 0, or a corner of a cloud far away)")
+      ->type_name("X,Y,Z");
   addTemporaryOption(*command, options.temporary_directory);
   context.addCommonOptions(*command);
   command->footer(

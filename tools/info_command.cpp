@@ -27,7 +27,7 @@ struct InfoArguments {
   ColorRange color_range = ColorRange::kAuto;
 };
 
-nlohmann::json vectorJson(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
 std::vector<std::string> channelNames(const CloudChannels& channels) {
   std::vector<std::string> names = {"position"};
@@ -53,6 +53,7 @@ nlohmann::json sceneJson(const SceneInfo& info) {
       {"precision", info.full_precision ? "full" : "quantized"},
       {"input_channels", channelNames(info.channels)},
       {"bounds", {vectorJson(info.min), vectorJson(info.max)}},
+      {"origin", vectorJson(info.origin)},
       {"node_pages", info.node_pages},
       {"node_page_bytes", info.node_page_bytes},
       {"node_decoded_bytes", info.node_cache_bytes},
@@ -66,13 +67,28 @@ nlohmann::json sceneJson(const SceneInfo& info) {
   return json;
 }
 
+// With all digits that the scene has: those of floats about its origin.
+std::string placeText(const glm::dvec3& place, const glm::dvec3& origin) {
+  std::string text;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string number = origin[axis] == 0 ? fmt::format("{}", float(place[axis]))
+                                                 : fmt::format("{:.12g}", place[axis]);
+    text += (axis == 0 ? "" : " ") + number;
+  }
+  return text;
+}
+
 std::string sceneText(const std::string& path, const SceneInfo& info) {
+  const std::string origin =
+      info.origin == glm::dvec3(0)
+          ? ""
+          : fmt::format("\n  origin         {} {} {}", info.origin.x, info.origin.y, info.origin.z);
   const std::string groups =
       info.channels.group ? fmt::format("  groups         {}\n", describeGroups(info.groups)) : "";
   return fmt::format(
       "{}: Surfeit scene, {} surfels, {} nodes\n"
       "  file           {} ({:.1f} bytes per surfel)\n"
-      "  bounds         {:g} {:g} {:g} .. {:g} {:g} {:g}\n"
+      "  bounds         {} .. {}{}\n"
       "  input had      {}\n"
       "{}"
       "  precision      {}\n"
@@ -80,9 +96,9 @@ std::string sceneText(const std::string& path, const SceneInfo& info) {
       "  surfel pages   {} in {}, decoded {}\n"
       "  provenance     {}",
       path, formatCount(info.surfels), formatCount(info.nodes), formatBytes(info.file_bytes),
-      double(info.file_bytes) / double(info.surfels), info.min.x, info.min.y, info.min.z,
-      info.max.x, info.max.y, info.max.z, fmt::join(channelNames(info.channels), ", "), groups,
-      info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
+      double(info.file_bytes) / double(info.surfels), placeText(info.min, info.origin),
+      placeText(info.max, info.origin), origin, fmt::join(channelNames(info.channels), ", "),
+      groups, info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
       formatBytes(info.node_page_bytes), formatBytes(info.node_cache_bytes),
       formatCount(info.surfel_pages), formatBytes(info.surfel_page_bytes),
       formatBytes(info.surfel_cache_bytes), info.provenance);
@@ -97,6 +113,26 @@ Result<RowReaderOptions> readingOf(const InfoArguments& arguments) {
   return options;
 }
 
+// Reads all surfels, which are counted from `origin`, for their number and their bounds.
+Result<std::uint64_t> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Bounds3d& bounds,
+                                  Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(source.rewind());
+  bounds = {};
+  std::uint64_t surfels = 0;
+  std::vector<Surfel> batch(16384);
+  progress.beginPhase("scan", source.recordCount(), "surfels");
+  for (;;) {
+    if (progress.isCancelled()) return Status::interrupted();
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source.read(batch));
+    if (count == 0) return surfels;
+    for (const Surfel& surfel : std::span(batch).first(count)) {
+      bounds.add(glm::dvec3(surfel.position) + origin);
+    }
+    surfels += count;
+    progress.advance(count);
+  }
+}
+
 // Of records that are surfels: how many are valid, their channels and bounds. Those of a cloud
 // without surfels are left out.
 Status addSurfels(const InfoArguments& arguments, nlohmann::json& json, Progress& progress) {
@@ -104,22 +140,22 @@ Status addSurfels(const InfoArguments& arguments, nlohmann::json& json, Progress
   Result<std::unique_ptr<SurfelSource>> source =
       openSurfelSource(arguments.path, /* strict= */ false, options);
   if (!source.ok()) return {};
-  Bounds3 bounds;
+  Bounds3d bounds;
   std::uint64_t surfels = 0;
-  std::vector<Surfel> batch(16384);
-  progress.beginPhase("scan", (*source)->recordCount(), "surfels");
-  for (;;) {
-    if (progress.isCancelled()) return Status::interrupted();
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, (*source)->read(batch));
-    if (count == 0) break;
-    for (const Surfel& surfel : std::span(batch).first(count)) bounds.add(surfel.position);
-    surfels += count;
-    progress.advance(count);
+  // Floats about an origin near the cloud have its digits: once more when 0 is far
+  glm::dvec3 origin(0);
+  for (int pass = 0; pass < 2; ++pass) {
+    (*source)->setOrigin(origin);
+    SURFEIT_ASSIGN_OR_RETURN(surfels, scanSurfels(**source, origin, bounds, progress));
+    if (bounds.isEmpty() || originFor(bounds) == origin) break;
+    origin = originFor(bounds);
   }
   json["surfels"] = surfels;
   json["notes"] = (*source)->notes();
   json["input_channels"] = channelNames((*source)->channels());
-  if (!bounds.isEmpty()) json["bounds"] = {vectorJson(bounds.min), vectorJson(bounds.max)};
+  if (!bounds.isEmpty()) {
+    json["bounds"] = {vectorJson(bounds.min), vectorJson(bounds.max)};
+  }
   const std::string defects = (*source)->defects().describe();
   if (!defects.empty()) json["defects"] = defects;
   return {};

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +25,10 @@ struct IndexOptions {
   // Channels of the inputs to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels{}, part{};
+  // What places are counted from in the scene, in the cloud's coordinates: finite, at most 1e12.
+  // Absent: 0 for clouds about 0, a corner of their root cube for others (docs/format.md). Scenes
+  // of one sequence may share one.
+  std::optional<glm::dvec3> origin{};
   // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
   // that the format marks as not to be used.
   std::string filter{};

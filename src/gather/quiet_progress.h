@@ -1,4 +1,5 @@
-// A progress without notes and other words, for runs inside a run: their advice is not for the user.
+// A progress without notes and other words, for runs inside a run: their advice is not for the
+// user.
 #pragma once
 
 #include <cstdint>

@@ -202,8 +202,8 @@ Status RadianceJob::planThreads() {
   const std::uint64_t most = stats_.memory_bytes / 4 / threadBytes(options_);
   stats_.threads = static_cast<int>(std::clamp<std::uint64_t>(most, 1, std::uint64_t(wanted)));
   if (stats_.threads < wanted) {
-    progress_.inform(fmt::format("{} of {} threads: a budget of {} MiB feeds no more", stats_.threads,
-                               wanted, stats_.memory_bytes >> 20));
+    progress_.inform(fmt::format("{} of {} threads: a budget of {} MiB feeds no more",
+                                 stats_.threads, wanted, stats_.memory_bytes >> 20));
   }
   return {};
 }

@@ -170,9 +170,9 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
     }
     SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, format.open(path, options));
     SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element(), path));
-    SURFEIT_ASSIGN_OR_RETURN(reader, filterRows(std::move(reader), options.filter,
-                                                selectionKey(path, options),
-                                                options.selections.get()));
+    SURFEIT_ASSIGN_OR_RETURN(
+        reader, filterRows(std::move(reader), options.filter, selectionKey(path, options),
+                           options.selections.get()));
     if (options.color_range) return readColors(std::move(reader), *options.color_range);
     return reader;
   }

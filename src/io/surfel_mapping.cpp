@@ -222,8 +222,7 @@ void SurfelMapping::setOrigin(const glm::dvec3& origin) {
 // those of decodeRow.
 std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
   FloatRowDecoder decoder(row_bytes_);
-  bool is_fast =
-      !channels_.long_side && !coverage_.isPresent() && origin_ == glm::dvec3(0);
+  bool is_fast = !channels_.long_side && !coverage_.isPresent() && origin_ == glm::dvec3(0);
   const auto add = [&](const Field& field, std::size_t place, float least, float most) {
     if (!field.isPresent()) return;
     const std::size_t offset = static_cast<std::size_t>(field.offset);

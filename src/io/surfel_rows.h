@@ -15,7 +15,8 @@ namespace surfeit {
 class SurfelRows {
  public:
   // `channels` says which optional properties a row has: floats, but for two_sided and group, which
-  // are uchar. Surfels are counted from `origin`, rows from 0: positions are doubles unless it is 0.
+  // are uchar. Surfels are counted from `origin`, rows from 0: positions are doubles unless it is
+  // 0.
   explicit SurfelRows(const CloudChannels& channels, const glm::dvec3& origin = glm::dvec3(0));
 
   const std::vector<PlyProperty>& properties() const { return properties_; }

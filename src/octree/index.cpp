@@ -69,11 +69,6 @@ glm::vec3 moved(const glm::vec3& position, const glm::dvec3& shift) {
   return glm::vec3(glm::dvec3(position) + shift);
 }
 
-// The origin for a cloud of these bounds, which are counted from `origin`.
-glm::dvec3 originAsked(const Bounds3& bounds, const glm::dvec3& origin) {
-  return originFor(movedBounds(bounds, origin));
-}
-
 // The rules that need no neighbourhood (docs/format.md, "Rules for what is missing").
 void applySizeRules(Surfel& surfel, float overlap) {
   if (surfel.radius > 0 && surfel.area > 0) return;
@@ -116,6 +111,7 @@ class Indexer {
   Result<std::unique_ptr<SurfelStore>> readInputs();
   Result<std::unique_ptr<SurfelStore>> readInto(const std::optional<RootCube>& cube);
   Status takeSample();
+  glm::dvec3 originAsked(const Bounds3& bounds) const;
   bool moveOrigin(const glm::dvec3& origin);
   void noteRules() const;
   Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
@@ -173,6 +169,11 @@ Status Indexer::checkOptions() const {
     return Status::invalidArgument(
         fmt::format("leaf capacity {}, expected 1 to 4096", options_.leaf_capacity));
   }
+  for (int axis = 0; options_.origin && axis < 3; ++axis) {
+    if (std::abs((*options_.origin)[axis]) <= double(kLargestLength)) continue;
+    return Status::invalidArgument(
+        fmt::format("origin {}, expected a number of at most 1e12", (*options_.origin)[axis]));
+  }
   if (!(options_.overlap >= 1 && options_.overlap <= 16)) {
     return Status::invalidArgument(
         fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
@@ -192,6 +193,7 @@ Status Indexer::openInputs() {
       reader_,
       CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes), reading));
   for (const std::string& note : reader_->notes()) progress_.note(note);
+  if (options_.origin) reader_->setOrigin(*options_.origin);
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) SURFEIT_RETURN_IF_ERROR(takeSample());
   // The octree of bare positions is built at full precision
@@ -210,11 +212,16 @@ Status Indexer::takeSample() {
   const std::uint64_t buckets = usualBucketCount(reader_->recordCount());
   SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(buckets));
   if (sample_.empty()) return {};
-  if (moveOrigin(originAsked(boundsOf(sample_), reader_->origin()))) {
+  if (moveOrigin(originAsked(boundsOf(sample_)))) {
     SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(buckets));
   }
   for (Surfel& surfel : sample_) applySizeRules(surfel, options_.overlap);
   return {};
+}
+
+// The origin for a cloud of these bounds, which are counted from the present one.
+glm::dvec3 Indexer::originAsked(const Bounds3& bounds) const {
+  return options_.origin.value_or(originFor(movedBounds(bounds, reader_->origin())));
 }
 
 // Counts positions from another origin from now on, those of the sample too; false when it is the
@@ -266,7 +273,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInputs() {
     sample_ = totals_.sample;
     const CloudTotals before = std::move(totals_);
     const glm::dvec3 old_origin = reader_->origin();
-    const bool is_moved = moveOrigin(originAsked(before.bounds, old_origin));
+    const bool is_moved = moveOrigin(originAsked(before.bounds));
     const Bounds3d bounds = movedBounds(before.bounds, old_origin - reader_->origin());
     SURFEIT_ASSIGN_OR_RETURN(store, readInto(rootCube(bounds)));
     clock_.finish("read again");
@@ -316,7 +323,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
   SURFEIT_ASSIGN_OR_RETURN(totals_, reader_->readAll(consume, progress_));
   if (totals_.surfels > 0 &&
       (!distributing || (needs_cube && !(rootCube(totals_.bounds) == *cube)) ||
-       originAsked(totals_.bounds, reader_->origin()) != reader_->origin())) {
+       originAsked(totals_.bounds) != reader_->origin())) {
     return std::unique_ptr<SurfelStore>();
   }
   SURFEIT_RETURN_IF_ERROR(store->finish());
@@ -462,7 +469,7 @@ Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std
                             available);
     if (threads < available) {
       progress.inform(fmt::format("{} of {} threads: a budget of {} MiB feeds no more", threads,
-                                available, options.memory_bytes >> 20));
+                                  available, options.memory_bytes >> 20));
     }
   }
   Result<IndexStats> result = Status::failed("index: not run");

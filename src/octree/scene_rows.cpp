@@ -43,7 +43,8 @@ class SceneRowReader final : public RowReader {
   std::vector<std::string> notes() const override {
     if (scene_.header().full_precision) return {};
     return {
-        "values have the digits that a quantized scene keeps, in the order of its pages (index with "
+        "values have the digits that a quantized scene keeps, in the order of its pages (index "
+        "with "
         "--precision full keeps all)"};
   }
 

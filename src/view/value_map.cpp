@@ -24,7 +24,7 @@ ValueMap chooseValueMap(const std::optional<glm::dvec2>& range, const Channel& c
     case ValueKind::kScalar:
       if (!(extent.lowest <= extent.highest)) return {};
       progress.inform(fmt::format("channel {}: black is {:.6g}, white is {:.6g}", channel.name(),
-                                extent.lowest, extent.highest));
+                                  extent.lowest, extent.highest));
       return stretch(extent.lowest, extent.highest);
     case ValueKind::kNormal:
       return stretch(-1, 1);

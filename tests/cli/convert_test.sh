@@ -66,7 +66,8 @@ scansAreFilteredAndWritten() {
   run 2 index scan.las -o none.sft --filter "clas == 2"
   says "filter: at 1: found 'clas'" classification
   run 2 info scan.sft --filter true
-  run 2 view scan.sft -o none.png --filter true
+  run 0 view scan.sft -o scene.png --size 64x64 --filter "y > 0"
+  run 0 convert scan.sft -o scene.csv --filter "y > 0"
   run 0 view scan.las -o scan.png --size 64x64 --filter "class == 2"
   run 0 gather scan.sft scan.las -o lit.las --filter true --max-solid-angle 0.1
   run 0 info lit.las --filter true

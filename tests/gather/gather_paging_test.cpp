@@ -38,6 +38,7 @@ GatherOptions coarse() {
 // Keeps what it is told.
 class NotedProgress : public Progress {
  public:
+  void inform(const std::string& message) override { note(message); }
   void note(const std::string& message) override {
     const std::lock_guard lock(mutex_);
     notes_.push_back(message);

@@ -40,6 +40,7 @@ class Scene {
     readBack(cloud_path, cloud.size());
     IndexOptions options;
     options.full_precision = true;
+    options.origin = glm::dvec3(0);  // receivers are given about it
     Progress progress;
     expectOk(indexClouds({cloud_path}, path, options, progress).status());
     Result<SceneFile> file = SceneFile::open(path);

@@ -71,6 +71,7 @@ Status indexCloud(std::span<const Surfel> cloud, const IndexedSceneOptions& opti
   indexing.threads = options.threads;
   indexing.memory_bytes = options.memory_bytes;
   indexing.full_precision = options.full_precision;
+  indexing.origin = glm::dvec3(0);  // receivers are given about it
   Progress progress;
   return indexClouds(paths, path, indexing, progress).status();
 }
