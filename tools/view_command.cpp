@@ -48,7 +48,7 @@ Status runView(ViewArguments& arguments, CommandContext& context) {
   SURFEIT_ASSIGN_OR_RETURN(const ViewStats stats, viewCloud(arguments.input, arguments.picture,
                                                             arguments.options, context.progress()));
   const std::string camera =
-      fmt::format("--eye \"{:.6g} {:.6g} {:.6g}\" --look-at \"{:.6g} {:.6g} {:.6g}\"", stats.eye.x,
+      fmt::format("--eye \"{:.10g} {:.10g} {:.10g}\" --look-at \"{:.10g} {:.10g} {:.10g}\"", stats.eye.x,
                   stats.eye.y, stats.eye.z, stats.look_at.x, stats.look_at.y, stats.look_at.z);
   if (!arguments.options.passes.empty()) {
     context.say(fmt::format("{}: {} of {}x{} pixels see the cloud; {}", arguments.options.passes,

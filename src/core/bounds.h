@@ -71,6 +71,13 @@ inline RootCube rootCube(const Bounds3& bounds) {
   return rootCube(movedBounds(bounds, glm::dvec3(0)));
 }
 
+// How far floats about 0 stand apart at the farthest coordinate of the box.
+inline double floatStep(const Bounds3d& bounds) {
+  const glm::dvec3 farthest = glm::max(glm::abs(bounds.min), glm::abs(bounds.max));
+  const float most = float(std::max({farthest.x, farthest.y, farthest.z}));
+  return double(std::nextafter(most, std::numeric_limits<float>::infinity())) - double(most);
+}
+
 // Where the places of a cloud with this box are counted from. Floats about 0 serve a box that is no
 // farther from 0 than twice its root cube is wide: they have all but two bits of the digits that
 // they could have. Others, on a map or a globe, are counted from a corner of their cube, so that a

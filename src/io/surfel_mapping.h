@@ -98,6 +98,8 @@ class SurfelMapping {
   std::size_t decodeRows(std::span<const std::byte> rows, std::uint64_t first_record,
                          std::span<Surfel> surfels, SurfelDefects& defects) const;
 
+  // Whether rows hold positions as floats, which have few digits far from 0.
+  bool hasFloatPositions() const { return position_[0].type == PlyType::kFloat32; }
   // The position of a valid row, about no origin.
   glm::dvec3 positionOf(const std::byte* row) const;
 

@@ -27,6 +27,7 @@ class RowSurfelSource final : public SurfelSource {
   std::uint64_t recordCount() const override { return reader_->element().count; }
   CloudChannels channels() const override { return mapping_.channels(); }
   void setOrigin(const glm::dvec3& origin) override { mapping_.setOrigin(origin); }
+  bool hasFloatPositions() const override { return mapping_.hasFloatPositions(); }
   bool hasCoverage() const override { return mapping_.hasCoverage(); }
   const SurfelDefects& defects() const override { return defects_; }
 

@@ -35,6 +35,9 @@ class SurfelSource {
   // Positions of surfels are counted from here from now on: the records' doubles less this, as
   // floats. 0 before. Finite.
   virtual void setOrigin(const glm::dvec3& origin) = 0;
+  // Whether the records hold positions as floats.
+  virtual bool hasFloatPositions() const { return false; }
+
   // What the file has that surfels do not, and rules by which values were read, one sentence each.
   virtual std::vector<std::string> notes() const { return {}; }
 

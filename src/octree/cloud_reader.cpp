@@ -129,6 +129,7 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
   for (const std::string& path : inputs) {
     SURFEIT_ASSIGN_OR_RETURN(const auto source, openCloudSource(path, strict, reading));
     reader.records_.push_back(source->recordCount());
+    if (source->hasFloatPositions()) reader.float_inputs_.push_back(path);
     reader.record_count_ += source->recordCount();
     reader.is_seekable_ = reader.is_seekable_ && source->isSeekable();
     for (const std::string& note : source->notes()) {

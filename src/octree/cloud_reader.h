@@ -54,6 +54,8 @@ class CloudReader {
   const glm::dvec3& origin() const { return origin_; }
   void setOrigin(const glm::dvec3& origin) { origin_ = origin; }
 
+  // Inputs whose positions are floats.
+  const std::vector<std::string>& floatInputs() const { return float_inputs_; }
   // What is to be told of the inputs, with their paths.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -83,6 +85,7 @@ class CloudReader {
   RowReaderOptions reading_;
   bool strict_ = false;
   glm::dvec3 origin_{0};
+  std::vector<std::string> float_inputs_;
   std::size_t read_bytes_ = 0;
   std::uint64_t record_count_ = 0;
   std::uint64_t file_bytes_ = 0;

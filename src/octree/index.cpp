@@ -332,6 +332,14 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
 
 void Indexer::noteRules() const {
   const CloudTotals& totals = totals_;
+  const Bounds3d bounds = movedBounds(totals.bounds, reader_->origin());
+  for (const std::string& path : reader_->floatInputs()) {
+    if (originFor(bounds) == glm::dvec3(0)) break;
+    progress_.note(
+        fmt::format("{}: positions are floats, which stand {:.2g} apart so far from 0: write the "
+                    "cloud with doubles, or near 0",
+                    path, floatStep(bounds)));
+  }
   if (totals.missing_both > 0) {
     progress_.note(
         fmt::format("{} surfels have neither radius nor area: both follow from the "

@@ -163,6 +163,13 @@ Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& 
         return Status::corruption(
             fmt::format("{}: no triangles ({} faces without area)", path, degenerate));
       }
+      const Bounds3d bounds = movedBounds(mesh.bounds(), glm::dvec3(0));
+      if (originFor(bounds) != glm::dvec3(0)) {
+        progress.note(
+            fmt::format("{}: vertices are taken as floats, which stand {:.2g} apart so far from 0: "
+                        "move the mesh near 0",
+                        path, floatStep(bounds)));
+      }
       if (degenerate > 0) {
         progress.note(fmt::format("{}: {} faces without area skipped", path, degenerate));
       }

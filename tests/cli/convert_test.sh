@@ -63,6 +63,9 @@ scansAreFilteredAndWritten() {
   run 0 index scan.las -o scan.sft --filter "class == 2"
   run 0 info scan.sft
   says "2,700"
+  run 3 index scan.las -o none.sft --strict
+  says "(refused by --strict)"
+  test ! -e none.sft || fail "refused, and written"
   run 2 index scan.las -o none.sft --filter "clas == 2"
   says "filter: at 1: found 'clas'" classification
   run 2 info scan.sft --filter true

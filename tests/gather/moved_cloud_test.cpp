@@ -124,6 +124,27 @@ TEST_P(MovedCloudTest, HasTheSamePagesAboutAnOrigin) {
   EXPECT_LE(glm::length(moved.bounds.max - local.bounds.max), 1e-6f);
 }
 
+// What a file has lost already is told.
+TEST_P(MovedCloudTest, FloatsFarFromZeroAreTold) {
+  std::vector<Surfel> cloud = roomCorner();
+  for (Surfel& surfel : cloud) {
+    surfel.position = glm::vec3(glm::dvec3(surfel.position) + GetParam());
+  }
+  Result<SurfelWriter> writer = SurfelWriter::create(path("floats.ply"), kLitChannels);
+  ASSERT_TRUE(writer.ok() && writer->write(cloud).ok() && writer->finish().ok());
+  NoteKeeper notes;
+  ASSERT_TRUE(indexClouds({path("floats.ply")}, path("floats.sft"), IndexOptions(), notes).ok());
+  const auto tells = [&] {
+    return std::count_if(notes.notes.begin(), notes.notes.end(), [](const std::string& note) {
+      return note.find("floats.ply: positions are floats, which stand") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(tells(), 1);
+  ASSERT_TRUE(indexClouds({path("moved.ply")}, path("again.sft"), IndexOptions(), notes).ok());
+  ASSERT_TRUE(indexClouds({path("local.ply")}, path("again.sft"), IndexOptions(), notes).ok());
+  EXPECT_EQ(tells(), 1);
+}
+
 TEST_P(MovedCloudTest, GathersTheSame) {
   GatherOptions options;
   options.mode = GatherMode::kBleeding;
