@@ -14,6 +14,7 @@
 #include "io/cloud_formats.h"
 #include "io/surfel_mapping.h"
 #include "io/surfel_names.h"
+#include "octree/scene_rows.h"
 
 namespace surfeit {
 namespace {
@@ -101,7 +102,7 @@ Result<std::vector<BrickChannel>> chooseBrickChannels(const PlyElement& element,
 Result<BrickInput> BrickInput::open(const std::string& path, std::span<const BrickChannel> channels,
                                     const RowReaderOptions& reading) {
   BrickInput input;
-  SURFEIT_ASSIGN_OR_RETURN(input.reader_, openRowReader(path, reading));
+  SURFEIT_ASSIGN_OR_RETURN(input.reader_, openCloud(path, reading));
   SURFEIT_RETURN_IF_ERROR(input.declare(channels));
   return input;
 }

@@ -11,7 +11,9 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -55,9 +57,11 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   options.eye -= scene.header().origin;
   SURFEIT_ASSIGN_OR_RETURN(
+      const std::optional<ColorRange> colors,
+      colorRangeFor(std::span(&receivers_path, 1), result_path, options.color_range));
+  SURFEIT_ASSIGN_OR_RETURN(
       GatherInput input,
-      GatherInput::open(receivers_path, options.channels, options.part, options.filter,
-                        colorRangeFor(result_path, options.color_range)));
+      GatherInput::open(receivers_path, options.channels, options.part, options.filter, colors));
   SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options, nullptr)));
   const ResultRows result_rows(input.receivers(), options.outputs, options.mode);
   stats.receivers = input.receiverCount();

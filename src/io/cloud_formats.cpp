@@ -179,9 +179,20 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
   return unknownFormat(path, first_bytes);
 }
 
-std::optional<ColorRange> colorRangeFor(const std::string& path, ColorRange asked) {
-  if (asked == ColorRange::kAuto && hasExtension(withoutCompression(path), ".las")) return {};
-  return asked;
+Result<std::optional<ColorRange>> colorRangeFor(std::span<const std::string> inputs,
+                                                const std::string& output, ColorRange asked) {
+  const std::optional<ColorRange> as_asked = asked;
+  if (asked != ColorRange::kAuto || !hasExtension(withoutCompression(output), ".las")) {
+    return as_asked;
+  }
+  for (const std::string& path : inputs) {
+    std::string first_bytes(8, '\0');
+    SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                             input.readSome(0, std::as_writable_bytes(std::span(first_bytes))));
+    if (!recognisesLas(std::string_view(first_bytes).substr(0, size))) return as_asked;
+  }
+  return std::optional<ColorRange>();
 }
 
 std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes) {

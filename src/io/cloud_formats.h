@@ -63,9 +63,10 @@ bool isSceneFile(std::string_view first_bytes);
 Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
                                                  const RowReaderOptions& options = {});
 
-// How colors are read for a cloud that is written to `path`: as `asked`, but in LAS, whose records
-// stay as they are, with their own numbers.
-std::optional<ColorRange> colorRangeFor(const std::string& path, ColorRange asked);
+// How colors of `inputs` are read that go to `output`: as `asked`, but from LAS to LAS, whose
+// records stay as they are, with their own numbers.
+Result<std::optional<ColorRange>> colorRangeFor(std::span<const std::string> inputs,
+                                                const std::string& output, ColorRange asked);
 
 // What the writer of `path` holds of so many rows until its end: 0 but for OpenVDB, whose tree is
 // sorted in memory (RowWriterOptions::memory_bytes).

@@ -145,7 +145,8 @@ class Converter {
     reading_.part = options_.part;
     reading_.filter = options_.filter;
     reading_.selections = std::make_shared<RowSelections>();
-    reading_.color_range = colorRangeFor(output_, options_.color_range);
+    SURFEIT_ASSIGN_OR_RETURN(reading_.color_range,
+                             colorRangeFor(inputs_, output_, options_.color_range));
     SURFEIT_RETURN_IF_ERROR(openInputs());
     SURFEIT_RETURN_IF_ERROR(createWriter());
     progress_.beginPhase("convert", stats_.records, "records");

@@ -332,13 +332,15 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
 
 void Indexer::noteRules() const {
   const CloudTotals& totals = totals_;
-  const Bounds3d bounds = movedBounds(totals.bounds, reader_->origin());
+  const double step = floatStep(movedBounds(totals.bounds, reader_->origin()));
+  const glm::vec3 sides = totals.bounds.extent();
+  const double spacing = double(std::max({sides.x, sides.y, sides.z})) / std::sqrt(totals.surfels);
   for (const std::string& path : reader_->floatInputs()) {
-    if (originFor(bounds) == glm::dvec3(0)) break;
-    progress_.note(
-        fmt::format("{}: positions are floats, which stand {:.2g} apart so far from 0: write the "
-                    "cloud with doubles, or near 0",
-                    path, floatStep(bounds)));
+    if (step <= 1e-3 * spacing) break;  // no more than quantizing moves
+    progress_.note(fmt::format(
+        "{}: positions are floats, which stand {:.2g} apart so far from 0, beside a spacing of "
+        "about {:.2g}: write the cloud with doubles, or near 0",
+        path, step, spacing));
   }
   if (totals.missing_both > 0) {
     progress_.note(

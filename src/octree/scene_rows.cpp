@@ -17,6 +17,8 @@ namespace {
 
 // Surfels decoded at once, unless one page holds more: enough that threads have work.
 constexpr std::size_t kBatchSurfels = 32768;
+// Pages decoded at once, however small they are: each has buffers of its own.
+constexpr std::size_t kMostSlots = 256;
 
 // What rows of the scene hold.
 CloudChannels channelsOf(const SceneHeader& header) {
@@ -30,7 +32,9 @@ class SceneRowReader final : public RowReader {
   static Result<std::unique_ptr<RowReader>> create(SceneFile scene,
                                                    const RowReaderOptions& options) {
     auto reader = std::unique_ptr<SceneRowReader>(new SceneRowReader(std::move(scene)));
-    SURFEIT_RETURN_IF_ERROR(reader->rename(options.channels));
+    SURFEIT_ASSIGN_OR_RETURN(reader->element_,
+                             renamedElement(reader->element_, options.channels, reader->path()));
+    SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element_, reader->path()));
     return std::unique_ptr<RowReader>(std::move(reader));
   }
 
@@ -43,13 +47,12 @@ class SceneRowReader final : public RowReader {
   std::vector<std::string> notes() const override {
     if (scene_.header().full_precision) return {};
     return {
-        "values have the digits that a quantized scene keeps, in the order of its pages (index "
-        "with "
-        "--precision full keeps all)"};
+        "values have the digits that a quantized scene keeps (index --precision full keeps all)"};
   }
 
   Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
-    if (next_ == surfels_.size()) SURFEIT_RETURN_IF_ERROR(decodePages());
+    if (failure_.ok() && next_ == surfels_.size()) failure_ = decodePages();
+    SURFEIT_RETURN_IF_ERROR(failure_);
     const std::size_t count = std::min(max_rows, surfels_.size() - next_);
     buffer.reserve(std::max<std::size_t>(count * rows_.rowBytes(), 1));
     rows_.pack(std::span<const Surfel>(surfels_).subspan(next_, count), buffer.data());
@@ -61,6 +64,7 @@ class SceneRowReader final : public RowReader {
     next_page_ = 0;
     surfels_.clear();
     next_ = 0;
+    failure_ = {};
     return {};
   }
 
@@ -71,24 +75,11 @@ class SceneRowReader final : public RowReader {
     element_.count = scene_.header().surfel_count;
     element_.properties = rows_.properties();
     element_.row_bytes = rows_.rowBytes();
-    slots_.resize(std::max<std::size_t>(kBatchSurfels / capacity(), 1));
+    slots_.resize(std::clamp<std::size_t>(kBatchSurfels / capacity(), 1, kMostSlots));
   }
 
   std::size_t capacity() const {
     return std::max<std::size_t>(scene_.header().surfel_group_capacity, 1);
-  }
-
-  Status rename(std::span<const ChannelRename> renames) {
-    const std::vector<std::string> names = renamedProperties(element_, renames);
-    DistinctNames distinct;
-    std::vector<PlyProperty> left;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (names[i].empty()) continue;
-      left.push_back(element_.properties[i]);
-      left.back().name = distinct.add(names[i]);
-    }
-    element_.properties = std::move(left);
-    return checkChannelsLeft(element_, path());
   }
 
   // The next pages' surfels; none at the end.
@@ -129,8 +120,11 @@ class SceneRowReader final : public RowReader {
   std::vector<Slot> slots_;
   std::uint32_t next_page_ = 0;
   std::vector<Surfel> surfels_;
+  Status failure_;        // which lasts until rewind()
   std::size_t next_ = 0;  // of the surfels, the first that is still to be packed
 };
+
+}  // namespace
 
 Result<bool> isScene(const std::string& path) {
   std::array<std::byte, 8> magic{};
@@ -138,8 +132,6 @@ Result<bool> isScene(const std::string& path) {
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t size, file.readSome(0, magic));
   return isSceneFile({reinterpret_cast<const char*>(magic.data()), size});
 }
-
-}  // namespace
 
 Result<std::unique_ptr<RowReader>> readSceneAsCloud(SceneFile scene,
                                                     const RowReaderOptions& options) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <glm/geometric.hpp>
@@ -30,6 +31,19 @@ void completeAttributes(Mesh& mesh) {
   if (!mesh.color.empty()) mesh.color.resize(count, glm::vec3(1));
   if (!mesh.uv.empty()) mesh.uv.resize(count, glm::vec2(0));
   mesh.position.reserve(count + 1);
+}
+
+// Tells when floats hold vertices worse than to a thousandth of the size of triangles.
+void noteFarVertices(const std::string& path, const Mesh& mesh, Progress& progress) {
+  const glm::vec3 sides = mesh.bounds().extent();
+  const double size =
+      double(std::max({sides.x, sides.y, sides.z})) / std::sqrt(double(mesh.triangle.size()));
+  const double step = floatStep(movedBounds(mesh.bounds(), glm::dvec3(0)));
+  if (step <= 1e-3 * size) return;
+  progress.note(fmt::format(
+      "{}: vertices are taken as floats, which stand {:.2g} apart so far from 0, beside "
+      "triangles of about {:.2g}: move the mesh near 0",
+      path, step, size));
 }
 
 enum class MeshFormat { kPly, kObj, kUnknown };
@@ -163,13 +177,7 @@ Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& 
         return Status::corruption(
             fmt::format("{}: no triangles ({} faces without area)", path, degenerate));
       }
-      const Bounds3d bounds = movedBounds(mesh.bounds(), glm::dvec3(0));
-      if (originFor(bounds) != glm::dvec3(0)) {
-        progress.note(
-            fmt::format("{}: vertices are taken as floats, which stand {:.2g} apart so far from 0: "
-                        "move the mesh near 0",
-                        path, floatStep(bounds)));
-      }
+      noteFarVertices(path, mesh, progress);
       if (degenerate > 0) {
         progress.note(fmt::format("{}: {} faces without area skipped", path, degenerate));
       }

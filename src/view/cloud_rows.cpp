@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <utility>
 
 #include "io/cloud_formats.h"
-#include "io/file.h"
 #include "io/row_reader.h"
 #include "octree/scene_file.h"
 #include "octree/scene_rows.h"
@@ -63,14 +61,8 @@ bool hasPositions(const PlyElement& element) {
 
 Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path,
                                                  const RowReaderOptions& options) {
-  // A scene says so in its first bytes
-  std::array<char, 8> magic{};
-  {
-    SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
-    SURFEIT_ASSIGN_OR_RETURN([[maybe_unused]] const std::size_t got,
-                             file.readSome(0, std::as_writable_bytes(std::span(magic))));
-  }
-  if (isSceneFile({magic.data(), magic.size()})) {
+  SURFEIT_ASSIGN_OR_RETURN(const bool is_scene, isScene(path));
+  if (is_scene) {
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(path));
     const SceneHeader header = scene.header();
     SURFEIT_ASSIGN_OR_RETURN(auto reader, readSceneAsCloud(std::move(scene), options));

@@ -309,6 +309,23 @@ TEST_F(LasWriterTest, LinearColorsBecomeShadesOf16Bits) {
                             Contains(HasSubstr("1 values of blue are not"))));
 }
 
+// What a color is follows from the input, where that is not LAS.
+TEST_F(LasWriterTest, ColorsTo255InFloatsAreTheSameShades) {
+  Table table = tableOf({{"x", kFloat},
+                         {"y", kFloat},
+                         {"z", kFloat},
+                         {"red", kFloat},
+                         {"green", kFloat},
+                         {"blue", kFloat}});
+  table.rows = {{0, 0, 0, 200, 0, 17}, {1, 1, 1, 255, 90, 3}};
+  writeTable("a.ply", table);
+  convertOk({"a.ply"}, "b.las");
+  const std::string las = bytesOf("b.las");
+  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 30), 200 * 257);
+  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 34), 17 * 257);
+  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 1), 32), 90 * 257);
+}
+
 TEST_F(LasWriterTest, ValuesThatNoFieldHoldsAreExtraBytes) {
   Table table = tableOf({{"x", kFloat},
                          {"y", kFloat},

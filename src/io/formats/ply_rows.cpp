@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "io/formats/packed_splat_reader.h"
@@ -26,21 +25,7 @@ Result<PlyElement> rowElement(const PlyElement& original, std::span<const Channe
         fmt::format("{}: element {}: property {} is a list, expected a scalar", path, original.name,
                     property.name));
   }
-  const std::vector<std::string> names = renamedProperties(original, renames);
-  PlyElement element = original;
-  element.properties.clear();
-  std::set<std::string> taken;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i].empty()) continue;
-    if (!taken.insert(names[i]).second) {
-      return Status::corruption(
-          fmt::format("{}: element {}: property {} would be a second {}, expected another name",
-                      path, original.name, original.properties[i].name, names[i]));
-    }
-    element.properties.push_back(original.properties[i]);
-    element.properties.back().name = names[i];
-  }
-  return element;
+  return renamedElement(original, renames, path);
 }
 
 // The element to read.

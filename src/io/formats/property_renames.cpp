@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <set>
 #include <utility>
 
 #include "io/property_aliases.h"
@@ -60,6 +61,25 @@ std::vector<std::string> renamedProperties(const PlyElement& element,
     names[i] = given.empty() ? "" : given.front();
   }
   return names;
+}
+
+Result<PlyElement> renamedElement(const PlyElement& original,
+                                  std::span<const ChannelRename> renames, const std::string& path) {
+  const std::vector<std::string> names = renamedProperties(original, renames);
+  PlyElement element = original;
+  element.properties.clear();
+  std::set<std::string> taken;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i].empty()) continue;
+    if (!taken.insert(names[i]).second) {
+      return Status::corruption(
+          fmt::format("{}: element {}: property {} would be a second {}, expected another name",
+                      path, original.name, original.properties[i].name, names[i]));
+    }
+    element.properties.push_back(original.properties[i]);
+    element.properties.back().name = names[i];
+  }
+  return element;
 }
 
 std::string DistinctNames::add(const std::string& name) {

@@ -11,6 +11,7 @@
 
 #include "io/channels.h"
 #include "io/ply_format.h"
+#include "surfeit/status.h"
 
 namespace surfeit {
 
@@ -19,6 +20,11 @@ namespace surfeit {
 // twice.
 std::vector<std::string> renamedProperties(const PlyElement& element,
                                            std::span<const ChannelRename> renames);
+
+// The element with these names, without lists and what is dropped; places in a row stay the same.
+// kCorruption when a name is taken twice.
+Result<PlyElement> renamedElement(const PlyElement& original,
+                                  std::span<const ChannelRename> renames, const std::string& path);
 
 // Gives names that come again a number. In constant time each: a damaged header may name thousands
 // of properties alike.
