@@ -63,6 +63,7 @@ Status runSample(SampleArguments& arguments, CommandContext& context) {
                              {"degenerate_faces", stats.degenerate_faces},
                              {"surfels", stats.surfels},
                              {"sliver_surfels", stats.sliver_surfels},
+                             {"clear_surfels", stats.clear_surfels},
                              {"area", stats.area},
                              {"disk_area", stats.disk_area},
                              {"spacing", stats.spacing},

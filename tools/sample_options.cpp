@@ -18,6 +18,11 @@ glm::vec3 vectorAt(const std::array<double, N>& numbers, std::size_t i) {
   return {float(numbers[i]), float(numbers[i + 1]), float(numbers[i + 2])};
 }
 
+template <std::size_t N>
+glm::dvec3 placeAt(const std::array<double, N>& numbers) {
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
 // Light cannot be taken away, and a surface reflects no more than it gets.
 glm::vec3 colorAt(const std::string& option, const glm::vec3& color, float max) {
   for (int i = 0; i < 3; ++i) {
@@ -52,12 +57,11 @@ constexpr float kNoLimit = 3e38f;
 
 void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
   Lights& lights = surroundings.lights;
-  addLightOption<6>(app, "--light-point", "x y z r g b",
-                    "Point light: position, intensity in W/sr; repeatable",
-                    [&lights](const std::array<double, 6>& n) {
-                      lights.points.push_back(
-                          {vectorAt(n, 0), colorAt("--light-point", vectorAt(n, 3), kNoLimit)});
-                    });
+  addLightOption<6>(
+      app, "--light-point", "x y z r g b", "Point light: position, intensity in W/sr; repeatable",
+      [&lights](const std::array<double, 6>& n) {
+        lights.points.push_back({placeAt(n), colorAt("--light-point", vectorAt(n, 3), kNoLimit)});
+      });
   addLightOption<6>(
       app, "--light-directional", "dx dy dz r g b",
       "Directional light: direction it travels in, irradiance facing it; repeatable",
@@ -69,7 +73,7 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       app, "--light-area", "cx cy cz ux uy uz vx vy vz r g b",
       "Rectangle light: centre, half edges u and v, radiance; emits towards u x v; repeatable",
       [&lights](const std::array<double, 12>& n) {
-        lights.areas.push_back({vectorAt(n, 0), vectorAt(n, 3), vectorAt(n, 6),
+        lights.areas.push_back({placeAt(n), vectorAt(n, 3), vectorAt(n, 6),
                                 colorAt("--light-area", vectorAt(n, 9), kNoLimit)});
       });
   app.add_option("--light-samples", lights.samples,

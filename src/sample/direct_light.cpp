@@ -24,7 +24,7 @@ float fraction(float value) { return value - std::floor(value); }
 // (Cranley and Patterson 1976), so that each surfel has its own but well spread pattern.
 struct Pattern {
   Pattern(std::uint64_t seed, int sample_count) : count(sample_count) {
-    const std::uint64_t bits = mixBits(seed);
+    const std::uint64_t bits = splitMix(seed);
     shift_u = float(bits >> 40) * 0x1p-24f;
     shift_v = float((bits >> 8) & 0xffffff) * 0x1p-24f;
   }
@@ -41,15 +41,18 @@ float luminance(const glm::vec3& rgb) {
 
 }  // namespace
 
-std::uint64_t mixBits(std::uint64_t value) {
-  value += 0x9e3779b97f4a7c15u;
-  value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9u;
-  value = (value ^ (value >> 27)) * 0x94d049bb133111ebu;
-  return value ^ (value >> 31);
+Lights Lights::countedFrom(const glm::dvec3& origin) const {
+  Lights moved = *this;
+  for (PointLight& light : moved.points) light.position -= origin;
+  for (AreaLight& light : moved.areas) light.centre -= origin;
+  return moved;
 }
 
 DirectLight::DirectLight(const Mesh& mesh, const RayScene& scene, const Lights& lights)
-    : mesh_(mesh), scene_(scene), lights_(lights), offset_(scene.surfaceOffset()) {
+    : mesh_(mesh),
+      scene_(scene),
+      lights_(lights.countedFrom(mesh.origin)),
+      offset_(scene.surfaceOffset()) {
   // Triangles emit in proportion to area and luminance, so they are chosen that way
   double sum = 0;
   for (std::size_t i = 0; i < mesh.triangle.size(); ++i) {
@@ -88,8 +91,8 @@ glm::vec3 DirectLight::fromAreaLight(const AreaLight& light, const SurfacePoint&
   const Pattern pattern(seed, samples);
   glm::vec3 sum(0);
   for (int i = 0; i < samples; ++i) {
-    const glm::vec3 position =
-        light.centre + (2 * pattern.u(i) - 1) * light.u + (2 * pattern.v(i) - 1) * light.v;
+    const glm::vec3 position = glm::vec3(light.centre) + (2 * pattern.u(i) - 1) * light.u +
+                               (2 * pattern.v(i) - 1) * light.v;
     sum += fromEmitterPoint(point, position, normal, light.radiance);
   }
   // 1 / d^2 has no bound for samples next to the light, but irradiance has: pi L
@@ -118,8 +121,9 @@ glm::vec3 DirectLight::fromEmissiveTriangles(const SurfacePoint& point, std::uin
     const SurfacePoint light =
         surfacePoint(mesh_, triangle, root * (1 - pattern.v(i)), root * pattern.v(i));
     const double probability_per_area = power / total / triangleArea(mesh_, triangle);
-    sum += fromEmitterPoint(point, light.position, light.geometric_normal,
-                            light.emission * float(1 / (double(kPi) * probability_per_area)));
+    sum += fromEmitterPoint(
+        point, light.position, light.geometric_normal,
+        light.emission * light.opacity * float(1 / (double(kPi) * probability_per_area)));
   }
   return glm::min(sum / float(samples), max_emission_);  // bounded as above: pi L is the exitance
 }
@@ -128,10 +132,10 @@ glm::vec3 DirectLight::irradiance(const SurfacePoint& point, std::uint64_t seed,
                                   int samples) const {
   glm::vec3 sum(0);
   for (const PointLight& light : lights_.points) {
-    const glm::vec3 towards = light.position - point.position;
+    const glm::vec3 position(light.position), towards = position - point.position;
     const float distance_sq = glm::dot(towards, towards);
     const float cos_theta = glm::dot(towards, point.normal) / std::sqrt(distance_sq);
-    if (!(cos_theta > 0) || isShadowed(point, light.position)) continue;
+    if (!(cos_theta > 0) || isShadowed(point, position)) continue;
     sum += light.intensity * (cos_theta / distance_sq);
   }
   for (const DirectionalLight& light : lights_.directionals) {
@@ -143,9 +147,9 @@ glm::vec3 DirectLight::irradiance(const SurfacePoint& point, std::uint64_t seed,
     sum += light.irradiance * cos_theta;
   }
   for (std::size_t i = 0; i < lights_.areas.size(); ++i) {
-    sum += fromAreaLight(lights_.areas[i], point, mixBits(seed) + i, samples);
+    sum += fromAreaLight(lights_.areas[i], point, splitMix(seed) + i, samples);
   }
-  if (!emissive_.empty()) sum += fromEmissiveTriangles(point, mixBits(~seed), samples);
+  if (!emissive_.empty()) sum += fromEmissiveTriangles(point, splitMix(~seed), samples);
   return sum;
 }
 

@@ -7,13 +7,14 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "core/split_mix.h"
 #include "sample/mesh.h"
 #include "sample/ray_scene.h"
 
 namespace surfeit {
 
 struct PointLight {
-  glm::vec3 position{0};
+  glm::dvec3 position{0};
   glm::vec3 intensity{0};  // W/sr: E = I cos / d^2
 };
 
@@ -25,7 +26,8 @@ struct DirectionalLight {
 // A rectangle with corners centre +- u +- v that emits on the side of u x v. It is no geometry:
 // it neither casts shadows nor is seen.
 struct AreaLight {
-  glm::vec3 centre{0}, u{0}, v{0};
+  glm::dvec3 centre{0};
+  glm::vec3 u{0}, v{0};
   glm::vec3 radiance{0};
 };
 
@@ -39,6 +41,8 @@ struct Lights {
   // gather from surfels that carry it too would count that light twice.
   bool with_emission = false;
 
+  // The same lights, their places counted from an origin.
+  Lights countedFrom(const glm::dvec3& origin) const;
   bool isEmpty() const { return points.empty() && directionals.empty() && areas.empty(); }
 };
 
@@ -78,8 +82,5 @@ class DirectLight {
   std::vector<double> emissive_power_sum_;  // cumulative over emissive_, ends at the total
   glm::vec3 max_emission_{0};
 };
-
-// Well-mixed bits of a number (SplitMix64).
-std::uint64_t mixBits(std::uint64_t value);
 
 }  // namespace surfeit

@@ -17,66 +17,72 @@
 
 namespace surfeit {
 
-inline constexpr std::uint32_t kNoTexture = ~std::uint32_t{0};
+inline constexpr std::uint32_t kNoTexture = ~std::uint32_t{0};  // and no mask
 
 struct Material {
   glm::vec3 albedo{0.5f};              // Kd: diffuse reflectance, scene-linear
   glm::vec3 emission{0};               // radiant exitance: pi times the radiance Ke
   std::uint32_t texture = kNoTexture;  // into Mesh::textures; multiplies the albedo
+  float opacity = 1;                   // d: part of the surface that is there
+  std::uint32_t mask = kNoTexture;     // map_d, into Mesh::masks; multiplies the opacity
+
+  bool isOpaque() const { return opacity >= 1 && mask == kNoTexture; }
 };
 
 // Triangles of one or several files. Vertex attributes are empty, or have one entry per position;
 // a zero normal means "the triangle's own". Filled by the loaders, then immutable.
 struct Mesh {
-  std::vector<glm::vec3> position;  // world units; capacity for one more, so that Embree may read
-                                    // 16 bytes at the last vertex
-  std::vector<glm::vec3> normal;    // shading normals, any length
-  std::vector<glm::vec3> color;     // scene-linear; multiplies the albedo
+  // World units from `origin`; capacity for one more, so that Embree may read 16 bytes at the last
+  // vertex
+  std::vector<glm::vec3> position;
+  glm::dvec3 origin{0};
+  std::vector<glm::vec3> normal;  // shading normals, any length
+  std::vector<glm::vec3> color;   // scene-linear; multiplies the albedo
   std::vector<glm::vec2> uv;
   std::vector<glm::uvec3> triangle;              // vertices; counter-clockwise seen from the front
   std::vector<std::uint32_t> triangle_material;  // one per triangle
   std::vector<Material> materials;
   std::vector<Texture> textures;
+  std::vector<Mask> masks;
   std::uint64_t degenerate_faces = 0;  // faces without area, skipped
 
   Bounds3 bounds() const;
+  // Whether no material lets anything through.
+  bool isOpaque() const;
+  // Gives vertices that came without an attribute that others have its neutral value, and Embree
+  // the room that it reads into.
+  void completeAttributes();
   // Bytes held by the arrays.
   std::uint64_t memoryBytes() const;
 };
 
-// A place on a mesh, ready for shading. Both normals have unit length and agree on the front side:
-// the geometric normal is turned to the side of the shading normal.
+// A place on a mesh, ready for shading, counted from the mesh's origin. Both normals have unit
+// length and agree on the front side: the geometric normal is turned to the side of the shading
+// normal.
 struct SurfacePoint {
   glm::vec3 position{0};
   glm::vec3 normal{0};
   glm::vec3 geometric_normal{0};
   glm::vec3 albedo{0};
   glm::vec3 emission{0};  // radiant exitance
+  float opacity = 1;
 };
 
 // The point of a triangle with barycentric weights (1 - u - v, u, v).
 SurfacePoint surfacePoint(const Mesh& mesh, std::uint32_t triangle, float u, float v);
 
+// The part of the surface that is there at that point, from 0 to 1.
+float opacityAt(const Mesh& mesh, std::uint32_t triangle, float u, float v);
+
 // Area of a triangle, in double: sums over millions of triangles must stay exact.
 double triangleArea(const Mesh& mesh, std::uint32_t triangle);
 
-// Appends the face with those corners (indices into mesh.position), polygons as a fan. Faces
-// without area are counted and skipped. kCorruption, naming the file and `face` (from 0), when a
-// corner is no vertex or is not finite.
-Status addFace(std::span<const std::uint64_t> corners, std::uint32_t material,
-               std::uint64_t vertex_begin, const std::string& path, std::uint64_t face, Mesh& mesh);
-
 // Reads meshes one after the other into one. PLY and OBJ are told apart by content and name.
 // `default_albedo` is the reflectance of what has neither colors nor material. Notes tell of
-// missing textures and skipped faces. kCorruption for files without any triangle.
+// missing textures, and of faces that are skipped or cross themselves. kCorruption for files
+// without any triangle.
 Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& default_albedo,
                         Progress& progress);
-
-// The readers behind loadMeshes; they append to `mesh`, and leave attributes that the file lacks as
-// they were.
-Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, Mesh& mesh);
-Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo, Mesh& mesh,
-                   Progress& progress);
 
 // A square on the ground below everything else.
 struct GroundPlane {

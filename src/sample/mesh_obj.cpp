@@ -2,16 +2,25 @@
 // returns is trusted: every index is checked here.
 
 #include <fmt/format.h>
-#include <tiny_obj_loader.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <istream>
 #include <map>
+#include <set>
 #include <unordered_map>
+
+// The library's own build has floats, too few digits for places on a map
+#define TINYOBJLOADER_USE_DOUBLE
+#define TINYOBJLOADER_IMPLEMENTATION
+#include <tiny_obj_loader.h>
 
 #include "core/spherical_harmonics.h"
 #include "io/file.h"
-#include "sample/mesh.h"
+#include "sample/mesh_builder.h"
+#include "sample/obj_lines.h"
 
 namespace surfeit {
 namespace {
@@ -22,26 +31,124 @@ struct ParsedObj {
   std::vector<tinyobj::shape_t> shapes;
   std::vector<tinyobj::material_t> materials;
   std::string warnings;
+  std::uint64_t free_form_statements = 0;
+};
+
+// The words of a line without line end, then of another one.
+std::vector<std::string> splitAt(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(separator, begin), text.size());
+    if (end > begin) parts.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+std::string shown(std::string name) {
+  std::replace(name.begin(), name.end(), kNameBlank, ' ');
+  return name;
+}
+
+// Finds material files beside the OBJ file: a name with blanks may be that of one, or of several.
+class MaterialFiles final : public tinyobj::MaterialReader {
+ public:
+  explicit MaterialFiles(std::string directory) : directory_(std::move(directory)) {}
+
+  const Status& status() const { return status_; }
+
+  bool operator()(const std::string& names, std::vector<tinyobj::material_t>* materials,
+                  std::map<std::string, int>* ids, std::string* warnings,
+                  std::string* errors) override {
+    std::vector<std::string> found;
+    if (const std::string whole = find(shown(names)); !whole.empty()) {
+      found.push_back(whole);
+    } else {
+      for (const std::string& name : splitAt(names, kNameBlank)) {
+        if (const std::string part = find(name); !part.empty()) found.push_back(part);
+      }
+      if (found.empty()) *warnings += "material file \"" + shown(names) + "\" not found\n";
+    }
+    for (const std::string& path : found) load(path, materials, ids, warnings, errors);
+    return true;  // else the parser adds words of its own
+  }
+
+ private:
+  // Where the file is; empty: nowhere. Paths of another machine are left out.
+  std::string find(const std::string& name) const {
+    const std::filesystem::path directory(directory_), given(name);
+    std::error_code ignored;
+    for (const std::filesystem::path& path : {directory / given, directory / given.filename()}) {
+      if (std::filesystem::is_regular_file(path, ignored)) return path.string();
+    }
+    return {};
+  }
+
+  void load(const std::string& path, std::vector<tinyobj::material_t>* materials,
+            std::map<std::string, int>* ids, std::string* warnings, std::string* errors) {
+    Result<ByteInput> input = ByteInput::open(path);
+    if (!input.ok()) {
+      status_ = input.status();
+      return;
+    }
+    ObjLines lines(std::move(*input));
+    std::istream stream(&lines);
+    tinyobj::LoadMtl(ids, materials, &stream, warnings, errors);
+    if (!lines.status().ok()) status_ = lines.status();
+  }
+
+  std::string directory_;
+  Status status_;
 };
 
 Status parseObj(const std::string& path, ParsedObj& parsed) {
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
+  ObjLines lines(std::move(input));
+  std::istream stream(&lines);
+  MaterialFiles material_files(directoryOf(path));
   std::string errors;
-  const std::string directory = directoryOf(path) + "/";
   bool ok = false;
   try {
     // Polygons stay whole and colors are not made up: we want to see what the file says
     ok = tinyobj::LoadObj(&parsed.attributes, &parsed.shapes, &parsed.materials, &parsed.warnings,
-                          &errors, path.c_str(), directory.c_str(), false, false);
+                          &errors, &stream, &material_files, false, false);
   } catch (const std::exception& exception) {
     errors = exception.what();
   }
+  SURFEIT_RETURN_IF_ERROR(lines.status());
+  SURFEIT_RETURN_IF_ERROR(material_files.status());
+  parsed.free_form_statements = lines.freeFormStatements();
   if (ok) return {};
   while (!errors.empty() && errors.back() == '\n') errors.pop_back();
   return Status::corruption(fmt::format("{}: {}", path, errors));
 }
 
-// First line only: a note is one line.
-std::string firstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
+// What the parser warns of, in one line.
+void noteWarnings(const std::string& path, const std::string& warnings, Progress& progress) {
+  const std::vector<std::string> lines = splitAt(shown(warnings), '\n');
+  if (lines.empty()) return;
+  const std::set<std::string> others(lines.begin() + 1, lines.end());
+  const std::size_t more = others.size() - others.count(lines.front());
+  progress.note(fmt::format("{}: {}{}", path, lines.front(),
+                            more > 0 ? fmt::format(" (and {} more)", more) : ""));
+}
+
+// What a file has that is no face.
+void noteLeftOut(const std::string& path, const ParsedObj& parsed, Progress& progress) {
+  std::uint64_t corners = 0;
+  for (const tinyobj::shape_t& shape : parsed.shapes) {
+    corners += shape.lines.indices.size() + shape.points.indices.size();
+  }
+  if (corners > 0) {
+    progress.note(fmt::format("{}: lines and points of {} corners are left out: they have no area",
+                              path, corners));
+  }
+  if (parsed.free_form_statements > 0) {
+    progress.note(fmt::format(
+        "{}: {} free-form curves and surfaces are left out: export the mesh tessellated", path,
+        parsed.free_form_statements));
+  }
+}
 
 // An OBJ corner: indices of position, normal and texture coordinate, -1 where absent.
 struct Corner {
@@ -62,21 +169,24 @@ struct CornerHash {
 class ObjImporter {
  public:
   ObjImporter(const std::string& path, const ParsedObj& parsed, const glm::vec3& default_albedo,
-              Mesh& mesh, Progress& progress)
-      : path_(path), parsed_(parsed), mesh_(mesh), progress_(progress) {
+              MeshBuilder& builder, Progress& progress)
+      : path_(path), parsed_(parsed), builder_(builder), mesh_(builder.mesh), progress_(progress) {
     has_normals_ = !parsed.attributes.normals.empty();
     has_uvs_ = !parsed.attributes.texcoords.empty();
     has_colors_ = !parsed.attributes.colors.empty();
-    vertex_begin_ = mesh.position.size();
-    if (has_normals_) mesh.normal.resize(vertex_begin_, glm::vec3(0));
-    if (has_uvs_) mesh.uv.resize(vertex_begin_, glm::vec2(0));
-    if (has_colors_) mesh.color.resize(vertex_begin_, glm::vec3(1));
+    vertex_begin_ = builder.position.size();
+    if (has_normals_) mesh_.normal.resize(vertex_begin_, glm::vec3(0));
+    if (has_uvs_) mesh_.uv.resize(vertex_begin_, glm::vec2(0));
+    if (has_colors_) {
+      mesh_.color.resize(vertex_begin_, glm::vec3(1));
+      findColorRange();
+    }
 
     // Material ids of the file follow the one for faces without a material
-    material_begin_ = std::uint32_t(mesh.materials.size());
+    material_begin_ = std::uint32_t(mesh_.materials.size());
     Material plain;
     plain.albedo = has_colors_ ? glm::vec3(1) : default_albedo;
-    mesh.materials.push_back(plain);
+    mesh_.materials.push_back(plain);
   }
 
   void importMaterials() {
@@ -85,12 +195,26 @@ class ObjImporter {
       material.albedo = {parsed.diffuse[0], parsed.diffuse[1], parsed.diffuse[2]};
       material.emission =
           kPi * glm::vec3(parsed.emission[0], parsed.emission[1], parsed.emission[2]);
+      material.opacity = float(std::clamp(parsed.dissolve, 0.0, 1.0));
       // Written so that NaN becomes 0 as well
       for (int i = 0; i < 3; ++i) {
         if (!(material.albedo[i] >= 0)) material.albedo[i] = 0;
         if (!(material.emission[i] >= 0)) material.emission[i] = 0;
       }
-      if (!parsed.diffuse_texname.empty()) material.texture = texture(parsed.diffuse_texname);
+      if (!parsed.diffuse_texname.empty()) {
+        noteOptions(parsed.diffuse_texname, parsed.diffuse_texopt);
+        material.texture = findPicture(parsed.diffuse_texname, mesh_.textures, textures_);
+      }
+      if (!parsed.alpha_texname.empty()) {
+        noteOptions(parsed.alpha_texname, parsed.alpha_texopt);
+        material.mask = findPicture(parsed.alpha_texname, mesh_.masks, masks_);
+      }
+      if (material.opacity == 0) {
+        progress_.note(
+            fmt::format("{}: material \"{}\" is clear (d 0 or Tr 1): its faces give no surfels and "
+                        "shade nothing",
+                        path_, shown(parsed.name)));
+      }
       mesh_.materials.push_back(material);
     }
   }
@@ -115,7 +239,7 @@ class ObjImporter {
         const bool has_material = id >= 0 && std::size_t(id) < parsed_.materials.size();
         const std::uint32_t material =
             material_begin_ + (has_material ? 1 + std::uint32_t(id) : 0u);
-        SURFEIT_RETURN_IF_ERROR(addFace(corners, material, vertex_begin_, path_, face, mesh_));
+        SURFEIT_RETURN_IF_ERROR(builder_.addFace(corners, material, vertex_begin_, path_, face));
       }
       if (index != faces.indices.size()) return tooManyCorners();
     }
@@ -146,16 +270,16 @@ class ObjImporter {
           fmt::format("{}: face {}: normal or texture coordinate out of range", path_, face));
     }
 
-    const auto [found, is_new] = vertices_.try_emplace(corner, mesh_.position.size());
+    const auto [found, is_new] = vertices_.try_emplace(corner, builder_.position.size());
     if (!is_new) return found->second;
-    const auto vector = [](const std::vector<tinyobj::real_t>& values, int i) {
-      const tinyobj::real_t* const value = &values[3 * std::size_t(i)];
-      return glm::vec3(value[0], value[1], value[2]);
+    const auto vector = [](const std::vector<double>& values, int i) {
+      const double* const value = &values[3 * std::size_t(i)];
+      return glm::dvec3(value[0], value[1], value[2]);
     };
-    mesh_.position.push_back(vector(attributes.vertices, corner.vertex));
+    builder_.position.push_back(vector(attributes.vertices, corner.vertex));
     if (has_normals_) {
-      mesh_.normal.push_back(corner.normal >= 0 ? vector(attributes.normals, corner.normal)
-                                                : glm::vec3(0));
+      mesh_.normal.emplace_back(corner.normal >= 0 ? vector(attributes.normals, corner.normal)
+                                                   : glm::dvec3(0));
     }
     if (has_uvs_) {
       const std::size_t i = 2 * std::size_t(corner.uv);
@@ -164,52 +288,83 @@ class ObjImporter {
                              : glm::vec2(0));
     }
     if (has_colors_) {
-      const glm::vec3 srgb = vector(attributes.colors, corner.vertex);
+      const glm::vec3 srgb = vector(attributes.colors, corner.vertex) / largest_color_;
       mesh_.color.emplace_back(linearFromSrgb(srgb.x), linearFromSrgb(srgb.y),
                                linearFromSrgb(srgb.z));
     }
     return found->second;
   }
 
-  // Index of the texture of that name; a picture that cannot be read is told once and left out.
-  std::uint32_t texture(std::string name) {
-    const auto [found, is_new] = textures_.try_emplace(name, kNoTexture);
+  // Colors are sRGB, from 0 to 1 or in codes of 8 bits.
+  void findColorRange() {
+    double most = 0;
+    for (const double value : parsed_.attributes.colors) most = std::max(most, value);
+    if (most <= 1) return;
+    largest_color_ = 255;
+    progress_.note(fmt::format(
+        "{}: colors of vertices are 0-255 (the largest is {:g}): read as sRGB of 8 bits", path_,
+        most));
+  }
+
+  void noteOptions(const std::string& name, const tinyobj::texture_option_t& options) {
+    const bool is_plain =
+        std::all_of(options.scale, options.scale + 2, [](double scale) { return scale == 1; }) &&
+        std::all_of(options.origin_offset, options.origin_offset + 2,
+                    [](double offset) { return offset == 0; });
+    if (is_plain) return;
+    progress_.note(
+        fmt::format("{}: options -s and -o of texture {} are not applied: bake them into "
+                    "the texture coordinates",
+                    path_, name));
+  }
+
+  // Index of the picture of that name; one that cannot be read is told once and left out.
+  template <typename Picture>
+  std::uint32_t findPicture(std::string name, std::vector<Picture>& pictures,
+                            std::map<std::string, std::uint32_t>& known) {
+    const auto [found, is_new] = known.try_emplace(name, kNoTexture);
     if (!is_new) return found->second;
-    for (char& c : name) {
-      if (c == '\\') c = '/';  // written on Windows
-    }
-    Result<Texture> loaded =
-        Texture::load((std::filesystem::path(directoryOf(path_)) / name).string());
+    std::replace(name.begin(), name.end(), '\\', '/');  // written on Windows
+    Result<Picture> loaded =
+        Picture::load((std::filesystem::path(directoryOf(path_)) / name).string());
     if (!loaded.ok()) {
       progress_.note(fmt::format("{}: texture left out: {}", path_, loaded.status().message()));
       return kNoTexture;
     }
-    found->second = std::uint32_t(mesh_.textures.size());
-    mesh_.textures.push_back(std::move(*loaded));
+    if constexpr (std::is_same_v<Picture, Texture>) {
+      if (loaded->hasAlpha()) {
+        progress_.note(fmt::format(
+            "{}: the alpha of texture {} is not used: map_d {} in the material cuts by it", path_,
+            name, name));
+      }
+    }
+    found->second = std::uint32_t(pictures.size());
+    pictures.push_back(std::move(*loaded));
     return found->second;
   }
 
   const std::string& path_;
   const ParsedObj& parsed_;
+  MeshBuilder& builder_;
   Mesh& mesh_;
   Progress& progress_;
   bool has_normals_, has_uvs_, has_colors_;
   std::uint64_t vertex_begin_;
   std::uint32_t material_begin_;
   std::unordered_map<Corner, std::uint64_t, CornerHash> vertices_;
-  std::map<std::string, std::uint32_t> textures_;
+  std::map<std::string, std::uint32_t> textures_, masks_;
+  double largest_color_ = 1;
 };
 
 }  // namespace
 
-Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo, Mesh& mesh,
+Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
                    Progress& progress) {
   ParsedObj parsed;
   SURFEIT_RETURN_IF_ERROR(parseObj(path, parsed));
-  if (!parsed.warnings.empty()) {
-    progress.note(fmt::format("{}: {}", path, firstLine(parsed.warnings)));
-  }
-  ObjImporter importer(path, parsed, default_albedo, mesh, progress);
+  noteWarnings(path, parsed.warnings, progress);
+  noteLeftOut(path, parsed, progress);
+  ObjImporter importer(path, parsed, default_albedo, builder, progress);
   importer.importMaterials();
   return importer.importFaces();
 }

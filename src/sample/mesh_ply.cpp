@@ -2,15 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string_view>
 
+#include "io/cloud_formats.h"
 #include "io/ply_reader.h"
-#include "sample/mesh.h"
+#include "io/srgb_curve.h"
+#include "sample/mesh_builder.h"
 
 namespace surfeit {
 namespace {
@@ -27,24 +30,45 @@ std::optional<Triple> findTriple(const PlyElement& element, std::string_view a, 
   return triple;
 }
 
-glm::vec3 value(const std::byte* row, const Triple& triple) {
-  glm::vec3 result;
+glm::dvec3 value(const std::byte* row, const Triple& triple) {
+  glm::dvec3 result;
   for (int i = 0; i < 3; ++i) {
     const PlyProperty& property = *triple[std::size_t(i)];
-    result[i] = float(plyValue(row + property.offset, property.type));
+    result[i] = plyValue(row + property.offset, property.type);
   }
   return result;
 }
 
-// Bytes hold sRGB, floats are linear already (docs/format.md).
+// Integers code sRGB, floats are linear already (docs/format.md).
 glm::vec3 linearColor(const std::byte* row, const Triple& triple) {
-  const glm::vec3 color = value(row, triple);
-  if (triple[0]->type != PlyType::kUint8) return glm::max(color, glm::vec3(0));
-  return {linearFromSrgb8(std::uint8_t(color.x)), linearFromSrgb8(std::uint8_t(color.y)),
-          linearFromSrgb8(std::uint8_t(color.z))};
+  glm::vec3 color = glm::max(glm::vec3(value(row, triple)), glm::vec3(0));
+  for (int i = 0; i < 3; ++i) {
+    const PlyType type = triple[std::size_t(i)]->type;
+    if (!codesSrgb(type)) continue;
+    color[i] = type == PlyType::kUint8 ? linearFromSrgb8(std::uint8_t(color[i]))
+                                       : linearFromSrgb(color[i] / 65535);
+  }
+  return color;
 }
 
-Status readVertices(PlyReader& reader, const PlyElement& element, Mesh& mesh) {
+// Vertices are rows like those of clouds, so that names and colors are read as there.
+Result<std::unique_ptr<RowReader>> openVertices(const std::string& path, Progress& progress) {
+  RowReaderOptions options;
+  options.part = "vertex";
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> rows, openRowReader(path, options));
+  // What rows do not have is read here
+  const std::vector<std::string> of_file = rows->file().notes();
+  for (const std::string& note : rows->notes()) {
+    if (std::find(of_file.begin(), of_file.end(), note) == of_file.end()) {
+      progress.note(path + ": " + note);
+    }
+  }
+  return rows;
+}
+
+// Returns whether vertices have colors.
+Result<bool> readVertices(RowReader& reader, MeshBuilder& builder) {
+  const PlyElement& element = reader.element();
   const std::optional<Triple> position = findTriple(element, "x", "y", "z");
   if (!position) {
     return Status::corruption(
@@ -52,7 +76,8 @@ Status readVertices(PlyReader& reader, const PlyElement& element, Mesh& mesh) {
   }
   const std::optional<Triple> normal = findTriple(element, "nx", "ny", "nz");
   const std::optional<Triple> color = findTriple(element, "red", "green", "blue");
-  const std::size_t vertex_begin = mesh.position.size();
+  Mesh& mesh = builder.mesh;
+  const std::size_t vertex_begin = builder.position.size();
   if (element.count >= std::numeric_limits<std::uint32_t>::max() - vertex_begin) {
     return Status::failed(
         fmt::format("{}: {} vertices, expected fewer than 2^32", reader.path(), element.count));
@@ -61,21 +86,21 @@ Status readVertices(PlyReader& reader, const PlyElement& element, Mesh& mesh) {
   if (color) mesh.color.resize(vertex_begin, glm::vec3(1));
 
   constexpr std::size_t kBatchRows = 4096;
-  std::vector<std::byte> rows(kBatchRows * element.row_bytes);
+  AlignedBuffer buffer;
   for (;;) {
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, reader.readRows(rows));
-    if (count == 0) return {};
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::byte* const row = &rows[i * element.row_bytes];
-      mesh.position.push_back(value(row, *position));
-      if (normal) mesh.normal.push_back(value(row, *normal));
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, reader.readRows(kBatchRows, buffer));
+    if (rows.empty()) return color.has_value();
+    for (std::size_t at = 0; at < rows.size(); at += element.row_bytes) {
+      const std::byte* const row = &rows[at];
+      builder.position.push_back(value(row, *position));
+      if (normal) mesh.normal.emplace_back(value(row, *normal));
       if (color) mesh.color.push_back(linearColor(row, *color));
     }
   }
 }
 
 Status readFaces(PlyReader& reader, const PlyElement& element, std::uint32_t material,
-                 std::uint64_t vertex_begin, Mesh& mesh) {
+                 std::uint64_t vertex_begin, MeshBuilder& builder) {
   std::optional<std::size_t> list_property;
   for (std::size_t i = 0; i < element.properties.size(); ++i) {
     const PlyProperty& property = element.properties[i];
@@ -102,39 +127,43 @@ Status readFaces(PlyReader& reader, const PlyElement& element, std::uint32_t mat
       if (!(index >= 0 && index < 9007199254740992.0)) {
         return Status::corruption(fmt::format("{}: face {}: vertex {}, expected 0 to {}",
                                               reader.path(), face, index,
-                                              mesh.position.size() - vertex_begin - 1));
+                                              builder.position.size() - vertex_begin - 1));
       }
       corners.push_back(vertex_begin + std::uint64_t(index));
     }
-    SURFEIT_RETURN_IF_ERROR(addFace(corners, material, vertex_begin, reader.path(), face, mesh));
+    SURFEIT_RETURN_IF_ERROR(builder.addFace(corners, material, vertex_begin, reader.path(), face));
   }
 }
 
 }  // namespace
 
-Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, Mesh& mesh) {
+Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
+                   Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
-  const std::optional<std::size_t> vertex = reader.header().findElement("vertex");
   const std::optional<std::size_t> face = reader.header().findElement("face");
-  if (!vertex || !face) {
-    return Status::corruption(
-        fmt::format("{}: no element {}: expected a triangle mesh (clouds need no sampling)", path,
-                    vertex ? "face" : "vertex"));
+  if (!face || !reader.header().findElement("vertex")) {
+    const bool has_strips = reader.header().findElement("tristrips").has_value();
+    return Status::corruption(fmt::format(
+        "{}: no element {}: expected a triangle mesh ({})", path, face ? "vertex" : "face",
+        has_strips ? "triangle strips are not read: write faces" : "clouds need no sampling"));
+  }
+  for (const std::string& comment : reader.header().comments) {
+    if (!comment.starts_with("TextureFile")) continue;
+    progress.note(
+        fmt::format("{}: {}: textures of PLY are not read (those of OBJ are)", path, comment));
   }
 
-  const std::uint64_t vertex_begin = mesh.position.size();
-  const PlyElement& vertex_element = reader.header().elements[*vertex];
-  SURFEIT_RETURN_IF_ERROR(reader.seekElement(*vertex));
-  SURFEIT_RETURN_IF_ERROR(readVertices(reader, vertex_element, mesh));
+  const std::uint64_t vertex_begin = builder.position.size();
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> rows, openVertices(path, progress));
+  SURFEIT_ASSIGN_OR_RETURN(const bool has_colors, readVertices(*rows, builder));
 
   // Vertex colors are the albedo; only without them the default steps in
   Material material;
-  const bool has_colors = findTriple(vertex_element, "red", "green", "blue").has_value();
   material.albedo = has_colors ? glm::vec3(1) : default_albedo;
-  mesh.materials.push_back(material);
+  builder.mesh.materials.push_back(material);
   SURFEIT_RETURN_IF_ERROR(reader.seekElement(*face));
   return readFaces(reader, reader.header().elements[*face],
-                   std::uint32_t(mesh.materials.size() - 1), vertex_begin, mesh);
+                   std::uint32_t(builder.mesh.materials.size() - 1), vertex_begin, builder);
 }
 
 }  // namespace surfeit

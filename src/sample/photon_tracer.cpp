@@ -41,16 +41,27 @@ constexpr std::uint64_t kMostPhotons = std::uint64_t{1} << 40;
 // Paths end also where nothing is absorbed: the powers of those that go on grow instead.
 constexpr float kMostSurvival = 0.97f;
 
-// A photon where it meets a surface: a row of the cloud.
+// A photon where it meets a surface: a row of the cloud, where the mesh's origin is 0.
 struct Photon {
-  glm::vec3 position, normal;
+  glm::vec3 position;  // from the origin
+  glm::vec3 normal;
   glm::vec3 power;
   glm::vec3 incident;  // direction in which it travels, unit length
   glm::vec3 albedo;
 };
 static_assert(sizeof(Photon) == 15 * sizeof(float));
 
-std::vector<PlyProperty> photonProperties() {
+// The row elsewhere.
+struct FarPhoton {
+  FarPhoton(const Photon& photon, const glm::dvec3& origin)
+      : position(origin + glm::dvec3(photon.position)),
+        rest{photon.normal, photon.power, photon.incident, photon.albedo} {}
+  glm::dvec3 position;
+  glm::vec3 rest[4];
+};
+static_assert(sizeof(FarPhoton) == 3 * sizeof(double) + 12 * sizeof(float));
+
+std::vector<PlyProperty> photonProperties(bool is_far) {
   std::vector<PlyProperty> properties;
   for (const auto& names :
        {kPositionNames, kNormalNames, kPowerNames, kIncidentNames, kAlbedoNames}) {
@@ -60,19 +71,28 @@ std::vector<PlyProperty> photonProperties() {
       properties.push_back(property);
     }
   }
+  for (int i = 0; i < 3 && is_far; ++i) properties[std::size_t(i)].type = PlyType::kFloat64;
   return properties;
+}
+
+Status writeRows(std::span<const Photon> photons, const glm::dvec3& origin, RowWriter& writer) {
+  if (origin == glm::dvec3(0)) return writer.writeRows(std::as_bytes(photons));
+  std::vector<FarPhoton> far;
+  far.reserve(photons.size());
+  for (const Photon& photon : photons) far.emplace_back(photon, origin);
+  return writer.writeRows(std::as_bytes(std::span(far)));
 }
 
 // Random numbers of one photon (SplitMix64).
 class PhotonRandom {
  public:
   PhotonRandom(std::uint64_t seed, std::uint64_t photon)
-      : state_(mixBits(mixBits(seed) + photon)) {}
+      : state_(splitMix(splitMix(seed) + photon)) {}
 
   // In [0, 1).
   float next() {
     state_ += 0x9e3779b97f4a7c15u;
-    return float(mixBits(state_) >> 40) * 0x1p-24f;
+    return float(splitMix(state_) >> 40) * 0x1p-24f;
   }
 
  private:
@@ -111,7 +131,7 @@ class Emitters {
  public:
   // Mesh and scene must outlive it.
   Emitters(const Mesh& mesh, const RayScene& scene, const Lights& lights)
-      : mesh_(mesh), lights_(lights), offset_(scene.surfaceOffset()) {
+      : mesh_(mesh), lights_(lights.countedFrom(mesh.origin)), offset_(scene.surfaceOffset()) {
     centre_ = scene.bounds().centre();
     reach_ = 0.5f * glm::length(scene.bounds().extent()) + offset_;
     for (std::size_t i = 0; i < lights.points.size(); ++i) {
@@ -167,7 +187,7 @@ class Emitters {
   Ray sendFrom(const Emitter& emitter, PhotonRandom& random) const {
     switch (emitter.kind) {
       case Kind::kPoint:
-        return {lights_.points[emitter.index].position, sphereDirection(random)};
+        return {glm::vec3(lights_.points[emitter.index].position), sphereDirection(random)};
       case Kind::kDirectional: {
         // From a disk before the scene that covers it
         const glm::vec3 direction = glm::normalize(lights_.directionals[emitter.index].direction);
@@ -180,7 +200,7 @@ class Emitters {
         const AreaLight& light = lights_.areas[emitter.index];
         const float u = 2 * random.next() - 1, v = 2 * random.next() - 1;
         const glm::vec3 normal = glm::normalize(glm::cross(light.u, light.v));
-        return {light.centre + u * light.u + v * light.v + offset_ * normal,
+        return {glm::vec3(light.centre) + u * light.u + v * light.v + offset_ * normal,
                 cosineDirection(normal, random)};
       }
       case Kind::kTriangle:
@@ -195,7 +215,7 @@ class Emitters {
   }
 
   const Mesh& mesh_;
-  const Lights& lights_;
+  const Lights lights_;
   float offset_;  // of rays from a surface
   glm::vec3 centre_{0};
   float reach_ = 0;  // radius of a sphere around the scene
@@ -216,6 +236,8 @@ class PhotonTracer {
   PhotonTracer(const Mesh& mesh, const RayScene& scene, const Emitters& emitters,
                const PhotonTracingOptions& options)
       : mesh_(mesh), scene_(scene), emitters_(emitters), options_(options) {}
+
+  const Mesh& mesh() const { return mesh_; }
 
   void trace(Batch& batch) const {
     for (std::uint64_t i = batch.begin; i < batch.end; ++i) {
@@ -284,7 +306,7 @@ Status writePhotons(const PhotonTracer& tracer, const PhotonTracingOptions& opti
   };
   const auto write = [&](BatchPtr batch) {
     if (!status.ok()) return;
-    status = writer.writeRows(std::as_bytes(std::span(batch->stored)));
+    status = writeRows(batch->stored, tracer.mesh().origin, writer);
     has_failed = !status.ok();
     stats.emitted += batch->end - batch->begin;
     stats.stored += batch->stored.size();
@@ -343,7 +365,7 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
     start = std::chrono::steady_clock::now();
     progress.beginPhase("trace", options.photons, "photons");
     RowWriterOptions writing;
-    writing.properties = photonProperties();
+    writing.properties = photonProperties(mesh.origin != glm::dvec3(0));
     writing.progress = &progress;
     SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
                              createRowWriter(output, writing));

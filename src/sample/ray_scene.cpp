@@ -4,10 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <utility>
+
+#include "core/split_mix.h"
 
 namespace surfeit {
 namespace {
@@ -19,6 +22,26 @@ RTCRay makeRay(const glm::vec3& origin, const glm::vec3& direction, float begin,
   ray.tnear = begin, ray.tfar = end;
   ray.time = 0, ray.mask = ~0u, ray.id = 0, ray.flags = 0;
   return ray;
+}
+
+// From 0 to 1, well mixed, by triangle and place.
+float placeNumber(std::uint32_t triangle, float u, float v) {
+  std::uint64_t bits = triangle;
+  bits = splitMix(bits << 32 | std::bit_cast<std::uint32_t>(u));
+  bits = splitMix(bits ^ std::bit_cast<std::uint32_t>(v));
+  return float(bits >> 40) * 0x1p-24f;
+}
+
+// Lets rays through where the surface is not there; Embree calls it at each hit.
+void passThroughMasks(const RTCFilterFunctionNArguments* arguments) {
+  const Mesh& mesh = *static_cast<const Mesh*>(arguments->geometryUserPtr);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const std::uint32_t triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
+    const float u = RTCHitN_u(arguments->hit, arguments->N, i);
+    const float v = RTCHitN_v(arguments->hit, arguments->N, i);
+    if (placeNumber(triangle, u, v) >= opacityAt(mesh, triangle, u, v)) arguments->valid[i] = 0;
+  }
 }
 
 }  // namespace
@@ -56,6 +79,11 @@ Result<RayScene> RayScene::build(const Mesh& mesh, int threads) {
                              mesh.position.data(), 0, sizeof(glm::vec3), mesh.position.size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                              mesh.triangle.data(), 0, sizeof(glm::uvec3), mesh.triangle.size());
+  if (!mesh.isOpaque()) {
+    rtcSetGeometryUserData(geometry, const_cast<Mesh*>(&mesh));  // read only, above
+    rtcSetGeometryIntersectFilterFunction(geometry, passThroughMasks);
+    rtcSetGeometryOccludedFilterFunction(geometry, passThroughMasks);
+  }
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(handles->scene, geometry);
   rtcReleaseGeometry(geometry);

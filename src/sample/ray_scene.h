@@ -18,8 +18,9 @@ struct RayHit {
   float u, v;
 };
 
-// Shares the mesh's arrays, so the mesh must outlive it and stay as it is. Queries are safe from
-// any thread.
+// Shares the mesh, which must outlive it and stay where and as it is. Rays pass through what is not
+// opaque with the probability that says how little of it is there, by a number that the place on
+// the triangle gives: the same ray always does the same. Queries are safe from any thread.
 class RayScene {
  public:
   // Builds the hierarchy with up to `threads` threads. kFailed when Embree refuses.
@@ -28,7 +29,8 @@ class RayScene {
   RayScene& operator=(RayScene&&) noexcept;
   ~RayScene();
 
-  // Is anything hit between distances begin and end along the ray?
+  // Is anything hit between distances begin and end along the ray? Its origin is counted from that
+  // of the mesh.
   bool isOccluded(const glm::vec3& origin, const glm::vec3& direction, float begin,
                   float end) const;
   std::optional<RayHit> closestHit(const glm::vec3& origin, const glm::vec3& direction, float begin,

@@ -27,7 +27,7 @@ class CosineDirections {
     const std::int64_t n = count_, rows = rows_;
     const std::int64_t row = i * rows / n;
     const std::int64_t begin = (row * n + rows - 1) / rows, end = ((row + 1) * n + rows - 1) / rows;
-    const std::uint64_t bits = mixBits(seed_ + std::uint64_t(i));
+    const std::uint64_t bits = splitMix(seed_ + std::uint64_t(i));
     const float jitter_u = float(bits >> 40) * 0x1p-24f;
     const float jitter_v = float((bits >> 8) & 0xffffff) * 0x1p-24f;
     const float u = (float(begin) + jitter_u * float(end - begin)) / float(n);
@@ -75,16 +75,17 @@ Result<ReferenceScene> ReferenceScene::load(const std::vector<std::string>& mesh
   return ReferenceScene(std::move(state));
 }
 
-glm::vec3 ReferenceScene::origin(const glm::vec3& position, const glm::vec3& normal,
-                                 float offset) const {
+glm::vec3 ReferenceScene::rayOrigin(const glm::dvec3& position, const glm::vec3& normal,
+                                    float offset) const {
   const float diagonal = glm::length(state_->rays->bounds().extent());
-  return position + normal * (offset > 0 ? offset : 1e-4f * diagonal);
+  return glm::vec3(position - state_->mesh.origin) +
+         normal * (offset > 0 ? offset : 1e-4f * diagonal);
 }
 
-ReferenceGather ReferenceScene::gather(const glm::vec3& position, const glm::vec3& normal,
+ReferenceGather ReferenceScene::gather(const glm::dvec3& position, const glm::vec3& normal,
                                        std::uint64_t seed, const ReferenceQuality& quality) const {
   const RayScene& rays = *state_->rays;
-  const glm::vec3 start = origin(position, normal, quality.offset);
+  const glm::vec3 start = rayOrigin(position, normal, quality.offset);
   const CosineDirections directions(normal, quality.rays, seed);
   ReferenceGather sum;
   int front = 0, both = 0;
@@ -102,7 +103,7 @@ ReferenceGather ReferenceScene::gather(const glm::vec3& position, const glm::vec
       if (glm::dot(point.geometric_normal, direction) < 0) {
         ++front;
         if (state_->light->hasLight()) {
-          const std::uint64_t hit_seed = mixBits(seed) + std::uint64_t(i);
+          const std::uint64_t hit_seed = splitMix(seed) + std::uint64_t(i);
           const glm::vec3 exitance =
               state_->light->exitance(point, hit_seed, quality.light_samples);
           sum.irradiance_front += exitance;
@@ -123,9 +124,9 @@ ReferenceGather ReferenceScene::gather(const glm::vec3& position, const glm::vec
   return sum;
 }
 
-float ReferenceScene::occlusion(const glm::vec3& position, const glm::vec3& normal,
+float ReferenceScene::occlusion(const glm::dvec3& position, const glm::vec3& normal,
                                 std::uint64_t seed, const ReferenceQuality& quality) const {
-  const glm::vec3 start = origin(position, normal, quality.offset);
+  const glm::vec3 start = rayOrigin(position, normal, quality.offset);
   const CosineDirections directions(normal, quality.rays, seed);
   int hits = 0;
   for (int i = 0; i < quality.rays; ++i) {

@@ -43,19 +43,19 @@ class ReferenceScene {
   const RayScene& rays() const;
   const DirectLight& light() const;
 
-  // Occlusion and irradiance at a receiver with unit normal. The rays are cosine-weighted and
-  // stratified, shifted by `seed`; the same seed gives the same estimate.
-  ReferenceGather gather(const glm::vec3& position, const glm::vec3& normal, std::uint64_t seed,
+  // Occlusion and irradiance at a receiver, in world units, with unit normal. The rays are
+  // cosine-weighted and stratified, shifted by `seed`; the same seed gives the same estimate.
+  ReferenceGather gather(const glm::dvec3& position, const glm::vec3& normal, std::uint64_t seed,
                          const ReferenceQuality& quality) const;
 
   // Occlusion alone (both sides), by any-hit rays: what ambient occlusion costs a ray tracer.
-  float occlusion(const glm::vec3& position, const glm::vec3& normal, std::uint64_t seed,
+  float occlusion(const glm::dvec3& position, const glm::vec3& normal, std::uint64_t seed,
                   const ReferenceQuality& quality) const;
 
  private:
   struct State;
   explicit ReferenceScene(std::unique_ptr<State> state);
-  glm::vec3 origin(const glm::vec3& position, const glm::vec3& normal, float offset) const;
+  glm::vec3 rayOrigin(const glm::dvec3& position, const glm::vec3& normal, float offset) const;
   std::unique_ptr<State> state_;
 };
 

@@ -37,6 +37,7 @@ struct Batch {
   std::vector<PieceRange> ranges;
   std::vector<Surfel> surfels;
   double disk_area = 0;
+  std::uint64_t clear = 0;  // pieces of which nothing is there
 };
 
 // 512 pieces are 32 KiB of surfels; a batch of nothing but the worst slivers stays below 32 MiB.
@@ -79,7 +80,7 @@ class SurfelMaker {
       : mesh_(mesh), plan_(plan), light_(light), is_two_sided_(is_two_sided) {}
 
   void fill(Batch& batch) const {
-    for (const PieceRange& range : batch.ranges) addPieces(range, batch.surfels);
+    for (const PieceRange& range : batch.ranges) addPieces(range, batch);
     for (const Surfel& surfel : batch.surfels) {
       batch.disk_area += double(kPi) * double(surfel.radius) * double(surfel.radius);
     }
@@ -133,9 +134,7 @@ class SurfelMaker {
     }
   }
 
-  Surfel makeSurfel(const DiceJob& job, const PiecePart& part, std::uint64_t seed) const {
-    const SurfacePoint point =
-        surfacePoint(mesh_, job.triangle, float(part.weight.y), float(part.weight.z));
+  Surfel makeSurfel(const SurfacePoint& point, const PiecePart& part, std::uint64_t seed) const {
     Surfel surfel;
     surfel.position = glm::vec3(part.centroid);
     surfel.normal = point.normal;
@@ -159,8 +158,24 @@ class SurfelMaker {
     surfel.radiosity = 0.5f * (surfel.radiosity + back);
   }
 
-  void addPieces(const PieceRange& range, std::vector<Surfel>& surfels) const {
+  // Leaves of the surfels from `begin` the areas that are there: none of what is clear.
+  static void applyOpacity(const std::vector<float>& opacities, std::size_t begin, Batch& batch) {
+    std::size_t kept = begin;
+    for (std::size_t i = begin; i < batch.surfels.size(); ++i) {
+      const float opacity = opacities[i - begin];
+      if (!(opacity > 0)) continue;
+      batch.surfels[kept] = batch.surfels[i];
+      batch.surfels[kept].area *= opacity;
+      ++kept;
+    }
+    batch.clear += batch.surfels.size() - kept;
+    batch.surfels.resize(kept);
+  }
+
+  void addPieces(const PieceRange& range, Batch& batch) const {
     const DiceJob& job = range.job;
+    std::vector<Surfel>& surfels = batch.surfels;
+    std::vector<float> opacities;
     const Micropolygon whole = wholeTriangle(mesh_, job.triangle);
     const TriangleDice dice(whole, job.area, job.piece_count, plan_.spacing());
     const Carried carried = gatherCarried(job, dice);
@@ -168,12 +183,17 @@ class SurfelMaker {
     for (std::uint64_t i = range.begin; i < range.end; ++i) {
       parts.clear();
       dice.appendParts(i, parts);
+      opacities.clear();
       const std::size_t begin = surfels.size();
       for (std::size_t k = 0; k < parts.size(); ++k) {
         const std::uint64_t seed = ((job.first_surfel + i) << kMaxSlabBits) + k;
-        surfels.push_back(makeSurfel(job, parts[k], seed));
+        const SurfacePoint point =
+            surfacePoint(mesh_, job.triangle, float(parts[k].weight.y), float(parts[k].weight.z));
+        surfels.push_back(makeSurfel(point, parts[k], seed));
+        opacities.push_back(point.opacity);
       }
       if (carried.area > 0 && i == carried.piece) takeOver(job, carried, surfels, begin);
+      if (!mesh_.isOpaque()) applyOpacity(opacities, begin, batch);
     }
   }
 
@@ -205,6 +225,7 @@ Status writeSurfels(DicePlan& plan, const SurfelMaker& maker, int threads, Surfe
     has_failed = !status.ok();
     stats.surfels += batch->surfels.size();
     stats.disk_area += batch->disk_area;
+    stats.clear_surfels += batch->clear;
     progress.advance(batch->surfels.size());
   };
   tbb::parallel_pipeline(
@@ -264,7 +285,7 @@ Status checkSurroundings(const Surroundings& surroundings) {
   // A sum is finite only when all its terms are
   const auto isFinite = [](const glm::vec3& sum) { return std::isfinite(sum.x + sum.y + sum.z); };
   for (const PointLight& light : surroundings.lights.points) {
-    if (!isFinite(light.position + light.intensity)) {
+    if (!isFinite(glm::vec3(light.position) + light.intensity)) {
       return Status::invalidArgument("point light: a value is not finite");
     }
   }
@@ -277,7 +298,7 @@ Status checkSurroundings(const Surroundings& surroundings) {
   for (const AreaLight& light : surroundings.lights.areas) {
     const float quarter_area = glm::length(glm::cross(light.u, light.v));
     if (!(quarter_area > 0) || !std::isfinite(quarter_area) ||
-        !isFinite(light.centre + light.radiance)) {
+        !isFinite(glm::vec3(light.centre) + light.radiance)) {
       return Status::invalidArgument(
           "area light: half edges u and v are parallel or zero, or a value is not finite");
     }
@@ -326,12 +347,23 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.normal = channels.radius = channels.area = channels.albedo = true;
     channels.radiosity = light.hasLight();
     channels.two_sided = channels.long_side = options.is_two_sided;
-    SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer,
-                             SurfelWriter::create(output, channels, {.progress = &progress}));
+    SURFEIT_ASSIGN_OR_RETURN(
+        SurfelWriter writer,
+        SurfelWriter::create(output, channels, {.progress = &progress}, mesh.origin));
     const SurfelMaker maker(mesh, plan, light.hasLight() ? &light : nullptr, options.is_two_sided);
     SURFEIT_RETURN_IF_ERROR(writeSurfels(plan, maker, stats.threads, writer, progress, stats));
+    stats.sliver_surfels = stats.surfels + stats.clear_surfels - plan.surfelCount();
+    if (stats.surfels == 0) {
+      return Status::invalidArgument(
+          fmt::format("{}: all materials are clear (d, Tr, map_d): there is nothing to sample",
+                      meshes.front()));
+    }
+    if (stats.clear_surfels > 0) {
+      progress.inform(
+          fmt::format("{}: {} surfels lie where materials are clear (d, Tr, map_d): left out",
+                      output, stats.clear_surfels));
+    }
     SURFEIT_RETURN_IF_ERROR(writer.finish());
-    stats.sliver_surfels = stats.surfels - plan.surfelCount();
     stats.sample_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

@@ -38,7 +38,8 @@ struct SampleStats {
   std::uint64_t triangles = 0;
   std::uint64_t degenerate_faces = 0;
   std::uint64_t surfels = 0;         // written
-  std::uint64_t sliver_surfels = 0;  // of these beyond the count asked for, from cutting slivers
+  std::uint64_t sliver_surfels = 0;  // beyond the count asked for, from cutting slivers
+  std::uint64_t clear_surfels = 0;   // not written: nothing of them is there (d, Tr, map_d)
   double area = 0;                   // of the meshes
   double disk_area = 0;              // sum of pi r^2: over `area`, how often disks overlap
   double spacing = 0;                // root of the area per surfel
@@ -48,8 +49,8 @@ struct SampleStats {
 
 // Writes a cloud of the format that its name tells, with normals, radii, areas, albedo, when
 // anything emits, radiosity, and of two-sided meshes two_sided and longer sides. The cloud depends
-// on meshes and options alone, not on the threads. Memory: the meshes, Embree's hierarchy (less than
-// 100 bytes per triangle) and a few batches of surfels, whatever the count. Errors: kIoError,
+// on meshes and options alone, not on the threads. Memory: the meshes, Embree's hierarchy (less
+// than 100 bytes per triangle) and a few batches of surfels, whatever the count. Errors: kIoError,
 // kCorruption (bad mesh), kInvalidArgument (options), kInterrupted, kFailed.
 Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const std::string& output,
                                  const SampleOptions& options, Progress& progress);

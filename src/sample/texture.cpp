@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <stb/stb_image.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -34,6 +35,43 @@ Footprint footprint(float coordinate, int texels) {
   return {first, (first + 1) % texels, in_texels - left};
 }
 
+template <typename Texel>
+auto interpolate(const Footprint& column, const Footprint& row, Texel texel) {
+  const auto upper = texel(column.first, row.first) * (1.0f - column.weight) +
+                     texel(column.second, row.first) * column.weight;
+  const auto lower = texel(column.first, row.second) * (1.0f - column.weight) +
+                     texel(column.second, row.second) * column.weight;
+  return upper * (1.0f - row.weight) + lower * row.weight;
+}
+
+struct Picture {
+  int width, height;
+  bool has_alpha;                    // in the file
+  std::vector<std::uint8_t> texels;  // rgba
+};
+
+Result<Picture> loadPicture(const std::string& path) {
+  // Our own open first: stb_image does not tell a missing file from a damaged one
+  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+  int width = 0, height = 0, channels = 0;
+  constexpr std::uint64_t kMaxTexels = std::uint64_t{1} << 28;
+  if (stbi_info(path.c_str(), &width, &height, &channels) == 0 || width <= 0 || height <= 0) {
+    return Status::corruption(fmt::format("{}: not a picture: {}", path, stbi_failure_reason()));
+  }
+  if (std::uint64_t(width) * std::uint64_t(height) > kMaxTexels) {
+    return Status::corruption(
+        fmt::format("{}: {} x {} texels, expected at most 2^28", path, width, height));
+  }
+  unsigned char* const texels = stbi_load(path.c_str(), &width, &height, &channels, 4);
+  if (texels == nullptr) {
+    return Status::corruption(fmt::format("{}: not a picture: {}", path, stbi_failure_reason()));
+  }
+  Picture picture{width, height, channels == 2 || channels == 4, {}};
+  picture.texels.assign(texels, texels + std::size_t(width) * std::size_t(height) * 4);
+  stbi_image_free(texels);
+  return picture;
+}
+
 }  // namespace
 
 float linearFromSrgb(float value) {
@@ -52,24 +90,43 @@ Texture::Texture(int width, int height, std::vector<std::uint8_t> rgb)
 }
 
 Result<Texture> Texture::load(const std::string& path) {
-  // Our own open first: stb_image does not tell a missing file from a damaged one
-  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
-  int width = 0, height = 0, channels = 0;
-  constexpr std::uint64_t kMaxTexels = std::uint64_t{1} << 28;
-  if (stbi_info(path.c_str(), &width, &height, &channels) == 0 || width <= 0 || height <= 0) {
-    return Status::corruption(fmt::format("{}: not a picture: {}", path, stbi_failure_reason()));
+  SURFEIT_ASSIGN_OR_RETURN(const Picture picture, loadPicture(path));
+  const std::size_t count = picture.texels.size() / 4;
+  std::vector<std::uint8_t> rgb(count * 3);
+  bool has_alpha = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint8_t* const texel = &picture.texels[4 * i];
+    std::copy_n(texel, 3, &rgb[3 * i]);
+    has_alpha = has_alpha || texel[3] < 255;
   }
-  if (std::uint64_t(width) * std::uint64_t(height) > kMaxTexels) {
-    return Status::corruption(
-        fmt::format("{}: {} x {} texels, expected at most 2^28", path, width, height));
+  Texture texture(picture.width, picture.height, std::move(rgb));
+  texture.has_alpha_ = has_alpha;
+  return texture;
+}
+
+Mask::Mask(int width, int height, std::vector<std::uint8_t> values)
+    : width_(width), height_(height), values_(std::move(values)) {}
+
+Result<Mask> Mask::load(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(const Picture picture, loadPicture(path));
+  const std::size_t count = picture.texels.size() / 4;
+  std::vector<std::uint8_t> values(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint8_t* const texel = &picture.texels[4 * i];
+    // Rec. 709, of codes: masks are data and have no curve
+    const double lightness =
+        0.2126 * double(texel[0]) + 0.7152 * double(texel[1]) + 0.0722 * double(texel[2]);
+    values[i] = picture.has_alpha ? texel[3] : std::uint8_t(std::lround(lightness));
   }
-  unsigned char* const texels = stbi_load(path.c_str(), &width, &height, &channels, 3);
-  if (texels == nullptr) {
-    return Status::corruption(fmt::format("{}: not a picture: {}", path, stbi_failure_reason()));
-  }
-  std::vector<std::uint8_t> rgb(texels, texels + std::size_t(width) * std::size_t(height) * 3);
-  stbi_image_free(texels);
-  return Texture(width, height, std::move(rgb));
+  return Mask(picture.width, picture.height, std::move(values));
+}
+
+float Mask::lookup(const glm::vec2& uv) const {
+  const auto texel = [&](int column, int row) {
+    return float(values_[std::size_t(row) * std::size_t(width_) + std::size_t(column)]) / 255;
+  };
+  if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return texel(0, 0);
+  return interpolate(footprint(uv.x, width_), footprint(1.0f - uv.y, height_), texel);
 }
 
 glm::vec3 Texture::texel(int column, int row) const {
@@ -80,13 +137,8 @@ glm::vec3 Texture::texel(int column, int row) const {
 
 glm::vec3 Texture::lookup(const glm::vec2& uv) const {
   if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return texel(0, 0);
-  const Footprint column = footprint(uv.x, width_);
-  const Footprint row = footprint(1.0f - uv.y, height_);
-  const glm::vec3 upper = texel(column.first, row.first) * (1.0f - column.weight) +
-                          texel(column.second, row.first) * column.weight;
-  const glm::vec3 lower = texel(column.first, row.second) * (1.0f - column.weight) +
-                          texel(column.second, row.second) * column.weight;
-  return upper * (1.0f - row.weight) + lower * row.weight;
+  return interpolate(footprint(uv.x, width_), footprint(1.0f - uv.y, height_),
+                     [&](int column, int row) { return texel(column, row); });
 }
 
 }  // namespace surfeit

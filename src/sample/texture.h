@@ -26,6 +26,9 @@ class Texture {
   // A texture from rows of packed 8-bit sRGB rgb, top row first.
   Texture(int width, int height, std::vector<std::uint8_t> rgb);
 
+  // Whether the file has alpha of which something is not opaque; it is not kept.
+  bool hasAlpha() const { return has_alpha_; }
+
   int width() const { return width_; }
   int height() const { return height_; }
 
@@ -38,6 +41,24 @@ class Texture {
 
   int width_, height_;
   std::vector<std::uint8_t> rgb_;
+  bool has_alpha_ = false;
+};
+
+// A picture that says how much of a surface is there. Immutable once loaded.
+class Mask {
+ public:
+  // The alpha of the picture where it has one, else its lightness. Formats and errors as of
+  // textures.
+  static Result<Mask> load(const std::string& path);
+
+  // From 0 (nothing) to 1, bilinear; coordinates as of textures.
+  float lookup(const glm::vec2& uv) const;
+
+ private:
+  Mask(int width, int height, std::vector<std::uint8_t> values);
+
+  int width_, height_;
+  std::vector<std::uint8_t> values_;
 };
 
 }  // namespace surfeit

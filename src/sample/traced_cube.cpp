@@ -40,8 +40,8 @@ CubeImage traceCube(const CubeImage& cube, const Mesh& mesh, const RayScene& ray
                     const TracedCubeOptions& options) {
   const glm::vec3 normal = cube.receiver.normal;
   const bool has_horizon = normal != glm::vec3(0);
-  const glm::vec3 origin =
-      glm::vec3(cube.receiver.position) + kOffset * glm::length(rays.bounds().extent()) * normal;
+  const glm::vec3 origin = glm::vec3(cube.receiver.position - mesh.origin) +
+                           kOffset * glm::length(rays.bounds().extent()) * normal;
   const int size = cube.resolution, places = size * options.rays;
   CubeImage traced;
   traced.receiver = cube.receiver;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "cases/case_notes.h"
 #include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/surfel_source.h"
@@ -22,12 +23,6 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
-
-class Notes : public Progress {
- public:
-  void note(const std::string& message) override { notes.push_back(message); }
-  std::vector<std::string> notes;
-};
 
 class ColorCasesTest : public DirectoryTest {
  protected:

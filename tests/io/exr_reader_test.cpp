@@ -67,6 +67,74 @@ class ExrReaderTest : public PictureFileTest {
   }
 };
 
+// A row of pixels on a slope of unit normal, of which the first is covered by a quarter.
+ExrTestPart edgeOfSlope(bool is_divided, bool has_normals) {
+  ExrTestPart part;
+  part.window = Imath::Box2i({0, 0}, {3, 1});
+  const auto scale = [=](int x) { return x == 0 && is_divided ? .25f : 1.f; };
+  part.add("A", [](int x, int) { return x == 0 ? .25f : 1.f; });
+  part.add("P.X", [=](int x, int) { return float(10 + x) * scale(x); });
+  part.add("P.Y", [=](int x, int y) { return float(20 + y) * scale(x); });
+  part.add("P.Z", [=](int x, int) { return float(30 + x) * scale(x); });
+  if (!has_normals) return part;
+  part.add("N.X", [=](int x, int) { return -.6f * scale(x); });
+  part.add("N.Y", [=](int, int) { return 0.f; });
+  part.add("N.Z", [=](int x, int) { return .8f * scale(x); });
+  return part;
+}
+
+TEST_F(ExrReaderTest, PositionsTimesAlphaAreDivided) {
+  for (const bool has_normals : {false, true}) {
+    for (const bool is_divided : {false, true}) {
+      writeExrTest(path("a.exr"), {edgeOfSlope(is_divided, has_normals)});
+      const Rows rows = read("a.exr");
+      ASSERT_EQ(rows.count(), 8u);
+      for (std::size_t i = 0; i < 8; ++i) {
+        EXPECT_EQ(rows.at(i, "x"), 10. + double(i % 4));
+        EXPECT_EQ(rows.at(i, "y"), 20. + double(i / 4));
+        EXPECT_EQ(rows.at(i, "z"), 30. + double(i % 4));
+        if (has_normals) {
+          EXPECT_EQ(rows.at(i, "nz"), double(.8f));
+        }
+      }
+      if (is_divided) {
+        EXPECT_THAT(rows.notes,
+                    ElementsAre(HasSubstr("2 of 8 pixels are covered in part and hold")));
+      } else {
+        EXPECT_TRUE(rows.notes.empty());
+      }
+    }
+  }
+}
+
+TEST_F(ExrReaderTest, EdgesOfWhichNothingTellsAreLeftOut) {
+  ExrTestPart part = edgeOfSlope(true, false);
+  // Nothing beside them
+  for (auto& [name, channel] : part.channels) channel.values[1] = channel.values[5] = 0;
+  writeExrTest(path("a.exr"), {part});
+  const Rows rows = read("a.exr");
+  EXPECT_EQ(rows.count(), 4u);
+  EXPECT_THAT(rows.notes, ElementsAre(HasSubstr("2 of 6 pixels are covered in part, and nothing")));
+}
+
+TEST_F(ExrReaderTest, HalfPositionsAreToldBesideTheirSpacing) {
+  ExrTestPart part;
+  part.add(
+      "P.X", [](int x, int) { return 1000 + x; }, Imf::HALF);
+  part.add(
+      "P.Y", [](int, int y) { return y; }, Imf::HALF);
+  part.add(
+      "P.Z", [](int, int) { return 0; }, Imf::HALF);
+  writeExrTest(path("a.exr"), {part});
+  EXPECT_THAT(read("a.exr").notes,
+              ElementsAre(HasSubstr("stand up to 0.5 apart here, beside pixels 1")));
+  part.channels.at("P.X").type = Imf::FLOAT;
+  part.channels.at("P.Y").type = Imf::FLOAT;
+  part.channels.at("P.Z").type = Imf::FLOAT;
+  writeExrTest(path("a.exr"), {part});
+  EXPECT_TRUE(read("a.exr").notes.empty());
+}
+
 TEST_F(ExrReaderTest, ReadsEveryKindOfStorage) {
   std::vector<ExrTestPart> kinds;
   for (const int tile : {0, 2, 4}) {
@@ -187,7 +255,8 @@ TEST_F(ExrReaderTest, PartsWithOneWindowAreOnePicture) {
   EXPECT_EQ(rows.at(5, "x"), 3);
   EXPECT_EQ(rows.at(5, "green"), 0.5);
   EXPECT_EQ(rows.at(5, "albedo_g"), 1);
-  EXPECT_THAT(rows.notes, ElementsAre("part shadow is not read"));
+  EXPECT_THAT(rows.notes,
+              ElementsAre("part shadow is not read", HasSubstr("all pixels are covered in part")));
 
   RowReaderOptions options;
   options.part = "shadow";

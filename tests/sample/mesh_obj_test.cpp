@@ -100,5 +100,134 @@ TEST_F(ObjFiles, SharedSponzaLoadsWithItsTextures) {
   EXPECT_TRUE(notes_.notes.empty()) << notes_.notes[0];
 }
 
+constexpr const char* kSquare =
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+
+double areaOf(const Mesh& mesh) {
+  double area = 0;
+  for (std::uint32_t i = 0; i < mesh.triangle.size(); ++i) area += triangleArea(mesh, i);
+  return area;
+}
+
+TEST_F(ObjFiles, BackslashesContinueLines) {
+  for (const std::string face :
+       {"f 1 2 \\\n 3 4\n", "f \\\n1 \\\n2 \\ \n3 4", "f 1 2 \\\r\n3 4\r\n"}) {
+    const Result<Mesh> mesh =
+        load(write("m.obj", kSquare + face + "\n# end \\\nf 1 2 9 # no comment\n"));
+    EXPECT_THAT(mesh.status().message(), HasSubstr("face 1: vertex 9")) << face;
+    const Result<Mesh> good = load(write("m.obj", kSquare + face));
+    ASSERT_TRUE(good.ok()) << good.status().message();
+    EXPECT_NEAR(areaOf(*good), 1, 1e-12) << face;
+  }
+}
+
+TEST_F(ObjFiles, WhatIsNoNumberIsRefusedWithItsLine) {
+  struct Case {
+    std::string text, said;
+  };
+  const std::vector<Case> cases = {
+      {"v 0,25 0 0\n", "line 1: found \"0,25\", expected a number with a decimal point"},
+      {"v 1 2 3\nvn 0 0 1,0\n", "line 2: found \"1,0\""},
+      {"v 1 2 3\n\n\nvt x 1\n", "line 4: found \"x\", expected a number"},
+      {"v 1 2 \\\n3,5\n", "line 2: found \"3,5\""},
+  };
+  for (const Case& bad : cases) {
+    const Result<Mesh> mesh = load(write("m.obj", bad.text + kSquare + "f 1 2 3\n"));
+    EXPECT_EQ(mesh.status().code(), StatusCode::kCorruption);
+    EXPECT_THAT(mesh.status().message(), HasSubstr("m.obj: " + bad.said));
+  }
+  write("m.mtl", "newmtl a\nKd 0,2 0,4 0,6\n");
+  EXPECT_THAT(load(write("m.obj", std::string("mtllib m.mtl\n") + kSquare + "f 1 2 3\n"))
+                  .status()
+                  .message(),
+              HasSubstr("m.mtl: line 2: found \"0,2\""));
+  // Signs, exponents and comments are of numbers
+  EXPECT_TRUE(load(write("m.obj", "v +1 -2e-3 3.E1 # one, two\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")).ok());
+}
+
+TEST_F(ObjFiles, NamesOfMaterialsAndTheirFilesMayHaveBlanks) {
+  write("my paints.mtl", "newmtl red paint\nKd 0.7 0.1 0.1\nnewmtl red\nKd 0 0 1\n");
+  write("a.mtl", "newmtl blue  paint\nKd 0.1 0.1 0.7\n");
+  for (const std::string library :
+       {"my paints.mtl", "C:\\models\\my paints.mtl", "../elsewhere/my paints.mtl "}) {
+    const Result<Mesh> mesh = load(
+        write("m.obj", "mtllib " + library + "\n" + kSquare + "usemtl red paint \nf 1 2 3 4\n"));
+    ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+    EXPECT_EQ(surfacePoint(*mesh, 0, .3f, .3f).albedo, glm::vec3(0.7f, 0.1f, 0.1f)) << library;
+  }
+  EXPECT_TRUE(notes_.notes.empty());
+  write("b.mtl", "newmtl red\nKd 1 0 0\n");
+  const Result<Mesh> both =
+      load(write("m.obj", std::string("mtllib a.mtl b.mtl\n") + kSquare +
+                              "usemtl red\nf 1 2 3\nusemtl blue  paint\nf 1 3 4\n"));
+  ASSERT_TRUE(both.ok());
+  EXPECT_EQ(surfacePoint(*both, 0, .3f, .3f).albedo, glm::vec3(1, 0, 0));
+  EXPECT_EQ(surfacePoint(*both, 1, .3f, .3f).albedo, glm::vec3(0.1f, 0.1f, 0.7f));
+  EXPECT_TRUE(notes_.notes.empty());
+}
+
+TEST_F(ObjFiles, DissolveAndMasksSayHowMuchIsThere) {
+  // Left texel there, right one not: as lightness, and as alpha would be
+  write("mask.ppm", std::string("P6\n2 1\n255\n\xff\xff\xff") + std::string(3, '\0'));
+  write("m.mtl",
+        "newmtl glass\nKd 1 1 1\nd 0.3\nnewmtl old\nTr 0.25\nnewmtl halo\nd -halo 0.5\n"
+        "newmtl leaf\nd 0.5\nmap_d mask.ppm\n");
+  const Result<Mesh> mesh = load(
+      write("m.obj",
+            std::string("mtllib m.mtl\n") + kSquare +
+                "usemtl glass\nf 1 2 3\nusemtl old\nf 1 2 3\nusemtl halo\nf 1 2 3\n"
+                "vt 0.25 0.5\nvt 0.75 0.5\nusemtl leaf\nf 1/5 2/5 3/5\nf 1/6 2/6 3/6\nf 1 2 3\n"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_FALSE(mesh->isOpaque());
+  const float expected[] = {.3f, .75f, .5f, .5f, 0, .25f};
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    EXPECT_NEAR(surfacePoint(*mesh, i, .3f, .3f).opacity, expected[i], 1e-6f) << i;
+  }
+  EXPECT_TRUE(notes_.notes.empty());
+}
+
+TEST_F(ObjFiles, ClearMaterialsAreTold) {
+  write("m.mtl", "newmtl clear\nd 0\n");
+  const Result<Mesh> mesh =
+      load(write("m.obj", std::string("mtllib m.mtl\n") + kSquare + "usemtl clear\nf 1 2 3\n"));
+  ASSERT_TRUE(mesh.ok());
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("material \"clear\" is clear")));
+}
+
+TEST_F(ObjFiles, ColorsOfEightBitsAndWhatIsNoFaceAreTold) {
+  const Result<Mesh> mesh = load(write(
+      "m.obj", "v 0 0 0 255 0 128\nv 1 0 0 255 0 128\nv 0 1 0 255 0 128\nf 1 2 3\nl 1 2 3\n"));
+  ASSERT_TRUE(mesh.ok());
+  EXPECT_NEAR(surfacePoint(*mesh, 0, .3f, .3f).albedo.x, 1, 1e-5f);
+  EXPECT_NEAR(surfacePoint(*mesh, 0, .3f, .3f).albedo.z, 0.2158605f, 1e-5f);
+  EXPECT_THAT(notes_.notes, testing::UnorderedElementsAre(HasSubstr("0-255"),
+                                                          HasSubstr("lines and points of 3")));
+}
+
+TEST_F(ObjFiles, PlacesOnAMapKeepTheirDigits) {
+  const std::string near = "v 0.25 0.125 0.5\nv 1.25 0.125 0.5\nv 1.25 1.125 0.5\nf 1 2 3\n";
+  const std::string far =
+      "v 500000.25 5000000.125 100.5\nv 500001.25 5000000.125 100.5\nv 500001.25 5000001.125 "
+      "100.5\nf 1 2 3\n";
+  const Result<Mesh> at_0 = load(write("near.obj", near)), moved = load(write("far.obj", far));
+  ASSERT_TRUE(at_0.ok() && moved.ok());
+  EXPECT_EQ(at_0->origin, glm::dvec3(0));
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec3 shift(500000, 5000000, 100);
+    EXPECT_EQ(glm::dvec3(moved->position[i]) + moved->origin - shift,
+              glm::dvec3(at_0->position[i]));
+  }
+  EXPECT_TRUE(notes_.notes.empty());
+}
+
+TEST_F(ObjFiles, MaterialFilesThatAreMissingAreToldByTheirNames) {
+  ASSERT_TRUE(load(write("m.obj", std::string("mtllib my paints.mtl\n") + kSquare +
+                                      "usemtl red paint\nf 1 2 3\n"))
+                  .ok());
+  EXPECT_THAT(
+      notes_.notes,
+      testing::ElementsAre(HasSubstr("material file \"my paints.mtl\" not found (and 1 more)")));
+}
+
 }  // namespace
 }  // namespace surfeit

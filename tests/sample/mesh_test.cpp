@@ -129,5 +129,44 @@ TEST_F(MeshFiles, SharedLionLoadsWhole) {
   EXPECT_EQ(mesh->color.size(), mesh->position.size());
 }
 
+TEST_F(MeshFiles, VerticesAreReadAsThoseOfClouds) {
+  const std::string head = "ply\nformat ascii 1.0\nelement vertex 3\n";
+  const std::string tail = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string rows = "0 0 0 128 255 0\n1 0 0 128 255 0\n0 1 0 128 255 0\n3 0 1 2\n";
+  for (const std::string names :
+       {"property double X\nproperty double Y\nproperty double Z\nproperty ushort Red\nproperty "
+        "ushort Green\nproperty ushort Blue\n",
+        "property float x\nproperty float y\nproperty float z\nproperty int r\nproperty int "
+        "g\nproperty int b\n",
+        "property float x\nproperty float y\nproperty float z\nproperty float "
+        "diffuse_red\nproperty float diffuse_green\nproperty float diffuse_blue\n"}) {
+    const Result<Mesh> mesh = load({write("m.ply", head + names + tail + rows)});
+    ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+    EXPECT_NEAR(surfacePoint(*mesh, 0, .3f, .3f).albedo.x, 0.2158605f, 1e-5f) << names;
+    EXPECT_EQ(notes_.notes.size(), 1u) << names;
+    notes_.notes.clear();
+  }
+}
+
+TEST_F(MeshFiles, FacesOfWhichEdgesCrossAreTold) {
+  const Result<Mesh> mesh =
+      load({write("m.ply", plyText({{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0, 2, 0}, {-1, 1, 0}},
+                                   {{0, 1, 2, 3, 4}}))});
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("edges of 1 faces cross")));
+}
+
+TEST_F(MeshFiles, FilesShareAnOrigin) {
+  const auto square = [](double x, double y) {
+    return fmt::format("v {} {} 0\nv {} {} 0\nv {} {} 0\nf 1 2 3\n", x, y, x + 1, y, x, y + 1);
+  };
+  const Result<Mesh> mesh =
+      load({write("a.obj", square(5e5, 5e6)), write("b.obj", square(5e5 + 10.125, 5e6))});
+  ASSERT_TRUE(mesh.ok());
+  EXPECT_NE(mesh->origin, glm::dvec3(0));
+  EXPECT_EQ(glm::dvec3(mesh->position[3]) - glm::dvec3(mesh->position[0]),
+            glm::dvec3(10.125, 0, 0));
+}
+
 }  // namespace
 }  // namespace surfeit

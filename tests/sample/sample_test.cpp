@@ -230,5 +230,83 @@ TEST_F(Sampling, CancelledWorkLeavesNothing) {
   EXPECT_FALSE(std::filesystem::exists(path("out.ply")));
 }
 
+// A unit square with uv from 0 to 1.
+std::string squareOf(const std::string& material) {
+  return "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 "
+         "1\nusemtl " +
+         material + "\nf 1/1 2/2 3/3 4/4\n";
+}
+
+TEST_F(Sampling, OnlyWhatIsThereBecomesSurfels) {
+  // A quarter of the mask is white
+  write("mask.ppm", std::string("P6\n2 2\n255\n\xff\xff\xff") + std::string(9, '\0'));
+  write("m.mtl", "newmtl leaf\nmap_d mask.ppm\nnewmtl glass\nd 0.3\n");
+  SampleOptions options;
+  options.count = 20000;
+  const std::vector<Surfel> leaf = sample(write("leaf.obj", squareOf("leaf")), options);
+  EXPECT_NEAR(totalArea(leaf), .25, .002);
+  EXPECT_EQ(stats_.surfels + stats_.clear_surfels, 20000u);
+  const std::vector<Surfel> glass = sample(write("glass.obj", squareOf("glass")), options);
+  EXPECT_EQ(glass.size(), 20000u);
+  EXPECT_NEAR(totalArea(glass), .3, 1e-4);
+}
+
+TEST_F(Sampling, ShadowsAreAsDenseAsWhatCastsThem) {
+  write("m.mtl", "newmtl glass\nd 0.3\n");
+  // The plate far above a floor, under a sun
+  write("plate.obj",
+        "mtllib m.mtl\nv -2 3 2\nv 2 3 2\nv 2 3 -2\nv -2 3 -2\nusemtl glass\nf 1 2 3 4\n");
+  SampleOptions options;
+  options.count = 20000;
+  options.surroundings.lights.directionals.push_back({{0, -1, 0}, glm::vec3(1)});
+  ASSERT_TRUE(sampleMeshes({write("floor.ply", floorPly(2)), path("plate.obj")}, path("out.ply"),
+                           options, notes_)
+                  .ok());
+  double light = 0;
+  int count = 0;
+  for (const Surfel& surfel : readCloud(path("out.ply"))) {
+    if (surfel.position.y > 1) continue;
+    light += double(surfel.radiosity.x) / .5;
+    ++count;
+  }
+  EXPECT_NEAR(light / count, .7, .02);
+}
+
+TEST_F(Sampling, AMeshOnAMapGivesTheSurfelsOfThatAtZero) {
+  const auto mesh = [](double x, double y) {
+    std::string text;
+    for (const auto& [u, v] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
+      text += fmt::format("v {:.3f} {:.3f} 0\n", x + u, y + v);
+    }
+    return text + "f 1 2 3 4\n";
+  };
+  SampleOptions options;
+  options.count = 200;
+  options.surroundings.lights.points.push_back({{.5, .5, 1}, glm::vec3(1)});
+  ASSERT_TRUE(
+      sampleMeshes({write("near.obj", mesh(0, 0))}, path("near.ply"), options, notes_).ok());
+  options.surroundings.lights.points[0].position += glm::dvec3(500000, 5000000, 0);
+  ASSERT_TRUE(
+      sampleMeshes({write("far.obj", mesh(500000, 5000000))}, path("far.ply"), options, notes_)
+          .ok());
+  const Result<std::unique_ptr<SurfelSource>> far = openSurfelSource(path("far.ply"), true);
+  ASSERT_TRUE(far.ok());
+  (*far)->setOrigin({500000, 5000000, 0});
+  std::vector<Surfel> moved(200);
+  ASSERT_EQ(*(*far)->read(moved), 200u);
+  const std::vector<Surfel> near = readCloud(path("near.ply"));
+  // The order of triangles is along the curve of another cube
+  const auto differs = [](const Surfel& a, const Surfel& b) {
+    return glm::distance(a.position, b.position) > 1e-6f ||
+           glm::distance(a.radiosity, b.radiosity) > 1e-6f;
+  };
+  for (const Surfel& surfel : near) {
+    EXPECT_EQ(std::count_if(moved.begin(), moved.end(),
+                            [&](const Surfel& other) { return !differs(surfel, other); }),
+              1);
+  }
+  EXPECT_TRUE(notes_.notes.empty());
+}
+
 }  // namespace
 }  // namespace surfeit

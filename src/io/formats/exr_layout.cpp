@@ -230,6 +230,9 @@ Result<ExrLayout> layOutExr(std::span<const ExrSource> sources,
   const auto position = findNamed(kPositionNames);
   if (position == groups.end()) return noPosition(sources, path);
   layout.position = builder.addTriple(*position);
+  layout.is_position_half = std::any_of(
+      layout.position.begin(), layout.position.end(),
+      [&](std::size_t column) { return sources[layout.columns[column].source].is_half; });
   const auto normal = findNamed(kNormalNames);
   if (normal != groups.end()) layout.normal = builder.addTriple(*normal);
   layout.pixel = layout.element.properties.size();

@@ -21,6 +21,7 @@ struct ExrSource {
   std::string channel;  // as the part calls it
   std::string name;     // with the layer that the part is: "P.X" for X of the part P
   bool is_integer = false;
+  bool is_half = false;
 };
 
 // A channel that is decoded.
@@ -35,6 +36,7 @@ struct ExrLayout {
   std::vector<ExrColumn> columns;
   // Indices of columns
   std::array<std::size_t, 3> position{};
+  bool is_position_half = false;  // of one coordinate at least
   std::optional<std::array<std::size_t, 3>> normal;
   std::optional<std::size_t> alpha, depth;
   // Properties pixel_x and pixel_y

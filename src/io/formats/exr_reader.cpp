@@ -18,12 +18,12 @@
 #include "io/formats/counted_row_reader.h"
 #include "io/formats/exr_header.h"
 #include "io/formats/exr_layout.h"
+#include "io/formats/exr_positions.h"
 #include "io/formats/exr_stream.h"
 
 namespace surfeit {
 namespace {
 
-constexpr float kMaxDepth = 1e30f;
 // What must be decoded at once may take this.
 constexpr std::uint64_t kMaxBlockBytes = std::uint64_t{192} << 20;
 
@@ -90,7 +90,7 @@ class ExrReader final : public CountedRowReader {
     for (auto i = channels.begin(); i != channels.end(); ++i) {
       if (i.channel().xSampling != 1 || i.channel().ySampling != 1) continue;
       sources.push_back({part, i.name(), exrLayerName(i.name(), layer, part == 0, options.channels),
-                         i.channel().type == Imf::UINT});
+                         i.channel().type == Imf::UINT, i.channel().type == Imf::HALF});
     }
     return sources;
   }
@@ -169,7 +169,7 @@ class ExrReader final : public CountedRowReader {
     return {};
   }
 
-  // Counts the rows; decodes only what the mask needs.
+  // Counts the rows and looks at what they hold; decodes only what the mask needs.
   Status countRows() {
     const Imath::Box2i& window = header().dataWindow();
     std::vector<std::size_t> mask(layout_.position.begin(), layout_.position.end());
@@ -178,9 +178,15 @@ class ExrReader final : public CountedRowReader {
     if (layout_.depth) mask.push_back(*layout_.depth);
     bindColumns(mask);
     SURFEIT_RETURN_IF_ERROR(moveTo(0));
+    ExrPositions positions;
     while (next_y_ <= std::int64_t(window.max.y)) {
-      SURFEIT_RETURN_IF_ERROR(readScanLine());
-      element_.count += pixels_.size();
+      SURFEIT_RETURN_IF_ERROR(decodeScanLine());
+      positions.look(decodedLine());
+    }
+    element_.count = positions.count();
+    edges_ = positions.edges();
+    for (std::string& note : positions.notes(layout_.is_position_half)) {
+      notes_.push_back(std::move(note));
     }
 
     std::vector<std::size_t> all(columns_.size());
@@ -213,42 +219,58 @@ class ExrReader final : public CountedRowReader {
     }
   }
 
-  // Decodes the scan line next_y_ and finds its pixels with a position.
-  Status readScanLine() {
+  // Decodes the scan line next_y_.
+  Status decodeScanLine() {
     const int y = int(next_y_);
     return guardExr(stream_, StatusCode::kCorruption, path_, fmt::format("scan line {}", y), [&] {
       for (std::size_t i = 0; i < inputs_.size(); ++i) {
         if (is_bound_[i]) inputs_[i]->readPixels(y);
       }
-      applyMask();
-      next_pixel_ = 0;
       y_ = y;
       ++next_y_;
       return Status();
     });
   }
 
-  void applyMask() {
-    const auto valuesOf = [&](std::size_t column) { return columns_[column].values.data(); };
-    const float* const px = valuesOf(layout_.position[0]);
-    const float* const py = valuesOf(layout_.position[1]);
-    const float* const pz = valuesOf(layout_.position[2]);
-    const float* const nx = layout_.normal ? valuesOf((*layout_.normal)[0]) : nullptr;
-    const float* const ny = layout_.normal ? valuesOf((*layout_.normal)[1]) : nullptr;
-    const float* const nz = layout_.normal ? valuesOf((*layout_.normal)[2]) : nullptr;
-    const float* const alpha = layout_.alpha ? valuesOf(*layout_.alpha) : nullptr;
-    const float* const depth = layout_.depth ? valuesOf(*layout_.depth) : nullptr;
+  // And finds its pixels with a position.
+  Status readScanLine() {
+    SURFEIT_RETURN_IF_ERROR(decodeScanLine());
+    applyMask();
+    next_pixel_ = 0;
+    return {};
+  }
 
+  ExrScanLine decodedLine() {
+    ExrScanLine line;
+    const auto valuesOf = [&](std::size_t column) { return columns_[column].values.data(); };
+    for (std::size_t i = 0; i < 3; ++i) {
+      line.position[i] = valuesOf(layout_.position[i]);
+      if (layout_.normal) line.normal[i] = valuesOf((*layout_.normal)[i]);
+    }
+    if (layout_.alpha) line.alpha = valuesOf(*layout_.alpha);
+    if (layout_.depth) line.depth = valuesOf(*layout_.depth);
+    line.width = columns_[layout_.position[0]].values.size();
+    return line;
+  }
+
+  void applyMask() {
+    const ExrScanLine line = decodedLine();
     pixels_.clear();
-    const std::size_t width = columns_[layout_.position[0]].values.size();
-    for (std::size_t x = 0; x < width; ++x) {
-      if (alpha != nullptr && !(alpha[x] > 0)) continue;
-      if (depth != nullptr && !(std::isfinite(depth[x]) && depth[x] < kMaxDepth)) continue;
-      if (!std::isfinite(px[x]) || !std::isfinite(py[x]) || !std::isfinite(pz[x])) continue;
-      const bool has_normal = nx != nullptr && !(nx[x] == 0 && ny[x] == 0 && nz[x] == 0);
-      if (px[x] == 0 && py[x] == 0 && pz[x] == 0 && !has_normal) continue;
+    for (std::size_t x = 0; x < line.width; ++x) {
+      if (!line.isSet(x)) continue;
+      if (line.isPartlyCovered(x)) {
+        if (edges_ == ExrPositions::Edges::kLeaveOut) continue;
+        if (edges_ == ExrPositions::Edges::kDivide) divideByAlpha(x);
+      }
       pixels_.push_back(std::uint32_t(x));
     }
+  }
+
+  void divideByAlpha(std::size_t x) {
+    const float alpha = columns_[*layout_.alpha].values[x];
+    for (const std::size_t column : layout_.position) columns_[column].values[x] /= alpha;
+    if (!layout_.normal) return;
+    for (const std::size_t column : *layout_.normal) columns_[column].values[x] /= alpha;
   }
 
   // Property by property, so that the loops are tight.
@@ -283,6 +305,7 @@ class ExrReader final : public CountedRowReader {
   std::vector<Imf::Header> headers_;
   std::size_t part_ = 0;  // with the positions
   ExrLayout layout_;
+  ExrPositions::Edges edges_ = ExrPositions::Edges::kKeep;
   std::vector<Column> columns_;     // as layout_.columns
   std::vector<std::size_t> parts_;  // that columns come from
   std::unique_ptr<Imf::MultiPartInputFile> file_;

@@ -1,0 +1,171 @@
+#include "sample/mesh_builder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <new>
+#include <utility>
+
+#include "io/file.h"
+#include "sample/polygon.h"
+
+namespace surfeit {
+namespace {
+
+bool isFinite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+// Tells when floats hold vertices worse than to a thousandth of the size of triangles.
+void noteFarVertices(const std::string& path, const Mesh& mesh, Progress& progress) {
+  const glm::vec3 sides = mesh.bounds().extent();
+  const double size =
+      double(std::max({sides.x, sides.y, sides.z})) / std::sqrt(double(mesh.triangle.size()));
+  const double step = floatStep(movedBounds(mesh.bounds(), glm::dvec3(0)));
+  if (step <= 1e-3 * size) return;
+  progress.note(fmt::format(
+      "{}: vertices are taken as floats, which stand {:.2g} apart in a scene so wide, beside "
+      "triangles of about {:.2g}: sample the parts one by one",
+      path, step, size));
+}
+
+enum class MeshFormat { kPly, kObj, kUnknown };
+
+// PLY by its magic; OBJ has none, so that its name must tell.
+Result<MeshFormat> recogniseMesh(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+  char magic[3] = {};
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                           file.readSome(0, std::as_writable_bytes(std::span(magic))));
+  if (count == 3 && magic[0] == 'p' && magic[1] == 'l' && magic[2] == 'y') return MeshFormat::kPly;
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (extension == ".obj" || extension == ".OBJ") return MeshFormat::kObj;
+  return MeshFormat::kUnknown;
+}
+
+Status loadFile(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
+                Progress& progress) {
+  const std::size_t triangles_before = builder.mesh.triangle.size();
+  const std::uint64_t degenerate_before = builder.mesh.degenerate_faces;
+  const std::uint64_t crossing_before = builder.crossing_faces;
+  SURFEIT_ASSIGN_OR_RETURN(const MeshFormat format, recogniseMesh(path));
+  switch (format) {
+    case MeshFormat::kPly:
+      SURFEIT_RETURN_IF_ERROR(loadPlyMesh(path, default_albedo, builder, progress));
+      break;
+    case MeshFormat::kObj:
+      SURFEIT_RETURN_IF_ERROR(loadObjMesh(path, default_albedo, builder, progress));
+      break;
+    case MeshFormat::kUnknown:
+      return Status::corruption(
+          fmt::format("{}: not a mesh that we read: expected PLY or a name ending in .obj", path));
+  }
+  const std::uint64_t degenerate = builder.mesh.degenerate_faces - degenerate_before;
+  if (builder.mesh.triangle.size() == triangles_before) {
+    return Status::corruption(
+        fmt::format("{}: no triangles ({} faces without area)", path, degenerate));
+  }
+  if (degenerate > 0) {
+    progress.note(fmt::format("{}: {} faces without area skipped", path, degenerate));
+  }
+  if (const std::uint64_t crossing = builder.crossing_faces - crossing_before; crossing > 0) {
+    progress.note(fmt::format(
+        "{}: the edges of {} faces cross: parts of them count twice or not at all (split them "
+        "where they cross)",
+        path, crossing));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status MeshBuilder::addFace(std::span<const std::uint64_t> corners, std::uint32_t material,
+                            std::uint64_t vertex_begin, const std::string& path,
+                            std::uint64_t face) {
+  places_.clear();
+  for (const std::uint64_t corner : corners) {
+    if (corner < vertex_begin || corner >= position.size()) {
+      return Status::corruption(fmt::format("{}: face {}: vertex {}, expected 0 to {}", path, face,
+                                            std::int64_t(corner - vertex_begin),
+                                            std::int64_t(position.size() - vertex_begin) - 1));
+    }
+    places_.push_back(position[corner]);
+    if (!isFinite(places_.back())) {
+      return Status::corruption(
+          fmt::format("{}: face {}: vertex {} is not finite", path, face, corner - vertex_begin));
+    }
+  }
+  if (mesh.triangle.size() + corners.size() >= std::numeric_limits<std::uint32_t>::max()) {
+    return Status::failed(fmt::format("{}: face {}: more than 2^32 triangles", path, face));
+  }
+
+  triangles_.clear();
+  if (!cutPolygon(places_, triangles_)) ++crossing_faces;
+  bool has_area = false;
+  for (const glm::uvec3& cut : triangles_) {
+    const glm::dvec3& a = places_[cut.x];
+    if (!(glm::length(glm::cross(places_[cut.y] - a, places_[cut.z] - a)) > 0)) continue;
+    mesh.triangle.emplace_back(std::uint32_t(corners[cut.x]), std::uint32_t(corners[cut.y]),
+                               std::uint32_t(corners[cut.z]));
+    mesh.triangle_material.push_back(material);
+    has_area = true;
+  }
+  if (!has_area) ++mesh.degenerate_faces;
+  return {};
+}
+
+Mesh MeshBuilder::finish() {
+  Bounds3d bounds;
+  for (const glm::uvec3& corners : mesh.triangle) {
+    for (int i = 0; i < 3; ++i) bounds.add(position[corners[i]]);
+  }
+  mesh.origin = originFor(bounds);
+  mesh.position.reserve(position.size() + 1);
+  for (const glm::dvec3& place : position) mesh.position.emplace_back(place - mesh.origin);
+  position = {};
+
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < mesh.triangle.size(); ++i) {
+    if (!(triangleArea(mesh, std::uint32_t(i)) > 0)) continue;
+    mesh.triangle[kept] = mesh.triangle[i];
+    mesh.triangle_material[kept] = mesh.triangle_material[i];
+    ++kept;
+  }
+  mesh.degenerate_faces += mesh.triangle.size() - kept;
+  mesh.triangle.resize(kept);
+  mesh.triangle_material.resize(kept);
+  mesh.completeAttributes();
+  return std::move(mesh);
+}
+
+Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& default_albedo,
+                        Progress& progress) {
+  if (paths.empty()) return Status::invalidArgument("no mesh given");
+  MeshBuilder builder;
+  try {
+    for (const std::string& path : paths) {
+      SURFEIT_RETURN_IF_ERROR(loadFile(path, default_albedo, builder, progress));
+    }
+    const std::uint64_t degenerate = builder.mesh.degenerate_faces;
+    Mesh mesh = builder.finish();
+    noteFarVertices(paths.front(), mesh, progress);
+    if (const std::uint64_t more = mesh.degenerate_faces - degenerate; more > 0) {
+      progress.note(
+          fmt::format("{}: {} triangles too small for floats skipped", paths.front(), more));
+    }
+    if (mesh.triangle.empty()) {
+      return Status::corruption(
+          fmt::format("{}: all triangles are too small for floats", paths.front()));
+    }
+    return mesh;
+  } catch (const std::bad_alloc&) {
+    return Status::failed(fmt::format("{}: out of memory after {} triangles", paths.front(),
+                                      builder.mesh.triangle.size()));
+  }
+}
+
+}  // namespace surfeit

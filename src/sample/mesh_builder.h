@@ -1,0 +1,42 @@
+// A mesh in the making: what the readers of mesh files add to.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sample/mesh.h"
+
+namespace surfeit {
+
+// Keeps places as doubles until all files are read and their origin can be chosen.
+struct MeshBuilder {
+  Mesh mesh;  // but for its positions and origin
+  std::vector<glm::dvec3> position;
+  std::uint64_t crossing_faces = 0;  // whose edges cross
+
+  // Appends the face with those corners (indices into position), polygons in triangles. Faces
+  // without area are counted and skipped. kCorruption, naming the file and `face` (from 0), when a
+  // corner is no vertex or is not finite.
+  Status addFace(std::span<const std::uint64_t> corners, std::uint32_t material,
+                 std::uint64_t vertex_begin, const std::string& path, std::uint64_t face);
+
+  // The mesh, its places counted from the origin that serves all of them (originFor). Triangles
+  // that have no area as floats are counted among the faces without.
+  Mesh finish();
+
+ private:
+  std::vector<glm::dvec3> places_;     // of one face
+  std::vector<glm::uvec3> triangles_;  // of one face
+};
+
+// The readers behind loadMeshes. They append, and leave attributes that the file lacks as they
+// were.
+Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
+                   Progress& progress);
+Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
+                   Progress& progress);
+
+}  // namespace surfeit

@@ -1,0 +1,166 @@
+#include "sample/obj_lines.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <span>
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kReadBytes = 256 << 10;
+constexpr std::size_t kLongestLine = 64 << 20;  // a face of millions of corners
+constexpr std::string_view kBlanks = " \t\r\v\f";
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+}
+
+// Takes the first word off.
+std::string_view takeWord(std::string_view& text) {
+  const std::size_t end = std::min(text.find_first_of(kBlanks), text.size());
+  const std::string_view word = text.substr(0, end);
+  text = trimmed(text.substr(end));
+  return word;
+}
+
+template <std::size_t N>
+bool isOneOf(std::string_view word, const std::string_view (&words)[N]) {
+  return std::find(std::begin(words), std::end(words), word) != std::end(words);
+}
+
+bool isNumber(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  // Too large or too small for a double is a number, too
+  return error != std::errc::invalid_argument && end == word.data() + word.size();
+}
+
+constexpr std::string_view kNumberStatements[] = {"v",  "vn", "vt", "Ka", "Kd",
+                                                  "Ks", "Ke", "d",  "Tr"};
+constexpr std::string_view kIndexStatements[] = {"f", "l", "p"};
+constexpr std::string_view kNameStatements[] = {"usemtl", "newmtl", "mtllib"};
+constexpr std::string_view kFreeFormStatements[] = {"surf", "curv", "curv2"};
+
+}  // namespace
+
+bool ObjLines::readPhysicalLine() {
+  physical_.clear();
+  if (is_at_end_ && begin_ == buffer_.size()) return false;
+  for (;;) {
+    const char* const begin = buffer_.data() + begin_;
+    const char* const end = buffer_.data() + buffer_.size();
+    const char* const stop =
+        std::find_if(begin, end, [](char c) { return c == '\n' || c == '\r'; });
+    physical_.append(begin, stop);
+    if (stop != end) {
+      begin_ = std::size_t(stop - buffer_.data()) + 1;
+      // \r\n may lie across two reads; the parser does not mind an empty line
+      if (*stop == '\r' && begin_ < buffer_.size() && buffer_[begin_] == '\n') ++begin_;
+      break;
+    }
+    if (physical_.size() > kLongestLine) {
+      status_ = Status::corruption(fmt::format("{}: line {} has more than {} bytes", input_.path(),
+                                               number_ + 1, kLongestLine));
+      return false;
+    }
+    buffer_.resize(kReadBytes);
+    begin_ = 0;
+    const Result<std::size_t> count =
+        input_.readSome(offset_, std::as_writable_bytes(std::span(buffer_)));
+    if (!count.ok()) status_ = count.status();
+    buffer_.resize(count.ok() ? *count : 0);
+    offset_ += buffer_.size();
+    if (!status_.ok()) return false;
+    if (buffer_.empty()) {
+      is_at_end_ = true;
+      break;
+    }
+  }
+  ++number_;
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (number_ == 1 && physical_.starts_with(kByteOrderMark)) physical_.erase(0, 3);
+  return true;
+}
+
+bool ObjLines::readLine() {
+  line_.clear();
+  std::size_t joined = 0;
+  for (;;) {
+    if (!readPhysicalLine()) return joined > 0 && status_.ok();
+    const std::string_view text = trimmed(physical_);
+    const bool is_comment = joined == 0 && text.starts_with('#');
+    if (is_comment || !text.ends_with('\\')) {
+      line_ += physical_;
+      break;
+    }
+    line_.append(physical_, 0, physical_.rfind('\\'));
+    line_ += ' ';
+    if (line_.size() > kLongestLine) {
+      status_ = Status::corruption(fmt::format("{}: the lines to {} are one of more than {} bytes",
+                                               input_.path(), number_, kLongestLine));
+      return false;
+    }
+    ++joined;
+  }
+  rewriteLine();
+  // Whoever counts lines comes to the same number
+  line_.append(joined + 1, '\n');
+  return status_.ok();
+}
+
+void ObjLines::rewriteLine() {
+  dropComment();
+  std::string_view rest = trimmed(line_);
+  const std::string_view word = takeWord(rest);
+  if (isOneOf(word, kFreeFormStatements)) ++free_form_;
+  if (isOneOf(word, kNameStatements)) {
+    std::string name(rest);
+    for (char& c : name) {
+      if (kBlanks.find(c) != std::string_view::npos) c = kNameBlank;
+      if (c == '\\') c = '/';  // written on Windows
+    }
+    line_ = std::string(word) + " " + name;
+  } else if (isOneOf(word, kNumberStatements)) {
+    if (word == "d" && rest.starts_with("-halo")) {
+      takeWord(rest);
+      line_ = "d " + std::string(rest);
+      rest = std::string_view(line_).substr(2);
+    }
+    checkNumbers(rest);
+  }
+}
+
+// The parser takes comments behind numbers for more of them. Names may have #.
+void ObjLines::dropComment() {
+  std::string_view rest = trimmed(line_);
+  const std::string_view word = takeWord(rest);
+  if (!isOneOf(word, kNumberStatements) && !isOneOf(word, kIndexStatements)) return;
+  line_.resize(std::min(line_.find('#'), line_.size()));
+}
+
+bool ObjLines::checkNumbers(std::string_view numbers) {
+  while (!numbers.empty()) {
+    const std::string_view word = takeWord(numbers);
+    if (isNumber(word)) continue;
+    const bool has_comma = word.find(',') != std::string_view::npos;
+    status_ = Status::corruption(fmt::format(
+        "{}: line {}: found \"{}\", expected a number{}", input_.path(), number_,
+        word.substr(0, 40), has_comma ? " with a decimal point: replace commas by points" : ""));
+    return false;
+  }
+  return true;
+}
+
+ObjLines::int_type ObjLines::underflow() {
+  if (!status_.ok() || !readLine()) return traits_type::eof();
+  setg(line_.data(), line_.data(), line_.data() + line_.size());
+  return traits_type::to_int_type(line_[0]);
+}
+
+}  // namespace surfeit

@@ -1,0 +1,50 @@
+// The lines of OBJ and MTL files, in a form that tinyobjloader takes as it should.
+#pragma once
+
+#include <cstdint>
+#include <streambuf>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/byte_input.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// A blank within a name, which the parser would end there.
+inline constexpr char kNameBlank = '\x01';
+
+// Feeds a parser: lines that a backslash continues are one, names of materials and their files hold
+// kNameBlank for blanks, line ends are \n and a byte order mark is gone. Numbers are looked at,
+// since the parser takes what is none as 0 (decimal commas most often): status() then names file
+// and line, and reading ends there, as it does when the file cannot be read.
+class ObjLines final : public std::streambuf {
+ public:
+  explicit ObjLines(ByteInput input) : input_(std::move(input)) {}
+
+  const Status& status() const { return status_; }
+  std::uint64_t freeFormStatements() const { return free_form_; }
+
+ protected:
+  int_type underflow() override;
+
+ private:
+  bool readPhysicalLine();
+  bool readLine();
+  void rewriteLine();
+  void dropComment();
+  bool checkNumbers(std::string_view numbers);
+
+  ByteInput input_;
+  Status status_;
+  std::uint64_t offset_ = 0;  // in the file, of what follows the buffer
+  std::vector<char> buffer_;
+  std::size_t begin_ = 0;        // in the buffer: the next line
+  std::string physical_, line_;  // as read; what the parser gets
+  std::uint64_t number_ = 0;     // of the last line read, from 1
+  std::uint64_t free_form_ = 0;
+  bool is_at_end_ = false;
+};
+
+}  // namespace surfeit
