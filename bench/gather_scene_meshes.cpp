@@ -94,7 +94,7 @@ Result<SceneGeometry> loadMeshScene(const std::string& name, const std::string& 
   const glm::vec3 extent = geometry.mesh.bounds().extent();
   const float size = std::max({extent.x, extent.y, extent.z});
   if (scene.ground_up_axis >= 0) {
-    addGroundPlane({.enabled = true, .up_axis = scene.ground_up_axis, .size = kGroundSize},
+    addGroundPlane({.enabled = true, .up = UpAxis(scene.ground_up_axis), .size = kGroundSize},
                    geometry.mesh);
   }
   geometry.exact_triangles = geometry.mesh.triangle.size();

@@ -68,6 +68,7 @@ Result<LoadedEnvironment> loadSky(int resolution) {
   SURFEIT_RETURN_IF_ERROR(writeSky(path));
   GatherEnvironment environment;
   environment.path = path;
+  environment.up = UpAxis::kZ;
   Progress quiet;
   SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, EnvironmentMap::load(environment, quiet));
   std::filesystem::remove(path);

@@ -8,7 +8,7 @@ packages=(
   g++ cmake ninja-build ccache
   # Library
   libglm-dev libfmt-dev libtbb-dev libzstd-dev zlib1g-dev libblosc-dev libxxhash-dev libhwy-dev nlohmann-json3-dev
-  libopenexr-dev
+  libopenexr-dev libeigen3-dev libnanoflann-dev
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
   libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev
   # Pictures of docs/gallery.md

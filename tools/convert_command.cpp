@@ -15,6 +15,7 @@
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/number_list.h"
+#include "tools/up_option.h"
 
 namespace surfeit {
 namespace {
@@ -24,8 +25,7 @@ using Matrix = std::array<double, 12>;  // as ConvertOptions::transform
 struct ConvertArguments {
   std::vector<std::string> inputs;
   std::string output;
-  double scale = 1;                                 // of --units
-  Matrix turn{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // of --up
+  double scale = 1;  // of --units
   ConvertOptions options;
 };
 
@@ -60,13 +60,6 @@ double parseUnits(const std::string& text) {
       "--units", fmt::format("found \"{}\", expected FROM:TO, each m, cm, mm, km, in, ft, us-ft or "
                              "the metres of a unit, such as ft:m or 0.5:m",
                              text));
-}
-
-// Turns +z up to +y up, or the other way round.
-Matrix parseUp(const std::string& text) {
-  if (text == "y") return {1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0};
-  if (text == "z") return {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0};
-  throw CLI::ValidationError("--up", fmt::format("found \"{}\", expected y or z", text));
 }
 
 // 12 numbers, or 16 with 0 0 0 1 at the end.
@@ -109,7 +102,7 @@ Status runConvert(ConvertArguments& arguments, CommandContext& context) {
   ConvertOptions options = arguments.options;
   const double scale = arguments.scale;
   const Matrix scaling{scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, scale, 0};
-  options.transform = product(options.transform, product(arguments.turn, scaling));
+  options.transform = product(options.transform, scaling);
   if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(
       const ConvertStats stats,
@@ -144,11 +137,11 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
           "Scales from one unit to another: m, cm, mm, km, in, ft, us-ft or a number of metres")
       ->type_name("FROM:TO")
       ->group(kGroup);
-  command
-      .add_option_function<std::string>(
-          "--up", [&](const std::string& text) { arguments.turn = parseUp(text); },
-          "Turns what is up: y for clouds with +z up, z for clouds with +y up")
-      ->type_name("y|z")
+  addUpOption(
+      command, arguments.options.up,
+      "Turns the cloud so that this is up: from the axis that it states, else from the other "
+      "of y and z",
+      "as it is")
       ->group(kGroup);
   command
       .add_option_function<std::string>(

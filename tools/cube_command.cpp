@@ -13,6 +13,7 @@
 #include "gather/gather_options.h"
 #include "sample/traced_cube.h"
 #include "surfeit/cube.h"
+#include "surfeit/scene.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
@@ -128,6 +129,8 @@ Status runCube(CubeArguments& arguments, CommandContext& context) {
     SURFEIT_ASSIGN_OR_RETURN(traced, traceReference(cube, arguments, context));
   }
   const CubeViews cubes = {&cube, traced ? &*traced : nullptr};
+  SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.scene));
+  arguments.drawing.up = options.environment.up.value_or(info.up);
   SURFEIT_RETURN_IF_ERROR(writeCube(cubes, arguments));
 
   context.say(describe(cube, arguments));
@@ -208,9 +211,6 @@ void addCubePictureOptions(CLI::App& command, CubeArguments& arguments) {
       .add_option("--exposure", drawing.exposure, "Stops of exposure: light times 2^EV in a PNG")
       ->type_name("EV")
       ->default_str("0")
-      ->group(kCubePictureGroup);
-  addChoice<UpAxis>(command, "--up-axis", drawing.up, "Axis that is up in the picture",
-                    {{"y", UpAxis::kY}, {"x", UpAxis::kX}, {"z", UpAxis::kZ}})
       ->group(kCubePictureGroup);
   command
       .add_option("--reference", arguments.reference,

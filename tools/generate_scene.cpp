@@ -14,6 +14,7 @@
 #include "io/scene_generator.h"
 #include "io/surfel_source.h"
 #include "io/surfel_writer.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -79,8 +80,10 @@ Result<GenerateStats> generateScene(const SceneRecipe& recipe, const std::string
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   std::size_t(threads));
   progress.beginPhase("generate", generator.recordCount(), "surfels");
-  SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(output, generator.channels(),
-                                                                     {.progress = &progress}));
+  SURFEIT_ASSIGN_OR_RETURN(
+      SurfelWriter writer,
+      SurfelWriter::create(output, generator.channels(),
+                           {.comments = {upComment(kGeneratedUpAxis)}, .progress = &progress}));
   SURFEIT_RETURN_IF_ERROR(writeRecords(generator, threads, writer, progress));
   SURFEIT_RETURN_IF_ERROR(writer.finish());
   return GenerateStats{generator.recordCount(), generator.area()};

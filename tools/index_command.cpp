@@ -10,6 +10,7 @@
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/number_list.h"
+#include "tools/up_option.h"
 
 namespace surfeit {
 namespace {
@@ -88,6 +89,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
           },
           "What places in the scene are counted from (default: 0, or a corner of a cloud far away)")
       ->type_name("X,Y,Z");
+  addUpOption(*command, options.up, "Axis that is up in the scene",
+              "what the clouds say, z for LAS, else y");
   addTemporaryOption(*command, options.temporary_directory);
   context.addCommonOptions(*command);
   command->footer(

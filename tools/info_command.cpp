@@ -13,6 +13,7 @@
 #include "io/cloud_formats.h"
 #include "io/ply_reader.h"
 #include "io/surfel_source.h"
+#include "io/up_comment.h"
 #include "octree/group_set.h"
 #include "surfeit/scene.h"
 #include "tools/channel_options.h"
@@ -54,6 +55,7 @@ nlohmann::json sceneJson(const SceneInfo& info) {
       {"input_channels", channelNames(info.channels)},
       {"bounds", {vectorJson(info.min), vectorJson(info.max)}},
       {"origin", vectorJson(info.origin)},
+      {"up", std::string(1, upAxisName(info.up))},
       {"node_pages", info.node_pages},
       {"node_page_bytes", info.node_page_bytes},
       {"node_decoded_bytes", info.node_cache_bytes},
@@ -89,6 +91,7 @@ std::string sceneText(const std::string& path, const SceneInfo& info) {
       "{}: Surfeit scene, {} surfels, {} nodes\n"
       "  file           {} ({:.1f} bytes per surfel)\n"
       "  bounds         {} .. {}{}\n"
+      "  up             {}\n"
       "  input had      {}\n"
       "{}"
       "  precision      {}\n"
@@ -97,8 +100,9 @@ std::string sceneText(const std::string& path, const SceneInfo& info) {
       "  provenance     {}",
       path, formatCount(info.surfels), formatCount(info.nodes), formatBytes(info.file_bytes),
       double(info.file_bytes) / double(info.surfels), placeText(info.min, info.origin),
-      placeText(info.max, info.origin), origin, fmt::join(channelNames(info.channels), ", "),
-      groups, info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
+      placeText(info.max, info.origin), origin, upAxisName(info.up),
+      fmt::join(channelNames(info.channels), ", "), groups,
+      info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
       formatBytes(info.node_page_bytes), formatBytes(info.node_cache_bytes),
       formatCount(info.surfel_pages), formatBytes(info.surfel_page_bytes),
       formatBytes(info.surfel_cache_bytes), info.provenance);

@@ -8,6 +8,7 @@
 #include "gather/gather_outputs.h"
 #include "tools/gather_options.h"
 #include "tools/number_list.h"
+#include "tools/up_option.h"
 
 namespace surfeit {
 namespace {
@@ -106,9 +107,7 @@ void addEnvironmentOptions(CLI::App& command, GatherEnvironment& environment) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group(kGroup);
-  addChoice<bool>(command, "--up", environment.y_is_up, "Axis that points up in the scene",
-                  {{"z", false}, {"y", true}})
-      ->group(kGroup);
+  addUpOption(command, environment.up, "Axis that points up", "the scene's")->group(kGroup);
 }
 
 }  // namespace

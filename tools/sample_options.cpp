@@ -107,11 +107,10 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->type_name("\"r g b\"")
       ->group("Ground");
   app.add_option_function<std::string>(
-         "--up", [&ground](const std::string& axis) { ground.up_axis = int(axis[0] - 'x'); },
-         "Axis that points up: x, y or z [y]")
+         "--up", [&ground](const std::string& axis) { ground.up = UpAxis(axis[0] - 'x'); },
+         "Axis that points up: x, y or z; the cloud says so [y]")
       ->check(CLI::IsMember({"x", "y", "z"}))
-      ->type_name("AXIS")
-      ->group("Ground");
+      ->type_name("AXIS");
 }
 
 void addSampleOptions(CLI::App& app, SampleArguments& arguments) {

@@ -101,17 +101,21 @@ void addDisplayOptions(CLI::App& app, float& exposure, glm::vec3& background) {
       ->group(kPictureGroup);
 }
 
-void addCameraOptions(CLI::App& app, CameraOptions& camera) {
+void addCameraOptions(CLI::App& app, CameraOptions& camera, std::optional<UpAxis>& up) {
   addVector(app, "--eye", camera.eye,
             "Where the eye stands. Default: a three-quarter view that frames the cloud; strays "
             "beyond three standard deviations may be cut off");
   addVector(app, "--look-at", camera.look_at,
             "What the eye looks at. Default: the centre of the cloud's bounds");
-  addVector(app, "--up", camera.up, "Direction that is up in the picture. Default: --up-axis");
-  addChoice<UpAxis>(app, "--up-axis", camera.up_axis,
-                    {{"x", UpAxis::kX}, {"y", UpAxis::kY}, {"z", UpAxis::kZ}},
-                    "Axis that is up: x, y or z (default y)")
-      ->type_name("AXIS")
+  app.add_option_function<std::string>(
+         "--up,--up-axis",
+         [&camera, &up](const std::string& text) {
+           const bool is_axis = text == "x" || text == "y" || text == "z";
+           if (is_axis) up = UpAxis(text[0] - 'x');
+           if (!is_axis) camera.up = parseVector("--up", text);
+         },
+         "Axis that is up, x, y or z, or a direction. Default: what the cloud says, else y")
+      ->type_name("AXIS|\"X Y Z\"")
       ->group(kCameraGroup);
   app.add_option("--fov", camera.fov_degrees, "Vertical field of view in degrees (default 35)")
       ->type_name("DEGREES")
@@ -184,7 +188,7 @@ void addPictureOptions(CLI::App& app, ViewOptions& options) {
 }  // namespace
 
 void addViewOptions(CLI::App& app, ViewOptions& options) {
-  addCameraOptions(app, options.camera);
+  addCameraOptions(app, options.camera, options.up);
   addSurfelOptions(app, options);
   addPictureOptions(app, options);
 }

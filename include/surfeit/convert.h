@@ -11,6 +11,7 @@
 #include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -33,6 +34,9 @@ struct ConvertOptions {
   // and width are multiplied by the cube root of |det|, area by its 2/3 power. Types stay, except
   // that integers become floats.
   std::array<double, 12> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  // What is to be up, by a quarter turn before the transform: from the axis that the first input
+  // states, else from the other one of y and z.
+  std::optional<UpAxis> up{};
   std::optional<CropBox> crop{};  // only these positions, as they are written
 
   // Channels by name (docs/files.md), or single properties. With `keep` only these and the

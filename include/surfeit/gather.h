@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -62,9 +64,9 @@ struct GatherWeights {
 // Light from all around, infinitely far away (memo 7.3).
 struct GatherEnvironment {
   std::string path;  // lat-long picture in OpenEXR or Radiance (.hdr), or OpenEXR cube; empty: none
-  float rotation = 0;    // about the up axis, radians, counterclockwise seen from above
-  bool y_is_up = false;  // else z
-  float intensity = 1;   // multiplies it, >= 0
+  float rotation = 0;          // about the up axis, radians, counterclockwise seen from above
+  std::optional<UpAxis> up{};  // absent: the scene's
+  float intensity = 1;         // multiplies it, >= 0
 };
 
 // Which side of a one-sided surfel covers the raster. Only front sides send light; with kBack

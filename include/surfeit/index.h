@@ -11,6 +11,7 @@
 #include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -29,6 +30,8 @@ struct IndexOptions {
   // Absent: 0 for clouds about 0, a corner of their root cube for others (docs/format.md). Scenes
   // of one sequence may share one.
   std::optional<glm::dvec3> origin{};
+  // What is up. Absent: what the inputs say (surfeit/up_axis.h).
+  std::optional<UpAxis> up{};
   // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
   // that the format marks as not to be used.
   std::string filter{};

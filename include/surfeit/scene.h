@@ -8,6 +8,7 @@
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -21,6 +22,7 @@ struct SceneInfo {
   std::uint64_t node_cache_bytes = 0, surfel_cache_bytes = 0;  // all pages decoded
   // Bounds of the surfel positions in the cloud's coordinates, and what the file counts them from.
   glm::dvec3 min{0}, max{0}, origin{0};
+  UpAxis up = kDefaultUpAxis;
   CloudChannels channels;  // what the input brought
   bool full_precision = false;
   std::vector<std::uint32_t> level_pages;  // node pages of levels 0..21

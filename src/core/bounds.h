@@ -26,6 +26,10 @@ struct Box3 {
     max = glm::max(max, other.max);
   }
   Vector extent() const { return isEmpty() ? Vector(0) : max - min; }
+  T longestSide() const {
+    const Vector sides = extent();
+    return std::max({sides.x, sides.y, sides.z});
+  }
   Vector centre() const { return isEmpty() ? Vector(0) : min + T(0.5) * (max - min); }
 };
 using Bounds3 = Box3<float>;
@@ -48,8 +52,7 @@ struct RootCube {
 // The cube for a box: its size is a power of two and its origin a multiple of a 16th of that, so
 // that a sample of a cloud nearly always gives the cube of the whole. A box of size zero gets 1.
 inline RootCube rootCube(const Bounds3d& bounds) {
-  const glm::dvec3 sides = bounds.extent();
-  const double extent = std::max({sides.x, sides.y, sides.z});
+  const double extent = bounds.longestSide();
   RootCube cube;
   if (extent > 0) {
     int exponent = 0;

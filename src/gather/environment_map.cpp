@@ -56,7 +56,8 @@ Result<EnvironmentMap> EnvironmentMap::load(const GatherEnvironment& environment
   for (glm::vec3& texel : map.texels_) texel = glm::vec3(unit * glm::dvec3(texel));
   map.power_ = unit * picture.power;
   map.rotation_ = std::remainder(double(environment.rotation), kTurn);
-  map.first_axis_ = environment.y_is_up ? 2 : 0;
+  // Up is the last of three in cyclic order
+  map.first_axis_ = (static_cast<int>(environment.up.value_or(kDefaultUpAxis)) + 1) % 3;
 
   // Sums of light must stay finite, over many pixels and with what is added later
   constexpr float kBrightest = 1e30f;

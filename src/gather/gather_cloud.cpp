@@ -67,7 +67,7 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   stats.receivers = input.receiverCount();
 
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<const LoadedEnvironment> environment,
-                           loadEnvironment(options, progress));
+                           loadEnvironment(options, scene.header().up, progress));
   RowWriterOptions writing;
   writing.properties = result_rows.properties();
   writing.comments = input.reader().comments();

@@ -132,7 +132,7 @@ Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const CubeRec
   options.eye -= origin;
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<const LoadedEnvironment> environment,
-                           loadEnvironment(options, progress));
+                           loadEnvironment(options, scene.header().up, progress));
   const GatherRules rules(options, environment.get());
   SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
                            planCubeMemory(scene, options, rules, environment.get()));

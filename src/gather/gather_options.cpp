@@ -10,6 +10,7 @@
 #include "gather/gather_outputs.h"
 #include "gather/gather_rules.h"
 #include "gather/raster_cube.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -113,9 +114,16 @@ void setQuality(QualityPreset preset, GatherQuality& quality) {
 }
 
 Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
+                                                                 UpAxis scene_up,
                                                                  Progress& progress) {
-  if (options.environment.path.empty()) return std::unique_ptr<const LoadedEnvironment>();
-  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, EnvironmentMap::load(options.environment, progress));
+  GatherEnvironment environment = options.environment;
+  if (environment.path.empty()) return std::unique_ptr<const LoadedEnvironment>();
+  if (!environment.up) {
+    environment.up = scene_up;
+    progress.inform(fmt::format("{}: {} is up, as in the scene (--up)", environment.path,
+                                upAxisName(scene_up)));
+  }
+  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, EnvironmentMap::load(environment, progress));
   EnvironmentCube cube(map, RasterGeometry(options.quality.raster_resolution));
   return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
 }

@@ -20,6 +20,7 @@ GatherOptions withDefaults(GatherOptions options);
 // The environment that is asked for, ready for a raster of that resolution; null when there is
 // none. Errors: as EnvironmentMap::load.
 Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
+                                                                 UpAxis scene_up,
                                                                  Progress& progress);
 
 // How the pages of the scene are read.

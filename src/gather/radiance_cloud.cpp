@@ -31,6 +31,7 @@
 #include "io/output_target.h"
 #include "io/surfel_writer.h"
 #include "io/temporary_name.h"
+#include "io/up_comment.h"
 #include "octree/index_plan.h"
 #include "octree/paged_octree.h"
 #include "octree/parallel.h"
@@ -151,6 +152,7 @@ class RadianceJob {
   Progress& progress_;
   RadianceStats stats_;
   std::uint64_t held_bytes_ = 0;  // by the writer, at most
+  UpAxis up_ = kDefaultUpAxis;
   std::chrono::steady_clock::time_point phase_begin_ = std::chrono::steady_clock::now();
 
   std::mutex mutex_;  // guards what follows
@@ -163,6 +165,7 @@ Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
   SURFEIT_ASSIGN_OR_RETURN(PhotonCloud photons,
                            PhotonCloud::open(inputs, options_.channels, options_.part,
                                              options_.filter, options_.color_range));
+  up_ = photons.up();
   SURFEIT_RETURN_IF_ERROR(planThreads());
   // A name that cannot be written is refused before the work
   const std::uint64_t records = photons.recordCount();
@@ -217,6 +220,7 @@ Result<SurfelWriter> RadianceJob::createWriter(const std::string& result_path,
   RowWriterOptions writing;
   if (held_bytes_ > 0) writing.count = most_surfels;  // so that too many are refused at once
   writing.memory_bytes = stats_.memory_bytes / 2;
+  writing.comments = {upComment(up_)};
   writing.progress = told;
   return SurfelWriter::create(result_path, channels, std::move(writing), origin);
 }

@@ -17,6 +17,7 @@
 #include "io/photon_names.h"
 #include "io/surfel_names.h"
 #include "io/temporary_name.h"
+#include "io/up_comment.h"
 #include "octree/local_density.h"
 
 namespace surfeit {
@@ -218,6 +219,9 @@ Result<PhotonCloud> PhotonCloud::open(const std::vector<std::string>& inputs,
   cloud.opening_.color_range = color_range;
   for (const std::string& path : inputs) {
     SURFEIT_ASSIGN_OR_RETURN(const PhotonFile file, PhotonFile::open(path, cloud.opening_));
+    if (cloud.record_count_ == 0) {
+      cloud.up_ = statedUpAxis(file.reader->comments()).value_or(kDefaultUpAxis);
+    }
     cloud.record_count_ += file.photons().count;
   }
   return cloud;

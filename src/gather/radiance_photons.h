@@ -14,6 +14,7 @@
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -80,6 +81,8 @@ class PhotonCloud {
                                   ColorRange color_range = ColorRange::kAuto);
 
   std::uint64_t recordCount() const { return record_count_; }
+  // What the first input says is up.
+  UpAxis up() const { return up_; }
 
   // Reads all inputs. `result_path` and `directory` name the temporary file as long as it needs a
   // name. Notes tell of albedo that is made up and records that are skipped, or the first of those
@@ -103,6 +106,7 @@ class PhotonCloud {
 
   std::vector<std::string> inputs_;
   RowReaderOptions opening_;
+  UpAxis up_ = kDefaultUpAxis;
   std::uint64_t record_count_ = 0;
   PositionalFile file_;
   std::vector<std::byte> buffer_;  // rows to be written at the end of the file

@@ -32,27 +32,31 @@
 #include "io/formats/vdb_writer.h"
 #include "io/formats/xyz_reader.h"
 #include "io/formats/xyz_writer.h"
+#include "io/moved_positions.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
 
 // Formats with a magic first; text, which is recognised by looking at more, last.
 constexpr CloudFormat kFormats[] = {
-    {"PLY", ".ply", recognisesPly, openPlyRows, createPlyRows},
-    {"OpenEXR", ".exr", recognisesExr, openExr, createExr, false},
-    {"PTC", ".ptc", recognisesPtc, openPtc, createPtc},
-    {"OpenVDB", ".vdb", recognisesVdb, openVdb, createVdb, false},
-    {"LAS", ".las", recognisesLas, openLas, createLas},
+    {"PLY", ".ply", recognisesPly, openPlyRows, createPlyRows, CloudFormat::kStatesUp},
+    {"OpenEXR", ".exr", recognisesExr, openExr, createExr,
+     CloudFormat::kReadInPlaces | CloudFormat::kFloatPositions},
+    {"PTC", ".ptc", recognisesPtc, openPtc, createPtc, CloudFormat::kFloatPositions},
+    {"OpenVDB", ".vdb", recognisesVdb, openVdb, createVdb,
+     CloudFormat::kReadInPlaces | CloudFormat::kStatesUp},
+    {"LAS", ".las", recognisesLas, openLas, createLas, CloudFormat::kHasUpZ},
     {"PCD", "", recognisesPcd, openPcd, nullptr},
     {"PRT", ".prt", recognisesPrt, openPrt, createPrt},
     {"PRT 2", "", recognisesPrt2, openPrt2, nullptr},
-    {"BGEO", ".bgeo", recognisesBgeo, openBgeo, createBgeo},
+    {"BGEO", ".bgeo", recognisesBgeo, openBgeo, createBgeo, CloudFormat::kFloatPositions},
     {"BGEO", "", recognisesBgeoJson, openBgeoJson, nullptr},
     {"GEO", "", recognisesBgeoAscii, openBgeoAscii, nullptr},
-    {"PDB", ".pdb", recognisesPdb, openPdb, createPdb},
+    {"PDB", ".pdb", recognisesPdb, openPdb, createPdb, CloudFormat::kFloatPositions},
     // Text stands last
     {"PTX", "", recognisesPtx, openPtx, nullptr},
-    {"xyz text", ".xyz .txt .asc .csv", recognisesXyz, openXyz, createXyz},
+    {"xyz text", ".xyz .txt .asc .csv", recognisesXyz, openXyz, createXyz, CloudFormat::kStatesUp},
 };
 
 // Known formats that are not read, and what to do instead.
@@ -162,7 +166,7 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
   first_bytes.resize(size);
   for (const CloudFormat& format : kFormats) {
     if (format.open == nullptr || !format.recognises(first_bytes)) continue;
-    if (input.isCompressed() && !format.is_read_compressed) {
+    if (input.isCompressed() && format.has(CloudFormat::kReadInPlaces)) {
       return Status::corruption(
           fmt::format("{}: found {} compressed as a whole, expected it as it is: unpack it first "
                       "(gunzip, unzstd)",
@@ -199,6 +203,22 @@ std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std:
   return hasExtension(path, ".vdb") ? count * (row_bytes + sizeof(VdbEntry)) : 0;
 }
 
+namespace {
+
+// Tells when what is up in the rows will not be known from the file. Pictures stay what they are.
+void noteLostUpAxis(const std::string& path, const CloudFormat& format,
+                    const RowWriterOptions& options) {
+  const UpAxis up = statedUpAxis(options.comments).value_or(kDefaultUpAxis);
+  const UpAxis own = format.has(CloudFormat::kHasUpZ) ? UpAxis::kZ : kDefaultUpAxis;
+  if (format.has(CloudFormat::kStatesUp) || own == up || options.progress == nullptr) return;
+  if (format.create == createExr) return;
+  options.progress->note(
+      fmt::format("{}: {} has no place for the up axis, {}: give --up {} where it is read", path,
+                  format.name, upAxisName(up), upAxisName(up)));
+}
+
+}  // namespace
+
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
                                                    const RowWriterOptions& options) {
   // Standard output has no name: it is PLY, or what follows the dash (-.csv)
@@ -207,7 +227,10 @@ Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
   if (writing.like != nullptr) writing.like = &writing.like->file();
   for (const CloudFormat& format : kFormats) {
     if (format.create != nullptr && hasExtension(name, format.extensions)) {
-      return format.create(path, writing);
+      noteLostUpAxis(path, format, writing);
+      SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> writer, format.create(path, writing));
+      return format.has(CloudFormat::kFloatPositions) ? watchPositions(std::move(writer))
+                                                      : std::move(writer);
     }
   }
   return Status::invalidArgument(fmt::format(

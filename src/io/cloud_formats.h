@@ -18,6 +18,7 @@
 #include "io/row_writer.h"
 #include "surfeit/color_range.h"
 #include "surfeit/status.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -49,7 +50,15 @@ struct CloudFormat {
                                              const RowReaderOptions& options);
   Result<std::unique_ptr<RowWriter>> (*create)(const std::string& path,
                                                const RowWriterOptions& options);
-  bool is_read_compressed = true;  // from .gz and .zst: not those that are read from place to place
+  unsigned traits = 0;
+
+  enum Trait : unsigned {
+    kReadInPlaces = 1,    // not from .gz and .zst
+    kStatesUp = 2,        // may say what is up (io/up_comment.h)
+    kHasUpZ = 4,          // has z up, whatever it says
+    kFloatPositions = 8,  // whatever type rows have
+  };
+  bool has(Trait trait) const { return (traits & trait) != 0; }
 };
 inline constexpr std::size_t kMagicBytes = 4096;
 

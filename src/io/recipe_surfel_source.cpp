@@ -28,6 +28,7 @@ class RecipeSurfelSource : public SurfelSource {
   const std::string& path() const override { return path_; }
   std::uint64_t recordCount() const override { return generator_.recordCount(); }
   CloudChannels channels() const override { return generator_.channels(); }
+  UpAxis up() const override { return kGeneratedUpAxis; }
   void setOrigin(const glm::dvec3& origin) override { origin_ = origin; }
   const SurfelDefects& defects() const override { return defects_; }
   std::size_t rowBytes() const override { return kRowBytes; }

@@ -17,8 +17,11 @@
 #include "io/surface_surfel.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
+
+inline constexpr UpAxis kGeneratedUpAxis = UpAxis::kZ;
 
 // A permutation of 0 .. count - 1 that needs no memory: a Feistel network of four rounds on the
 // bits of count - 1, walked along until it comes back into the range (fewer than two steps on

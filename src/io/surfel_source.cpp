@@ -12,6 +12,7 @@
 #include "io/recipe_surfel_source.h"
 #include "io/row_reader.h"
 #include "io/scene_recipe.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -27,6 +28,7 @@ class RowSurfelSource final : public SurfelSource {
   std::uint64_t recordCount() const override { return reader_->element().count; }
   CloudChannels channels() const override { return mapping_.channels(); }
   void setOrigin(const glm::dvec3& origin) override { mapping_.setOrigin(origin); }
+  UpAxis up() const override { return statedUpAxis(reader_->comments()).value_or(kDefaultUpAxis); }
   bool hasFloatPositions() const override { return mapping_.hasFloatPositions(); }
   bool hasCoverage() const override { return mapping_.hasCoverage(); }
   const SurfelDefects& defects() const override { return defects_; }

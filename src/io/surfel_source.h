@@ -15,6 +15,7 @@
 #include "io/surfel_mapping.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -35,6 +36,8 @@ class SurfelSource {
   // Positions of surfels are counted from here from now on: the records' doubles less this, as
   // floats. 0 before. Finite.
   virtual void setOrigin(const glm::dvec3& origin) = 0;
+  // The axis that the cloud says is up.
+  virtual UpAxis up() const { return kDefaultUpAxis; }
   // Whether the records hold positions as floats.
   virtual bool hasFloatPositions() const { return false; }
 

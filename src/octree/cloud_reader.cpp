@@ -10,6 +10,7 @@
 
 #include "core/first_failure.h"
 #include "core/thread_scratch.h"
+#include "io/up_comment.h"
 #include "octree/parallel.h"
 #include "octree/row_fetcher.h"
 #include "octree/scene_rows.h"
@@ -135,6 +136,13 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     for (const std::string& note : source->notes()) {
       reader.notes_.push_back(fmt::format("{}: {}", path, note));
     }
+    const UpAxis up = source->up();
+    if (reader.up_.value_or(up) != up) {
+      reader.notes_.push_back(fmt::format("{}: {} is up, but {} in {}: the scene has that (--up)",
+                                          path, upAxisName(up), upAxisName(*reader.up_),
+                                          inputs[0]));
+    }
+    if (!reader.up_) reader.up_ = up;
     const CloudChannels channels = source->channels();
     reader.lacks_sizes_ =
         reader.lacks_sizes_ || (!channels.radius && !channels.area) || source->hasCoverage();

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -54,6 +55,9 @@ class CloudReader {
   const glm::dvec3& origin() const { return origin_; }
   void setOrigin(const glm::dvec3& origin) { origin_ = origin; }
 
+  // The axis that the inputs say is up; where they disagree that of the first, which notes() tell.
+  UpAxis up() const { return up_.value_or(kDefaultUpAxis); }
+
   // Inputs whose positions are floats.
   const std::vector<std::string>& floatInputs() const { return float_inputs_; }
   // What is to be told of the inputs, with their paths.
@@ -85,6 +89,7 @@ class CloudReader {
   RowReaderOptions reading_;
   bool strict_ = false;
   glm::dvec3 origin_{0};
+  std::optional<UpAxis> up_;
   std::vector<std::string> float_inputs_;
   std::size_t read_bytes_ = 0;
   std::uint64_t record_count_ = 0;

@@ -25,6 +25,7 @@
 #include "io/row_transform.h"
 #include "io/row_union.h"
 #include "io/surfel_names.h"
+#include "io/up_comment.h"
 #include "octree/scene_rows.h"
 
 namespace surfeit {
@@ -130,6 +131,16 @@ class Cropper {
   std::array<PlyProperty, 3> properties_;
 };
 
+// The transform behind a quarter turn that brings axis `from` to axis `to`.
+std::array<double, 12> behindTurn(std::array<double, 12> transform, UpAxis from, UpAxis to) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    double& of_from = transform[4 * row + static_cast<std::size_t>(from)];
+    double& of_to = transform[4 * row + static_cast<std::size_t>(to)];
+    of_from = std::exchange(of_to, -of_from);
+  }
+  return transform;
+}
+
 class Converter {
  public:
   Converter(const std::vector<std::string>& inputs, const std::string& output,
@@ -148,6 +159,7 @@ class Converter {
     SURFEIT_ASSIGN_OR_RETURN(reading_.color_range,
                              colorRangeFor(inputs_, output_, options_.color_range));
     SURFEIT_RETURN_IF_ERROR(openInputs());
+    SURFEIT_RETURN_IF_ERROR(placeRows());
     SURFEIT_RETURN_IF_ERROR(createWriter());
     progress_.beginPhase("convert", stats_.records, "records");
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
@@ -188,11 +200,27 @@ class Converter {
     return {};
   }
 
+  // Turns up what is to be up.
+  Status placeRows() {
+    if (!options_.up) return {};
+    const UpAxis other = *options_.up == UpAxis::kY ? UpAxis::kZ : UpAxis::kY;
+    const UpAxis from = statedUpAxis(first_->comments()).value_or(other);
+    if (from == *options_.up) {
+      progress_.inform(
+          fmt::format("{}: {} is up already: not turned", inputs_[0], upAxisName(from)));
+      return {};
+    }
+    SURFEIT_ASSIGN_OR_RETURN(
+        transform_, RowTransform::create(behindTurn(options_.transform, from, *options_.up)));
+    return {};
+  }
+
   Status createWriter() {
     RowWriterOptions writing;
     SURFEIT_ASSIGN_OR_RETURN(writing.properties, chooseProperties(union_.properties(), options_));
     transform_.widenTypes(writing.properties);
     writing.comments = first_->comments();
+    if (options_.up) stateUpAxis(*options_.up, writing.comments);
     if (!options_.crop) writing.count = rows_to_write_;
     writing.memory_bytes = options_.memory_bytes;
     writing.progress = &progress_;

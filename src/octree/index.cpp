@@ -333,8 +333,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
 void Indexer::noteRules() const {
   const CloudTotals& totals = totals_;
   const double step = floatStep(movedBounds(totals.bounds, reader_->origin()));
-  const glm::vec3 sides = totals.bounds.extent();
-  const double spacing = double(std::max({sides.x, sides.y, sides.z})) / std::sqrt(totals.surfels);
+  const double spacing = double(totals.bounds.longestSide()) / std::sqrt(totals.surfels);
   for (const std::string& path : reader_->floatInputs()) {
     if (step <= 1e-3 * spacing) break;  // no more than quantizing moves
     progress_.note(fmt::format(
@@ -378,6 +377,7 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
   header.surfel_group_capacity = kDefaultSurfelGroup;
   header.flatness_limit = kDefaultFlatnessLimit;
   header.origin = reader_->origin();
+  header.up = options_.up.value_or(reader_->up());
   header.bounds = totals_.bounds;
   header.cube = rootCube(totals_.bounds);
   header.channels = totals_.channels;

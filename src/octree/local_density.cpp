@@ -11,107 +11,86 @@
 namespace surfeit {
 namespace {
 
-// Neighbours looked at: on a square grid the 8th is the diagonal one, and pi d^2 / k is right
-// within a fifth; fewer are noisy, more smear edges.
-constexpr std::size_t kNeighbours = 8;
-// Strays: radii are limited to this many times the cloud's median.
-constexpr float kStrayLimit = 8;
+// Neighbours looked at first, and while cells are open: of random places all but one of a thousand
+// cells are settled by 24; scan lines twenty times as far apart as their points take 96.
+constexpr std::size_t kNeighbours[] = {24, 48, 96};
+// Places in a searcher's box, and surfels that it serves at most.
+constexpr std::size_t kMostPlaces = 32768, kServedSurfels = 4096, kFewSurfels = 64;
+// How far the box goes beyond the surfels: so many times their spacing, if they are a sheet.
+constexpr float kMarginSpacings = 6;
+// Strays: radii of open cells are limited to this many times the distance of the neighbours from
+// each other, and off surfaces to this many times the cloud's median.
+constexpr float kOpenLimit = 4, kStrayLimit = 8;
 constexpr std::size_t kSamplePages = 64;
 // Pages whose surfels are sized at once.
 constexpr std::uint32_t kBatchPages = 32;
 
-// Squared distances to the nearest surfels at other positions, ascending.
-struct Nearest {
-  std::array<float, kNeighbours> distance_sq;
-  std::uint64_t coincident = 0;
-
-  Nearest() { distance_sq.fill(std::numeric_limits<float>::infinity()); }
-  float limit() const { return distance_sq.back(); }
-  void add(float d2) {
-    if (d2 == 0) {
-      ++coincident;
-      return;
-    }
-    if (d2 >= limit()) return;
-    std::size_t i = kNeighbours - 1;
-    for (; i > 0 && distance_sq[i - 1] > d2; --i) distance_sq[i] = distance_sq[i - 1];
-    distance_sq[i] = d2;
-  }
-};
-
-// A node to visit, by the least distance that its surfels can have.
-struct Candidate {
-  float distance;
-  NodeRange children;          // of a leaf: where its surfels begin
-  std::uint64_t surfel_count;  // of a leaf, else 0
-};
-
-float leastDistance(const glm::vec3& position, const Node& node) {
-  return std::max(0.f, glm::length(node.position - position) - node.radius);
+Bounds3 boundsOf(std::span<const Surfel> surfels) {
+  Bounds3 bounds;
+  for (const Surfel& surfel : surfels) bounds.add(surfel.position);
+  return bounds;
 }
 
-// Depth first, nearest child first; what is needed of a visited range is copied because the reader
-// may drop its page.
-Status search(const glm::vec3& position, const NodeRange& range, PagedOctree::Reader& reader,
-              Nearest& nearest) {
-  SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(range));
-  std::array<Candidate, 8> candidates;
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const Node& node = nodes[i];
-    candidates[i] = {leastDistance(position, node), childrenOf(node),
-                     node.isLeaf() ? node.surfel_count : 0};
-  }
-  const std::span<Candidate> order = std::span(candidates).first(nodes.size());
-  std::sort(order.begin(), order.end(),
-            [](const Candidate& a, const Candidate& b) { return a.distance < b.distance; });
-  for (const Candidate& candidate : order) {
-    // Positions count, not disks; a slack of one part in a million covers rounding
-    if (candidate.distance * candidate.distance > nearest.limit() * 1.000001f) break;
-    const NodeRange& below = candidate.children;
-    if (candidate.surfel_count == 0) {
-      SURFEIT_RETURN_IF_ERROR(search(position, below, reader, nearest));
-      continue;
-    }
-    const auto visit = [&](std::span<const Surfel> surfels) {
-      for (const Surfel& surfel : surfels) {
-        const glm::vec3 d = surfel.position - position;
-        nearest.add(glm::dot(d, d));
-      }
-    };
-    SURFEIT_RETURN_IF_ERROR(
-        reader.visitSurfels(below.page, below.first, candidate.surfel_count, visit));
-  }
-  return {};
+glm::vec3 normalOf(const Surfel& surfel) {
+  return (surfel.flags & kSurfelSphere) != 0 ? glm::vec3(0) : surfel.normal;
 }
 
 }  // namespace
 
-Result<float> localArea(const glm::vec3& position, PagedOctree::Reader& reader) {
-  Nearest nearest;
-  SURFEIT_RETURN_IF_ERROR(search(position, kRootRange, reader, nearest));
-  const auto end = std::find(nearest.distance_sq.begin(), nearest.distance_sq.end(),
-                             std::numeric_limits<float>::infinity());
-  const auto found = end - nearest.distance_sq.begin();
-  if (found == 0) return 0.f;
-  const float sharers = float(std::max<std::uint64_t>(nearest.coincident, 1));
-  return kPi * *(end - 1) / float(found) / sharers;
-}
-
 SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap, int threads)
     : octree_(octree), overlap_(overlap) {
   for (int i = 0; i < threads; ++i) {
-    searchers_.push_back({std::make_unique<PagedOctree::Reader>(octree)});
+    searchers_.emplace_back().reader = std::make_unique<PagedOctree::Reader>(octree);
   }
 }
 
 SizedSurfelStream::~SizedSurfelStream() = default;
 
-Result<float> SizedSurfelStream::Searcher::areaAt(const glm::vec3& position) {
-  if (!has_last || position != last_position) {
-    SURFEIT_ASSIGN_OR_RETURN(last_area, localArea(position, *reader));
-    last_position = position;
-    has_last = true;
+// The box around the surfels with a margin for their neighbours, as wide as the room for places
+// allows. Surfels of which the box has no room are served in two halves.
+Status SizedSurfelStream::Searcher::serve(std::span<Surfel> surfels, const Sizing& sizing) {
+  const Bounds3 inner = boundsOf(surfels);
+  const float spacing = glm::length(inner.extent()) / std::sqrt(float(surfels.size()));
+  bool fits = false;
+  for (float margin = kMarginSpacings * spacing; !fits && margin >= spacing; margin *= 0.5f) {
+    Bounds3 box = inner;
+    box.min -= margin;
+    box.max += margin;
+    SURFEIT_ASSIGN_OR_RETURN(fits, places.read(box, kMostPlaces, *reader));
   }
+  if (!fits && surfels.size() > kFewSurfels) {
+    const std::size_t half = surfels.size() / 2;
+    SURFEIT_RETURN_IF_ERROR(serve(surfels.first(half), sizing));
+    return serve(surfels.subspan(half), sizing);
+  }
+  for (Surfel& surfel : surfels) {
+    if ((surfel.flags & kSurfelNeedsSize) == 0) continue;
+    SURFEIT_ASSIGN_OR_RETURN(const float area, areaAt(surfel));
+    sizing(surfel, area);
+  }
+  return {};
+}
+
+Result<float> SizedSurfelStream::Searcher::areaAt(const Surfel& surfel) {
+  const glm::vec3& position = surfel.position;
+  if (has_last && position == last_position) return last_area;
+  SurfaceCell cell;
+  for (const std::size_t count : kNeighbours) {
+    if (!places.find(position, count, found)) {
+      SURFEIT_RETURN_IF_ERROR(findPlaces(position, count, *reader, found));
+    }
+    const bool is_last = count == std::end(kNeighbours)[-1] || std::isinf(found.reach);
+    cell = cells.cellOf(found.neighbours, found.reach, normalOf(surfel), is_last);
+    if (cell.is_settled || is_last) break;
+  }
+  last_area = cell.area / float(std::max<std::uint64_t>(found.coincident, 1));
+  // What is open may be a stray, far from neighbours that are close to each other; and strays may
+  // lie all around each other
+  const float most_radius = kOpenLimit * cell.neighbour_spacing;
+  if (!cell.is_settled) last_area = std::min(last_area, kPi * most_radius * most_radius);
+  if (!cell.is_surface) last_area = std::min(last_area, largest_loose_area);
+  last_position = position;
+  has_last = true;
   return last_area;
 }
 
@@ -126,7 +105,7 @@ Status SizedSurfelStream::prepare() {
     SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
                              file.decodeSurfels(page, scratch, surfels_));
     for (std::uint32_t i = 0; i < count; i += 16) {
-      SURFEIT_ASSIGN_OR_RETURN(const float area, searchers_[0].areaAt(surfels_[i].position));
+      SURFEIT_ASSIGN_OR_RETURN(const float area, searchers_[0].areaAt(surfels_[i]));
       if (area > 0) areas.push_back(area);
     }
   }
@@ -139,6 +118,10 @@ Status SizedSurfelStream::prepare() {
   const auto median = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
   std::nth_element(areas.begin(), median, areas.end());
   largest_radius_ = kStrayLimit * std::sqrt(*median * overlap_ / kPi);
+  for (Searcher& searcher : searchers_) {
+    searcher.largest_loose_area = kStrayLimit * kStrayLimit * *median;
+    searcher.has_last = false;
+  }
   return {};
 }
 
@@ -172,19 +155,21 @@ float SizedSurfelStream::coveringArea(float coverage, float radius, float local_
   return std::max(coverage * area, std::numeric_limits<float>::min());
 }
 
+void SizedSurfelStream::applyArea(Surfel& surfel, float area) const {
+  surfel.flags &= ~kSurfelNeedsSize;
+  if (surfel.radius > kPlaceholderSize) {
+    surfel.area = coveringArea(std::min(surfel.area / kPlaceholderSize, 1.f), surfel.radius, area);
+    return;
+  }
+  surfel.radius = area > 0 ? std::sqrt(area * overlap_ / kPi) : largest_radius_;
+  surfel.area = areaOfDisk(surfel.radius, overlap_);
+}
+
 Status SizedSurfelStream::fillSizes(Searcher& searcher, std::span<Surfel> surfels) const {
-  for (Surfel& surfel : surfels) {
-    if ((surfel.flags & kSurfelNeedsSize) == 0) continue;
-    SURFEIT_ASSIGN_OR_RETURN(const float area, searcher.areaAt(surfel.position));
-    surfel.flags &= ~kSurfelNeedsSize;
-    if (surfel.radius > kPlaceholderSize) {
-      surfel.area =
-          coveringArea(std::min(surfel.area / kPlaceholderSize, 1.f), surfel.radius, area);
-      continue;
-    }
-    surfel.radius = std::min(std::sqrt(area * overlap_ / kPi), largest_radius_);
-    if (!(surfel.radius > 0)) surfel.radius = largest_radius_;
-    surfel.area = areaOfDisk(surfel.radius, overlap_);
+  const auto apply = [this](Surfel& surfel, float area) { applyArea(surfel, area); };
+  for (std::size_t begin = 0; begin < surfels.size(); begin += kServedSurfels) {
+    const std::size_t count = std::min(kServedSurfels, surfels.size() - begin);
+    SURFEIT_RETURN_IF_ERROR(searcher.serve(surfels.subspan(begin, count), apply));
   }
   return {};
 }

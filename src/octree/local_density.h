@@ -1,10 +1,11 @@
 // Radius and area from the neighbourhood, for clouds that bring neither (docs/format.md, "Rules for
-// what is missing"): the distance to the k-th nearest neighbour tells the area per surfel.
+// what is missing"): the area is that of the surfel's cell among its neighbours.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -12,7 +13,9 @@
 
 #include "core/spherical_harmonics.h"
 #include "octree/paged_octree.h"
+#include "octree/places.h"
 #include "octree/sorted_surfels.h"
+#include "octree/surface_cell.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -35,7 +38,7 @@ class SizedSurfelStream : public SortedSurfelStream {
 
   // Samples the cloud for the limit below. Call once, before next().
   Status prepare();
-  // No radius becomes larger than this: strays far from everything would cover the scene.
+  // No radius off a surface becomes larger: strays far from everything would cover the scene.
   float largestRadius() const { return largest_radius_; }
 
   Result<std::shared_ptr<const SortedBatch>> next() override;
@@ -45,15 +48,24 @@ class SizedSurfelStream : public SortedSurfelStream {
   // among a million of them should happen once.
   struct Searcher {
     std::unique_ptr<PagedOctree::Reader> reader;
+    PlaceIndex places;
+    SurfaceCells cells;
+    NearestPlaces found;
     bool has_last = false;
     glm::vec3 last_position{0};
     float last_area = 0;
+    float largest_loose_area = std::numeric_limits<float>::infinity();
 
-    Result<float> areaAt(const glm::vec3& position);
+    // Sizes all surfels that need it, which lie close to each other.
+    using Sizing = std::function<void(Surfel& surfel, float area)>;
+    Status serve(std::span<Surfel> surfels, const Sizing& sizing);
+    // The area of a place, shared among the surfels there; 0: unknown.
+    Result<float> areaAt(const Surfel& surfel);
   };
 
   float coveringArea(float coverage, float radius, float local_area) const;
   Status readPages(std::uint32_t end_page);
+  void applyArea(Surfel& surfel, float area) const;
   Status fillSizes(Searcher& searcher, std::span<Surfel> surfels) const;
 
   PagedOctree& octree_;
@@ -68,9 +80,5 @@ class SizedSurfelStream : public SortedSurfelStream {
 inline float areaOfDisk(float radius, float overlap) {
   return std::max(kPi * radius * radius / overlap, std::numeric_limits<float>::min());
 }
-
-// Area per surfel around `position`: pi d^2 / k for the k-th nearest surfel at another position,
-// shared among the surfels that lie at `position` itself. 0 when there is no other position.
-Result<float> localArea(const glm::vec3& position, PagedOctree::Reader& reader);
 
 }  // namespace surfeit

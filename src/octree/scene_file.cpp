@@ -24,7 +24,8 @@ Result<SceneFile> SceneFile::open(PageFile pages) {
   }
   scene.header_ = *header;
   scene.header_.format_version = scene.pages_.formatVersion();
-  if (scene.header_.format_version < 2 && scene.header_.origin != glm::dvec3(0)) {
+  const bool is_of_2 = scene.header_.origin != glm::dvec3(0) || scene.header_.up != kDefaultUpAxis;
+  if (scene.header_.format_version < 2 && is_of_2) {
     return Status::corruption(
         fmt::format("{}: header: reserved space is not zero, expected zero", scene.path()));
   }

@@ -16,6 +16,7 @@
 #include "octree/page_form.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
 #include "surfeit/version.h"
 
 namespace surfeit {
@@ -32,8 +33,9 @@ struct SceneHeader {
   // In the cloud's own coordinates: what positions in this file are counted from, bounds and cube
   // among them. Finite.
   glm::dvec3 origin{0};
-  Bounds3 bounds;               // of the surfel positions
-  RootCube cube;                // the root cell of octree and curve
+  Bounds3 bounds;  // of the surfel positions
+  RootCube cube;   // the root cell of octree and curve
+  UpAxis up = kDefaultUpAxis;
   CloudChannels channels;       // what the input had, as opposed to filled in by rules
   bool full_precision = false;  // pages hold floats instead of quantized values
   // First node page of each level 0..21, and the number of node pages at index 22.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "io/byte_coding.h"
 
@@ -114,6 +115,13 @@ Status checkCounts(const SceneHeader& header, std::uint32_t node_pages,
   return {};
 }
 
+// In the order of their codes: files of version 1 have 0.
+constexpr UpAxis kUpAxes[] = {UpAxis::kY, UpAxis::kZ, UpAxis::kX};
+
+std::uint32_t codeOf(UpAxis up) {
+  return std::uint32_t(std::find(std::begin(kUpAxes), std::end(kUpAxes), up) - std::begin(kUpAxes));
+}
+
 }  // namespace
 
 std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
@@ -132,7 +140,7 @@ std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
   for (const double origin : header.cube.origin) writer.put(origin);
   writer.put(header.cube.size);
   for (const std::uint32_t page : header.level_first_page) writer.put(page);
-  writer.put(std::uint32_t{0});  // reserved
+  writer.put(codeOf(header.up));
   for (int axis = 0; axis < 3; ++axis) writer.put(header.origin[axis]);
   return bytes;
 }
@@ -164,11 +172,12 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
   for (double& origin : header.cube.origin) origin = reader.get<double>();
   header.cube.size = reader.get<double>();
   for (std::uint32_t& page : header.level_first_page) page = reader.get<std::uint32_t>();
-  const std::uint32_t reserved = reader.get<std::uint32_t>();
+  const std::uint32_t up = reader.get<std::uint32_t>();
+  if (up >= std::size(kUpAxes)) return wrongField("up axis", up, "0 to 2");
+  header.up = kUpAxes[up];
   for (int axis = 0; axis < 3; ++axis) header.origin[axis] = reader.get<double>();
   const std::span<const std::byte> unused = reader.take(reader.remaining());
-  if (reserved != 0 ||
-      !std::all_of(unused.begin(), unused.end(), [](std::byte b) { return b == std::byte{0}; })) {
+  if (!std::all_of(unused.begin(), unused.end(), [](std::byte b) { return b == std::byte{0}; })) {
     return wrongField("reserved space", "not zero", "zero");
   }
   SURFEIT_RETURN_IF_ERROR(checkGeometry(header));

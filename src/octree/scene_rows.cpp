@@ -10,6 +10,7 @@
 #include "io/filtered_reader.h"
 #include "io/formats/property_renames.h"
 #include "io/surfel_rows.h"
+#include "io/up_comment.h"
 #include "octree/parallel.h"
 
 namespace surfeit {
@@ -59,6 +60,8 @@ class SceneRowReader final : public RowReader {
     next_ += count;
     return Bytes(buffer.data(), count * rows_.rowBytes());
   }
+
+  std::vector<std::string> comments() const override { return {upComment(scene_.header().up)}; }
 
   Status rewind() override {
     next_page_ = 0;

@@ -207,6 +207,7 @@ Result<SceneInfo> readSceneInfo(const std::string& path) {
   info.min = bounds.min;
   info.max = bounds.max;
   info.origin = header.origin;
+  info.up = header.up;
   info.channels = header.channels;
   info.full_precision = header.full_precision;
   for (int level = 0; level <= kCurveLevels; ++level) {

@@ -97,7 +97,7 @@ void addGroundPlane(const GroundPlane& ground, Mesh& mesh) {
   if (!ground.enabled) return;
   const Bounds3 bounds = mesh.bounds();
   const float diagonal = glm::length(bounds.extent());
-  const int up = ground.up_axis, first = (up + 1) % 3, second = (up + 2) % 3;
+  const int up = int(ground.up), first = (up + 1) % 3, second = (up + 2) % 3;
 
   // (first, second, up) is right-handed, so this order of corners faces up
   glm::vec3 corner = bounds.centre();

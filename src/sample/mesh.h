@@ -14,6 +14,7 @@
 #include "sample/texture.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -87,8 +88,8 @@ Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& 
 // A square on the ground below everything else.
 struct GroundPlane {
   bool enabled = false;
-  int up_axis = 1;  // 0, 1, 2: x, y, z
-  float size = 2;   // edge length over the diagonal of the bounds
+  UpAxis up = kDefaultUpAxis;
+  float size = 2;  // edge length over the diagonal of the bounds
   glm::vec3 albedo{0.5f};
 };
 

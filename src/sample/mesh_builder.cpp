@@ -22,10 +22,9 @@ bool isFinite(const glm::dvec3& v) {
 
 // Tells when floats hold vertices worse than to a thousandth of the size of triangles.
 void noteFarVertices(const std::string& path, const Mesh& mesh, Progress& progress) {
-  const glm::vec3 sides = mesh.bounds().extent();
-  const double size =
-      double(std::max({sides.x, sides.y, sides.z})) / std::sqrt(double(mesh.triangle.size()));
-  const double step = floatStep(movedBounds(mesh.bounds(), glm::dvec3(0)));
+  const Bounds3 bounds = mesh.bounds();
+  const double size = double(bounds.longestSide()) / std::sqrt(double(mesh.triangle.size()));
+  const double step = floatStep(movedBounds(bounds, glm::dvec3(0)));
   if (step <= 1e-3 * size) return;
   progress.note(fmt::format(
       "{}: vertices are taken as floats, which stand {:.2g} apart in a scene so wide, beside "

@@ -29,6 +29,7 @@
 #include "io/photon_names.h"
 #include "io/row_writer.h"
 #include "io/surfel_names.h"
+#include "io/up_comment.h"
 #include "sample/ray_scene.h"
 
 namespace surfeit {
@@ -366,6 +367,7 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
     progress.beginPhase("trace", options.photons, "photons");
     RowWriterOptions writing;
     writing.properties = photonProperties(mesh.origin != glm::dvec3(0));
+    writing.comments = {upComment(options.surroundings.ground.up)};
     writing.progress = &progress;
     SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
                              createRowWriter(output, writing));

@@ -19,6 +19,7 @@
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
 #include "io/surfel_writer.h"
+#include "io/up_comment.h"
 #include "sample/dice.h"
 #include "sample/ray_scene.h"
 
@@ -277,10 +278,9 @@ Status checkSurroundings(const Surroundings& surroundings) {
         fmt::format("light samples {}: expected 1 to 65536", surroundings.lights.samples));
   }
   const GroundPlane& ground = surroundings.ground;
-  if (ground.up_axis < 0 || ground.up_axis > 2 || !(ground.size > 0) || !(ground.size < 1e6f)) {
-    return Status::invalidArgument(fmt::format(
-        "ground of size {} across axis {}: expected a size up to 1e6 and an axis 0 to 2",
-        ground.size, ground.up_axis));
+  if (!(ground.size > 0) || !(ground.size < 1e6f)) {
+    return Status::invalidArgument(
+        fmt::format("ground of size {}: expected a size up to 1e6", ground.size));
   }
   // A sum is finite only when all its terms are
   const auto isFinite = [](const glm::vec3& sum) { return std::isfinite(sum.x + sum.y + sum.z); };
@@ -349,7 +349,10 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.two_sided = channels.long_side = options.is_two_sided;
     SURFEIT_ASSIGN_OR_RETURN(
         SurfelWriter writer,
-        SurfelWriter::create(output, channels, {.progress = &progress}, mesh.origin));
+        SurfelWriter::create(
+            output, channels,
+            {.comments = {upComment(options.surroundings.ground.up)}, .progress = &progress},
+            mesh.origin));
     const SurfelMaker maker(mesh, plan, light.hasLight() ? &light : nullptr, options.is_two_sided);
     SURFEIT_RETURN_IF_ERROR(writeSurfels(plan, maker, stats.threads, writer, progress, stats));
     stats.sliver_surfels = stats.surfels + stats.clear_surfels - plan.surfelCount();

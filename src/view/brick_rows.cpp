@@ -48,6 +48,7 @@ class BrickRows final : public CloudRows {
 
   const std::string& path() const override { return rows_->path(); }
   const PlyElement& element() const override { return element_; }
+  UpAxis up() const override { return rows_->up(); }
   std::vector<std::string> notes() const override { return rows_->notes(); }
   Status rewind() override { return rows_->rewind(); }
   std::optional<Bounds3d> statedBounds() const override { return rows_->statedBounds(); }

@@ -11,18 +11,17 @@
 
 #include "core/bounds.h"
 #include "surfeit/status.h"
+#include "surfeit/up_axis.h"
 #include "view/view_frame.h"
 
 namespace surfeit {
-
-enum class UpAxis : std::uint8_t { kX, kY, kZ };
 
 // What the user asks for; whatever is absent is chosen so that the bounds fill the picture.
 struct CameraOptions {
   std::optional<glm::dvec3> eye;
   std::optional<glm::dvec3> look_at;  // absent: the centre of the bounds
   std::optional<glm::dvec3> up;       // absent: up_axis
-  UpAxis up_axis = UpAxis::kY;
+  UpAxis up_axis = kDefaultUpAxis;
   double fov_degrees = 35;  // vertical field of view, 1..170
 };
 

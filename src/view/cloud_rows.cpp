@@ -6,6 +6,7 @@
 
 #include "io/cloud_formats.h"
 #include "io/row_reader.h"
+#include "io/up_comment.h"
 #include "octree/scene_file.h"
 #include "octree/scene_rows.h"
 
@@ -19,6 +20,7 @@ class FileRows final : public CloudRows {
 
   const std::string& path() const override { return reader_->path(); }
   const PlyElement& element() const override { return reader_->element(); }
+  UpAxis up() const override { return statedUpAxis(reader_->comments()).value_or(kDefaultUpAxis); }
   std::vector<std::string> notes() const override { return reader_->notes(); }
   Status rewind() override { return reader_->rewind(); }
   Result<std::span<const std::byte>> next() override {
@@ -37,6 +39,7 @@ class SceneRows final : public CloudRows {
 
   const std::string& path() const override { return reader_->path(); }
   const PlyElement& element() const override { return reader_->element(); }
+  UpAxis up() const override { return header_.up; }
   Status rewind() override { return reader_->rewind(); }
   Result<std::span<const std::byte>> next() override {
     return reader_->readRows(kBatchRows, buffer_);

@@ -15,6 +15,7 @@
 #include "io/ply_format.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -29,6 +30,8 @@ class CloudRows {
   virtual const std::string& path() const = 0;
   // Names, types and offsets of a row's properties; row_bytes apart.
   virtual const PlyElement& element() const = 0;
+  // The axis that the file says is up.
+  virtual UpAxis up() const = 0;
   // What is to be told of the file, one sentence each.
   virtual std::vector<std::string> notes() const { return {}; }
   // The next rows, empty at the end. Valid until the next call on this object.

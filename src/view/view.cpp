@@ -193,6 +193,8 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
     SURFEIT_ASSIGN_OR_RETURN(rows,
                              addBrickValues(std::move(rows), options.brick, options.filter_width));
   }
+  CameraOptions looking = options.camera;
+  looking.up_axis = options.up.value_or(rows->up());
   const PlyElement& element = rows->element();
   SURFEIT_ASSIGN_OR_RETURN(const RecordDecoder decoder, RecordDecoder::create(element, input));
   const bool is_normal_map = options.mode == ViewMode::kNormals || !has_picture;
@@ -207,12 +209,12 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
   const bool needs_range =
       channel.kind() == ValueKind::kScalar && !options.range && format == PictureFormat::kPng;
   const int width = options.width * options.samples, height = options.height * options.samples;
-  SURFEIT_ASSIGN_OR_RETURN(ViewFrame frame, Camera::createFrame(options.camera, width, height));
+  SURFEIT_ASSIGN_OR_RETURN(ViewFrame frame, Camera::createFrame(looking, width, height));
   SURFEIT_ASSIGN_OR_RETURN(
       const ValueExtent extent,
       findExtent(*rows, decoder, channel, needs_range, !options.camera.eye, frame, progress));
   SURFEIT_ASSIGN_OR_RETURN(const Camera camera,
-                           Camera::create(options.camera, extent.bounds, frame, width, height));
+                           Camera::create(looking, extent.bounds, frame, width, height));
   stats.eye = camera.eye();
   stats.look_at = camera.lookAt();
 
@@ -253,7 +255,7 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
     // The same view, with a pixel for a sample
     SURFEIT_ASSIGN_OR_RETURN(
         const Camera pixel_camera,
-        Camera::create(options.camera, extent.bounds, frame, options.width, options.height));
+        Camera::create(looking, extent.bounds, frame, options.width, options.height));
     SURFEIT_ASSIGN_OR_RETURN(stats.pass_pixels,
                              writePasses(options.passes, *rows, style, pixel_camera, progress));
     if (stats.pass_pixels == 0) {

@@ -24,8 +24,9 @@ enum class ViewMode : std::uint8_t {
 
 struct ViewOptions {
   ViewMode mode = ViewMode::kDiscs;
-  std::string channel;  // view/channel.h; empty: the most telling one
-  CameraOptions camera;
+  std::string channel;             // view/channel.h; empty: the most telling one
+  CameraOptions camera;            // but for its up axis
+  std::optional<UpAxis> up{};      // absent: the cloud's
   int width = 1280, height = 960;  // pixels
   int samples = 2;                 // along each edge of a pixel, 1..8
   float point_size = 1;            // kPoints: edge of a square, pixels

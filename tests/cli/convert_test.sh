@@ -149,7 +149,7 @@ badOptionsAreUsageErrors() {
   says determinant
   run 2 convert points.ply -o none.ply --units m:parsec
   says "--units" "us-ft"
-  run 2 convert points.ply -o none.ply --up x
+  run 2 convert points.ply -o none.ply --up w
   run 2 convert points.ply -o none.ply --crop 0,0,0,1,1
   says "--crop" "six numbers"
   run 2 convert points.ply -o none.ply --crop 0,0,0,-1,1,1

@@ -14,7 +14,7 @@ cubesArePicturesAndValues() {
   run 0 cube cornell.sft "${floor[@]}" -o some.png --show coverage,kind --zoom 2 --exposure 1 --quiet
   [[ -z $said ]] || fail "said with --quiet: $said"
   differentBytes floor.png some.png
-  run 0 cube cornell.sft --at "0.5 0.5 0.9" -o around.png --up-axis z
+  run 0 cube cornell.sft --at "0.5 0.5 0.9" -o around.png --up z
   run 0 cube cornell.sft "${floor[@]}" -o cone.png --cone-angle 0.4 --sides both --max-dist 2
   run 0 cube cornell.sft "${floor[@]}" -o glossy.png --mode glossy --camera 0.5,0.5,2.4 \
     --roughness 0.3 --quality draft

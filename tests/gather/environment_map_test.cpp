@@ -40,7 +40,7 @@ class EnvironmentMapTest : public DirectoryTest {
                       float intensity = 1) const {
     GatherEnvironment options = environment("map.exr");
     options.rotation = rotation;
-    options.y_is_up = y_is_up;
+    options.up = y_is_up ? UpAxis::kY : UpAxis::kZ;
     options.intensity = intensity;
     writeExr(picture, options.path);
     return load(options);

@@ -75,7 +75,7 @@ StatusCode refusalOf(const std::string& path, const CubeReceiver& receiver,
 void expectIntegratesToTheGather(Scene& scene, const CubeReceiver& given,
                                  const GatherOptions& options) {
   Progress progress;
-  const auto environment = loadEnvironment(options, progress);
+  const auto environment = loadEnvironment(options, kDefaultUpAxis, progress);
   ASSERT_TRUE(environment.ok()) << environment.status().message();
   const GatherRules rules(withDefaults(options), environment->get());
   const CubeImage cube = cubeOf(scene, given, options);

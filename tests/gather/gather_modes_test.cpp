@@ -48,6 +48,7 @@ class GatherModes : public testing::Test {
     Progress progress;
     GatherEnvironment environment;
     environment.path = path;
+    environment.up = UpAxis::kZ;
     Result<EnvironmentMap> map = EnvironmentMap::load(environment, progress);
     EXPECT_TRUE(map.ok()) << map.status().message();
     EnvironmentCube cube(*map, RasterGeometry(GatherQuality().raster_resolution));

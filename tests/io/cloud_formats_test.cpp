@@ -15,6 +15,7 @@
 namespace surfeit {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -54,6 +55,35 @@ TEST_F(CloudFormatsTest, FormatsThatAreNotReadAreToldWhatToDo) {
 
 TEST_F(CloudFormatsTest, DamagedCompressionIsToldBeforeTheFormat) {
   EXPECT_THAT(refusal("\x1f\x8b damaged"), HasSubstr("damaged gzip data"));
+}
+
+// A row of points along x, a tenth of a unit apart, as doubles.
+std::vector<std::string> notesOfPoints(const std::string& path, double x) {
+  RowWriterOptions options;
+  for (const char* name : {"x", "y", "z"}) {
+    options.properties.emplace_back();
+    options.properties.back().name = name;
+    options.properties.back().type = PlyType::kFloat64;
+  }
+  const auto writer = createRowWriter(path, options);
+  EXPECT_TRUE(writer.ok()) << writer.status().message();
+  std::vector<double> rows;
+  for (int i = 0; i < 100; ++i) rows.insert(rows.end(), {x + i * .1, 0, 0});
+  EXPECT_TRUE((*writer)->writeRows(std::as_bytes(std::span(rows))).ok());
+  EXPECT_TRUE((*writer)->finish().ok());
+  return (*writer)->notes();
+}
+
+TEST_F(CloudFormatsTest, PositionsThatFloatsMoveAreToldByHowMuch) {
+  for (const char* name : {"a.ptc", "a.bgeo", "a.pdb"}) {
+    EXPECT_THAT(notesOfPoints(path(name), 5e5),
+                Contains(HasSubstr("they move by up to 0.013, beside a spacing of about 0.99")))
+        << name;
+    EXPECT_THAT(notesOfPoints(path(name), 5), Not(Contains(HasSubstr("move by")))) << name;
+  }
+  for (const char* name : {"a.ply", "a.txt", "a.las", "a.prt", "a.vdb"}) {
+    EXPECT_THAT(notesOfPoints(path(name), 5e5), Not(Contains(HasSubstr("move by")))) << name;
+  }
 }
 
 TEST_F(CloudFormatsTest, ChannelsAreNotAllDropped) {

@@ -378,7 +378,11 @@ TEST_F(LasTest, ExtraBytesThatDoNotFitAreTold) {
 
 TEST_F(LasTest, CoordinateReferenceSystemsAreTold) {
   const auto crsOf = [&](const std::vector<std::string>& records) {
-    return openGood(withRecords(makeLas(4, 6, 3), records))->comments();
+    std::vector<std::string> comments =
+        openGood(withRecords(makeLas(4, 6, 3), records))->comments();
+    EXPECT_EQ(comments.front(), "up z");
+    comments.erase(comments.begin());
+    return comments;
   };
   EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 2112, std::string("PROJCS[\"a\",\n  B]\0", 18))}),
               ElementsAre("crs PROJCS[\"a\", B]"));

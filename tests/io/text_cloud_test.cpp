@@ -86,6 +86,20 @@ TEST_F(TextCloudTest, CommasBetweenOtherSeparatorsAreDecimal) {
   EXPECT_EQ(rowOf("418,446;50,290;4,725\n", 0), "x=418.446 y=50.29 z=4.725");
 }
 
+TEST_F(TextCloudTest, UnitsOfPlacesAreTold) {
+  for (const char* head : {"X [ft],Y [ft],Z [ft]", "x (FT);y (FT);z (m)",
+                           "Easting(ft)\tNorthing(ft)\tElevation"}) {
+    EXPECT_EQ(rowOf(std::string(head) + "\n1;2;3\n", 0), "x=1 y=2 z=3") << head;
+    EXPECT_THAT(notes_, Contains(HasSubstr("places are in 'ft'"))) << head;
+  }
+  for (const char* head : {"X (m);Y (m);Z (m)", "x;y;z", "x [Metres];y;z"}) {
+    rowOf(std::string(head) + "\n1;2;3\n", 0);
+    EXPECT_THAT(notes_, Not(Contains(HasSubstr("places are in")))) << head;
+  }
+  rowOf("x;y;z;intensity (ft)\n1;2;3;4\n", 0);
+  EXPECT_THAT(notes_, Not(Contains(HasSubstr("places are in"))));
+}
+
 TEST_F(TextCloudTest, OneDecimalCommaInAnyLineSettlesIt) {
   std::string text;
   for (int i = 0; i < 40000; ++i) text += "100 200 300\n";

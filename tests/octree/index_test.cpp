@@ -287,12 +287,9 @@ TEST_F(IndexTest, GridOfPointsGetsDisksThatJustCoverIt) {
   const Result<ReadScene> scene = readScene(scene_path);
   ASSERT_TRUE(scene.ok());
   for (const Surfel& surfel : scene->surfels) {
-    const bool inside = surfel.position.x > 0.25f && surfel.position.x < 5.65f &&
-                        surfel.position.y > 0.25f && surfel.position.y < 5.65f;
-    if (!inside) continue;
-    // The 8 nearest lie within sqrt(2) spacings: pi 2 s^2 / 8 of area, .79 s^2; overlap 2
-    ASSERT_NEAR(surfel.radius, 0.0707f, 0.002f);
-    ASSERT_NEAR(surfel.area, 0.00785f, 0.0003f);
+    // A cell of s^2, and a disk of twice that
+    ASSERT_NEAR(surfel.radius, 0.0798f, 1e-4f);
+    ASSERT_NEAR(surfel.area, 0.01f, 1e-5f);
     ASSERT_TRUE(surfel.isSphere());
     ASSERT_EQ(surfel.flags, kSurfelSphere);
   }

@@ -13,6 +13,7 @@
 namespace surfeit {
 namespace {
 
+using testing::AnyOf;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -143,18 +144,32 @@ TEST_F(VerifyTest, PagesOfAnotherVersionThanTheHeaderSaysAreCorruption) {
 }
 
 TEST_F(VerifyTest, ReservedBytesOfTheSceneFieldsAreZero) {
-  constexpr std::size_t kReservedAt = 252, kOriginAt = 256, kOriginEnd = 280;
+  constexpr std::size_t kUpAt = 252, kOriginEnd = 280;  // the origin follows the up axis
   for (const bool is_old : {false, true}) {
     const std::string sound =
         bytesOf(is_old ? SURFEIT_TEST_SOURCE_DIR "/golden/v1.sft" : smallScene());
-    for (std::size_t at = kReservedAt; at < kHeaderChecksumAt; ++at) {
-      if (!is_old && at >= kOriginAt && at < kOriginEnd) continue;
+    for (std::size_t at = is_old ? kUpAt : kOriginEnd; at < kHeaderChecksumAt; ++at) {
       std::string file = sound;
       ASSERT_EQ(file[at], 0);
       file[at] = 1;
       sealFile(file);
       replaceContents(path("reserved.sft"), file);
-      EXPECT_THAT(findingsOf(path("reserved.sft")), Contains(HasSubstr("reserved space")));
+      EXPECT_THAT(findingsOf(path("reserved.sft")),
+                  Contains(AnyOf(HasSubstr("reserved space"), HasSubstr("up axis"))));
+    }
+  }
+}
+
+TEST_F(VerifyTest, UpAxesAreThree) {
+  for (const std::uint32_t up : {0u, 1u, 2u, 3u, 0x100u, ~0u}) {
+    std::string file = bytesOf(smallScene());
+    setAt(file, 252, up);
+    sealFile(file);
+    replaceContents(path("up.sft"), file);
+    if (up <= 2) {
+      EXPECT_THAT(findingsOf(path("up.sft")), IsEmpty()) << up;
+    } else {
+      EXPECT_THAT(findingsOf(path("up.sft")), Contains(HasSubstr("up axis"))) << up;
     }
   }
 }

@@ -106,7 +106,7 @@ TEST_F(MeshFiles, GroundPlaneLiesBelowAndFacesUp) {
     ASSERT_TRUE(mesh.ok());
     GroundPlane ground;
     ground.enabled = true;
-    ground.up_axis = axis;
+    ground.up = UpAxis(axis);
     addGroundPlane(ground, *mesh);
     ASSERT_EQ(mesh->triangle.size(), 14u);
     const SurfacePoint point = surfacePoint(*mesh, 13, 0.3f, 0.3f);

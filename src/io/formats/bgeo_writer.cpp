@@ -10,6 +10,7 @@
 #include "core/assert.h"
 #include "io/byte_output.h"
 #include "io/formats/word_channels.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -46,7 +47,7 @@ class BgeoWriter final : public RowWriter {
       return Status::invalidArgument(
           fmt::format("{}: no position, which BGEO files must have", output_.path()));
     }
-    if (!options.comments.empty()) notes_.push_back("comments are not kept");
+    if (hasOtherComments(options.comments)) notes_.push_back("comments are not kept");
     return writeHeader(plan, *position);
   }
 

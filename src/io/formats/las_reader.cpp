@@ -10,6 +10,7 @@
 
 #include "io/formats/fixed_record_reader.h"
 #include "io/formats/property_renames.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -47,7 +48,11 @@ class LasReader : public FixedRecordReader {
   std::string formatName() const override {
     return fmt::format("LAS 1.{} point format {}", header_.minor, header_.point_format);
   }
-  std::vector<std::string> comments() const override { return header_.crs; }
+  std::vector<std::string> comments() const override {
+    std::vector<std::string> comments = header_.crs;
+    stateUpAxis(UpAxis::kZ, comments);  // of elevations
+    return comments;
+  }
   std::vector<std::string> notes() const override { return notes_; }
 
   RowExclusions exclusions() const override {

@@ -18,6 +18,7 @@
 #include "io/formats/las_plan.h"
 #include "io/formats/las_reader.h"
 #include "io/formats/spooled_input.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -47,6 +48,7 @@ class LasWriter final : public RowWriter {
   }
 
   Status open(const RowWriterOptions& options) {
+    std::erase(comments_, upComment(UpAxis::kZ));  // which all LAS files have
     std::optional<LasCrsRecord> crs = lasCrsRecord(comments_);
     if (const LasHeader* const like = lasHeaderOf(options.like)) {
       like_ = *like;

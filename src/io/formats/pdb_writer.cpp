@@ -13,6 +13,7 @@
 #include "io/file.h"
 #include "io/formats/spooled_input.h"
 #include "io/formats/word_channels.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -46,7 +47,7 @@ class PdbWriter final : public RowWriter {
       return Status::invalidArgument(
           fmt::format("{}: no position, which PDB files must have", output_.path()));
     }
-    if (!options.comments.empty()) notes_.push_back("comments are not kept");
+    if (hasOtherComments(options.comments)) notes_.push_back("comments are not kept");
     for (const PlannedChannel& planned : plan) {
       if (planned.name != "position") continue;
       addColumn(planned);  // the first, as all programs write it

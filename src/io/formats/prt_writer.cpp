@@ -12,6 +12,7 @@
 #include "io/byte_coding.h"
 #include "io/byte_output.h"
 #include "io/formats/channel_encoder.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -50,7 +51,7 @@ class PrtWriter final : public RowWriter {
       return Status::invalidArgument(
           fmt::format("{}: no position, which PRT files must have", output_.path()));
     }
-    if (!options.comments.empty()) notes_.push_back("comments are not kept");
+    if (hasOtherComments(options.comments)) notes_.push_back("comments are not kept");
     SURFEIT_RETURN_IF_ERROR(writeHeader(plan));
     is_ready_ = deflateInit(&zlib_, Z_DEFAULT_COMPRESSION) == Z_OK;
     return is_ready_ ? Status() : Status::failed(output_.path() + ": no memory for zlib");

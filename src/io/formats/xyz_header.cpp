@@ -164,16 +164,35 @@ Words split(std::string_view line, char separator) {
   return words;
 }
 
+// Where a unit in brackets begins behind a name; its size when there is none.
+std::size_t beginOfUnit(std::string_view name) {
+  const std::size_t bracket = name.find_first_of("([");
+  const bool has_unit =
+      bracket != name.npos && bracket > 0 && (name.back() == ')' || name.back() == ']');
+  return has_unit ? bracket : name.size();
+}
+
+std::string inLowerCase(std::string_view word) {
+  std::string text(word);
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
 // In lower case, without a unit in brackets.
 std::string plainName(std::string_view word) {
-  std::string name(word);
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const std::size_t bracket = name.find_first_of("([");
-  if (bracket != name.npos && bracket > 0 && (name.back() == ')' || name.back() == ']')) {
-    name.resize(bracket);
-  }
-  return std::string(trimmedLine(name));
+  return inLowerCase(trimmedLine(word.substr(0, beginOfUnit(word))));
+}
+
+// "ft" of "X [ft]"; metres, and no unit, are nothing.
+std::string unitOf(std::string_view word) {
+  const std::size_t begin = beginOfUnit(word);
+  if (begin + 2 > word.size()) return {};
+  const std::string unit =
+      inLowerCase(trimmedLine(word.substr(begin + 1, word.size() - begin - 2)));
+  const bool is_metres =
+      unit == "m" || unit == "metre" || unit == "metres" || unit == "meter" || unit == "meters";
+  return is_metres ? std::string() : unit;
 }
 
 // The letters of the file made fit for a property.
@@ -229,6 +248,11 @@ XyzHeader headerOf(Words words) {
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i].empty()) names[i] = distinct.add(fitName(words[i]));
+  }
+  for (const std::string_view place : {"x", "y", "z"}) {
+    const auto found = std::find(names.begin(), names.end(), place);
+    if (!header.unit.empty() || found == names.end()) continue;
+    header.unit = unitOf(words[static_cast<std::size_t>(found - names.begin())]);
   }
   header.names = std::move(names);
   header.file_names = std::move(words);

@@ -16,6 +16,9 @@ struct XyzHeader {
   std::vector<std::string> names;
   // As the file has them, without quotes.
   std::vector<std::string> file_names;
+  // Of x, y and z, as names have them behind: "ft"; where they differ that of the first that is no m.
+  // Empty: m, or nothing is said.
+  std::string unit;
   // Why a line that names columns cannot be used; empty when it can.
   std::string refusal;
 };

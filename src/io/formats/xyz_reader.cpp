@@ -151,6 +151,11 @@ class XyzReader final : public CountedRowReader {
     head_.end(words.size());
     comments_ = head_.comments();
     if (!head_.note().empty()) notes_.push_back(head_.note());
+    if (const std::string& unit = head_.header().unit; !unit.empty()) {
+      notes_.push_back(fmt::format(
+          "places are in {}, as the names of columns say, and stay so: convert --units scales them",
+          quotePlyText(unit)));
+    }
     SURFEIT_RETURN_IF_ERROR(checkHead(words.size()));
     names_ = head_.header().names;
     if (names_.empty()) {

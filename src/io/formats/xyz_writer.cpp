@@ -10,6 +10,7 @@
 #include "io/channels.h"
 #include "io/ply_format.h"
 #include "io/ply_number.h"
+#include "io/up_comment.h"
 
 namespace surfeit {
 namespace {
@@ -31,6 +32,7 @@ class XyzWriter final : public RowWriter {
 
   Status writeHead(std::vector<std::string> comments) {
     std::string head;
+    std::erase(comments, upComment(kDefaultUpAxis));  // as all text that says nothing
     for (std::string& comment : comments) {
       std::replace_if(
           comment.begin(), comment.end(), [](char c) { return c >= '\0' && c < ' '; }, ' ');

@@ -1,0 +1,294 @@
+#include "octree/surface_cell.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <limits>
+#include <vector>
+
+#include "core/spherical_harmonics.h"
+#include "core/tangent_frame.h"
+
+namespace surfeit {
+namespace {
+
+// Places on a line have this part of their variance, at most, across it.
+constexpr float kLineFlatness = 1e-4f;
+// Sheets are told apart by a gap between them: of half a spacing, or of a fifth where it is four
+// times as wide as the own sheet is thick (two scans of one surface lie closer than that).
+constexpr float kWideGap = 0.5f, kNarrowGap = 0.2f, kGapOverThickness = 4;
+// What lies so close beside a place, in spacings, has no mirror image.
+constexpr float kSharing = 0.05f;
+// What lies so close beside a place, in spacings, shares its cell.
+constexpr float kCoincident = 1e-3f;
+
+// A plane is fitted again where what lies off it is more than this part of the spacing.
+constexpr float kThick = 0.1f;
+// Places all around have a thickness of about a spacing.
+constexpr float kMostThickness = 0.4f;
+constexpr int kSheetPasses = 6;
+// Of a slope from the place to a neighbour that is another sheet's, not its own.
+constexpr float kSteep = 0.7f;
+
+struct Plane {
+  glm::vec3 normal{0};
+  float thickness = 0;   // root mean square of what lies off it
+  bool is_line = false;  // the places lie on one: the plane is any through it
+};
+
+Eigen::Vector3f eigenVector(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+
+// The plane through the neighbours and the place itself, each with its weight, which is 1 without
+// `weights`.
+Plane fitPlane(std::span<const Neighbour> neighbours, std::span<const float> weights = {}) {
+  const auto weightOf = [&](std::size_t i) { return weights.empty() ? 1.f : weights[i]; };
+  float sum = 1;
+  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    mean += weightOf(i) * eigenVector(neighbours[i].offset);
+    sum += weightOf(i);
+  }
+  mean /= sum;
+  Eigen::Matrix3f covariance = mean * mean.transpose();
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    const Eigen::Vector3f d = eigenVector(neighbours[i].offset) - mean;
+    covariance += weightOf(i) * d * d.transpose();
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+  solver.computeDirect(covariance);
+  const Eigen::Vector3f normal = solver.eigenvectors().col(0);
+  Plane plane;
+  plane.normal = {normal.x(), normal.y(), normal.z()};
+  const float length = glm::length(plane.normal);
+  plane.normal = length > 0.5f ? plane.normal / length : glm::vec3(0, 0, 1);
+  plane.thickness = std::sqrt(std::max(solver.eigenvalues()(0), 0.f) / sum);
+  plane.is_line = !(solver.eigenvalues()(1) > kLineFlatness * solver.eigenvalues()(2));
+  return plane;
+}
+
+// The plane of the place's own sheet, where several lie close to each other: what lies off it
+// counts the less, the farther it does (Cauchy's weights, again and again).
+Plane fitSheet(std::span<const Neighbour> neighbours, float spacing, std::vector<float>& weights) {
+  Plane plane = fitPlane(neighbours);
+  weights.resize(neighbours.size());
+  for (int pass = 0; pass < kSheetPasses && plane.thickness > kThick * spacing; ++pass) {
+    const float width = kNarrowGap * spacing;
+    for (std::size_t i = 0; i < neighbours.size(); ++i) {
+      const float above = glm::dot(neighbours[i].offset, plane.normal) / width;
+      weights[i] = 1 / (1 + above * above);
+    }
+    const Plane again = fitPlane(neighbours, weights);
+    plane.normal = again.normal, plane.is_line = again.is_line;
+  }
+  return plane;
+}
+
+// A neighbour in the plane: beside the place, and above it.
+struct Flat {
+  glm::vec2 beside;
+  float above;
+};
+
+// Drops what lies above (`side` 1) or below (-1) the first gap on that side. What lies only far
+// beside the place may belong to a slope: a sheet that goes has something steeply above the place.
+void dropSheet(float side, float spacing, float thickness, std::vector<Flat>& flat,
+               std::vector<float>& heights) {
+  heights.clear();
+  for (const Flat& n : flat) {
+    if (side * n.above > 0) heights.push_back(side * n.above);
+  }
+  std::sort(heights.begin(), heights.end());
+  float below = 0, limit = 0;
+  for (const float height : heights) {
+    const float gap = height - below;
+    if (gap > kWideGap * spacing ||
+        (gap > kNarrowGap * spacing && gap > kGapOverThickness * thickness)) {
+      limit = height;
+      break;
+    }
+    below = height;
+  }
+  if (limit == 0) return;
+  const auto is_beyond = [&](const Flat& n) { return side * n.above >= limit; };
+  const bool is_sheet = std::any_of(flat.begin(), flat.end(), [&](const Flat& n) {
+    return is_beyond(n) && std::abs(n.above) > kSteep * glm::length(n.beside);
+  });
+  const auto beyond = std::count_if(flat.begin(), flat.end(), is_beyond);
+  // A few places are strays of their surface, not a sheet
+  const std::ptrdiff_t fewest = std::ptrdiff_t(flat.size()) / 6;
+  if (is_sheet && beyond >= fewest && std::ptrdiff_t(flat.size()) - beyond >= fewest) {
+    std::erase_if(flat, is_beyond);
+  }
+}
+
+// Whether anything lies so high that there may be a gap below it.
+bool mayBeSheets(const std::vector<Flat>& flat, float spacing) {
+  return std::any_of(flat.begin(), flat.end(),
+                     [&](const Flat& n) { return std::abs(n.above) > kNarrowGap * spacing; });
+}
+
+// How thick the own sheet is: a quarter of the neighbours lie nearer to the plane.
+float thicknessOf(const std::vector<Flat>& flat, std::vector<float>& heights) {
+  heights.clear();
+  for (const Flat& n : flat) heights.push_back(std::abs(n.above));
+  const auto middle = heights.begin() + std::ptrdiff_t(heights.size() / 4);
+  std::nth_element(heights.begin(), middle, heights.end());
+  return heights.empty() ? 0 : *middle;
+}
+
+// The median of how far each neighbour is from the third of the others, since scans come in pairs.
+float spacingAmong(std::span<const Neighbour> neighbours, std::vector<float>& nearest) {
+  nearest.clear();
+  for (const Neighbour& a : neighbours) {
+    float least[3];
+    std::fill(std::begin(least), std::end(least), std::numeric_limits<float>::infinity());
+    for (const Neighbour& b : neighbours) {
+      const float distance = glm::length(a.offset - b.offset);
+      if (&a == &b || distance >= least[2]) continue;
+      least[2] = distance;
+      if (least[2] < least[1]) std::swap(least[1], least[2]);
+      if (least[1] < least[0]) std::swap(least[0], least[1]);
+    }
+    nearest.push_back(least[2]);
+  }
+  const auto middle = nearest.begin() + std::ptrdiff_t(nearest.size() / 2);
+  std::nth_element(nearest.begin(), middle, nearest.end());
+  return *middle;
+}
+
+// A convex polygon around the place, cut by the lines halfway to its neighbours.
+class Cell {
+ public:
+  explicit Cell(float reach) : reach_sq_(2 * reach * reach) {
+    count_ = 4;
+    corners_ = {{{-reach, -reach}, {reach, -reach}, {reach, reach}, {-reach, reach}}};
+  }
+
+  // Keeps what is nearer to the place than to `other`.
+  bool cut(const glm::vec2& other) {
+    const float limit = 0.5f * glm::dot(other, other);
+    if (limit * 0.5f >= reach_sq_) return false;  // (|other| / 2)^2
+    std::array<glm::vec2, kMostCorners> kept;
+    std::size_t kept_count = 0;
+    bool is_cut = false;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec2 &from = corners_[i], &to = corners_[i + 1 == count_ ? 0 : i + 1];
+      const float before = glm::dot(from, other) - limit, after = glm::dot(to, other) - limit;
+      if (before <= 0) {
+        kept[kept_count++] = from;
+      } else {
+        is_cut = true;
+      }
+      if ((before <= 0) != (after <= 0) && kept_count < kMostCorners) {
+        kept[kept_count++] = from + before / (before - after) * (to - from);
+      }
+      if (kept_count + 1 >= kMostCorners) break;
+    }
+    if (!is_cut || kept_count < 3) return false;
+    corners_ = kept;
+    count_ = kept_count;
+    reach_sq_ = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      reach_sq_ = std::max(reach_sq_, glm::dot(corners_[i], corners_[i]));
+    }
+    return true;
+  }
+
+  float reach() const { return std::sqrt(reach_sq_); }
+  float area() const {
+    float twice = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
+      twice += a.x * b.y - a.y * b.x;
+    }
+    return 0.5f * twice;
+  }
+  // Its width along a direction of unit length.
+  float width(const glm::vec2& direction) const {
+    float low = 0, high = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const float at = glm::dot(corners_[i], direction);
+      low = std::min(low, at), high = std::max(high, at);
+    }
+    return high - low;
+  }
+
+ private:
+  static constexpr std::size_t kMostCorners = 64;
+  std::array<glm::vec2, kMostCorners> corners_;
+  std::size_t count_;
+  float reach_sq_;  // of the farthest corner
+};
+
+void flatten(std::span<const Neighbour> neighbours, const glm::vec3& own_normal,
+             const glm::vec3& normal, std::vector<Flat>& flat) {
+  flat.clear();
+  const TangentFrame frame(normal);
+  for (const Neighbour& n : neighbours) {
+    if (glm::dot(n.normal, own_normal) < 0) continue;  // the other side of something thin
+    flat.push_back({{glm::dot(n.offset, frame.tangent), glm::dot(n.offset, frame.bitangent)},
+                    glm::dot(n.offset, normal)});
+  }
+}
+
+}  // namespace
+
+struct SurfaceCells::Scratch {
+  std::vector<Flat> flat;
+  std::vector<float> heights, weights;
+  std::vector<glm::vec2> cutters;
+};
+
+SurfaceCells::SurfaceCells() : scratch_(std::make_unique<Scratch>()) {}
+SurfaceCells::SurfaceCells(SurfaceCells&&) noexcept = default;
+SurfaceCells& SurfaceCells::operator=(SurfaceCells&&) noexcept = default;
+SurfaceCells::~SurfaceCells() = default;
+
+SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float reach,
+                                 const glm::vec3& own_normal, bool is_last) {
+  SurfaceCell cell;
+  if (neighbours.empty()) return cell;
+  const float farthest = glm::length(neighbours.back().offset);
+  const float spacing = farthest * std::sqrt(kPi / float(neighbours.size() + 1));
+  const Plane plane = fitSheet(neighbours, spacing, scratch_->weights);
+  const glm::vec3 normal = own_normal != glm::vec3(0) ? own_normal : plane.normal;
+  std::vector<Flat>& flat = scratch_->flat;
+  flatten(neighbours, own_normal, normal, flat);
+  if (mayBeSheets(flat, spacing)) {
+    const float thickness = thicknessOf(flat, scratch_->heights);
+    dropSheet(1, spacing, thickness, flat, scratch_->heights);
+    dropSheet(-1, spacing, thickness, flat, scratch_->heights);
+  }
+
+  Cell polygon(2 * farthest);
+  float sharers = 1;
+  std::vector<glm::vec2>& cutters = scratch_->cutters;
+  cutters.clear();
+  for (const Flat& n : flat) {
+    if (glm::length(n.beside) < kCoincident * spacing) {
+      ++sharers;
+    } else if (polygon.cut(n.beside)) {
+      cutters.push_back(n.beside);
+    }
+  }
+  if (cutters.empty()) return cell;
+  // Where all places are known, what is open reaches farther than any of them
+  cell.is_surface = plane.thickness < kMostThickness * spacing;
+  cell.is_settled = 2 * polygon.reach() <= std::min(reach, 2 * farthest);
+  if (!cell.is_settled && is_last) {
+    // One close by shares the cell rather than telling its size
+    for (const glm::vec2& cutter : cutters) {
+      if (glm::length(cutter) > kSharing * spacing) polygon.cut(-cutter);
+    }
+    cell.neighbour_spacing = spacingAmong(neighbours, scratch_->heights);
+  }
+  // Of a line all that is known is a width: the piece is a square of it
+  const float width = plane.is_line ? polygon.width(glm::normalize(cutters[0])) : 0;
+  cell.area = (plane.is_line ? width * width : polygon.area()) / sharers;
+  return cell;
+}
+
+}  // namespace surfeit

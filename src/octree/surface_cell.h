@@ -1,0 +1,48 @@
+// The piece of a surface that is nearer to a place than to its neighbours: the place's cell of
+// their Voronoi diagram, in the plane that touches the surface there. What clouds without areas are
+// given (docs/format.md, "Rules for what is missing").
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+
+namespace surfeit {
+
+// Another place, from the one in question.
+struct Neighbour {
+  glm::vec3 offset{0};
+  glm::vec3 normal{0};  // zero: none
+};
+
+struct SurfaceCell {
+  float area = 0;  // 0: the neighbours do not tell
+  // Whether places beyond the last neighbour would not change it.
+  bool is_settled = false;
+  // Whether the neighbours lie on one, rather than all around.
+  bool is_surface = false;
+  // Of cells that stay open: how far the neighbours are from each other.
+  float neighbour_spacing = 0;
+};
+
+// One thread at a time: it keeps memory between calls.
+class SurfaceCells {
+ public:
+  SurfaceCells();
+  SurfaceCells(SurfaceCells&&) noexcept;
+  SurfaceCells& operator=(SurfaceCells&&) noexcept;
+  ~SurfaceCells();
+
+  // `neighbours`: all that are nearer than `reach`, ascending; none at the place itself. `normal`:
+  // of the place; zero: that of the plane through all. Neighbours on another sheet (turned away, or
+  // above or below with nothing between) do not count. With `is_last` there will be no more of
+  // them: a cell that is open, at the edge of a surface, is closed by their mirror images.
+  SurfaceCell cellOf(std::span<const Neighbour> neighbours, float reach, const glm::vec3& normal,
+                     bool is_last);
+
+ private:
+  struct Scratch;
+  std::unique_ptr<Scratch> scratch_;
+};
+
+}  // namespace surfeit

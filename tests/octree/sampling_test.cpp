@@ -1,0 +1,182 @@
+// Areas that clouds of bare positions are given, whatever the sampling, beside the true ones.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "io/surfel_writer.h"
+#include "io/test_directory.h"
+#include "octree/test_scenes.h"
+#include "surfeit/index.h"
+
+namespace surfeit {
+namespace {
+
+using Places = std::vector<glm::dvec2>;
+
+class SamplingTest : public DirectoryTest {
+ protected:
+  static constexpr int kSide = 100;  // places along an edge of the unit square, about
+
+  double unit() { return std::uniform_real_distribution<double>(0, 1)(random_); }
+  double normal() { return std::normal_distribution<double>(0, 1)(random_); }
+
+  Places scattered(int count) {
+    Places places;
+    for (int i = 0; i < count; ++i) places.emplace_back(unit(), unit());
+    return places;
+  }
+  // Rows `ratio` times as far apart as their points.
+  static Places rows(double ratio) {
+    const int lines = int(std::lround(kSide / std::sqrt(ratio)));
+    const int points = int(std::lround(double(kSide) * kSide / lines));
+    Places places;
+    for (int j = 0; j < lines; ++j) {
+      for (int i = 0; i < points; ++i) places.emplace_back((i + .5) / points, (j + .5) / lines);
+    }
+    return places;
+  }
+  static Places hexagons() {
+    const int lines = int(std::lround(kSide * std::sqrt(2 / std::sqrt(3.))));
+    const int points = int(std::lround(double(kSide) * kSide / lines));
+    Places places;
+    for (int j = 0; j < lines; ++j) {
+      for (int i = 0; i < points; ++i) {
+        places.emplace_back((i + .25 + .5 * (j % 2)) / points, (j + .5) / lines);
+      }
+    }
+    return places;
+  }
+
+  // Adds the places on the plane through `corner` along u and v, each moved by `noise` across.
+  void add(const Places& places, const glm::dvec3& corner, const glm::dvec3& u, const glm::dvec3& v,
+           double noise = 0) {
+    const glm::dvec3 across = glm::normalize(glm::cross(u, v));
+    for (const glm::dvec2& place : places) {
+      Surfel surfel;
+      surfel.position = corner + place.x * u + place.y * v + noise * normal() * across;
+      surfels_.push_back(surfel);
+    }
+  }
+  void addFlat(const Places& places, double noise = 0) {
+    add(places, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, noise);
+  }
+
+  // The sum of the areas that index gives, over `area`.
+  double found(double area) {
+    EXPECT_TRUE(writeSurfels(path("cloud.ply"), surfels_));
+    surfels_.clear();
+    IndexOptions options;
+    options.full_precision = true;
+    Progress quiet;
+    const auto stats = indexClouds({path("cloud.ply")}, path("scene.sft"), options, quiet);
+    EXPECT_TRUE(stats.ok()) << stats.status().message();
+    const Result<ReadScene> scene = readScene(path("scene.sft"));
+    EXPECT_TRUE(scene.ok());
+    double sum = 0;
+    for (const Surfel& surfel : scene->surfels) sum += double(surfel.area);
+    return sum / area;
+  }
+
+  static bool writeSurfels(const std::string& file, const std::vector<Surfel>& surfels) {
+    Result<SurfelWriter> writer = SurfelWriter::create(file, CloudChannels());
+    return writer.ok() && writer->write(surfels).ok() && writer->finish().ok();
+  }
+
+  std::mt19937 random_{7};
+  std::vector<Surfel> surfels_;
+};
+
+TEST_F(SamplingTest, GridsAndLinesOfAPlaneHaveItsArea) {
+  addFlat(hexagons());
+  EXPECT_NEAR(found(1), 1, .03) << "hexagons";
+  for (const double ratio : {1., 2., 5., 10., 20.}) {
+    addFlat(rows(ratio));
+    EXPECT_NEAR(found(1), 1, .01) << ratio;
+  }
+  addFlat(scattered(kSide * kSide));
+  EXPECT_NEAR(found(1), 1, .02) << "random";
+}
+
+TEST_F(SamplingTest, PlacesCountAndNotRecords) {
+  const Places some = scattered(5000);
+  for (int times = 1; times <= 5; times += 2) {
+    for (int i = 0; i < times; ++i) addFlat(some);
+    EXPECT_NEAR(found(1), 1, .02) << times;
+  }
+  addFlat(some);
+  Places half;
+  for (const glm::dvec2& place : some) {
+    if (place.x < .5) half.push_back(place);
+  }
+  addFlat(half);
+  EXPECT_NEAR(found(1), 1, .02) << "half of it twice";
+  // A second scan, a hundredth of the spacing off
+  addFlat(some);
+  add(some, {1e-4, 0, 1e-4}, {1, 0, 0}, {0, 1, 0});
+  EXPECT_NEAR(found(1), 1, .02) << "second scan";
+}
+
+TEST_F(SamplingTest, NoiseDoesNotGrowAreas) {
+  for (const double noise : {.1, .2, .5}) {
+    addFlat(scattered(kSide * kSide), noise / kSide);
+    EXPECT_NEAR(found(1), 1, .03) << "random " << noise;
+    addFlat(rows(1), noise / kSide);
+    EXPECT_NEAR(found(1), 1, .03) << "grid " << noise;
+  }
+}
+
+TEST_F(SamplingTest, CurvedSurfacesAndEdgesHaveTheirArea) {
+  for (int i = 0; i < 20000; ++i) {
+    Surfel surfel;
+    surfel.position = glm::normalize(glm::dvec3(normal(), normal(), normal()));
+    surfels_.push_back(surfel);
+  }
+  EXPECT_NEAR(found(4 * 3.14159265), 1, .01) << "sphere";
+  for (const bool is_random : {false, true}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 u(0), v(0), far(0);
+      u[(axis + 1) % 3] = v[(axis + 2) % 3] = far[axis] = 1;
+      for (const glm::dvec3& corner : {glm::dvec3(0), far}) {
+        add(is_random ? scattered(3600) : rows(1), corner, u, v);
+      }
+    }
+    EXPECT_NEAR(found(6), 1, .03) << "box";
+  }
+}
+
+TEST_F(SamplingTest, WallsThatAreASpacingThickHaveTwoSides) {
+  for (const bool is_random : {false, true}) {
+    addFlat(is_random ? scattered(20000) : rows(1));
+    add(is_random ? scattered(20000) : rows(1), {0, 0, is_random ? 1 / 141. : 1. / kSide},
+        {1, 0, 0}, {0, 1, 0});
+    EXPECT_NEAR(found(2), 1, .035) << is_random;
+  }
+}
+
+TEST_F(SamplingTest, DensitiesMayChangeByAThousand) {
+  Places places = scattered(200000);
+  for (glm::dvec2& place : places) place.x *= .5;
+  const Places sparse = scattered(200);
+  for (const glm::dvec2& place : sparse) places.emplace_back(.5 + .5 * place.x, place.y);
+  addFlat(places);
+  EXPECT_NEAR(found(1), 1, .1);  // the sparse ones beside the dense ones are open on that side
+}
+
+TEST_F(SamplingTest, StraysStaySmall) {
+  addFlat(scattered(kSide * kSide));
+  for (int i = 0; i < 20; ++i) {
+    Surfel stray;
+    stray.position = {50 * unit(), 50 * unit(), 10 + 50 * unit()};
+    surfels_.push_back(stray);
+  }
+  EXPECT_NEAR(found(1), 1, .2);
+}
+
+}  // namespace
+}  // namespace surfeit
