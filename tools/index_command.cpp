@@ -26,7 +26,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
   options.threads = context.common.threads;
   options.full_precision = arguments.precision == "full";
   options.strict = context.common.strict;
-  if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
+  options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
                                                                options, context.progress()));
   const double seconds = context.wallSeconds();
@@ -40,7 +40,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                   formatPhases(stats.phase_seconds), double(stats.surfels) / seconds / 1e6,
                   formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
   return context.writeStats({{"command", "index"},
-                             {"memory_bytes", options.memory_bytes},
+                             {"memory_bytes", stats.memory_bytes},
                              {"input_bytes", stats.input_bytes},
                              {"surfels", stats.surfels},
                              {"skipped_records", stats.skipped_records},
@@ -94,7 +94,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
       "overlap;\n"
       "no radius, that of the area; neither, the distance to the neighbours; no normal, a sphere.\n"
-      "--memory defaults to 1G; 64M is the least for two threads.\n"
+      "--memory defaults to 1G, or three quarters of what the job may hold where that is less; 64M is\n"
+      "the least for two threads.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"

@@ -15,7 +15,8 @@
 namespace surfeit {
 
 struct IndexOptions {
-  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // budget of the process
+  // Budget of the process. 0: 1 GiB, or three quarters of what the job may hold where that is less.
+  std::uint64_t memory_bytes = 0;
   int threads = 0;                    // 0: all that the job may use and the budget feeds
   std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
   float overlap = 2;                  // disk area over surfel area where one must be made up
@@ -37,6 +38,7 @@ struct IndexOptions {
 };
 
 struct IndexStats {
+  std::uint64_t memory_bytes = 0;  // the budget
   std::uint64_t input_bytes = 0;  // of the input files
   std::uint64_t surfels = 0;
   std::uint64_t skipped_records = 0;

@@ -83,8 +83,7 @@ class Bouncer {
         options_(options),
         gather_options_(withDefaults(gatherOptions(options))),
         progress_(progress),
-        temporary_directory_(options.temporary_directory.empty() ? scratchDirectoryOf(result_path)
-                                                                 : options.temporary_directory) {}
+        temporary_directory_(temporaryDirectory(options.temporary_directory, result_path)) {}
 
   Result<BounceStats> run();
 

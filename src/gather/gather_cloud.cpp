@@ -48,9 +48,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   GatherStats stats;
   stats.threads = options.threads;
   stats.memory_bytes = options.memory_bytes;
-  const std::string temporary_directory = options.temporary_directory.empty()
-                                              ? scratchDirectoryOf(result_path)
-                                              : options.temporary_directory;
+  const std::string temporary_directory =
+      temporaryDirectory(options.temporary_directory, result_path);
 
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));

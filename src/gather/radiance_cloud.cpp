@@ -22,6 +22,7 @@
 
 #include "core/first_failure.h"
 #include "core/job_limits.h"
+#include "core/program_memory.h"
 #include "core/spherical_harmonics.h"
 #include "gather/nearest_photons.h"
 #include "gather/radiance_estimate.h"
@@ -190,8 +191,7 @@ Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
 
 // Threads do not show in the result: a budget that does not feed all gets fewer.
 Status RadianceJob::planThreads() {
-  stats_.memory_bytes =
-      options_.memory_bytes != 0 ? options_.memory_bytes : memoryLimitBytes() / 4 * 3;
+  stats_.memory_bytes = options_.memory_bytes != 0 ? options_.memory_bytes : defaultMemoryBytes();
   if (stats_.memory_bytes < kLeastIndexMemory) {
     return Status::budgetTooSmall(
         fmt::format("a memory budget of {:.1f} MiB is too small for an index of photons: {} MiB is "
@@ -223,9 +223,7 @@ Result<SurfelWriter> RadianceJob::createWriter(const std::string& result_path,
 
 // The photons as a scene, open and without a name.
 Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::string& result_path) {
-  const std::string directory = options_.temporary_directory.empty()
-                                    ? scratchDirectoryOf(result_path)
-                                    : options_.temporary_directory;
+  const std::string directory = temporaryDirectory(options_.temporary_directory, result_path);
   stats_.photons = photons.recordCount();
   SURFEIT_RETURN_IF_ERROR(photons.write(
       directory, result_path,
@@ -260,7 +258,8 @@ Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::stri
 }
 
 Result<std::unique_ptr<PagedOctree>> RadianceJob::openOctree(SceneFile scene) const {
-  const std::uint64_t fixed = PagedOctree::fixedBytes(scene, stats_.threads) + kStreamBytes +
+  const std::uint64_t fixed = programBytes(stats_.threads) +
+                              PagedOctree::fixedBytes(scene, stats_.threads) + kStreamBytes +
                               held_bytes_ + std::uint64_t(stats_.threads) * threadBytes(options_);
   const std::uint64_t least = fixed + PagedOctree::leastCacheBytes(scene, stats_.threads);
   if (stats_.memory_bytes < least) {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <filesystem>
 #include <memory>
 #include <new>
 #include <span>
@@ -22,6 +21,7 @@
 #include "gather/quiet_progress.h"
 #include "gather/receiver_sorter.h"
 #include "gather/tune_sample.h"
+#include "io/output_target.h"
 #include "octree/group_set.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
@@ -97,10 +97,7 @@ Result<TuneReport> Tuning::run() {
         "interpolated: leave it out (--max-variation); the gather then needs no more memory");
   }
   gather_ = withDefaults(gather_);
-  if (gather_.temporary_directory.empty()) {
-    std::error_code error;  // where there is none, who spills says so
-    gather_.temporary_directory = std::filesystem::temp_directory_path(error).string();
-  }
+  if (gather_.temporary_directory.empty()) gather_.temporary_directory = spoolDirectory();
 
   // Open scene and receivers
   {

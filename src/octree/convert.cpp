@@ -18,6 +18,8 @@
 #include <string_view>
 #include <utility>
 
+#include "core/job_limits.h"
+#include "core/program_memory.h"
 #include "io/channels.h"
 #include "io/cloud_formats.h"
 #include "io/file.h"
@@ -32,6 +34,7 @@ namespace {
 
 constexpr std::size_t kBatchBytes = 1 << 20;
 constexpr std::size_t kMostNamesTold = 12;
+constexpr std::uint64_t kUsualMemory = std::uint64_t{2} << 30;
 
 std::string listNames(const std::vector<std::string>& names) {
   std::string text;
@@ -314,8 +317,10 @@ Status checkOptions(const std::vector<std::string>& inputs, const ConvertOptions
 }  // namespace
 
 Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
-                                   const std::string& output, const ConvertOptions& options,
+                                   const std::string& output, const ConvertOptions& given,
                                    Progress& progress) {
+  ConvertOptions options = given;
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   try {
     SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
     SURFEIT_ASSIGN_OR_RETURN(RowTransform transform, RowTransform::create(options.transform));

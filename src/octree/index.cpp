@@ -40,6 +40,9 @@ constexpr double kLeastPackedBytes = 10;
 // The octree of bare positions, at full precision.
 constexpr double kBareOutputBytes = 40;
 
+// More memory saves little time.
+constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;
+
 // kIoError when a directory's file system has less room.
 Status checkRoom(const std::string& directory, double needed, const char* advice) {
   SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t available, availableBytes(directory));
@@ -97,8 +100,7 @@ class Indexer {
         threads_(threads),
         progress_(progress),
         clock_(stats_) {
-    temporary_directory_ = options.temporary_directory.empty() ? scratchDirectoryOf(output)
-                                                               : options.temporary_directory;
+    temporary_directory_ = temporaryDirectory(options.temporary_directory, output);
   }
 
   Result<IndexStats> run();
@@ -136,6 +138,7 @@ class Indexer {
 };
 
 Result<IndexStats> Indexer::run() {
+  stats_.memory_bytes = options_.memory_bytes;
   SURFEIT_RETURN_IF_ERROR(checkOptions());
   SURFEIT_RETURN_IF_ERROR(openInputs());
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
@@ -251,7 +254,7 @@ Status Indexer::checkFreeSpace(double packed_bytes) {
 
 Status Indexer::checkOutputRoom() const {
   const double records = double(reader_->recordCount());
-  return checkRoom(scratchDirectoryOf(output_), records * kLeastOutputBytes,
+  return checkRoom(outputDirectory(output_), records * kLeastOutputBytes,
                    "make room, or write the scene elsewhere");
 }
 
@@ -471,7 +474,9 @@ std::string Indexer::provenance() const {
 }  // namespace
 
 Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
-                               const IndexOptions& options, Progress& progress) {
+                               const IndexOptions& given, Progress& progress) {
+  IndexOptions options = given;
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   int threads = options.threads;
   if (threads <= 0) {
     const int available = defaultThreadCount();

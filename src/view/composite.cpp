@@ -179,7 +179,7 @@ Result<Picture> createPicture(const Imath::Box2i& window, const std::string& pat
                     path, width, height, kMaxPixelsPerEdge));
   }
   const std::uint64_t budget =
-      options.memory_bytes > 0 ? options.memory_bytes : memoryLimitBytes() / 4 * 3;
+      options.memory_bytes > 0 ? options.memory_bytes : defaultMemoryBytes();
   const std::uint64_t needed =
       std::uint64_t(width) * std::uint64_t(height) * kBytesPerPixel + kStreamBytes;
   if (needed > budget) {

@@ -98,7 +98,7 @@ Result<ValueExtent> findExtent(CloudRows& rows, const RecordDecoder& decoder,
 
 Status checkBudget(const ViewOptions& options, std::uint64_t framebuffer_bytes) {
   const std::uint64_t budget =
-      options.memory_bytes > 0 ? options.memory_bytes : memoryLimitBytes() / 4 * 3;
+      options.memory_bytes > 0 ? options.memory_bytes : defaultMemoryBytes();
   const std::uint64_t pixels = std::uint64_t(options.width) * std::uint64_t(options.height);
   // Passes and picture are drawn one after the other
   const std::uint64_t pass_bytes =
