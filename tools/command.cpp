@@ -194,7 +194,8 @@ std::string formatCount(std::uint64_t count) {
 
 CLI::Option* addTemporaryOption(CLI::App& command, std::string& directory) {
   return command
-      .add_option("--temp", directory, "Directory of temporary files (default: SLURM_TMPDIR, TMPDIR, beside the output)")
+      .add_option("--temp", directory,
+                  "Directory of temporary files (default: SLURM_TMPDIR, TMPDIR, beside the output)")
       ->type_name("DIRECTORY");
 }
 

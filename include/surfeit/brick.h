@@ -46,7 +46,7 @@ struct BrickOptions {
 
 struct BrickStats {
   std::uint64_t memory_bytes = 0;  // the budget
-  std::uint64_t points = 0;  // records of the inputs
+  std::uint64_t points = 0;        // records of the inputs
   std::uint64_t skipped_points = 0;
   std::vector<std::string> channels;
   double voxel_size = 0;                    // of level 0, the finest

@@ -39,7 +39,7 @@ struct IndexOptions {
 
 struct IndexStats {
   std::uint64_t memory_bytes = 0;  // the budget
-  std::uint64_t input_bytes = 0;  // of the input files
+  std::uint64_t input_bytes = 0;   // of the input files
   std::uint64_t surfels = 0;
   std::uint64_t skipped_records = 0;
   std::uint64_t nodes = 0;

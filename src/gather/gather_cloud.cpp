@@ -17,6 +17,7 @@
 #include <string>
 #include <utility>
 
+#include "core/program_memory.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
@@ -72,7 +73,11 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   writing.comments = input.reader().comments();
   writing.count = stats.receivers;
   writing.like = &input.reader();
-  writing.memory_bytes = stats.memory_bytes / 2;  // of what the caches give back before
+  // Of what the caches give back before
+  writing.memory_parts = 2;
+  writing.memory_beside_bytes = programBytes(options.threads);
+  writing.memory_bytes =
+      (stats.memory_bytes - std::min(stats.memory_bytes, writing.memory_beside_bytes)) / 2;
   writing.progress = &progress;
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
                            createRowWriter(result_path, writing));

@@ -216,7 +216,10 @@ Result<SurfelWriter> RadianceJob::createWriter(const std::string& result_path,
   held_bytes_ = heldWriterBytes(result_path, most_surfels, kResultRowBytes);
   RowWriterOptions writing;
   if (held_bytes_ > 0) writing.count = most_surfels;  // so that too many are refused at once
-  writing.memory_bytes = stats_.memory_bytes / 2;
+  writing.memory_parts = 2;
+  writing.memory_beside_bytes = programBytes(stats_.threads);
+  writing.memory_bytes =
+      (stats_.memory_bytes - std::min(stats_.memory_bytes, writing.memory_beside_bytes)) / 2;
   writing.progress = told;
   return SurfelWriter::create(result_path, channels, std::move(writing), origin);
 }

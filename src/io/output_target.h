@@ -26,8 +26,8 @@ Result<OutputTarget> resolveOutput(const std::string& path);
 // Writes the first `size` bytes of the open file `from` to a stream.
 Status writeToStream(const OutputTarget& target, int from, std::uint64_t size);
 
-// The directory of temporary files that belong to no output: that of the job (SLURM_TMPDIR, TMPDIR),
-// else /tmp.
+// The directory of temporary files that belong to no output: that of the job (SLURM_TMPDIR,
+// TMPDIR), else /tmp.
 std::string spoolDirectory();
 
 // The directory of temporary files on the way to an output: `given` (--temp), else that of the job,

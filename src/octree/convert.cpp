@@ -34,6 +34,8 @@ namespace {
 
 constexpr std::size_t kBatchBytes = 1 << 20;
 constexpr std::size_t kMostNamesTold = 12;
+// Buffers of readers and writer, and batches.
+constexpr std::uint64_t kStreamBytes = std::uint64_t{8} << 20;
 constexpr std::uint64_t kUsualMemory = std::uint64_t{2} << 30;
 
 std::string listNames(const std::vector<std::string>& names) {
@@ -197,7 +199,15 @@ class Converter {
     transform_.widenTypes(writing.properties);
     writing.comments = first_->comments();
     if (!options_.crop) writing.count = rows_to_write_;
-    writing.memory_bytes = options_.memory_bytes;
+    const std::uint64_t beside = programBytes(1) + kStreamBytes;
+    if (options_.memory_bytes < beside) {
+      return Status::budgetTooSmall(
+          fmt::format("a memory budget of {:.1f} MiB is too small to convert: {} MiB is the least "
+                      "that works",
+                      double(options_.memory_bytes) / (1 << 20), (beside >> 20) + 1));
+    }
+    writing.memory_bytes = options_.memory_bytes - beside;
+    writing.memory_beside_bytes = beside;
     writing.progress = &progress_;
     std::unique_ptr<RowReader> like;
     if (!options_.like.empty()) {

@@ -88,8 +88,7 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
   // What is taken in any case, while reading and while building
   const std::uint64_t lists = blockListBytes(task.records, kMinBlockSurfels);
   const std::uint64_t beside = programBytes(task.threads) + kFileBytes + lists;
-  const std::uint64_t read_fixed =
-      CloudReader::memoryBytes(plan.read_bytes, task.threads) + beside;
+  const std::uint64_t read_fixed = CloudReader::memoryBytes(plan.read_bytes, task.threads) + beside;
   const std::uint64_t build_fixed =
       buildOctreeBytes(task.slabs, task.threads) + directoryBytes(task) + beside;
   const std::uint64_t least_bucket =

@@ -36,9 +36,9 @@ class JobLimits : public testing::Test {
   std::string root_;
 
  private:
-  static constexpr const char* kVariables[] = {
-      "SLURM_MEM_PER_NODE",  "SLURM_MEM_PER_CPU", "SLURM_CPUS_ON_NODE",
-      "SLURM_CPUS_PER_TASK", "SLURM_TMPDIR",      "TMPDIR"};
+  static constexpr const char* kVariables[] = {"SLURM_MEM_PER_NODE", "SLURM_MEM_PER_CPU",
+                                               "SLURM_CPUS_ON_NODE", "SLURM_CPUS_PER_TASK",
+                                               "SLURM_TMPDIR",       "TMPDIR"};
 };
 
 TEST_F(JobLimits, WithoutAJobTheMachineIsTheLimit) {
