@@ -143,6 +143,7 @@ Result<GatherMemory> planGatherMemory(const SceneFile& file, std::uint64_t memor
   }
 
   GatherMemory memory;
+  memory.work = work;
   const std::uint64_t for_prefetching = least + memory_bytes / kPrefetchPart;
   for (int threads = work.prefetch_threads; threads > 0 && memory.prefetch_threads == 0;
        --threads) {
