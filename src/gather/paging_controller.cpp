@@ -38,6 +38,11 @@ constexpr double kMuchRepeated = 0.1;
 
 std::uint64_t loads(const CacheCounters& counters) { return counters.misses + counters.prefetches; }
 
+// What a gather works beside loads takes up to so many times as long where it has too little
+// memory: evictions, processor caches that decoding empties (mostly 1 to 2 times, 4.3 at worst in
+// tests/gather/memory_advice_test.cpp on a loaded machine). Advice counts on no more than the rest.
+constexpr double kStarvedWork = 4;
+
 double secondsPerLoad(const CacheCounters& counters) {
   return loads(counters) > 0 ? double(counters.load_ns) * 1e-9 / double(loads(counters)) : 0;
 }
@@ -227,14 +232,18 @@ void PagingController::advise(const Moment& now) const {
                              octree_.surfelDistances()->curve(now.surfels.requests),
                              secondsPerLoad(now.nodes), secondsPerLoad(now.surfels)};
 
-  // All seconds are those of all threads together
+  // All seconds are those of all threads together. Who reads ahead takes time from the others,
+  // unless there are processors to spare: then this advises too much rather than too little
   const double stalled = double(now.nodes.stall_ns + now.surfels.stall_ns) * 1e-9;
-  const double working = std::max(now.seconds * options_.threads - stalled, 0.0);
+  const double ahead = double(now.nodes.prefetches) * loads.node_load_seconds +
+                       double(now.surfels.prefetches) * loads.surfel_load_seconds;
+  const double working = std::max(now.seconds * options_.threads - stalled - ahead, 0.0);
   const double best = working + loads.leastLoadSeconds();
   const double longer = working + predictSplit(file, *plan, loads).load_seconds - best;
   if (longer <= kShortOfMemory * kTuneTimeMargin * best) return;
-  const std::uint64_t enough =
-      memoryForLoads(file, options_.work, loads, (1 + kTuneTimeMargin) * best - working);
+  const double least = loads.leastLoadSeconds();
+  const std::uint64_t enough = memoryForLoads(
+      file, options_.work, loads, least + kTuneTimeMargin * (working / kStarvedWork + least));
   progress_.inform(fmt::format(
       "memory: to read pages again that were evicted takes {:.0f} % of the time with {}; --memory "
       "{} would do",
