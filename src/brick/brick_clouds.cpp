@@ -346,8 +346,10 @@ Status checkOptions(const std::vector<std::string>& inputs, const BrickOptions& 
         fmt::format("voxel size {}: expected more than 0", options.voxel_size));
   }
   if (options.memory_bytes < kLeastMemory) {
-    return Status::budgetTooSmall(fmt::format("a memory budget of {} MiB, expected {} MiB or more",
-                                              options.memory_bytes >> 20, kLeastMemory >> 20));
+    return Status::budgetTooSmall(
+        fmt::format("a memory budget of {} MiB is too small: {} MiB is the "
+                    "least that works",
+                    options.memory_bytes >> 20, kLeastMemory >> 20));
   }
   return {};
 }

@@ -68,6 +68,14 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<const LoadedEnvironment> environment,
                            loadEnvironment(options, progress));
+  // Spend the budget before anything large is allocated
+  GatherWork work = gatherWork(input.receivers(), options);
+  if (environment != nullptr) {
+    work.held_bytes = environment->map.memoryBytes() + environment->cube.memoryBytes();
+  }
+  SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory,
+                           planGatherMemory(scene, stats.memory_bytes, work));
+
   RowWriterOptions writing;
   writing.properties = result_rows.properties();
   writing.comments = input.reader().comments();
@@ -81,14 +89,6 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   writing.progress = &progress;
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
                            createRowWriter(result_path, writing));
-
-  // Spend the budget before anything large is allocated
-  GatherWork work = gatherWork(input.receivers(), options);
-  if (environment != nullptr) {
-    work.held_bytes = environment->map.memoryBytes() + environment->cube.memoryBytes();
-  }
-  SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory,
-                           planGatherMemory(scene, stats.memory_bytes, work));
 
   // Sort
   input.note(progress);

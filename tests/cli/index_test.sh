@@ -5,13 +5,13 @@
 # means nothing. Exit status 77: cannot be tested here.
 source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 
-spilling=(--memory 64M --threads 2 --quiet)
+spilling=(--memory 72M --threads 2 --quiet)
 
-# Runs that spill hold to the budget and 64 MiB more.
+# Runs that spill hold to the budget.
 staysInBudget() {
   local peak
   peak=$(field "$1" peak_resident_bytes)
-  [[ -n ${SURFEIT_SANITIZED:-} ]] || ((peak <= 128 << 20)) || fail "peak memory of $peak bytes"
+  [[ -n ${SURFEIT_SANITIZED:-} ]] || ((peak <= 72 << 20)) || fail "peak memory of $peak bytes"
 }
 
 # sameSceneByEveryWay OPTION...: the cloud of these options makes the same scene, however it is made.
@@ -20,7 +20,7 @@ sameSceneByEveryWay() {
   generate cloud.ply "$@"
   run 0 index cloud.ply -o expected.sft --quiet
   for threads in 1 2 5; do
-    for memory in 80M 256M 1G; do
+    for memory in 128M 256M 1G; do
       run 0 index cloud.ply -o scene.sft --memory "$memory" --threads "$threads" --quiet
       sameBytes scene.sft expected.sft
     done
@@ -38,7 +38,7 @@ scenesDoNotDependOnThreadsBudgetOrOrder() {
   sameSceneByEveryWay --kind terrain --duplicates 50 --surfels 300k
   sameSceneByEveryWay --kind city --surfels 300k
   generate shuffled.ply --kind city --surfels 300k --order shuffled
-  for memory in 64M 1G; do
+  for memory in 72M 1G; do
     run 0 index shuffled.ply -o scene.sft --memory "$memory" --quiet
     sameBytes scene.sft expected.sft
   done
