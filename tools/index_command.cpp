@@ -94,12 +94,13 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
       "overlap;\n"
       "no radius, that of the area; neither, the distance to the neighbours; no normal, a sphere.\n"
-      "--memory defaults to 1G, or three quarters of what the job may hold where that is less; 64M "
-      "is\n"
-      "the least for two threads.\n"
+      "--memory defaults to 1G, or 3/4 of what the job may hold where that is less; 64M is the "
+      "least\n"
+      "for one thread, 72M for two.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
+      "  surfeit index city.ply -o city.sft --memory 80%\n"
       "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");
   command->callback(
       [arguments, &context] { context.run([&] { return runIndex(*arguments, context); }); });

@@ -15,14 +15,16 @@
 namespace surfeit {
 
 struct IndexOptions {
-  // Budget of the process. 0: 1 GiB, or three quarters of what the job may hold where that is less.
+  // Budget, as in GatherOptions. 0: 1 GiB, or three quarters of what the job may hold where that is
+  // less.
   std::uint64_t memory_bytes = 0;
   int threads = 0;                    // 0: all that the job may use and the budget feeds
   std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
   float overlap = 2;                  // disk area over surfel area where one must be made up
   bool full_precision = false;        // keep floats instead of quantized values
   bool strict = false;                // refuse invalid records instead of skipping them
-  std::string temporary_directory{};  // empty: beside the output
+  std::string temporary_directory{};  // empty: where the job wants them (SLURM_TMPDIR, TMPDIR),
+                                      // else beside the output
   // Channels of the inputs to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels{}, part{};
