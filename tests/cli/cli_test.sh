@@ -52,7 +52,7 @@ resultsDoNotDependOnThreadsOrMemory() {
   sameBytes cornell.sft other.sft
   run 0 sample cornell.obj -o receivers.ply --count 300 --light-samples 1
   run 0 gather cornell.sft receivers.ply -o one.ply --mode bleeding --threads 1 --memory 1G
-  run 0 gather cornell.sft receivers.ply -o many.ply --mode bleeding --threads 4 --memory 28M
+  run 0 gather cornell.sft receivers.ply -o many.ply --mode bleeding --threads 4 --memory 48M
   sameBytes one.ply many.ply
 }
 
