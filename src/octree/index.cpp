@@ -39,9 +39,7 @@ constexpr double kUsualOutputBytes = 26;
 constexpr double kLeastPackedBytes = 10;
 // The octree of bare positions, at full precision.
 constexpr double kBareOutputBytes = 40;
-
-// More memory saves little time.
-constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;
+constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;  // more saves little time
 
 // kIoError when a directory's file system has less room.
 Status checkRoom(const std::string& directory, double needed, const char* advice) {
@@ -99,9 +97,8 @@ class Indexer {
         options_(options),
         threads_(threads),
         progress_(progress),
-        clock_(stats_) {
-    temporary_directory_ = temporaryDirectory(options.temporary_directory, output);
-  }
+        temporary_directory_(temporaryDirectory(options.temporary_directory, output)),
+        clock_(stats_) {}
 
   Result<IndexStats> run();
 
@@ -127,7 +124,7 @@ class Indexer {
   const IndexOptions& options_;
   const int threads_;
   Progress& progress_;
-  std::string temporary_directory_;
+  const std::string temporary_directory_;
   std::optional<CloudReader> reader_;
   std::vector<Surfel> sample_;
   IndexPlan plan_;
@@ -146,7 +143,6 @@ Result<IndexStats> Indexer::run() {
   stats_.skipped_records = totals_.skipped;
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
-
   auto buckets = std::make_unique<BucketStream>(
       std::move(store),
       BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
