@@ -39,7 +39,7 @@ surfeit sample out/cornell.obj -o out/receivers.ply --count $receivers --emissio
 say "Gathering ambient occlusion and color bleeding at every receiver, within $memory of memory"
 surfeit gather out/cornell.sft out/receivers.ply -o out/gathered.ply --mode bleeding \
   --memory $memory --stats out/gather.json
-cat out/gather.json
+echo "All statistics: out/index.json and out/gather.json (docs/stats.md)"
 
 say "Drawing the results"
 surfeit view out/gathered.ply -o out/ambient_occlusion.png --channel ao "${camera[@]}"

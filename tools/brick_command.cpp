@@ -25,7 +25,7 @@ Status runBrick(BrickArguments& arguments, CommandContext& context) {
   BrickOptions& options = arguments.options;
   options.threads = context.common.threads;
   options.strict = context.common.strict;
-  if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
+  options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const BrickStats stats, brickClouds(arguments.clouds, arguments.output,
                                                                options, context.progress()));
   const double seconds = std::max(context.wallSeconds(), 1e-9);
@@ -39,7 +39,7 @@ Status runBrick(BrickArguments& arguments, CommandContext& context) {
       formatBytes(stats.file_bytes), seconds, double(stats.points) / seconds / 1e6,
       formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
   return context.writeStats({{"command", "brick"},
-                             {"memory_bytes", options.memory_bytes},
+                             {"memory_bytes", stats.memory_bytes},
                              {"max_error", options.max_error},
                              {"points", stats.points},
                              {"skipped_points", stats.skipped_points},

@@ -11,6 +11,7 @@
 #include <new>
 
 #include "core/job_limits.h"
+#include "core/program_memory.h"
 #include "core/seconds_since.h"
 #include "io/file.h"
 #include "tools/output_check.h"
@@ -44,8 +45,15 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
         ->group(kGroup);
   }
   if (set.memory) {
-    addByteSizeOption(command, "--memory", common.memory_bytes,
-                      "Memory budget of the process, such as 512M or 2G")
+    const auto parse = [this](const std::string& text) {
+      const Result<std::uint64_t> bytes = parseMemory(text);
+      if (!bytes.ok()) throw CLI::ValidationError("--memory", bytes.status().message());
+      common.memory_bytes = *bytes;
+    };
+    command
+        .add_option_function<std::string>(
+            "--memory", parse, "Limit of the process: 512M, 2G, or 80% of what the job may hold")
+        ->type_name("SIZE")
         ->group(kGroup);
   }
   if (set.stats) {
@@ -67,6 +75,7 @@ void CommandContext::run(const std::function<Status()>& body) {
   Status status;
   progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
                                                 common.strict);
+  countProgramInBudgets();
   try {
     status = checkParsed();
     if (status.ok()) status = body();
@@ -136,6 +145,18 @@ int CommandContext::threads() const {
   return common.threads > 0 ? common.threads : defaultThreadCount();
 }
 
+Result<std::uint64_t> parseMemory(const std::string& text) {
+  if (!text.ends_with('%')) return parseByteSize(text);
+  double percent = 0;
+  const char* const end = text.data() + text.size() - 1;
+  const auto [number_end, error] = std::from_chars(text.data(), end, percent);
+  if (error != std::errc() || number_end != end || !(percent > 0 && percent <= 100)) {
+    return Status::invalidArgument(
+        fmt::format("found \"{}\", expected more than 0% and at most 100%", text));
+  }
+  return static_cast<std::uint64_t>(percent / 100 * double(memoryLimitBytes()));
+}
+
 Result<std::uint64_t> parseByteSize(const std::string& text) {
   double value = 0;
   const char* const end = text.data() + text.size();
@@ -150,7 +171,7 @@ Result<std::uint64_t> parseByteSize(const std::string& text) {
   if (error != std::errc() || unit.size() > 1 || power == std::string_view::npos || !(bytes >= 1) ||
       bytes > 1e18) {
     return Status::invalidArgument(
-        fmt::format("found \"{}\", expected a size such as 512M, 2G or 1048576", text));
+        fmt::format("found \"{}\", expected a size such as 512M, 2G, 1048576 or 80%", text));
   }
   return static_cast<std::uint64_t>(bytes);
 }
@@ -171,19 +192,10 @@ std::string formatCount(std::uint64_t count) {
   return fmt::format("{},{:03}", formatCount(count / 1000), count % 1000);
 }
 
-CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,
-                               const std::string& help) {
-  const auto parse = [names, &target](const std::string& text) {
-    const Result<std::uint64_t> bytes = parseByteSize(text);
-    if (!bytes.ok()) throw CLI::ValidationError(names, bytes.status().message());
-    target = *bytes;
-  };
-  return command.add_option_function<std::string>(names, parse, help)->type_name("SIZE");
-}
-
 CLI::Option* addTemporaryOption(CLI::App& command, std::string& directory) {
   return command
-      .add_option("--temp", directory, "Directory of temporary files (default: beside the output)")
+      .add_option("--temp", directory,
+                  "Directory of temporary files (default: SLURM_TMPDIR, TMPDIR, beside the output)")
       ->type_name("DIRECTORY");
 }
 

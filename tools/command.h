@@ -83,16 +83,14 @@ class CommandContext {
 
 // "512M", "2G", "1.5GiB", "4096": bytes; units are powers of 1024.
 Result<std::uint64_t> parseByteSize(const std::string& text);
+// The same, or "80%" of what the job may hold (memoryLimitBytes).
+Result<std::uint64_t> parseMemory(const std::string& text);
 // "1.5 GiB"
 std::string formatBytes(std::uint64_t bytes);
 // "1,234,567"
 std::string formatCount(std::uint64_t count);
 
-// An option that takes a byte size.
-CLI::Option* addByteSizeOption(CLI::App& command, const std::string& names, std::uint64_t& target,
-                               const std::string& help);
-
-// --temp; without it files lie beside the output.
+// --temp; without it files lie where the job wants them, else beside the output.
 CLI::Option* addTemporaryOption(CLI::App& command, std::string& directory);
 
 // Seconds by phase, for people, "read 1.2 s, sort 0.3 s", and for statistics.
@@ -114,6 +112,7 @@ void addConvertCommand(CLI::App& app, CommandContext& context);
 void addIndexCommand(CLI::App& app, CommandContext& context);
 void addInfoCommand(CLI::App& app, CommandContext& context);
 void addVerifyCommand(CLI::App& app, CommandContext& context);
+void addNormalsCommand(CLI::App& app, CommandContext& context);
 void addGatherCommand(CLI::App& app, CommandContext& context);
 void addRadianceCommand(CLI::App& app, CommandContext& context);
 void addBounceCommand(CLI::App& app, CommandContext& context);

@@ -103,7 +103,7 @@ Status runConvert(ConvertArguments& arguments, CommandContext& context) {
   const double scale = arguments.scale;
   const Matrix scaling{scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, scale, 0};
   options.transform = product(options.transform, scaling);
-  if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
+  options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(
       const ConvertStats stats,
       convertClouds(arguments.inputs, arguments.output, options, context.progress()));

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/program_memory.h"
+#include "gather/gather_memory.h"
 #include "gather/gather_options.h"
 #include "sample/traced_cube.h"
 #include "surfeit/cube.h"
@@ -89,10 +91,19 @@ double coverageError(const CubeImage& cube, const CubeImage& traced) {
   return weight_sum > 0 ? std::sqrt(sum / weight_sum) : 0;
 }
 
+// The gather's memory is free again when the picture is drawn.
 Status writeCube(const CubeViews& cubes, const CubeArguments& arguments) {
   SURFEIT_ASSIGN_OR_RETURN(const PictureFormat format, pictureFormat(arguments.picture));
   if (format == PictureFormat::kExr) {
     return writeCubeExr(arguments.picture, cubes, arguments.drawing.up);
+  }
+  const std::uint64_t needed = programBytes(1) + cubePictureBytes(cubes, arguments.drawing);
+  const std::uint64_t budget = withDefaults(arguments.options).memory_bytes;
+  if (budget < needed) {
+    return Status::budgetTooSmall(fmt::format(
+        "a memory budget of {:.1f} MiB is too small for the picture: {} is the least that works; "
+        "fewer panels (--show) or a smaller --zoom take less",
+        double(budget) / (1 << 20), formatMebibytes(needed)));
   }
   PngOptions png;
   png.is_data = true;

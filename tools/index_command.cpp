@@ -27,7 +27,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
   options.threads = context.common.threads;
   options.full_precision = arguments.precision == "full";
   options.strict = context.common.strict;
-  if (context.common.memory_bytes > 0) options.memory_bytes = context.common.memory_bytes;
+  options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
                                                                options, context.progress()));
   const double seconds = context.wallSeconds();
@@ -41,7 +41,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                   formatPhases(stats.phase_seconds), double(stats.surfels) / seconds / 1e6,
                   formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
   return context.writeStats({{"command", "index"},
-                             {"memory_bytes", options.memory_bytes},
+                             {"memory_bytes", stats.memory_bytes},
                              {"input_bytes", stats.input_bytes},
                              {"surfels", stats.surfels},
                              {"skipped_records", stats.skipped_records},
@@ -96,11 +96,14 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->footer(
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
       "overlap;\n"
-      "no radius, that of the area; neither, the distance to the neighbours; no normal, a sphere.\n"
-      "--memory defaults to 1G; 64M is the least for two threads.\n"
+      "no radius, that of the area; neither, its cell among the neighbours; no normal, a sphere.\n"
+      "--memory defaults to 1G, or 3/4 of what the job may hold where that is less; 64M is the "
+      "least\n"
+      "for one thread, 72M for two.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
+      "  surfeit index city.ply -o city.sft --memory 80%\n"
       "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");
   command->callback(
       [arguments, &context] { context.run([&] { return runIndex(*arguments, context); }); });

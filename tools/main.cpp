@@ -20,6 +20,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addIndexCommand(app, context);
   addInfoCommand(app, context);
   addVerifyCommand(app, context);
+  addNormalsCommand(app, context);
   addGatherCommand(app, context);
   addRadianceCommand(app, context);
   addBounceCommand(app, context);

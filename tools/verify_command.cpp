@@ -11,8 +11,9 @@ namespace surfeit {
 namespace {
 
 Status runVerify(const std::string& path, CommandContext& context) {
-  SURFEIT_ASSIGN_OR_RETURN(const VerifyReport report,
-                           verifyScene(path, context.threads(), context.progress()));
+  SURFEIT_ASSIGN_OR_RETURN(
+      const VerifyReport report,
+      verifyScene(path, context.threads(), context.progress(), context.common.memory_bytes));
   SURFEIT_RETURN_IF_ERROR(context.writeStats({{"command", "verify"},
                                               {"pages", report.pages_checked},
                                               {"bytes", report.bytes_checked},
@@ -41,11 +42,12 @@ void addVerifyCommand(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand("verify", "Check every byte of a scene file");
   const auto path = std::make_shared<std::string>();
   command->add_option("SCENE", *path, "Scene file (.sft)")->required();
-  context.addCommonOptions(*command, {.threads = true, .memory = false, .stats = true});
+  context.addCommonOptions(*command);
   command->footer(
       "Exit status 3 and a line for each finding when something is wrong.\n"
-      "Example:\n"
-      "  surfeit verify lion.sft");
+      "Examples:\n"
+      "  surfeit verify lion.sft\n"
+      "  surfeit verify city.sft --memory 96M --threads 8");
   command->callback([path, &context] { context.run([&] { return runVerify(*path, context); }); });
 }
 

@@ -31,10 +31,12 @@ struct BrickOptions {
   // Edge of the finest voxels, scene units. 0: twice the spacing of the points, by the median of
   // their areas, or by their density where they have no sizes.
   double voxel_size = 0;
-  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // budget of the process; at least 64 MiB
-  int threads = 0;                                      // 0: all that the job may use
+  // Budget, as in GatherOptions, at least 64 MiB. 0: 1 GiB, or three quarters of what the job may
+  // hold where that is less.
+  std::uint64_t memory_bytes = 0;
+  int threads = 0;                    // 0: all that the job may use
   bool strict = false;                // refuse invalid records instead of skipping them
-  std::string temporary_directory{};  // empty: beside the output
+  std::string temporary_directory{};  // empty: as for IndexOptions
   // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
   // that the format marks as not to be used.
   std::string filter{};
@@ -43,7 +45,8 @@ struct BrickOptions {
 };
 
 struct BrickStats {
-  std::uint64_t points = 0;  // records of the inputs
+  std::uint64_t memory_bytes = 0;  // the budget
+  std::uint64_t points = 0;        // records of the inputs
   std::uint64_t skipped_points = 0;
   std::vector<std::string> channels;
   double voxel_size = 0;                    // of level 0, the finest

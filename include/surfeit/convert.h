@@ -48,8 +48,9 @@ struct ConvertOptions {
   // of a .las. Empty: the input, where there is only one, which is not moved.
   std::string like{};
   // Memory that a format may take that must hold what it writes until the end (OpenVDB); others
-  // take some MiB, whatever the clouds' size.
-  std::uint64_t memory_bytes = std::uint64_t{2} << 30;
+  // take some MiB, whatever the clouds' size. 0: 2 GiB, or three quarters of what the job may hold
+  // where that is less.
+  std::uint64_t memory_bytes = 0;
   // Which records of the inputs are taken, "classification == 2" (docs/files.md, "Filters"), before
   // all else but `channels`; empty: all but those that the format marks as not to be used.
   std::string filter{};

@@ -122,8 +122,8 @@ struct GatherOptions {
   // With kGlossy, receivers without view_x view_y view_z are looked at from here; NaN: all need
   // theirs.
   glm::dvec3 eye{std::numeric_limits<double>::quiet_NaN()};
-  // Budget of the process: its peak resident memory stays below this plus 64 MiB. 0: three quarters
-  // of what the job may use.
+  // Budget of the job. What the process holds besides, code, libraries and what the caller has, is
+  // not counted (the program counts it). 0: three quarters of what the job may use.
   std::uint64_t memory_bytes = 0;
   int threads = 0;      // 0: all that the job may use
   bool strict = false;  // refuse invalid receivers instead of writing NaN for them

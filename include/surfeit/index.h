@@ -16,13 +16,16 @@
 namespace surfeit {
 
 struct IndexOptions {
-  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  // budget of the process
+  // Budget, as in GatherOptions. 0: 1 GiB, or three quarters of what the job may hold where that is
+  // less.
+  std::uint64_t memory_bytes = 0;
   int threads = 0;                    // 0: all that the job may use and the budget feeds
   std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
   float overlap = 2;                  // disk area over surfel area where one must be made up
   bool full_precision = false;        // keep floats instead of quantized values
   bool strict = false;                // refuse invalid records instead of skipping them
-  std::string temporary_directory{};  // empty: beside the output
+  std::string temporary_directory{};  // empty: where the job wants them (SLURM_TMPDIR, TMPDIR),
+                                      // else beside the output
   // Channels of the inputs to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
   std::string channels{}, part{};
@@ -40,7 +43,8 @@ struct IndexOptions {
 };
 
 struct IndexStats {
-  std::uint64_t input_bytes = 0;  // of the input files
+  std::uint64_t memory_bytes = 0;  // the budget
+  std::uint64_t input_bytes = 0;   // of the input files
   std::uint64_t surfels = 0;
   std::uint64_t skipped_records = 0;
   std::uint64_t nodes = 0;

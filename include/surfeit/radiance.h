@@ -24,8 +24,7 @@ struct RadianceOptions {
   // Disk area over surfel area, 1 to 16. Photons lie at random, so disks must overlap more than
   // those cut from a mesh to leave no gaps: e^-overlap of the surface stays uncovered.
   float overlap = 7;
-  // Budget of the process: its peak resident memory stays below this plus 64 MiB. At least 64 MiB.
-  // 0: three quarters of what the job may use.
+  // As in GatherOptions; at least 64 MiB.
   std::uint64_t memory_bytes = 0;
   int threads = 0;                    // 0: all that the job may use
   bool strict = false;                // refuse invalid photons instead of skipping them

@@ -43,7 +43,10 @@ struct VerifyReport {
 
 // Reads every page and checks every checksum, and the invariants of docs/format.md: references,
 // counts, areas that add up, bounding spheres that hold what is below. Damage ends up in `findings`
-// and the check goes on with the next page. Errors: kIoError, kInterrupted.
-Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress);
+// and the check goes on with the next page. `memory_bytes`: budget; 0: three quarters of what the
+// job may hold; more than some 100 MiB are left alone. Errors: kIoError, kBudgetTooSmall,
+// kInterrupted.
+Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress,
+                                 std::uint64_t memory_bytes = 0);
 
 }  // namespace surfeit

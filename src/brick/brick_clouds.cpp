@@ -24,6 +24,7 @@ namespace surfeit {
 namespace {
 
 constexpr std::uint64_t kLeastMemory = std::uint64_t{64} << 20;
+constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;
 // Readers, the writer, cells of the sweep, and the occupancy of clouds without sizes.
 constexpr std::uint64_t kFixedMemory = std::uint64_t{32} << 20;
 // Edge of the finest voxels over the spacing of the points: 4 points of a surface in each.
@@ -239,8 +240,7 @@ Status BrickBuild::chooseVoxelSize(const AreaMedian& areas) {
 
 RecordSorter::Options BrickBuild::sorterOptions(std::size_t record_bytes) const {
   return {record_bytes, (options_.memory_bytes - kFixedMemory) / 2,
-          options_.temporary_directory.empty() ? scratchDirectoryOf(output_)
-                                               : options_.temporary_directory};
+          temporaryDirectory(options_.temporary_directory, output_)};
 }
 
 // The finest level whose voxels are as large as a point of that area: the points between those of a
@@ -346,8 +346,10 @@ Status checkOptions(const std::vector<std::string>& inputs, const BrickOptions& 
         fmt::format("voxel size {}: expected more than 0", options.voxel_size));
   }
   if (options.memory_bytes < kLeastMemory) {
-    return Status::budgetTooSmall(fmt::format("a memory budget of {} MiB, expected {} MiB or more",
-                                              options.memory_bytes >> 20, kLeastMemory >> 20));
+    return Status::budgetTooSmall(
+        fmt::format("a memory budget of {} MiB is too small: {} MiB is the "
+                    "least that works",
+                    options.memory_bytes >> 20, kLeastMemory >> 20));
   }
   return {};
 }
@@ -355,13 +357,18 @@ Status checkOptions(const std::vector<std::string>& inputs, const BrickOptions& 
 }  // namespace
 
 Result<BrickStats> brickClouds(const std::vector<std::string>& inputs, const std::string& output,
-                               const BrickOptions& options, Progress& progress) {
+                               const BrickOptions& given, Progress& progress) {
+  BrickOptions options = given;
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
   const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
   try {
     std::optional<Result<BrickStats>> result;
     withThreads(threads, [&] { result = BrickBuild(inputs, output, options, progress).run(); });
-    if (result->ok()) (*result)->threads = threads;
+    if (result->ok()) {
+      (*result)->threads = threads;
+      (*result)->memory_bytes = options.memory_bytes;
+    }
     return std::move(*result);
   } catch (const std::bad_alloc&) {
     return Status::failed("out of memory while making a brick map");

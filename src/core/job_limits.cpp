@@ -1,18 +1,21 @@
 #include "core/job_limits.h"
 
 #include <sched.h>
-#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
-#include <limits>
-#include <string>
 
 namespace surfeit {
 namespace {
+
+// The text of an environment variable; absent and empty ones are the same.
+std::string textFromEnvironment(const char* name) {
+  const char* text = std::getenv(name);
+  return text == nullptr ? std::string() : text;
+}
 
 // The positive number in an environment variable, 0 when there is none.
 std::uint64_t numberFromEnvironment(const char* name) {
@@ -41,6 +44,20 @@ void applyCgroupLimits(const std::string& mount, std::string group, const char* 
   }
 }
 
+// Bytes that Slurm gives this job on this node; no limit where it says nothing.
+std::uint64_t slurmMemoryBytes() {
+  std::uint64_t limit = kNoMemoryLimit;
+  if (const std::uint64_t mebibytes = numberFromEnvironment("SLURM_MEM_PER_NODE")) {
+    limit = mebibytes << 20;
+  }
+  if (const std::uint64_t mebibytes = numberFromEnvironment("SLURM_MEM_PER_CPU")) {
+    std::uint64_t cpus = numberFromEnvironment("SLURM_CPUS_ON_NODE");
+    if (cpus == 0) cpus = static_cast<std::uint64_t>(defaultThreadCount());
+    limit = std::min(limit, (mebibytes << 20) * cpus);
+  }
+  return limit;
+}
+
 }  // namespace
 
 int defaultThreadCount() {
@@ -52,14 +69,12 @@ int defaultThreadCount() {
   return std::max(1, static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN)));
 }
 
-std::uint64_t memoryLimitBytes() {
+std::uint64_t memoryLimitBytes(const std::string& root) {
   const std::uint64_t page_bytes = static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
   std::uint64_t limit = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * page_bytes;
-  if (const std::uint64_t mebibytes = numberFromEnvironment("SLURM_MEM_PER_NODE")) {
-    limit = std::min(limit, mebibytes << 20);
-  }
+  limit = std::min(limit, slurmMemoryBytes());
   // Lines of /proc/self/cgroup: "0::/group" (version 2) or "4:memory:/group" (version 1)
-  std::ifstream cgroups("/proc/self/cgroup");
+  std::ifstream cgroups(root + "/proc/self/cgroup");
   for (std::string line; std::getline(cgroups, line);) {
     const std::size_t first = line.find(':');
     const std::size_t second = line.find(':', first + 1);
@@ -67,12 +82,21 @@ std::uint64_t memoryLimitBytes() {
     const std::string controllers = line.substr(first + 1, second - first - 1);
     const std::string group = line.substr(second + 1);
     if (controllers.empty()) {
-      applyCgroupLimits("/sys/fs/cgroup", group, "memory.max", limit);
+      applyCgroupLimits(root + "/sys/fs/cgroup", group, "memory.max", limit);
     } else if (controllers.find("memory") != std::string::npos) {
-      applyCgroupLimits("/sys/fs/cgroup/memory", group, "memory.limit_in_bytes", limit);
+      applyCgroupLimits(root + "/sys/fs/cgroup/memory", group, "memory.limit_in_bytes", limit);
     }
   }
   return limit;
+}
+
+std::uint64_t defaultMemoryBytes(std::uint64_t most) {
+  return std::min(most, memoryLimitBytes() / 4 * 3);
+}
+
+std::string jobTemporaryDirectory() {
+  const std::string of_job = textFromEnvironment("SLURM_TMPDIR");
+  return of_job.empty() ? textFromEnvironment("TMPDIR") : of_job;
 }
 
 std::uint64_t peakResidentBytes() {

@@ -83,8 +83,7 @@ class Bouncer {
         options_(options),
         gather_options_(withDefaults(gatherOptions(options))),
         progress_(progress),
-        temporary_directory_(options.temporary_directory.empty() ? scratchDirectoryOf(result_path)
-                                                                 : options.temporary_directory) {}
+        temporary_directory_(temporaryDirectory(options.temporary_directory, result_path)) {}
 
   Result<BounceStats> run();
 
@@ -232,7 +231,9 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
                               {.threads = gather_options_.threads,
                                .adapts_split = options_.cache_split < 0,
                                .prefetches = false,
-                               .memory_bytes = gather_options_.memory_bytes,
+                               .memory_bytes = gather_options_.memory_bytes - bytesBesideGather(),
+                               .work = memory.work,
+                               .beside_bytes = bytesBesideGather(),
                                .receivers = stats_.surfels,
                                .least_node_frames = memory.caches.least_node_frames,
                                .least_surfel_frames = memory.caches.least_surfel_frames},

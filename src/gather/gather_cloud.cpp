@@ -17,6 +17,7 @@
 #include <string>
 #include <utility>
 
+#include "core/program_memory.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
@@ -48,9 +49,8 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   GatherStats stats;
   stats.threads = options.threads;
   stats.memory_bytes = options.memory_bytes;
-  const std::string temporary_directory = options.temporary_directory.empty()
-                                              ? scratchDirectoryOf(result_path)
-                                              : options.temporary_directory;
+  const std::string temporary_directory =
+      temporaryDirectory(options.temporary_directory, result_path);
 
   // Open scene and receivers
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
@@ -68,16 +68,6 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
 
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<const LoadedEnvironment> environment,
                            loadEnvironment(options, scene.header().up, progress));
-  RowWriterOptions writing;
-  writing.properties = result_rows.properties();
-  writing.comments = input.reader().comments();
-  writing.count = stats.receivers;
-  writing.like = &input.reader();
-  writing.memory_bytes = stats.memory_bytes / 2;  // of what the caches give back before
-  writing.progress = &progress;
-  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
-                           createRowWriter(result_path, writing));
-
   // Spend the budget before anything large is allocated
   GatherWork work = gatherWork(input.receivers(), options);
   if (environment != nullptr) {
@@ -85,6 +75,20 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   }
   SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory,
                            planGatherMemory(scene, stats.memory_bytes, work));
+
+  RowWriterOptions writing;
+  writing.properties = result_rows.properties();
+  writing.comments = input.reader().comments();
+  writing.count = stats.receivers;
+  writing.like = &input.reader();
+  // Of what the caches give back before
+  writing.memory_parts = 2;
+  writing.memory_beside_bytes = programBytes(options.threads);
+  writing.memory_bytes =
+      (stats.memory_bytes - std::min(stats.memory_bytes, writing.memory_beside_bytes)) / 2;
+  writing.progress = &progress;
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
+                           createRowWriter(result_path, writing));
 
   // Sort
   input.note(progress);

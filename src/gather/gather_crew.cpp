@@ -84,6 +84,7 @@ Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory&
                                .adapts_split = adapts_split,
                                .prefetches = memory.prefetch_threads != 0,
                                .memory_bytes = stats.memory_bytes,
+                               .work = memory.work,
                                .receivers = stats.receivers - stats.invalid_receivers,
                                .least_node_frames = memory.caches.least_node_frames,
                                .least_surfel_frames = memory.caches.least_surfel_frames},

@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "core/program_memory.h"
 #include "gather/gather_memory.h"
 #include "gather/gather_options.h"
 #include "gather/gather_point.h"
@@ -70,7 +71,8 @@ std::uint64_t fixedBytes(const SceneFile& file, const GatherRules& rules,
   const std::size_t pixels = RasterGeometry::pixelCount(rules.quality.raster_resolution);
   const std::uint64_t held =
       environment == nullptr ? 0 : environment->map.memoryBytes() + environment->cube.memoryBytes();
-  return PagedOctree::fixedBytes(file, 1) + PointGatherer::memoryBytes(rules.quality) +
+  return programBytes(1) + PagedOctree::fixedBytes(file, 1) +
+         PointGatherer::memoryBytes(rules.quality) +
          pixels * (sizeof(PixelRecord) + sizeof(CubePixel)) + held +
          static_cast<std::uint64_t>(more * kBytes);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "cache/reuse_distances.h"
+#include "core/program_memory.h"
 #include "gather/gather_options.h"
 #include "gather/gather_outputs.h"
 #include "gather/interpolating_gatherer.h"
@@ -58,7 +59,8 @@ std::uint64_t threadBytes(const SceneFile& file, const GatherWork& work) {
 std::uint64_t fixedBytes(const SceneFile& file, const GatherWork& work, int prefetch_threads) {
   const auto threads = static_cast<std::uint64_t>(work.threads);
   const std::uint64_t rows = kSliceRows * (work.input_row_bytes + work.result_row_bytes);
-  return work.held_bytes + PagedOctree::fixedBytes(file, work.threads + prefetch_threads) +
+  return programBytes(work.threads + prefetch_threads) + work.held_bytes +
+         PagedOctree::fixedBytes(file, work.threads + prefetch_threads) +
          threads * threadBytes(file, work) +
          static_cast<std::uint64_t>(prefetch_threads) * (kThreadBytes + sizeof(CutWalk)) + rows +
          kStreamBytes + kQueueReceivers * sizeof(SortedReceiver) + PagingController::memoryBytes() +
@@ -141,6 +143,7 @@ Result<GatherMemory> planGatherMemory(const SceneFile& file, std::uint64_t memor
   }
 
   GatherMemory memory;
+  memory.work = work;
   const std::uint64_t for_prefetching = least + memory_bytes / kPrefetchPart;
   for (int threads = work.prefetch_threads; threads > 0 && memory.prefetch_threads == 0;
        --threads) {

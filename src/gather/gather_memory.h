@@ -40,6 +40,7 @@ struct GatherMemory {
   std::uint64_t cache_bytes = 0;                             // of both caches
   PagedOctree::Memory caches;
   int prefetch_threads = 0;  // for which there is memory
+  GatherWork work;           // that it was planned for
 };
 
 // "5.9 MiB", rounded up.

@@ -134,7 +134,7 @@ GatherOptions withDefaults(GatherOptions options) {
     if (!options.environment.path.empty()) options.outputs |= kOutputEnvironment;
   }
   if (options.threads == 0) options.threads = defaultThreadCount();
-  if (options.memory_bytes == 0) options.memory_bytes = memoryLimitBytes() / 4 * 3;
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes();
   return options;
 }
 

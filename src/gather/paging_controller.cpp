@@ -7,6 +7,8 @@
 
 #include "core/seconds_since.h"
 #include "gather/cache_split.h"
+#include "gather/memory_advice.h"
+#include "surfeit/tune.h"
 
 namespace surfeit {
 namespace {
@@ -31,12 +33,15 @@ constexpr double kAheadPart = 0.125;
 constexpr double kSplitGain = 0.05;
 constexpr std::size_t kSplitStep = 10;
 
-// Memory is short when so many reads repeat an earlier one. The working set is what a cache must
-// hold to stay below that. Advice waits until this part of the receivers is done.
+// Many reads repeat an earlier one. The working set is what a cache must hold to stay below that.
 constexpr double kMuchRepeated = 0.1;
-constexpr double kAdvicePart = 0.05;
 
 std::uint64_t loads(const CacheCounters& counters) { return counters.misses + counters.prefetches; }
+
+// What a gather works beside loads takes up to so many times as long where it has too little
+// memory: evictions, processor caches that decoding empties (mostly 1 to 2 times, 4.3 at worst in
+// tests/gather/memory_advice_test.cpp on a loaded machine). Advice counts on no more than the rest.
+constexpr double kStarvedWork = 4;
 
 double secondsPerLoad(const CacheCounters& counters) {
   return loads(counters) > 0 ? double(counters.load_ns) * 1e-9 / double(loads(counters)) : 0;
@@ -52,7 +57,10 @@ GatherCacheStats statsSoFar(const CacheCounters& counters, const ReuseDistances&
   return stats;
 }
 
-std::string mebibytes(double bytes) { return fmt::format("{:.0f}M", std::ceil(bytes / (1 << 20))); }
+// As --memory takes it.
+std::string mebibytes(std::uint64_t bytes) {
+  return fmt::format("{:.0f}M", std::ceil(double(bytes) / (1 << 20)));
+}
 
 }  // namespace
 
@@ -113,7 +121,6 @@ void PagingController::tick() {
     noteWorkingSets(true);
     octree_.nodeDistances()->endWindow(at.nodes.requests);
     octree_.surfelDistances()->endWindow(at.surfels.requests);
-    if (double(at.receivers) > kAdvicePart * double(options_.receivers)) advise(at);
   }
   last_tick_ = at;
   if (record_.isDue(at.seconds)) record_.add(now());
@@ -215,22 +222,33 @@ void PagingController::adaptSplit(const Moment& now) {
   if (next.first_frames > node_frames) octree_.nodeCache().setFrameLimit(next.first_frames);
 }
 
-// Says once that more memory would help, and how much.
-void PagingController::advise(const Moment& now) {
-  if (has_advised_) return;
-  const std::uint64_t all = loads(now.nodes) + loads(now.surfels);
-  const std::uint64_t repeated = now.nodes.repeated_loads + now.surfels.repeated_loads;
-  if (double(repeated) <= kMuchRepeated * double(all) || repeated < kLeastMisses) return;
-  const GatherCacheStats nodes = nodeStats(), surfels = surfelStats();
-  const double short_of = double(nodes.working_set_bytes) + double(surfels.working_set_bytes) -
-                          double(nodes.budget_bytes) - double(surfels.budget_bytes);
-  if (short_of <= 0) return;
-  has_advised_ = true;
+// Says what budget would do where this one is too small (memory_advice.h has the rule).
+void PagingController::advise(const Moment& now) const {
+  const SceneFile& file = octree_.file();
+  if (now.nodes.repeated_loads + now.surfels.repeated_loads < kLeastMisses) return;
+  const Result<GatherMemory> plan = planGatherMemory(file, options_.memory_bytes, options_.work);
+  if (!plan.ok()) return;  // the frames were given, and no budget
+  const GatherLoads loads = {octree_.nodeDistances()->curve(now.nodes.requests),
+                             octree_.surfelDistances()->curve(now.surfels.requests),
+                             secondsPerLoad(now.nodes), secondsPerLoad(now.surfels)};
+
+  // All seconds are those of all threads together. Who reads ahead takes time from the others,
+  // unless there are processors to spare: then this advises too much rather than too little
+  const double stalled = double(now.nodes.stall_ns + now.surfels.stall_ns) * 1e-9;
+  const double ahead = double(now.nodes.prefetches) * loads.node_load_seconds +
+                       double(now.surfels.prefetches) * loads.surfel_load_seconds;
+  const double working = std::max(now.seconds * options_.threads - stalled - ahead, 0.0);
+  const double best = working + loads.leastLoadSeconds();
+  const double longer = working + predictSplit(file, *plan, loads).load_seconds - best;
+  if (longer <= kShortOfMemory * kTuneTimeMargin * best) return;
+  const double least = loads.leastLoadSeconds();
+  const std::uint64_t enough = memoryForLoads(
+      file, options_.work, loads, least + kTuneTimeMargin * (working / kStarvedWork + least));
   progress_.inform(fmt::format(
-      "memory: {:.0f} % of the pages read were read before and evicted; the budget of {} is below "
-      "the working set, --memory {} would do",
-      100 * double(repeated) / double(all), mebibytes(double(options_.memory_bytes)),
-      mebibytes(double(options_.memory_bytes) + short_of)));
+      "memory: to read pages again that were evicted takes {:.0f} % of the time with {}; --memory "
+      "{} would do",
+      100 * longer / (best + longer), mebibytes(options_.memory_bytes + options_.beside_bytes),
+      mebibytes(enough + options_.beside_bytes)));
 }
 
 GatherCacheStats PagingController::nodeStats() const {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "gather/gather_memory.h"
 #include "gather/packet_cluster.h"
 #include "gather/window_record.h"
 #include "octree/paged_octree.h"
@@ -25,8 +26,12 @@ class PagingController {
     int threads = 1;
     bool adapts_split = true;
     bool prefetches = true;
-    std::uint64_t memory_bytes = 0;  // the budget of the process, for advice
-    std::uint64_t receivers = 0;     // that will be gathered
+    // For advice: the budget of the gather, the work that it was planned for, and what the job
+    // takes beside it.
+    std::uint64_t memory_bytes = 0;
+    GatherWork work{};
+    std::uint64_t beside_bytes = 0;
+    std::uint64_t receivers = 0;  // that will be gathered
     std::size_t least_node_frames = 1, least_surfel_frames = 1;
   };
 
@@ -51,7 +56,8 @@ class PagingController {
 
   // `receivers` more are done. Looks at the caches when it is time.
   void advance(std::uint64_t receivers);
-  // The gather is over: closes the last window, and gives advice that was not given yet.
+  // The gather is over: closes the last window, and tells what more memory would save. Not before,
+  // for only all look-ups tell what budget would do.
   void finish();
 
   // Call after finish().
@@ -69,7 +75,7 @@ class PagingController {
   void adaptRun(const Moment& now);
   void adaptPrefetch(const Moment& now);
   void adaptSplit(const Moment& now);
-  void advise(const Moment& now);
+  void advise(const Moment& now) const;
   void noteWorkingSets(bool is_whole);
   double secondsSinceStart() const;
 
@@ -88,7 +94,6 @@ class PagingController {
   Moment last_tick_;
   std::uint64_t ticks_ = 0;
   double usual_repeat_rate_ = -1;  // of past ticks, newer ones counting more; negative: none yet
-  bool has_advised_ = false;
   // Bytes of the pages touched in the last kTicksPerHalving ticks
   std::uint64_t node_working_set_bytes_ = 0, surfel_working_set_bytes_ = 0;
   WindowRecord record_;

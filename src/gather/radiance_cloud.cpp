@@ -22,6 +22,7 @@
 
 #include "core/first_failure.h"
 #include "core/job_limits.h"
+#include "core/program_memory.h"
 #include "core/spherical_harmonics.h"
 #include "gather/nearest_photons.h"
 #include "gather/radiance_estimate.h"
@@ -193,8 +194,7 @@ Result<RadianceStats> RadianceJob::run(const std::vector<std::string>& inputs,
 
 // Threads do not show in the result: a budget that does not feed all gets fewer.
 Status RadianceJob::planThreads() {
-  stats_.memory_bytes =
-      options_.memory_bytes != 0 ? options_.memory_bytes : memoryLimitBytes() / 4 * 3;
+  stats_.memory_bytes = options_.memory_bytes != 0 ? options_.memory_bytes : defaultMemoryBytes();
   if (stats_.memory_bytes < kLeastIndexMemory) {
     return Status::budgetTooSmall(
         fmt::format("a memory budget of {:.1f} MiB is too small for an index of photons: {} MiB is "
@@ -219,17 +219,18 @@ Result<SurfelWriter> RadianceJob::createWriter(const std::string& result_path,
   held_bytes_ = heldWriterBytes(result_path, most_surfels, kResultRowBytes);
   RowWriterOptions writing;
   if (held_bytes_ > 0) writing.count = most_surfels;  // so that too many are refused at once
-  writing.memory_bytes = stats_.memory_bytes / 2;
   writing.comments = {upComment(up_)};
+  writing.memory_parts = 2;
+  writing.memory_beside_bytes = programBytes(stats_.threads);
+  writing.memory_bytes =
+      (stats_.memory_bytes - std::min(stats_.memory_bytes, writing.memory_beside_bytes)) / 2;
   writing.progress = told;
   return SurfelWriter::create(result_path, channels, std::move(writing), origin);
 }
 
 // The photons as a scene, open and without a name.
 Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::string& result_path) {
-  const std::string directory = options_.temporary_directory.empty()
-                                    ? scratchDirectoryOf(result_path)
-                                    : options_.temporary_directory;
+  const std::string directory = temporaryDirectory(options_.temporary_directory, result_path);
   stats_.photons = photons.recordCount();
   SURFEIT_RETURN_IF_ERROR(photons.write(
       directory, result_path,
@@ -264,7 +265,8 @@ Result<SceneFile> RadianceJob::indexPhotons(PhotonCloud photons, const std::stri
 }
 
 Result<std::unique_ptr<PagedOctree>> RadianceJob::openOctree(SceneFile scene) const {
-  const std::uint64_t fixed = PagedOctree::fixedBytes(scene, stats_.threads) + kStreamBytes +
+  const std::uint64_t fixed = programBytes(stats_.threads) +
+                              PagedOctree::fixedBytes(scene, stats_.threads) + kStreamBytes +
                               held_bytes_ + std::uint64_t(stats_.threads) * threadBytes(options_);
   const std::uint64_t least = fixed + PagedOctree::leastCacheBytes(scene, stats_.threads);
   if (stats_.memory_bytes < least) {

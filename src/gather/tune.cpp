@@ -8,20 +8,20 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <filesystem>
 #include <memory>
 #include <new>
 #include <span>
 #include <utility>
 
-#include "gather/cache_split.h"
 #include "gather/gather_crew.h"
 #include "gather/gather_input.h"
 #include "gather/gather_memory.h"
 #include "gather/gather_options.h"
+#include "gather/memory_advice.h"
 #include "gather/quiet_progress.h"
 #include "gather/receiver_sorter.h"
 #include "gather/tune_sample.h"
+#include "io/output_target.h"
 #include "octree/group_set.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
@@ -33,13 +33,6 @@ namespace {
 constexpr double kTableParts[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
 // Sizes of the curve, in equal ratios.
 constexpr int kCurveSizes = 64;
-// Budgets are advised in whole units.
-constexpr std::uint64_t kMemoryUnit = std::uint64_t{1} << 20;
-
-std::uint64_t roundedUp(std::uint64_t bytes) {
-  return (bytes + kMemoryUnit - 1) / kMemoryUnit * kMemoryUnit;
-}
-
 std::uint64_t loads(const GatherCacheStats& stats) { return stats.misses + stats.prefetches; }
 
 TuneCache measuredCache(const GatherCacheStats& stats) {
@@ -66,11 +59,14 @@ class Tuning {
   Result<GatherMemory> planOwnMemory() const;
   Status sample(const GatherMemory& memory);
   void predictAll();
-  std::uint64_t memoryFor(std::uint64_t cache_bytes) const;
+  GatherLoads loads() const {
+    return {sample_.nodes.curve, sample_.surfels.curve, sample_.nodes.load_seconds,
+            sample_.surfels.load_seconds};
+  }
   TuneRow predict(std::uint64_t memory_bytes) const;
-  TuneRow predictCaches(std::uint64_t cache_bytes) const { return predict(memoryFor(cache_bytes)); }
-  template <typename IsEnough>
-  TuneRow leastThat(IsEnough&& is_enough) const;
+  TuneRow predictCaches(std::uint64_t cache_bytes) const {
+    return predict(memoryForCaches(*scene_, work_, cache_bytes));
+  }
   Result<TuneOutcome> measure(std::uint64_t memory_bytes) const;
   Status check();
 
@@ -97,10 +93,7 @@ Result<TuneReport> Tuning::run() {
         "interpolated: leave it out (--max-variation); the gather then needs no more memory");
   }
   gather_ = withDefaults(gather_);
-  if (gather_.temporary_directory.empty()) {
-    std::error_code error;  // where there is none, who spills says so
-    gather_.temporary_directory = std::filesystem::temp_directory_path(error).string();
-  }
+  if (gather_.temporary_directory.empty()) gather_.temporary_directory = spoolDirectory();
 
   // Open scene and receivers
   {
@@ -198,28 +191,18 @@ void Tuning::predictAll() {
   // Beyond the knees of both, whatever the split
   const auto knee_loads = [](const MissRatioCurve& curve) { return curve.misses(curve.knee()); };
   const double most_loads = knee_loads(sample_.nodes.curve) + knee_loads(sample_.surfels.curve);
-  report_.knee = leastThat([&](const TuneOutcome& outcome) {
-    return outcome.node_cache.loads + outcome.surfel_cache.loads <= most_loads;
-  });
-  const double most_seconds = (1 + kTuneTimeMargin) * report_.rows.back().predicted.seconds;
+  report_.knee = predict(leastMemoryThat(*scene_, work_, [&](const GatherMemory& plan) {
+    const CacheSplit split = predictSplit(*scene_, plan, loads());
+    return sample_.nodes.curve.misses(split.first_frames) +
+               sample_.surfels.curve.misses(split.second_frames) <=
+           most_loads;
+  }));
+  // All seconds are those of all threads together
+  const double working = double(report_.receivers - report_.invalid_receivers) *
+                         sample_.receiver_seconds * gather_.threads;
+  const double best = working + loads().leastLoadSeconds();
   report_.recommended =
-      leastThat([&](const TuneOutcome& outcome) { return outcome.seconds <= most_seconds; });
-}
-
-// The least budget that spends so much on the caches.
-std::uint64_t Tuning::memoryFor(std::uint64_t cache_bytes) const {
-  std::uint64_t low = least_memory_;
-  std::uint64_t high = std::max(low, gatherMemoryBesideCaches(*scene_, work_) + cache_bytes);
-  while (low < high) {
-    const std::uint64_t middle = low + (high - low) / 2;
-    const Result<GatherMemory> plan = planGatherMemory(*scene_, middle, work_);
-    if (plan.ok() && plan->cache_bytes >= cache_bytes) {
-      high = middle;
-    } else {
-      low = middle + 1;
-    }
-  }
-  return high;
+      predict(memoryForLoads(*scene_, work_, loads(), (1 + kTuneTimeMargin) * best - working));
 }
 
 TuneRow Tuning::predict(std::uint64_t memory_bytes) const {
@@ -229,19 +212,7 @@ TuneRow Tuning::predict(std::uint64_t memory_bytes) const {
   if (!plan.ok()) return row;  // never: no budget here is below the least
   row.cache_bytes = std::min(plan->cache_bytes, report_.decoded_cache_bytes);
 
-  // The split that the gather finds, or was given
-  const PagedOctree::Memory& caches = plan->caches;
-  const CacheDemand nodes{sample_.nodes.curve, sample_.nodes.load_seconds,
-                          PagedOctree::nodeFrameBytes(*scene_), caches.least_node_frames,
-                          scene_->nodePageCount()};
-  const CacheDemand surfels{sample_.surfels.curve, sample_.surfels.load_seconds,
-                            PagedOctree::surfelFrameBytes(*scene_), caches.least_surfel_frames,
-                            scene_->surfelPageCount()};
-  const std::size_t total =
-      caches.node_frames * nodes.frame_bytes + caches.surfel_frames * surfels.frame_bytes;
-  const CacheSplit split = gather_.cache_split < 0
-                               ? bestSplit(nodes, surfels, total, caches.node_frames)
-                               : splitAt(nodes, surfels, total, caches.node_frames);
+  const CacheSplit split = predictSplit(*scene_, *plan, loads());
 
   const auto outcome = [](const CacheSample& cache, std::size_t frames, std::size_t frame_bytes) {
     const double pages = cache.curve.misses(frames);
@@ -250,28 +221,14 @@ TuneRow Tuning::predict(std::uint64_t memory_bytes) const {
                      .loads = pages,
                      .bytes_read = pages * cache.page_bytes};
   };
-  row.predicted.node_cache = outcome(sample_.nodes, split.first_frames, nodes.frame_bytes);
-  row.predicted.surfel_cache = outcome(sample_.surfels, split.second_frames, surfels.frame_bytes);
+  row.predicted.node_cache =
+      outcome(sample_.nodes, split.first_frames, PagedOctree::nodeFrameBytes(*scene_));
+  row.predicted.surfel_cache =
+      outcome(sample_.surfels, split.second_frames, PagedOctree::surfelFrameBytes(*scene_));
   row.predicted.seconds =
       double(report_.receivers - report_.invalid_receivers) * sample_.receiver_seconds +
       split.load_seconds / gather_.threads;
   return row;
-}
-
-// The smallest budget, in whole units, that is good enough; larger ones are, and so is the largest.
-template <typename IsEnough>
-TuneRow Tuning::leastThat(IsEnough&& is_enough) const {
-  std::uint64_t low = report_.rows.front().cache_bytes, high = report_.decoded_cache_bytes;
-  if (is_enough(report_.rows.front().predicted)) high = low;
-  while (high > low + kMemoryUnit / 4) {
-    const std::uint64_t middle = low + (high - low) / 2;
-    if (is_enough(predictCaches(middle).predicted)) {
-      high = middle;
-    } else {
-      low = middle;
-    }
-  }
-  return predict(roundedUp(memoryFor(high)));
 }
 
 // The gather as it is, but for its results.

@@ -15,6 +15,7 @@
 #include <system_error>
 #include <vector>
 
+#include "core/job_limits.h"
 #include "io/file.h"
 #include "io/system_calls.h"
 
@@ -145,12 +146,17 @@ Status writeToStream(const OutputTarget& target, int from, std::uint64_t size) {
 }
 
 std::string spoolDirectory() {
-  std::error_code error;
-  const std::filesystem::path directory = std::filesystem::temp_directory_path(error);
-  return error ? std::string("/tmp") : directory.string();
+  const std::string of_job = jobTemporaryDirectory();
+  return of_job.empty() ? "/tmp" : of_job;
 }
 
-std::string scratchDirectoryOf(const std::string& output) {
+std::string temporaryDirectory(const std::string& given, const std::string& output) {
+  if (!given.empty()) return given;
+  const std::string of_job = jobTemporaryDirectory();
+  return of_job.empty() ? outputDirectory(output) : of_job;
+}
+
+std::string outputDirectory(const std::string& output) {
   const Result<OutputTarget> target = resolveOutput(output);
   if (!target.ok()) return directoryOf(output);
   return target->is_stream ? spoolDirectory() : directoryOf(target->path);

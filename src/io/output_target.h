@@ -26,9 +26,15 @@ Result<OutputTarget> resolveOutput(const std::string& path);
 // Writes the first `size` bytes of the open file `from` to a stream.
 Status writeToStream(const OutputTarget& target, int from, std::uint64_t size);
 
-// The directory for temporary files (TMPDIR, else /tmp), and that beside an output: the former
-// where the output is a stream.
+// The directory of temporary files that belong to no output: that of the job (SLURM_TMPDIR,
+// TMPDIR), else /tmp.
 std::string spoolDirectory();
-std::string scratchDirectoryOf(const std::string& output);
+
+// The directory of temporary files on the way to an output: `given` (--temp), else that of the job,
+// else beside the output, else, where that is a stream, spoolDirectory().
+std::string temporaryDirectory(const std::string& given, const std::string& output);
+
+// The directory in which an output becomes complete, to be named there.
+std::string outputDirectory(const std::string& output);
 
 }  // namespace surfeit

@@ -36,6 +36,9 @@ struct RowWriterOptions {
   // Memory that a format may take that must hold what it writes until the end (OpenVDB). Others
   // take a few MiB.
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
+  // The budget of the job that gives so much: memory_parts times that, and memory_beside_bytes. For
+  // the message that tells what would do.
+  std::uint64_t memory_parts = 1, memory_beside_bytes = 0;
 };
 
 // One thread at a time. The file appears under its final name only when finish() succeeds;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <mutex>
 #include <optional>
 
@@ -224,6 +225,20 @@ std::uint64_t CloudReader::memoryBytes(std::size_t read_bytes, int threads) {
   constexpr std::uint64_t kThreadBytes = kReadBatch * (2 * sizeof(Surfel) + 16) + (512 << 10);
   return RowFetcher::kSlots * std::uint64_t{read_bytes} +
          static_cast<std::uint64_t>(threads) * kThreadBytes + 3 * kSampleSurfels * sizeof(Surfel);
+}
+
+std::vector<std::string> CloudReader::notesOfFloats(const CloudTotals& totals) const {
+  std::vector<std::string> notes;
+  const double step = floatStep(movedBounds(totals.bounds, origin_));
+  const double spacing = double(totals.bounds.longestSide()) / std::sqrt(double(totals.surfels));
+  if (step <= 1e-3 * spacing) return notes;  // no more than quantizing moves
+  for (const std::string& path : float_inputs_) {
+    notes.push_back(fmt::format(
+        "{}: positions are floats, which stand {:.2g} apart so far from 0, beside a spacing of "
+        "about {:.2g}: write the cloud with doubles, or near 0",
+        path, step, spacing));
+  }
+  return notes;
 }
 
 }  // namespace surfeit

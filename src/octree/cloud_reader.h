@@ -58,8 +58,8 @@ class CloudReader {
   // The axis that the inputs say is up; where they disagree that of the first, which notes() tell.
   UpAxis up() const { return up_.value_or(kDefaultUpAxis); }
 
-  // Inputs whose positions are floats.
-  const std::vector<std::string>& floatInputs() const { return float_inputs_; }
+  // Of inputs whose positions are floats, where these are coarse beside the spacing of all.
+  std::vector<std::string> notesOfFloats(const CloudTotals& totals) const;
   // What is to be told of the inputs, with their paths.
   const std::vector<std::string>& notes() const { return notes_; }
 

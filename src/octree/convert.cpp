@@ -18,6 +18,8 @@
 #include <string_view>
 #include <utility>
 
+#include "core/job_limits.h"
+#include "core/program_memory.h"
 #include "io/channels.h"
 #include "io/cloud_formats.h"
 #include "io/file.h"
@@ -33,6 +35,9 @@ namespace {
 
 constexpr std::size_t kBatchBytes = 1 << 20;
 constexpr std::size_t kMostNamesTold = 12;
+// Buffers of readers and writer, and batches.
+constexpr std::uint64_t kStreamBytes = std::uint64_t{8} << 20;
+constexpr std::uint64_t kUsualMemory = std::uint64_t{2} << 30;
 
 std::string listNames(const std::vector<std::string>& names) {
   std::string text;
@@ -222,7 +227,15 @@ class Converter {
     writing.comments = first_->comments();
     if (options_.up) stateUpAxis(*options_.up, writing.comments);
     if (!options_.crop) writing.count = rows_to_write_;
-    writing.memory_bytes = options_.memory_bytes;
+    const std::uint64_t beside = programBytes(1) + kStreamBytes;
+    if (options_.memory_bytes < beside) {
+      return Status::budgetTooSmall(
+          fmt::format("a memory budget of {:.1f} MiB is too small to convert: {} MiB is the least "
+                      "that works",
+                      double(options_.memory_bytes) / (1 << 20), (beside >> 20) + 1));
+    }
+    writing.memory_bytes = options_.memory_bytes - beside;
+    writing.memory_beside_bytes = beside;
     writing.progress = &progress_;
     std::unique_ptr<RowReader> like;
     if (!options_.like.empty()) {
@@ -342,8 +355,10 @@ Status checkOptions(const std::vector<std::string>& inputs, const ConvertOptions
 }  // namespace
 
 Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
-                                   const std::string& output, const ConvertOptions& options,
+                                   const std::string& output, const ConvertOptions& given,
                                    Progress& progress) {
+  ConvertOptions options = given;
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   try {
     SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
     SURFEIT_ASSIGN_OR_RETURN(RowTransform transform, RowTransform::create(options.transform));

@@ -20,6 +20,8 @@
 #include "io/output_target.h"
 #include "octree/bucket_stream.h"
 #include "octree/cloud_reader.h"
+#include "octree/index_notes.h"
+#include "octree/index_places.h"
 #include "octree/index_plan.h"
 #include "octree/local_density.h"
 #include "octree/octree_builder.h"
@@ -39,6 +41,7 @@ constexpr double kUsualOutputBytes = 26;
 constexpr double kLeastPackedBytes = 10;
 // The octree of bare positions, at full precision.
 constexpr double kBareOutputBytes = 40;
+constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;  // more saves little time
 
 // kIoError when a directory's file system has less room.
 Status checkRoom(const std::string& directory, double needed, const char* advice) {
@@ -96,12 +99,12 @@ class Indexer {
         options_(options),
         threads_(threads),
         progress_(progress),
-        clock_(stats_) {
-    temporary_directory_ = options.temporary_directory.empty() ? scratchDirectoryOf(output)
-                                                               : options.temporary_directory;
-  }
+        temporary_directory_(temporaryDirectory(options.temporary_directory, output)),
+        clock_(stats_) {}
 
   Result<IndexStats> run();
+  // The places alone, without a name.
+  Result<SceneFile> runPlaces();
 
  private:
   Status checkOptions() const;
@@ -113,9 +116,10 @@ class Indexer {
   Status takeSample();
   glm::dvec3 originAsked(const Bounds3& bounds) const;
   bool moveOrigin(const glm::dvec3& origin);
-  void noteRules() const;
   Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
   Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path, bool full_precision);
+  Result<std::unique_ptr<BucketStream>> readBuckets();
+  Result<SceneFile> buildPlaces(std::unique_ptr<BucketStream> buckets);
   Status buildWithDensity(std::unique_ptr<BucketStream> buckets);
   std::uint64_t identity(bool full_precision) const;
   std::string provenance() const;
@@ -125,7 +129,7 @@ class Indexer {
   const IndexOptions& options_;
   const int threads_;
   Progress& progress_;
-  std::string temporary_directory_;
+  const std::string temporary_directory_;
   std::optional<CloudReader> reader_;
   std::vector<Surfel> sample_;
   IndexPlan plan_;
@@ -136,19 +140,10 @@ class Indexer {
 };
 
 Result<IndexStats> Indexer::run() {
-  SURFEIT_RETURN_IF_ERROR(checkOptions());
-  SURFEIT_RETURN_IF_ERROR(openInputs());
-  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
-  noteRules();
-  stats_.skipped_records = totals_.skipped;
+  SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
+  noteIndexRules(totals_, *reader_, options_.overlap, progress_);
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
-
-  auto buckets = std::make_unique<BucketStream>(
-      std::move(store),
-      BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
-                            temporary_directory_},
-      progress_);
   if (totals_.missing_both + totals_.covering > 0) {
     SURFEIT_RETURN_IF_ERROR(buildWithDensity(std::move(buckets)));
     return stats_;
@@ -161,6 +156,24 @@ Result<IndexStats> Indexer::run() {
   stats_.file_bytes = writer->fileBytes();
   clock_.finish("finish");
   return stats_;
+}
+
+Result<SceneFile> Indexer::runPlaces() {
+  SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
+  return buildPlaces(std::move(buckets));
+}
+
+Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
+  stats_.memory_bytes = options_.memory_bytes;
+  SURFEIT_RETURN_IF_ERROR(checkOptions());
+  SURFEIT_RETURN_IF_ERROR(openInputs());
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
+  stats_.skipped_records = totals_.skipped;
+  return std::make_unique<BucketStream>(
+      std::move(store),
+      BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
+                            temporary_directory_},
+      progress_);
 }
 
 Status Indexer::checkOptions() const {
@@ -251,7 +264,7 @@ Status Indexer::checkFreeSpace(double packed_bytes) {
 
 Status Indexer::checkOutputRoom() const {
   const double records = double(reader_->recordCount());
-  return checkRoom(scratchDirectoryOf(output_), records * kLeastOutputBytes,
+  return checkRoom(outputDirectory(output_), records * kLeastOutputBytes,
                    "make room, or write the scene elsewhere");
 }
 
@@ -330,45 +343,6 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
   return store;
 }
 
-void Indexer::noteRules() const {
-  const CloudTotals& totals = totals_;
-  const double step = floatStep(movedBounds(totals.bounds, reader_->origin()));
-  const double spacing = double(totals.bounds.longestSide()) / std::sqrt(totals.surfels);
-  for (const std::string& path : reader_->floatInputs()) {
-    if (step <= 1e-3 * spacing) break;  // no more than quantizing moves
-    progress_.note(fmt::format(
-        "{}: positions are floats, which stand {:.2g} apart so far from 0, beside a spacing of "
-        "about {:.2g}: write the cloud with doubles, or near 0",
-        path, step, spacing));
-  }
-  if (totals.missing_both > 0) {
-    progress_.note(
-        fmt::format("{} surfels have neither radius nor area: both follow from the "
-                    "distance to their neighbours",
-                    totals.missing_both));
-  }
-  if (totals.covering > 0) {
-    progress_.note(fmt::format(
-        "{} surfels have a coverage: it is multiplied by the area of the disk, or of the "
-        "place that the distance to their neighbours leaves, whichever is smaller",
-        totals.covering));
-  }
-  if (totals.missing_area > 0) {
-    progress_.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area,
-                               options_.overlap));
-  }
-  if (totals.missing_radius > 0) {
-    progress_.note(fmt::format("{} surfels have no radius: a disk of {} times the area is used",
-                               totals.missing_radius, options_.overlap));
-  }
-  if (totals.spheres > 0) {
-    progress_.note(
-        fmt::format("warning: {} surfels have no normal: they are spheres, which look "
-                    "the same from everywhere",
-                    totals.spheres));
-  }
-}
-
 Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& path,
                                                            bool full_precision) {
   SceneHeader header;
@@ -400,22 +374,28 @@ Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const cha
   return {};
 }
 
-// Without sizes, an octree over the bare positions is built first; its neighbour searches give
-// every surfel its size, and its curve order is the input of the real build.
-Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
+// An octree over the bare positions.
+Result<SceneFile> Indexer::buildPlaces(std::unique_ptr<BucketStream> buckets) {
   const std::string bare_path = temporary_directory_ + "/surfeit-density.sft";
   SURFEIT_ASSIGN_OR_RETURN(auto bare_writer, createWriter(bare_path, /* full_precision= */ true));
   SURFEIT_RETURN_IF_ERROR(build(*bare_writer, *buckets, "order"));
   const std::uint64_t bucket_bytes = buckets->temporaryBytes();
   buckets.reset();
   SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, bare_writer->finishUnnamed(provenance()));
-  bare_writer.reset();
   stats_.temporary_bytes = bucket_bytes + bare.fileBytes();
+  return bare;
+}
+
+// Without sizes, an octree over the bare positions is built first; its neighbour searches give
+// every surfel its size, and its curve order is the input of the real build.
+Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, buildPlaces(std::move(buckets)));
 
   // Its directory is another one of the same size
-  const std::uint64_t directory = bare.pages().pageCount() * sizeof(PageEntry);
+  const std::uint64_t beside =
+      bare.pages().pageCount() * sizeof(PageEntry) + SizedSurfelStream::searcherBytes(threads_);
   const std::uint64_t cache_bytes =
-      std::min<std::uint64_t>(plan_.octree_memory - std::min(plan_.octree_memory, directory),
+      std::min<std::uint64_t>(plan_.octree_memory - std::min(plan_.octree_memory, beside),
                               PagedOctree::unlimitedCacheBytes(bare));
   SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
                            PagedOctree::planMemory(bare, cache_bytes, threads_));
@@ -470,8 +450,20 @@ std::string Indexer::provenance() const {
 
 }  // namespace
 
+Result<SceneFile> indexPlaces(const std::string& input, const std::string& beside,
+                              const IndexOptions& options, Progress& progress) {
+  const std::vector<std::string> inputs = {input};
+  Result<SceneFile> places = Status::failed("places: not indexed");
+  withThreads(options.threads, [&] {
+    places = Indexer(inputs, beside, options, options.threads, progress).runPlaces();
+  });
+  return places;
+}
+
 Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
-                               const IndexOptions& options, Progress& progress) {
+                               const IndexOptions& given, Progress& progress) {
+  IndexOptions options = given;
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   int threads = options.threads;
   if (threads <= 0) {
     const int available = defaultThreadCount();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/curve_key.h"
+#include "core/program_memory.h"
 #include "octree/bucket_stream.h"
 #include "octree/cloud_reader.h"
 #include "octree/surfel_block.h"
@@ -86,10 +87,10 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
 
   // What is taken in any case, while reading and while building
   const std::uint64_t lists = blockListBytes(task.records, kMinBlockSurfels);
-  const std::uint64_t read_fixed =
-      CloudReader::memoryBytes(plan.read_bytes, task.threads) + kFileBytes + lists;
+  const std::uint64_t beside = programBytes(task.threads) + kFileBytes + lists;
+  const std::uint64_t read_fixed = CloudReader::memoryBytes(plan.read_bytes, task.threads) + beside;
   const std::uint64_t build_fixed =
-      buildOctreeBytes(task.slabs, task.threads) + directoryBytes(task) + kFileBytes + lists;
+      buildOctreeBytes(task.slabs, task.threads) + directoryBytes(task) + beside;
   const std::uint64_t least_bucket =
       std::min(kLeastBucket, task.records) * BucketStream::kBytesPerSurfel;
   const std::uint64_t least = std::max({kLeastIndexMemory, build_fixed + least_bucket,

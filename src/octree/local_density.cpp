@@ -11,87 +11,23 @@
 namespace surfeit {
 namespace {
 
-// Neighbours looked at first, and while cells are open: of random places all but one of a thousand
-// cells are settled by 24; scan lines twenty times as far apart as their points take 96.
-constexpr std::size_t kNeighbours[] = {24, 48, 96};
-// Places in a searcher's box, and surfels that it serves at most.
-constexpr std::size_t kMostPlaces = 32768, kServedSurfels = 4096, kFewSurfels = 64;
-// How far the box goes beyond the surfels: so many times their spacing, if they are a sheet.
-constexpr float kMarginSpacings = 6;
-// Strays: radii of open cells are limited to this many times the distance of the neighbours from
-// each other, and off surfaces to this many times the cloud's median.
-constexpr float kOpenLimit = 4, kStrayLimit = 8;
+// Strays: radii off surfaces are limited to this many times the cloud's median.
+constexpr float kStrayLimit = 8;
 constexpr std::size_t kSamplePages = 64;
 // Pages whose surfels are sized at once.
 constexpr std::uint32_t kBatchPages = 32;
-
-Bounds3 boundsOf(std::span<const Surfel> surfels) {
-  Bounds3 bounds;
-  for (const Surfel& surfel : surfels) bounds.add(surfel.position);
-  return bounds;
-}
-
-glm::vec3 normalOf(const Surfel& surfel) {
-  return (surfel.flags & kSurfelSphere) != 0 ? glm::vec3(0) : surfel.normal;
-}
 
 }  // namespace
 
 SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap, int threads)
     : octree_(octree), overlap_(overlap) {
-  for (int i = 0; i < threads; ++i) {
-    searchers_.emplace_back().reader = std::make_unique<PagedOctree::Reader>(octree);
-  }
+  for (int i = 0; i < threads; ++i) searchers_.emplace_back(octree);
 }
 
 SizedSurfelStream::~SizedSurfelStream() = default;
 
-// The box around the surfels with a margin for their neighbours, as wide as the room for places
-// allows. Surfels of which the box has no room are served in two halves.
-Status SizedSurfelStream::Searcher::serve(std::span<Surfel> surfels, const Sizing& sizing) {
-  const Bounds3 inner = boundsOf(surfels);
-  const float spacing = glm::length(inner.extent()) / std::sqrt(float(surfels.size()));
-  bool fits = false;
-  for (float margin = kMarginSpacings * spacing; !fits && margin >= spacing; margin *= 0.5f) {
-    Bounds3 box = inner;
-    box.min -= margin;
-    box.max += margin;
-    SURFEIT_ASSIGN_OR_RETURN(fits, places.read(box, kMostPlaces, *reader));
-  }
-  if (!fits && surfels.size() > kFewSurfels) {
-    const std::size_t half = surfels.size() / 2;
-    SURFEIT_RETURN_IF_ERROR(serve(surfels.first(half), sizing));
-    return serve(surfels.subspan(half), sizing);
-  }
-  for (Surfel& surfel : surfels) {
-    if ((surfel.flags & kSurfelNeedsSize) == 0) continue;
-    SURFEIT_ASSIGN_OR_RETURN(const float area, areaAt(surfel));
-    sizing(surfel, area);
-  }
-  return {};
-}
-
-Result<float> SizedSurfelStream::Searcher::areaAt(const Surfel& surfel) {
-  const glm::vec3& position = surfel.position;
-  if (has_last && position == last_position) return last_area;
-  SurfaceCell cell;
-  for (const std::size_t count : kNeighbours) {
-    if (!places.find(position, count, found)) {
-      SURFEIT_RETURN_IF_ERROR(findPlaces(position, count, *reader, found));
-    }
-    const bool is_last = count == std::end(kNeighbours)[-1] || std::isinf(found.reach);
-    cell = cells.cellOf(found.neighbours, found.reach, normalOf(surfel), is_last);
-    if (cell.is_settled || is_last) break;
-  }
-  last_area = cell.area / float(std::max<std::uint64_t>(found.coincident, 1));
-  // What is open may be a stray, far from neighbours that are close to each other; and strays may
-  // lie all around each other
-  const float most_radius = kOpenLimit * cell.neighbour_spacing;
-  if (!cell.is_settled) last_area = std::min(last_area, kPi * most_radius * most_radius);
-  if (!cell.is_surface) last_area = std::min(last_area, largest_loose_area);
-  last_position = position;
-  has_last = true;
-  return last_area;
+std::size_t SizedSurfelStream::searcherBytes(int threads) {
+  return std::size_t(threads) * SurfaceSearch::memoryBytes();
 }
 
 Status SizedSurfelStream::prepare() {
@@ -105,8 +41,8 @@ Status SizedSurfelStream::prepare() {
     SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
                              file.decodeSurfels(page, scratch, surfels_));
     for (std::uint32_t i = 0; i < count; i += 16) {
-      SURFEIT_ASSIGN_OR_RETURN(const float area, searchers_[0].areaAt(surfels_[i]));
-      if (area > 0) areas.push_back(area);
+      SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, searchers_[0].at(surfels_[i]));
+      if (surface.area > 0) areas.push_back(surface.area);
     }
   }
   // One position for all: any size will do, so take a thousandth of the scene
@@ -118,9 +54,8 @@ Status SizedSurfelStream::prepare() {
   const auto median = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
   std::nth_element(areas.begin(), median, areas.end());
   largest_radius_ = kStrayLimit * std::sqrt(*median * overlap_ / kPi);
-  for (Searcher& searcher : searchers_) {
-    searcher.largest_loose_area = kStrayLimit * kStrayLimit * *median;
-    searcher.has_last = false;
+  for (SurfaceSearch& searcher : searchers_) {
+    searcher.limitLooseAreas(kStrayLimit * kStrayLimit * *median);
   }
   return {};
 }
@@ -145,7 +80,7 @@ Status SizedSurfelStream::readPages(std::uint32_t end_page) {
 // Faint disks add up, each with its coverage of its own place, `local_area`. Disks of an opaque
 // sheet must overlap, or it has gaps where they happen to lie apart: these get the area of other
 // disks. The eighth power of the coverage leads from one to the other: of a sheet of random splats,
-// which overlap four times, coverages of .01, .5 and .98 hide .009, .44 and .86 of what lies
+// which overlap four times, coverages of .01, .5 and .98 hide .009, .45 and .86 of what lies
 // behind, and without a coverage .86.
 float SizedSurfelStream::coveringArea(float coverage, float radius, float local_area) const {
   const float disk_area = areaOfDisk(radius, 1), opaque_area = areaOfDisk(radius, overlap_);
@@ -165,13 +100,10 @@ void SizedSurfelStream::applyArea(Surfel& surfel, float area) const {
   surfel.area = areaOfDisk(surfel.radius, overlap_);
 }
 
-Status SizedSurfelStream::fillSizes(Searcher& searcher, std::span<Surfel> surfels) const {
-  const auto apply = [this](Surfel& surfel, float area) { applyArea(surfel, area); };
-  for (std::size_t begin = 0; begin < surfels.size(); begin += kServedSurfels) {
-    const std::size_t count = std::min(kServedSurfels, surfels.size() - begin);
-    SURFEIT_RETURN_IF_ERROR(searcher.serve(surfels.subspan(begin, count), apply));
-  }
-  return {};
+Status SizedSurfelStream::fillSizes(SurfaceSearch& searcher, std::span<Surfel> surfels) const {
+  return searcher.find(
+      surfels, [&](std::size_t i) { return (surfels[i].flags & kSurfelNeedsSize) != 0; },
+      [&](std::size_t i, const SurfaceAt& surface) { applyArea(surfels[i], surface.area); });
 }
 
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {

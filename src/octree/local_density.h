@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -13,9 +12,8 @@
 
 #include "core/spherical_harmonics.h"
 #include "octree/paged_octree.h"
-#include "octree/places.h"
 #include "octree/sorted_surfels.h"
-#include "octree/surface_cell.h"
+#include "octree/surface_search.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -36,6 +34,9 @@ class SizedSurfelStream : public SortedSurfelStream {
   SizedSurfelStream(PagedOctree& octree, float overlap, int threads);
   ~SizedSurfelStream() override;
 
+  // What searches of so many threads take, besides the octree's own readers.
+  static std::size_t searcherBytes(int threads);
+
   // Samples the cloud for the limit below. Call once, before next().
   Status prepare();
   // No radius off a surface becomes larger: strays far from everything would cover the scene.
@@ -44,33 +45,14 @@ class SizedSurfelStream : public SortedSurfelStream {
   Result<std::shared_ptr<const SortedBatch>> next() override;
 
  private:
-  // A reader and what it found last: surfels at one position follow each other, and a search
-  // among a million of them should happen once.
-  struct Searcher {
-    std::unique_ptr<PagedOctree::Reader> reader;
-    PlaceIndex places;
-    SurfaceCells cells;
-    NearestPlaces found;
-    bool has_last = false;
-    glm::vec3 last_position{0};
-    float last_area = 0;
-    float largest_loose_area = std::numeric_limits<float>::infinity();
-
-    // Sizes all surfels that need it, which lie close to each other.
-    using Sizing = std::function<void(Surfel& surfel, float area)>;
-    Status serve(std::span<Surfel> surfels, const Sizing& sizing);
-    // The area of a place, shared among the surfels there; 0: unknown.
-    Result<float> areaAt(const Surfel& surfel);
-  };
-
   float coveringArea(float coverage, float radius, float local_area) const;
   Status readPages(std::uint32_t end_page);
   void applyArea(Surfel& surfel, float area) const;
-  Status fillSizes(Searcher& searcher, std::span<Surfel> surfels) const;
+  Status fillSizes(SurfaceSearch& searcher, std::span<Surfel> surfels) const;
 
   PagedOctree& octree_;
   float overlap_;
-  std::vector<Searcher> searchers_;
+  std::vector<SurfaceSearch> searchers_;
   float largest_radius_ = 0;
   std::uint32_t next_page_ = 0;
   std::vector<Surfel> surfels_;  // of the pages being sized

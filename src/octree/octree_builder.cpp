@@ -201,10 +201,11 @@ double SlabForm::nodesPerSurfel() const { return std::min(2.0, 4.0 / leaf_capaci
 
 std::uint64_t buildOctreeBytes(const SlabForm& form, int threads) {
   // A slab has at most 2 * kBrickSurfels surfels, with their nodes and pages, in vectors that grow
-  // by doubling; a thread fetches the surfels of one slab at a time
+  // by doubling; a thread fetches the surfels of one slab at a time, and the batches that hold them
+  // stay meanwhile: beside small buckets that is as much again
   constexpr double kSlack = 1.5;
   constexpr double kQuantizedBytes = 24, kFullBytes = 64;
-  constexpr std::uint64_t kFetchBytes = 2 * kBrickSurfels * (sizeof(Surfel) + sizeof(CurveKey));
+  constexpr std::uint64_t kFetchBytes = 4 * kBrickSurfels * (sizeof(Surfel) + sizeof(CurveKey));
   const double surfel_bytes = form.nodesPerSurfel() * sizeof(LevelNode) +
                               (form.full_precision ? kFullBytes : kQuantizedBytes);
   const std::uint64_t slab_bytes =

@@ -27,15 +27,14 @@ constexpr float kCoincident = 1e-3f;
 
 // A plane is fitted again where what lies off it is more than this part of the spacing.
 constexpr float kThick = 0.1f;
-// Places all around have a thickness of about a spacing.
-constexpr float kMostThickness = 0.4f;
 constexpr int kSheetPasses = 6;
 // Of a slope from the place to a neighbour that is another sheet's, not its own.
 constexpr float kSteep = 0.7f;
 
 struct Plane {
   glm::vec3 normal{0};
-  float thickness = 0;   // root mean square of what lies off it
+  float thickness = 0;  // root mean square of what lies off it
+  float confidence = 0;
   bool is_line = false;  // the places lie on one: the plane is any through it
 };
 
@@ -65,6 +64,8 @@ Plane fitPlane(std::span<const Neighbour> neighbours, std::span<const float> wei
   const float length = glm::length(plane.normal);
   plane.normal = length > 0.5f ? plane.normal / length : glm::vec3(0, 0, 1);
   plane.thickness = std::sqrt(std::max(solver.eigenvalues()(0), 0.f) / sum);
+  const float all = solver.eigenvalues().sum();
+  plane.confidence = all > 0 ? std::clamp(1 - 3 * solver.eigenvalues()(0) / all, 0.f, 1.f) : 0;
   plane.is_line = !(solver.eigenvalues()(1) > kLineFlatness * solver.eigenvalues()(2));
   return plane;
 }
@@ -81,7 +82,8 @@ Plane fitSheet(std::span<const Neighbour> neighbours, float spacing, std::vector
       weights[i] = 1 / (1 + above * above);
     }
     const Plane again = fitPlane(neighbours, weights);
-    plane.normal = again.normal, plane.is_line = again.is_line;
+    plane.normal = again.normal;
+    plane.is_line = again.is_line;
   }
   return plane;
 }
@@ -274,9 +276,12 @@ SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float re
       cutters.push_back(n.beside);
     }
   }
+  cell.normal = plane.normal;
+  cell.confidence = plane.confidence;
+  cell.is_line = plane.is_line;
+  cell.thickness = plane.thickness / spacing;
   if (cutters.empty()) return cell;
   // Where all places are known, what is open reaches farther than any of them
-  cell.is_surface = plane.thickness < kMostThickness * spacing;
   cell.is_settled = 2 * polygon.reach() <= std::min(reach, 2 * farthest);
   if (!cell.is_settled && is_last) {
     // One close by shares the cell rather than telling its size

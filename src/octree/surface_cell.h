@@ -16,11 +16,14 @@ struct Neighbour {
 };
 
 struct SurfaceCell {
-  float area = 0;  // 0: the neighbours do not tell
+  float area = 0;        // 0: the neighbours do not tell
+  glm::vec3 normal{0};   // of the plane through them, either way
+  float confidence = 0;  // 1 - 3 l0 / (l0 + l1 + l2), with the variances along its axes
+  bool is_line = false;  // the neighbours lie on one: any plane through it will do
   // Whether places beyond the last neighbour would not change it.
   bool is_settled = false;
-  // Whether the neighbours lie on one, rather than all around.
-  bool is_surface = false;
+  // How far they lie off that plane, root mean square, over the spacing: about 1 all around.
+  float thickness = 0;
   // Of cells that stay open: how far the neighbours are from each other.
   float neighbour_spacing = 0;
 };

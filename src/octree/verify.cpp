@@ -8,6 +8,7 @@
 
 #include "core/first_failure.h"
 #include "core/job_limits.h"
+#include "core/program_memory.h"
 #include "core/worker_threads.h"
 #include "octree/paged_octree.h"
 #include "octree/scene_file.h"
@@ -18,6 +19,8 @@ namespace surfeit {
 namespace {
 
 constexpr std::size_t kMaxFindings = 100;
+// Stack and allocator of a thread.
+constexpr std::uint64_t kThreadBytes = std::uint64_t{256} << 10;
 // Quantized sums and spheres may differ by this part.
 constexpr float kAreaTolerance = 2e-3f;
 constexpr float kReachTolerance = 2e-3f;
@@ -183,6 +186,29 @@ class PageChecker {
   std::uint64_t node_balance_ = 0, surfel_balance_ = 0;
 };
 
+// References are followed through small caches: pages come in curve order, so few are needed.
+Result<PagedOctree::Memory> planMemory(const SceneFile& file, std::uint64_t memory_bytes,
+                                       int threads) {
+  constexpr std::uint64_t kMostCacheBytes = std::uint64_t{64} << 20;
+  const std::uint64_t thread_bytes = file.header().node_group_capacity * sizeof(Node) +
+                                     file.header().surfel_group_capacity * sizeof(Surfel) +
+                                     kThreadBytes;
+  const std::uint64_t fixed = programBytes(threads) + PagedOctree::fixedBytes(file, threads) +
+                              static_cast<std::uint64_t>(threads) * thread_bytes;
+  const std::uint64_t least_caches = PagedOctree::leastCacheBytes(file, threads);
+  if (memory_bytes == 0) memory_bytes = defaultMemoryBytes();
+  if (memory_bytes < fixed + least_caches) {
+    return Status::budgetTooSmall(fmt::format(
+        "a memory budget of {:.1f} MiB is too small to verify {} with {} {}: {} MiB is the least "
+        "that works",
+        double(memory_bytes) / (1 << 20), file.path(), threads, threads == 1 ? "thread" : "threads",
+        ((fixed + least_caches) >> 20) + 1));
+  }
+  return PagedOctree::planMemory(
+      file, std::clamp(memory_bytes - fixed, least_caches, std::max(least_caches, kMostCacheBytes)),
+      threads);
+}
+
 }  // namespace
 
 Result<SceneInfo> readSceneInfo(const std::string& path) {
@@ -218,7 +244,8 @@ Result<SceneInfo> readSceneInfo(const std::string& path) {
   return info;
 }
 
-Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress) {
+Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress,
+                                 std::uint64_t memory_bytes) {
   VerifyReport report;
   Findings findings(report);
   Result<SceneFile> opened = SceneFile::open(path);
@@ -233,12 +260,8 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
   const std::uint64_t expected_nodes = opened->header().node_count;
   const std::uint64_t expected_surfels = opened->header().surfel_count;
 
-  // References are followed through small caches: pages come in curve order, so few are needed
-  constexpr std::size_t kCacheBytes = 64 << 20;
-  SURFEIT_ASSIGN_OR_RETURN(
-      const PagedOctree::Memory memory,
-      PagedOctree::planMemory(
-          *opened, std::max(kCacheBytes, static_cast<std::size_t>(threads) << 20), threads));
+  SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
+                           planMemory(*opened, memory_bytes, threads));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(*opened), memory));
   const SceneFile& file = octree->file();

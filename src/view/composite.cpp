@@ -179,13 +179,14 @@ Result<Picture> createPicture(const Imath::Box2i& window, const std::string& pat
                     path, width, height, kMaxPixelsPerEdge));
   }
   const std::uint64_t budget =
-      options.memory_bytes > 0 ? options.memory_bytes : memoryLimitBytes() / 4 * 3;
+      options.memory_bytes > 0 ? options.memory_bytes : defaultMemoryBytes();
   const std::uint64_t needed =
       std::uint64_t(width) * std::uint64_t(height) * kBytesPerPixel + kStreamBytes;
   if (needed > budget) {
     return Status::budgetTooSmall(
-        fmt::format("a picture of {}x{} needs {} MiB, the budget is {} MiB", width, height,
-                    (needed >> 20) + 1, budget >> 20));
+        fmt::format("a memory budget of {} MiB is too small for a picture of {}x{}: {} MiB is the "
+                    "least that works",
+                    budget >> 20, width, height, (needed >> 20) + 1));
   }
   Picture picture;
   picture.width = int(width);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/vec2.hpp>
 #include <memory>
 #include <utility>
 
@@ -147,6 +148,18 @@ void drawPanel(const CubeImage& cube, const CubeLayout& layout, CubePanel panel,
   }
 }
 
+// From one panel to the next, in pixels of the picture.
+glm::ivec2 panelStep(const CubeViews& cubes, const CubePictureOptions& options) {
+  const CubeLayout layout(*cubes.gathered, options.up);
+  return zoomOf(*cubes.gathered, options) * glm::ivec2(layout.width(), layout.height()) + kGap;
+}
+
+glm::ivec2 pictureSize(const PanelRows& rows, const glm::ivec2& step) {
+  std::size_t columns = 0;
+  for (const auto& row : rows) columns = std::max(columns, row.size());
+  return glm::ivec2(columns, rows.size()) * step + kGap;
+}
+
 }  // namespace
 
 std::string_view panelName(CubePanel panel) {
@@ -165,25 +178,29 @@ std::string_view panelName(CubePanel panel) {
   return "kind";
 }
 
+std::uint64_t cubePictureBytes(const CubeViews& cubes, const CubePictureOptions& options) {
+  const glm::ivec2 size = pictureSize(arrange(cubes, options.panels), panelStep(cubes, options));
+  // The picture, its bytes for the encoder, and the file in memory
+  constexpr std::uint64_t kPixelBytes = sizeof(Picture::Pixel) + 16;
+  return std::uint64_t(size.x) * std::uint64_t(size.y) * kPixelBytes;
+}
+
 Picture drawCube(const CubeViews& cubes, const CubePictureOptions& options) {
   const CubeLayout layout(*cubes.gathered, options.up);
   const DepthScale depths(cubes);
   const PanelRows rows = arrange(cubes, options.panels);
-  const int zoom = zoomOf(*cubes.gathered, options);
-  const int step_x = layout.width() * zoom + kGap, step_y = layout.height() * zoom + kGap;
-  std::size_t columns = 0;
-  for (const auto& row : rows) columns = std::max(columns, row.size());
+  const glm::ivec2 step = panelStep(cubes, options), size = pictureSize(rows, step);
 
   Picture picture;
-  picture.width = int(columns) * step_x + kGap;
-  picture.height = int(rows.size()) * step_y + kGap;
+  picture.width = size.x;
+  picture.height = size.y;
   picture.pixels.assign(std::size_t(picture.width) * std::size_t(picture.height),
                         {.color = kBackground, .alpha = 1});
   for (std::size_t row = 0; row < rows.size(); ++row) {
     for (std::size_t column = 0; column < rows[row].size(); ++column) {
       const PlacedPanel& placed = rows[row][column];
       drawPanel(placed.is_traced ? *cubes.traced : *cubes.gathered, layout, placed.panel,
-                kGap + int(column) * step_x, kGap + int(row) * step_y, depths, options, picture);
+                kGap + int(column) * step.x, kGap + int(row) * step.y, depths, options, picture);
     }
   }
   return picture;

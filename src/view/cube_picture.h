@@ -38,6 +38,8 @@ struct CubeViews {
 // The panels, in rows of up to three, with display values (PngOptions::is_data). The traced
 // coverage and depth stand to the right of the gathered ones.
 Picture drawCube(const CubeViews& cubes, const CubePictureOptions& options);
+// Memory that drawing and encoding it take.
+std::uint64_t cubePictureBytes(const CubeViews& cubes, const CubePictureOptions& options);
 // What the colors and brightnesses of that picture mean, and where its panels are; lines of text.
 std::string cubeLegend(const CubeViews& cubes, const CubePictureOptions& options);
 

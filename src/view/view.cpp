@@ -98,7 +98,7 @@ Result<ValueExtent> findExtent(CloudRows& rows, const RecordDecoder& decoder,
 
 Status checkBudget(const ViewOptions& options, std::uint64_t framebuffer_bytes) {
   const std::uint64_t budget =
-      options.memory_bytes > 0 ? options.memory_bytes : memoryLimitBytes() / 4 * 3;
+      options.memory_bytes > 0 ? options.memory_bytes : defaultMemoryBytes();
   const std::uint64_t pixels = std::uint64_t(options.width) * std::uint64_t(options.height);
   // Passes and picture are drawn one after the other
   const std::uint64_t pass_bytes =
@@ -107,11 +107,11 @@ Status checkBudget(const ViewOptions& options, std::uint64_t framebuffer_bytes) 
       std::max(framebuffer_bytes + pixels * kEncodeBytesPerPixel, pass_bytes) + kStreamBytes +
       RadiusEstimate::kMaxBytes + (options.brick.empty() ? 0 : kBrickRowsBytes);
   if (needed <= budget) return {};
-  return Status::budgetTooSmall(
-      fmt::format("a picture of {}x{} with {}x{} samples needs {} MiB, the budget is {} MiB; "
-                  "a smaller size or fewer samples take less",
-                  options.width, options.height, options.samples, options.samples,
-                  (needed >> 20) + 1, budget >> 20));
+  return Status::budgetTooSmall(fmt::format(
+      "a memory budget of {} MiB is too small for a picture of {}x{} with {}x{} samples: "
+      "{} MiB is the least that works; a smaller size or fewer samples take less",
+      budget >> 20, options.width, options.height, options.samples, options.samples,
+      (needed >> 20) + 1));
 }
 
 // The format of the picture, if there is one; what is written must have a name that fits.

@@ -9,6 +9,8 @@ surfeit=$2
 cornell_scene=$3
 work_dir=$4
 script=$(realpath "$0")
+# Limits and places of the job that runs the tests are none of their business
+unset SLURM_TMPDIR TMPDIR SLURM_MEM_PER_NODE SLURM_MEM_PER_CPU SLURM_CPUS_ON_NODE SLURM_CPUS_PER_TASK
 
 # Runs the case in its own directory.
 runCase() {

@@ -52,7 +52,7 @@ resultsDoNotDependOnThreadsOrMemory() {
   sameBytes cornell.sft other.sft
   run 0 sample cornell.obj -o receivers.ply --count 300 --light-samples 1
   run 0 gather cornell.sft receivers.ply -o one.ply --mode bleeding --threads 1 --memory 1G
-  run 0 gather cornell.sft receivers.ply -o many.ply --mode bleeding --threads 4 --memory 28M
+  run 0 gather cornell.sft receivers.ply -o many.ply --mode bleeding --threads 4 --memory 48M
   sameBytes one.ply many.ply
 }
 
@@ -68,6 +68,11 @@ statisticsHaveTheDocumentedFields() {
   run 0 generate --surfels 1k -o city.ply --stats generate.json
   jsonHas generate.json "${common[@]}" kind scene_surfels seed order surfels scene_area \
     surfels_per_second
+  run 0 normals cornell.ply -o normals.csv --orient outward --sizes --stats normals.json
+  jsonHas normals.json "${common[@]}" points points_without_surface mean_confidence memory_bytes \
+    temporary_bytes points_per_second phases order
+  run 2 normals cornell.ply -o normals.csv --orient sideways
+  says "expected up, outward or"
   run 0 verify cornell.sft --stats verify.json
   jsonHas verify.json "${common[@]}" pages bytes finding_count findings
   run 0 gather cornell.sft again.ply -o lit.ply --memory 64M --stats gather.json --cache-series series.csv
@@ -103,7 +108,7 @@ helpAndVersionExitWithZero() {
   run 0 --help
   local command help=$said
   for command in sample generate convert index info verify gather bounce radiance brick tune view \
-    composite cube; do
+    composite cube normals; do
     [[ $help == *"  $command "* ]] || fail "no $command in: $help"
     run 0 "$command" --help
     says Example "  surfeit $command "

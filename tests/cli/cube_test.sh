@@ -9,7 +9,7 @@ cubesArePicturesAndValues() {
   says "light | coverage | depth" "rough node" occlusion
   exists floor.png
   [[ $(od -An -c -j 1 -N 3 floor.png | tr -d ' ') == PNG ]] || fail "floor.png is no PNG"
-  run 0 cube cornell.sft "${floor[@]}" -o again.png --memory 32M --threads 1
+  run 0 cube cornell.sft "${floor[@]}" -o again.png --memory 64M --threads 1
   sameBytes floor.png again.png
   run 0 cube cornell.sft "${floor[@]}" -o some.png --show coverage,kind --zoom 2 --exposure 1 --quiet
   [[ -z $said ]] || fail "said with --quiet: $said"

@@ -174,15 +174,15 @@ TEST_F(GatherPaging, WindowsAddUpToTheWhole) {
   EXPECT_GT(nodes.load_seconds, 0);
 }
 
-TEST_F(GatherPaging, ABudgetBelowTheWorkingSetIsToldOnceWithWhatWouldDo) {
+TEST_F(GatherPaging, ABudgetThatIsTooSmallIsToldOnceWithWhatWouldDo) {
   GatherOptions options = coarse();
   options.order = ReceiverOrder::kInput;  // no order at all: pages are read again and again
   options.memory_bytes = leastBudget(2);
   ASSERT_TRUE(gather(options).ok());
-  EXPECT_EQ(progress_.notesWith("below the working set, --memory"), 1);
+  EXPECT_EQ(progress_.notesWith("would do"), 1);
   options.memory_bytes = std::uint64_t{1} << 30;
   ASSERT_TRUE(gather(options).ok());
-  EXPECT_EQ(progress_.notesWith("working set"), 1);
+  EXPECT_EQ(progress_.notesWith("would do"), 1);
 }
 
 TEST_F(GatherPaging, CachesOfOnePageAndEightThreadsEndWithTheSameResult) {

@@ -3,27 +3,31 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
-#include <limits>
 #include <new>
 
 namespace surfeit {
 
 VdbHeldRows::VdbHeldRows(std::string path, std::size_t row_bytes, std::size_t extra_bytes,
-                         std::uint64_t memory_bytes)
+                         const RowWriterOptions& options)
     : path_(std::move(path)),
       row_bytes_(row_bytes),
       extra_bytes_(extra_bytes),
-      memory_bytes_(memory_bytes) {}
+      memory_bytes_(options.memory_bytes),
+      memory_parts_(options.memory_parts),
+      memory_beside_bytes_(options.memory_beside_bytes) {}
 
 Status VdbHeldRows::checkRoom(std::uint64_t count) const {
   const std::uint64_t per_row = row_bytes_ + extra_bytes_;
   if (count <= memory_bytes_ / per_row) return {};
-  const bool is_countable = count <= std::numeric_limits<std::uint64_t>::max() / per_row;
+  const double needed = double(count) * double(per_row);  // a file may claim any count
+  const double budget = needed * double(memory_parts_) + double(memory_beside_bytes_);
   return Status::budgetTooSmall(fmt::format(
-      "{}: OpenVDB files are sorted in memory: {} rows need {} MiB, {} MiB may be taken", path_,
-      count, is_countable ? count * per_row / (1 << 20) + 1 : count / (1 << 20) * per_row,
-      memory_bytes_ >> 20));
+      "{}: OpenVDB files are sorted in memory: {} rows need {:.0f} MiB, {} MiB may be taken: a "
+      "memory budget of {:.0f} MiB would do",
+      path_, count, std::ceil(needed / (1 << 20)), memory_bytes_ >> 20,
+      std::floor(budget / (1 << 20)) + 1));
 }
 
 Status VdbHeldRows::append(std::span<const std::byte> rows) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "io/row_writer.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -18,9 +19,10 @@ namespace surfeit {
 class VdbHeldRows {
  public:
   VdbHeldRows(std::string path, std::size_t row_bytes, std::size_t extra_bytes,
-              std::uint64_t memory_bytes);
+              const RowWriterOptions& options);
 
-  // kBudgetTooSmall when `count` rows need more memory than there may be, with what they need.
+  // kBudgetTooSmall when `count` rows need more memory than there may be, with the budget that
+  // would do.
   Status checkRoom(std::uint64_t count) const;
   // Appends whole rows; kBudgetTooSmall as above, kInvalidArgument for parts of rows.
   Status append(std::span<const std::byte> rows);
@@ -35,7 +37,7 @@ class VdbHeldRows {
 
   std::string path_;
   std::size_t row_bytes_, extra_bytes_;
-  std::uint64_t memory_bytes_, count_ = 0;
+  std::uint64_t memory_bytes_, memory_parts_, memory_beside_bytes_, count_ = 0;
   std::vector<std::unique_ptr<std::byte[]>> chunks_;
 };
 

@@ -43,7 +43,7 @@ class VdbPointsWriter final : public RowWriter {
         element_(std::move(element)),
         comments_(options.comments),
         progress_(options.progress),
-        rows_(path_, element_.row_bytes, sizeof(VdbEntry), options.memory_bytes) {}
+        rows_(path_, element_.row_bytes, sizeof(VdbEntry), options) {}
 
   Status declare(const RowWriterOptions& options);
 

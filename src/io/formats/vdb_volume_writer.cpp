@@ -32,7 +32,7 @@ class VdbVolumeWriter final : public RowWriter {
         is_level_set_(like.text("class") == "level set"),
         like_metadata_(like.metadata),
         transform_record_(like.transform_record),
-        rows_(path_, element_.row_bytes, sizeof(VdbEntry), options.memory_bytes) {}
+        rows_(path_, element_.row_bytes, sizeof(VdbEntry), options) {}
 
   Status declare(const RowWriterOptions& options);
 

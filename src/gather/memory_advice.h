@@ -1,0 +1,44 @@
+// How much of a gather's time goes into loading pages, at any budget: one rule for `tune`, which
+// knows a sample of the look-ups, and for the monitor of a gather, which saw all of them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "cache/miss_ratio_curve.h"
+#include "gather/cache_split.h"
+#include "gather/gather_memory.h"
+
+namespace surfeit {
+
+// A budget is advised with which a gather takes no more than this part longer than with all pages
+// in memory (kTuneTimeMargin); it is called too small when it takes twice as much longer. What
+// loads cost differs between runs, and the one who follows the advice is not to be advised again.
+inline constexpr double kShortOfMemory = 2;
+
+// The look-ups of each cache, and the time that one thread spends on a load.
+struct GatherLoads {
+  MissRatioCurve node_curve, surfel_curve;
+  double node_load_seconds = 0, surfel_load_seconds = 0;
+
+  // With all pages in memory: every page once.
+  double leastLoadSeconds() const;
+};
+
+// The split of the caches that a gather with this plan finds, or was given, and what it loads.
+CacheSplit predictSplit(const SceneFile& file, const GatherMemory& plan, const GatherLoads& loads);
+
+// The least budget that spends so much on the caches.
+std::uint64_t memoryForCaches(const SceneFile& file, const GatherWork& work,
+                              std::uint64_t cache_bytes);
+
+// The least budget, in whole MiB, whose plan is good enough; larger ones are, and that of all pages
+// in memory is taken to be.
+std::uint64_t leastMemoryThat(const SceneFile& file, const GatherWork& work,
+                              const std::function<bool(const GatherMemory&)>& is_enough);
+
+// The least budget, in whole MiB, with which loads take no longer than that.
+std::uint64_t memoryForLoads(const SceneFile& file, const GatherWork& work,
+                             const GatherLoads& loads, double most_load_seconds);
+
+}  // namespace surfeit

@@ -1,0 +1,40 @@
+#include "octree/index_notes.h"
+
+#include <fmt/format.h>
+
+#include <string>
+
+namespace surfeit {
+
+void noteIndexRules(const CloudTotals& totals, const CloudReader& reader, float overlap,
+                    Progress& progress) {
+  for (const std::string& note : reader.notesOfFloats(totals)) progress.note(note);
+  if (totals.missing_both > 0) {
+    progress.note(
+        fmt::format("{} surfels have neither radius nor area: both follow from the "
+                    "cells among their neighbours",
+                    totals.missing_both));
+  }
+  if (totals.covering > 0) {
+    progress.note(fmt::format(
+        "{} surfels have a coverage: it is multiplied by the area of the disk, or of the "
+        "cell among their neighbours, whichever is smaller",
+        totals.covering));
+  }
+  if (totals.missing_area > 0) {
+    progress.note(
+        fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area, overlap));
+  }
+  if (totals.missing_radius > 0) {
+    progress.note(fmt::format("{} surfels have no radius: a disk of {} times the area is used",
+                              totals.missing_radius, overlap));
+  }
+  if (totals.spheres > 0) {
+    progress.note(
+        fmt::format("warning: {} surfels have no normal: they are spheres, which look "
+                    "the same from everywhere",
+                    totals.spheres));
+  }
+}
+
+}  // namespace surfeit

@@ -1,0 +1,105 @@
+#include "octree/surface_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <iterator>
+
+#include "core/spherical_harmonics.h"
+
+namespace surfeit {
+namespace {
+
+// Neighbours looked at first, and while cells are open: of random places all but one of a thousand
+// cells are settled by 24; scan lines twenty times as far apart as their points take 96.
+constexpr std::size_t kNeighbours[] = {24, 48, 96};
+// Places in the box, and surfels that it serves at most.
+constexpr std::size_t kMostPlaces = 16384, kServedSurfels = 4096, kFewSurfels = 64;
+// How far the box goes beyond the surfels: so many times their spacing, if they are a sheet.
+constexpr float kMarginSpacings = 6;
+// Strays: radii of open cells are limited to this many times the distance of the neighbours from
+// each other.
+constexpr float kOpenLimit = 4;
+// Of the neighbours of strays, in spacings; a surface with noise may have as much, which does no
+// harm: only areas 64 times the median's are limited.
+constexpr float kLooseThickness = 0.4f;
+
+Bounds3 boundsOf(std::span<const Surfel> surfels) {
+  Bounds3 bounds;
+  for (const Surfel& surfel : surfels) bounds.add(surfel.position);
+  return bounds;
+}
+
+glm::vec3 normalOf(const Surfel& surfel) {
+  return (surfel.flags & kSurfelSphere) != 0 ? glm::vec3(0) : surfel.normal;
+}
+
+}  // namespace
+
+SurfaceSearch::SurfaceSearch(PagedOctree& octree)
+    : reader_(std::make_unique<PagedOctree::Reader>(octree)) {}
+
+std::size_t SurfaceSearch::memoryBytes() { return PlaceIndex::memoryBytes(kMostPlaces); }
+
+Status SurfaceSearch::find(std::span<const Surfel> places, const Wants& wants, const Take& take) {
+  for (std::size_t begin = 0; begin < places.size(); begin += kServedSurfels) {
+    const std::size_t count = std::min(kServedSurfels, places.size() - begin);
+    SURFEIT_RETURN_IF_ERROR(serve(places.subspan(begin, count), begin, wants, take));
+  }
+  return {};
+}
+
+// The box around the surfels with a margin for their neighbours, as wide as the room for places
+// allows. Surfels of which the box has no room are served in two halves.
+Status SurfaceSearch::serve(std::span<const Surfel> places, std::size_t first, const Wants& wants,
+                            const Take& take) {
+  const Bounds3 inner = boundsOf(places);
+  const float spacing = glm::length(inner.extent()) / std::sqrt(float(places.size()));
+  bool fits = false;
+  for (float margin = kMarginSpacings * spacing; !fits && margin >= spacing; margin *= 0.5f) {
+    Bounds3 box = inner;
+    box.min -= margin;
+    box.max += margin;
+    SURFEIT_ASSIGN_OR_RETURN(fits, index_.read(box, kMostPlaces, *reader_));
+  }
+  if (!fits && places.size() > kFewSurfels) {
+    const std::size_t half = places.size() / 2;
+    SURFEIT_RETURN_IF_ERROR(serve(places.first(half), first, wants, take));
+    return serve(places.subspan(half), first + half, wants, take);
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (!wants(first + i)) continue;
+    SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, at(places[i]));
+    take(first + i, surface);
+  }
+  return {};
+}
+
+Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
+  const glm::vec3& position = place.position;
+  if (has_last_ && position == last_position_) return last_;
+  SurfaceCell cell, first;
+  for (const std::size_t count : kNeighbours) {
+    if (!index_.find(position, count, found_)) {
+      SURFEIT_RETURN_IF_ERROR(findPlaces(position, count, *reader_, found_));
+    }
+    const bool is_last = count == std::end(kNeighbours)[-1] || std::isinf(found_.reach);
+    cell = cells_.cellOf(found_.neighbours, found_.reach, normalOf(place), is_last);
+    if (count == kNeighbours[0]) first = cell;
+    if (cell.is_settled || is_last) break;
+  }
+  // The plane is that of the nearest, unless they lie on a line
+  const SurfaceCell& plane = first.is_line ? cell : first;
+  last_ = {cell.area / float(std::max<std::uint64_t>(found_.coincident, 1)), plane.normal,
+           plane.confidence, plane.thickness};
+  // What is open may be a stray, far from neighbours that are close to each other; and strays may
+  // lie all around each other
+  const float most_radius = kOpenLimit * cell.neighbour_spacing;
+  if (!cell.is_settled) last_.area = std::min(last_.area, kPi * most_radius * most_radius);
+  if (plane.thickness > kLooseThickness) last_.area = std::min(last_.area, largest_loose_area_);
+  last_position_ = position;
+  has_last_ = true;
+  return last_;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,65 @@
+// Surfaces through the places of an octree: what the neighbours of a place tell of area and normal
+// (docs/algorithm.md, "Sizes from the neighbourhood").
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "octree/paged_octree.h"
+#include "octree/places.h"
+#include "octree/surface_cell.h"
+#include "surfeit/status.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+struct SurfaceAt {
+  float area = 0;        // per surfel at the place; 0: unknown
+  glm::vec3 normal{0};   // of the plane through the neighbours, unit, either way; zero: unknown
+  float confidence = 0;  // 1: they lie on the plane; 0: all around (Pauly et al. 2002)
+  float thickness = 0;   // how far they lie off it, over the spacing: about 1 all around
+};
+
+// One thread at a time; several search one octree.
+class SurfaceSearch {
+ public:
+  explicit SurfaceSearch(PagedOctree& octree);
+
+  // Besides the octree's reader.
+  static std::size_t memoryBytes();
+
+  // Calls take(i, surface) for all places i that wants(i). Those that follow each other are close
+  // to each other, or it takes long. They need not be in the octree.
+  using Wants = std::function<bool(std::size_t)>;
+  using Take = std::function<void(std::size_t, const SurfaceAt&)>;
+  Status find(std::span<const Surfel> places, const Wants& wants, const Take& take);
+  // The same at one place.
+  Result<SurfaceAt> at(const Surfel& place);
+
+  // No area off a surface becomes larger.
+  void limitLooseAreas(float largest) {
+    largest_loose_area_ = largest;
+    has_last_ = false;
+  }
+
+ private:
+  Status serve(std::span<const Surfel> places, std::size_t first, const Wants& wants,
+               const Take& take);
+
+  std::unique_ptr<PagedOctree::Reader> reader_;
+  PlaceIndex index_;
+  SurfaceCells cells_;
+  NearestPlaces found_;
+  float largest_loose_area_ = std::numeric_limits<float>::infinity();
+  // Surfels at one position follow each other, and a search among a million of them should happen
+  // once.
+  bool has_last_ = false;
+  glm::vec3 last_position_{0};
+  SurfaceAt last_;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,141 @@
+#!/usr/bin/env bash
+# One case of the tests of memory: --memory is the limit of the process, for every command.
+#
+# SURFEIT_SANITIZED: set where peak memory means nothing. Exit status 77: cannot be tested here.
+source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
+
+# Every command that takes --memory, with what the case's directory holds.
+commands=(
+  "index cloud.ply -o out.sft"
+  "index bare.ply -o out.sft"
+  "verify scene.sft"
+  "gather scene.sft receivers.ply -o out.ply --quality draft"
+  "gather scene.sft receivers.ply -o out.ply --quality draft --mode bleeding --order input"
+  "gather scene.sft receivers.ply -o out.ply --quality draft --max-variation 0.02"
+  "gather scene.sft receivers.ply -o out.ply --quality draft --mode glossy --camera 0.5,0.5,2"
+  "gather scene.sft receivers.ply -o out.vdb --quality draft"
+  "tune scene.sft receivers.ply --quality draft"
+  "bounce scene.sft -o out.sft --bounces 2 --surfels-per-receiver 64"
+  "radiance photons.ply -o out.ply"
+  "brick cloud.ply --channel radiosity -o out.vdb"
+  "view cloud.ply -o out.png --size 400x300"
+  "cube scene.sft --at 0.5,0.1,0.5 --normal 0,1,0 -o out.png"
+  "convert cloud.ply -o out.vdb"
+  "convert cloud.ply -o out.las"
+)
+
+skipWhereSanitized() {
+  [[ -z ${SURFEIT_SANITIZED:-} ]] || { echo "skipped: sanitizers take memory"; exit 77; }
+}
+
+makeInputs() {
+  skipWhereSanitized
+  makeScene 200000
+  mv cornell.ply cloud.ply
+  mv cornell.sft scene.sft
+  run 0 convert cloud.ply -o bare.ply --keep position,normal --quiet
+  run 0 convert cloud.ply -o receivers.ply --every 100 --quiet
+  run 0 sample cornell.obj -o photons.ply --photons 50000 --quiet
+}
+
+# peakIsAtMost MEBIBYTES COMMAND: by the statistics that it has written.
+peakIsAtMost() {
+  local peak
+  peak=$(field stats.json peak_resident_bytes)
+  echo "peak of $((peak >> 10)) KiB of $1 MiB: $2"
+  ((peak <= $1 << 20)) || fail "peak of $peak bytes with $1 MiB: $2"
+}
+
+# runWithin MEBIBYTES COMMAND OPTION...: succeeds below that, or says what would do.
+runWithin() {
+  local command=$2 status=0
+  rm -f out.* stats.json
+  # shellcheck disable=SC2086 # a list of words
+  said=$("$surfeit" $command --stats stats.json --progress none "${@:3}" 2>&1) || status=$?
+  case $status in
+    0) peakIsAtMost "$1" "$command ${*:3}" ;;
+    33) least=$(sed -n -E 's/.*[: ]([0-9.]+) MiB (is the least that works|would do).*/\1/p' <<< "$said") ;;
+    *) fail "exit status $status, expected 0 or 33: $command ${*:3}: $said" ;;
+  esac
+  [[ $status == 0 || -n $least ]] || fail "no least budget in: $said"
+  ((status == 0))
+}
+
+peaksStayBelowTheBudget() {
+  local command limit threads options successes=0
+  makeInputs
+  for command in "${commands[@]}"; do
+    # With 32 MiB and most of 80 not all that would help fits
+    for limit in "32 1" "80 2" "128 8"; do
+      read -r limit threads <<< "$limit"
+      options=(--memory "${limit}M" --threads "$threads")
+      [[ $command != convert* ]] || options=(--memory "${limit}M")
+      if runWithin "$limit" "$command" "${options[@]}"; then
+        ((++successes))
+      else
+        echo "$least MiB would do: $command ${options[*]}"
+      fi
+    done
+  done
+  ((successes >= 2 * ${#commands[@]} - 2)) || fail "only $successes runs"
+}
+
+budgetsThatAreNamedDo() {
+  local command least rounded step
+  makeInputs
+  for command in "${commands[@]}"; do
+    runWithin 0 "$command" --memory 3M && fail "3 MiB are enough: $command"
+    # Named first: what there must be before cube knows its picture, and convert its rows
+    for step in 1 2; do
+      rounded=$(awk -v least="$least" 'BEGIN { print int(least) + (least > int(least)) }')
+      ! runWithin "$rounded" "$command" --memory "${rounded}M" || break
+      [[ $step == 1 && $command == c* ]] || fail "$rounded MiB do not do: $said"
+    done
+  done
+}
+
+jobsLimitEveryCommand() {
+  local command
+  makeInputs
+  export SLURM_MEM_PER_CPU=64 SLURM_CPUS_ON_NODE=2
+  for command in "${commands[@]}"; do
+    runWithin 96 "$command" || echo "$least MiB would do: $command"
+  done
+  run 33 gather scene.sft receivers.ply -o out.ply --memory 5%
+  says "a memory budget of 6.4 MiB"
+  run 2 gather scene.sft receivers.ply -o out.ply --memory 101%
+}
+
+# Really limited to 128 MiB: the system ends what takes more.
+cgroupsLimitEveryCommand() {
+  local command group=/sys/fs/cgroup/surfeit-test-$$ limit=memory.max
+  if [[ $(stat --file-system --format=%T /sys/fs/cgroup) != cgroup2fs ]]; then
+    group=/sys/fs/cgroup/memory/surfeit-test-$$ limit=memory.limit_in_bytes # version 1
+  fi
+  makeInputs
+  if ! mkdir "$group" 2> /dev/null || ! (echo 128M > "$group/$limit") 2> /dev/null; then
+    rmdir "$group" 2> /dev/null || true
+    echo "skipped: no cgroup can be made here"
+    exit 77
+  fi
+  for command in "${commands[@]}"; do
+    # Of 3/4 of the limit, which is the default
+    (echo "$BASHPID" > "$group/cgroup.procs" && (runWithin 96 "$command" || [[ -n $least ]])) ||
+      { rmdir "$group"; fail "in a cgroup of 128 MiB: $command"; }
+  done
+  rmdir "$group"
+}
+
+temporaryFilesGoWhereTheJobWants() {
+  skipWhereSanitized
+  generate cloud.ply --surfels 300k
+  mkdir job given
+  SLURM_TMPDIR=nowhere run 74 index cloud.ply -o out.sft --memory 64M
+  says nowhere
+  TMPDIR=nowhere SLURM_TMPDIR=job run 0 index cloud.ply -o out.sft --memory 64M --stats stats.json
+  (($(field stats.json temporary_bytes) > 0)) || fail "nothing was spilled"
+  SLURM_TMPDIR=nowhere run 0 index cloud.ply -o out.sft --memory 64M --temp given
+  [[ -z $(find job given -type f) ]] || fail "left behind: $(find job given)"
+}
+
+runCase

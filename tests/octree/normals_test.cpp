@@ -1,0 +1,240 @@
+// Normals of clouds of bare positions, beside the true ones.
+#include "surfeit/normals.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "io/cloud_formats.h"
+#include "io/row_stream_test.h"
+#include "io/test_directory.h"
+
+namespace surfeit {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using Toward = NormalOrientation::Toward;
+
+class NotesOfNormals : public Progress {
+ public:
+  void note(const std::string& message) override { notes.push_back(message); }
+  std::vector<std::string> notes;
+};
+
+class NormalsTest : public DirectoryTest {
+ protected:
+  double unit() { return std::uniform_real_distribution<double>(0, 1)(random_); }
+  double gauss() { return std::normal_distribution<double>(0, 1)(random_); }
+
+  // Points with their number, as doubles.
+  void write(const std::vector<glm::dvec3>& points, const std::string& comment = "") const {
+    std::string text = "ply\nformat ascii 1.0\n" + comment +
+                       fmt::format(
+                           "element vertex {}\nproperty double x\nproperty double y\n"
+                           "property double z\nproperty int number\nend_header\n",
+                           points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      text += fmt::format("{} {} {} {}\n", points[i].x, points[i].y, points[i].z, i);
+    }
+    DirectoryTest::write("cloud.ply", text);
+  }
+
+  struct Found {
+    std::vector<glm::dvec3> position, normal;
+    std::vector<double> number, confidence;
+  };
+  Found find(const NormalsOptions& options, const std::string& name = "normals.ply") {
+    const auto stats = estimateNormals(path("cloud.ply"), path(name), options, notes_);
+    EXPECT_TRUE(stats.ok()) << stats.status().message();
+    Found found;
+    if (!stats.ok()) return found;
+    stats_ = *stats;
+    const auto reader = openRowReader(path(name));
+    EXPECT_TRUE(reader.ok()) << reader.status().message();
+    const std::vector<std::byte> rows = readAllRows(**reader);
+    for (std::size_t i = 0; i < (*reader)->element().count; ++i) {
+      const auto value = [&](const char* property) { return valueOf(**reader, rows, i, property); };
+      found.position.emplace_back(value("x"), value("y"), value("z"));
+      found.normal.emplace_back(value("nx"), value("ny"), value("nz"));
+      found.number.push_back(value("number"));
+      found.confidence.push_back(value("normal_confidence"));
+    }
+    return found;
+  }
+
+  // The median angle from the true normals, in degrees; those without are 90.
+  static double medianAngle(const Found& found,
+                            const std::function<glm::dvec3(const glm::dvec3&)>& truth) {
+    std::vector<double> angles;
+    for (std::size_t i = 0; i < found.normal.size(); ++i) {
+      const double cosine = glm::dot(found.normal[i], truth(found.position[i]));
+      angles.push_back(std::acos(std::clamp(cosine, -1., 1.)) * 180 / 3.14159265358979);
+    }
+    std::nth_element(angles.begin(), angles.begin() + std::ptrdiff_t(angles.size() / 2),
+                     angles.end());
+    return angles[angles.size() / 2];
+  }
+  static double partBelow(const Found& found, double cosine,
+                          const std::function<glm::dvec3(const glm::dvec3&)>& truth) {
+    int below = 0;
+    for (std::size_t i = 0; i < found.normal.size(); ++i) {
+      below += glm::dot(found.normal[i], truth(found.position[i])) < cosine ? 1 : 0;
+    }
+    return double(below) / double(found.normal.size());
+  }
+
+  std::vector<glm::dvec3> sphere(int count, double noise,
+                                 const glm::dvec3& centre = glm::dvec3(0)) {
+    std::vector<glm::dvec3> points;
+    const double spacing = std::sqrt(4 * 3.14159265 / count);
+    for (int i = 0; i < count; ++i) {
+      const glm::dvec3 direction = glm::normalize(glm::dvec3(gauss(), gauss(), gauss()));
+      points.push_back(centre + direction * (1 + noise * spacing * gauss()));
+    }
+    return points;
+  }
+
+  std::mt19937 random_{3};
+  NotesOfNormals notes_;
+  NormalsStats stats_;
+};
+
+TEST_F(NormalsTest, SpheresGetTheirsWithAndWithoutNoise) {
+  NormalsOptions outward;
+  outward.orientation.toward = Toward::kOutward;
+  const auto truth = [](const glm::dvec3& p) { return glm::normalize(p); };
+  write(sphere(20000, 0));
+  const Found clean = find(outward);
+  EXPECT_LT(medianAngle(clean, truth), 1);
+  EXPECT_EQ(partBelow(clean, 0, truth), 0);
+  EXPECT_EQ(stats_.without, 0u);
+  EXPECT_GT(stats_.mean_confidence, .98);
+  write(sphere(20000, .2));
+  const Found noisy = find(outward);
+  EXPECT_LT(medianAngle(noisy, truth), 5);
+  EXPECT_LT(partBelow(noisy, 0, truth), .005);
+}
+
+TEST_F(NormalsTest, RowsKeepTheirOrderAndAllThatTheyHave) {
+  std::vector<glm::dvec3> points = sphere(5000, 0, {500000, 5000000, 100});
+  write(points);
+  NormalsOptions outward;
+  outward.orientation.toward = Toward::kOutward;
+  const Found found = find(outward);
+  ASSERT_EQ(found.number.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(found.number[i], double(i));
+    EXPECT_EQ(found.position[i], points[i]);
+  }
+  EXPECT_LT(medianAngle(found,
+                        [](const glm::dvec3& p) {
+                          return glm::normalize(p - glm::dvec3(500000, 5000000, 100));
+                        }),
+            2);
+  // Whatever the order, the threads and the budget
+  const Found alone = [&] {
+    NormalsOptions options = outward;
+    options.threads = 1;
+    return find(options, "alone.ply");
+  }();
+  EXPECT_EQ(contents("alone.ply"), contents("normals.ply"));
+  std::vector<std::size_t> order(points.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::shuffle(order.begin(), order.end(), random_);
+  std::vector<glm::dvec3> shuffled;
+  for (const std::size_t i : order) shuffled.push_back(points[i]);
+  write(shuffled);
+  const Found other = find(outward);
+  for (std::size_t i = 0; i < order.size(); ++i) EXPECT_EQ(other.normal[i], found.normal[order[i]]);
+}
+
+TEST_F(NormalsTest, TerrainFacesUpWhateverUpIs) {
+  const auto heights = [](double x, double y) { return .1 * std::sin(7 * x) * std::cos(5 * y); };
+  std::vector<glm::dvec3> points;
+  for (int i = 0; i < 10000; ++i) {
+    const double x = unit(), y = unit();
+    points.emplace_back(x, y, heights(x, y));
+  }
+  write(points, "comment up z\n");
+  EXPECT_EQ(partBelow(find({}), 0, [](const glm::dvec3&) { return glm::dvec3(0, 0, 1); }), 0);
+  NormalsOptions y_up;
+  y_up.up = UpAxis::kY;
+  EXPECT_EQ(partBelow(find(y_up), 0, [](const glm::dvec3&) { return glm::dvec3(0, 1, 0); }), 0);
+}
+
+TEST_F(NormalsTest, RoomsFaceTheirSensor) {
+  std::vector<glm::dvec3> points;
+  for (int i = 0; i < 12000; ++i) {
+    glm::dvec3 p(unit(), unit(), unit());
+    p[i % 3] = i % 2;
+    points.push_back(p + glm::dvec3(1000, 0, 0));
+  }
+  write(points);
+  NormalsOptions options;
+  options.orientation = {Toward::kSensor, {1000.3, .6, .4}};
+  const glm::dvec3 sensor = options.orientation.sensor;
+  const Found found = find(options);
+  for (std::size_t i = 0; i < found.normal.size(); ++i) {
+    EXPECT_GE(glm::dot(found.normal[i], sensor - found.position[i]), -1e-4);
+  }
+}
+
+TEST_F(NormalsTest, PointsAllAroundHaveNoneOrAreTwoSided) {
+  std::vector<glm::dvec3> points;
+  for (int i = 0; i < 5000; ++i) points.emplace_back(unit(), unit(), unit());
+  write(points);
+  Found found = find({});
+  const auto none = std::count(found.normal.begin(), found.normal.end(), glm::dvec3(0));
+  EXPECT_GT(none, 3750);  // all but those at the faces of the cube
+  EXPECT_EQ(stats_.without, std::uint64_t(none));
+  NormalsOptions options;
+  options.thin_is_two_sided = true;
+  found = find(options);
+  EXPECT_EQ(std::count(found.normal.begin(), found.normal.end(), glm::dvec3(0)), 0);
+  const auto reader = openRowReader(path("normals.ply"));
+  EXPECT_NE((*reader)->element().find("two_sided"), nullptr);
+}
+
+TEST_F(NormalsTest, SizesAreThoseOfTheSurface) {
+  write(sphere(20000, 0));
+  NormalsOptions options;
+  options.with_sizes = true;
+  find(options);
+  const auto reader = openRowReader(path("normals.ply"));
+  const std::vector<std::byte> rows = readAllRows(**reader);
+  double area = 0;
+  for (std::size_t i = 0; i < 20000; ++i) area += valueOf(**reader, rows, i, "area");
+  EXPECT_NEAR(area, 4 * 3.14159265, .05);
+}
+
+TEST_F(NormalsTest, WhatCannotBeDoneIsSaid) {
+  write(sphere(1000, 0));
+  NormalsOptions options;
+  options.memory_bytes = 1 << 20;
+  EXPECT_EQ(estimateNormals(path("cloud.ply"), path("a.ply"), options, notes_).status().code(),
+            StatusCode::kBudgetTooSmall);
+  options.memory_bytes = 0;
+  options.orientation = {Toward::kSensor, {NAN, 0, 0}};
+  EXPECT_EQ(estimateNormals(path("cloud.ply"), path("a.ply"), options, notes_).status().code(),
+            StatusCode::kInvalidArgument);
+  EXPECT_EQ(estimateNormals(path("gone.ply"), path("a.ply"), {}, notes_).status().code(),
+            StatusCode::kIoError);
+  EXPECT_FALSE(std::filesystem::exists(path("a.ply")));
+  // Normals that are there are replaced
+  find({}, "cloud2.ply");
+  std::filesystem::rename(path("cloud2.ply"), path("cloud.ply"));
+  find({});
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("nx is replaced")));
+}
+
+}  // namespace
+}  // namespace surfeit

@@ -1,0 +1,111 @@
+// surfeit normals: normals for clouds that have none.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include "core/job_limits.h"
+#include "surfeit/normals.h"
+#include "tools/channel_options.h"
+#include "tools/command.h"
+#include "tools/number_list.h"
+#include "tools/up_option.h"
+
+namespace surfeit {
+namespace {
+
+struct NormalsArguments {
+  std::string input, output;
+  NormalsOptions options;
+};
+
+// "up", "outward" or "sensor X,Y,Z".
+NormalOrientation parseOrientation(const std::string& text) {
+  using Toward = NormalOrientation::Toward;
+  if (text == "up") return {Toward::kUp, {}};
+  if (text == "outward") return {Toward::kOutward, {}};
+  constexpr std::string_view kSensor = "sensor";
+  if (!text.starts_with(kSensor)) {
+    throw CLI::ValidationError(
+        "--orient", fmt::format("found \"{}\", expected up, outward or \"sensor X,Y,Z\"", text));
+  }
+  const auto at =
+      parseNumberList<3>("--orient", text.substr(kSensor.size()), "\"sensor X,Y,Z\", a place");
+  return {Toward::kSensor, {at[0], at[1], at[2]}};
+}
+
+Status runNormals(NormalsArguments& arguments, CommandContext& context) {
+  NormalsOptions& options = arguments.options;
+  options.threads = context.common.threads;
+  options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(
+      const NormalsStats stats,
+      estimateNormals(arguments.input, arguments.output, options, context.progress()));
+  const double seconds = std::max(stats.seconds, 1e-9);
+  context.say(fmt::format(
+      "{}: normals of {} points, confidence {:.3f} on average\n"
+      "{:.1f} s (order {:.1f} s), {:.2f} M points/s, peak memory {}, temporary files {}",
+      arguments.output, formatCount(stats.points), stats.mean_confidence, seconds,
+      stats.index_seconds, double(stats.points) / seconds / 1e6, formatBytes(peakResidentBytes()),
+      formatBytes(stats.temporary_bytes)));
+  return context.writeStats(
+      {{"command", "normals"},
+       {"memory_bytes", stats.memory_bytes},
+       {"points", stats.points},
+       {"points_without_surface", stats.without},
+       {"mean_confidence", stats.mean_confidence},
+       {"temporary_bytes", stats.temporary_bytes},
+       {"points_per_second", double(stats.points) / seconds},
+       {"phases",
+        {{"order", stats.index_seconds}, {"normals", stats.seconds - stats.index_seconds}}}});
+}
+
+void addNormalsOptions(CLI::App& command, NormalsOptions& options) {
+  command
+      .add_option_function<std::string>(
+          "--orient",
+          [&options](const std::string& text) { options.orientation = parseOrientation(text); },
+          "Which way they point: up (terrain, airborne scans), outward from the middle of the "
+          "cloud "
+          "(single objects), or \"sensor X,Y,Z\": to the place that all points were seen from")
+      ->type_name("up|outward|\"sensor X,Y,Z\"")
+      ->default_str("up");
+  addUpOption(command, options.up, "Axis that is up", "what the cloud says, z for LAS, else y");
+  command
+      .add_option_function<std::string>(
+          "--thin",
+          [&options](const std::string& text) { options.thin_is_two_sided = text == "two-sided"; },
+          "Points on no surface (foliage, wires): spheres, without a normal, or two-sided disks")
+      ->check(CLI::IsMember({"spheres", "two-sided"}))
+      ->type_name("spheres|two-sided")
+      ->default_str("spheres");
+  command.add_flag("--sizes", options.with_sizes,
+                   "Write radius and area, too, as index finds them without");
+  addChannelOptions(command, options.channels, options.part, options.filter);
+  addColorRangeOption(command, options.color_range);
+  addTemporaryOption(command, options.temporary_directory);
+}
+
+}  // namespace
+
+void addNormalsCommand(CLI::App& app, CommandContext& context) {
+  CLI::App* command = app.add_subcommand("normals", "Find normals of a cloud that has none");
+  const auto arguments = std::make_shared<NormalsArguments>();
+  command->add_option("CLOUD", arguments->input, "Cloud of points, or a scene (.sft)")->required();
+  addCloudOutputOption(*command, arguments->output, "Cloud to write, with all that CLOUD has");
+  addNormalsOptions(*command, arguments->options);
+  context.addCommonOptions(*command);
+  command->footer(
+      "Writes nx ny nz and normal_confidence, from 0 (neighbours all around) to 1 (on a plane).\n"
+      "Examples:\n"
+      "  surfeit normals scan.las -o scan_normals.ply\n"
+      "  surfeit normals statue.ply -o statue_normals.ply --orient outward\n"
+      "  surfeit normals room.ply -o room_normals.ply --orient \"sensor 2,3,1.6\" --thin "
+      "two-sided\n"
+      "  surfeit index scan_normals.ply -o scan.sft");
+  command->callback(
+      [arguments, &context] { context.run([&] { return runNormals(*arguments, context); }); });
+}
+
+}  // namespace surfeit
