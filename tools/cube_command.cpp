@@ -21,6 +21,7 @@
 #include "tools/gather_options.h"
 #include "tools/light_options.h"
 #include "tools/number_list.h"
+#include "tools/up_option.h"
 #include "view/cube_picture.h"
 #include "view/picture_file.h"
 
@@ -31,6 +32,7 @@ constexpr const char* kReceiverGroup = "Receiver";
 constexpr const char* kCubePictureGroup = "Picture";
 
 struct CubeArguments {
+  std::optional<UpAxis> up;  // absent: the scene's
   std::string scene, picture, receivers;
   std::uint64_t number = 0;
   CubeReceiver receiver;
@@ -141,7 +143,7 @@ Status runCube(CubeArguments& arguments, CommandContext& context) {
   }
   const CubeViews cubes = {&cube, traced ? &*traced : nullptr};
   SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.scene));
-  arguments.drawing.up = options.environment.up.value_or(info.up);
+  arguments.drawing.up = arguments.up.value_or(info.up);
   SURFEIT_RETURN_IF_ERROR(writeCube(cubes, arguments));
 
   context.say(describe(cube, arguments));
@@ -222,6 +224,8 @@ void addCubePictureOptions(CLI::App& command, CubeArguments& arguments) {
       .add_option("--exposure", drawing.exposure, "Stops of exposure: light times 2^EV in a PNG")
       ->type_name("EV")
       ->default_str("0")
+      ->group(kCubePictureGroup);
+  addUpOption(command, arguments.up, "Axis that is up in the picture", "the scene's")
       ->group(kCubePictureGroup);
   command
       .add_option("--reference", arguments.reference,

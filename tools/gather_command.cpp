@@ -6,7 +6,11 @@
 
 #include "core/job_limits.h"
 #include "gather/gather_options.h"
+#include "gather/gather_outputs.h"
+#include "gather/receiver_sorter.h"
+#include "io/file.h"
 #include "surfeit/gather.h"
+#include "surfeit/tune.h"
 #include "tools/cache_report.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
@@ -17,15 +21,67 @@ namespace surfeit {
 namespace {
 
 struct GatherArguments {
+  bool is_dry_run = false;
   std::string scene, receivers, result, series;
   GatherOptions options;
 };
+
+// The last row of the curve that a budget reaches.
+const TuneRow& rowFor(const TuneReport& report, std::uint64_t memory_bytes) {
+  const TuneRow* found = &report.rows.front();
+  for (const std::vector<TuneRow>* rows : {&report.rows, &report.curve}) {
+    for (const TuneRow& row : *rows) {
+      const bool is_reached = row.memory_bytes <= memory_bytes;
+      if (is_reached && row.memory_bytes > found->memory_bytes) found = &row;
+    }
+  }
+  return *found;
+}
+
+// --dry-run: what tune finds out, at the budget of the gather.
+Status sayForecast(const GatherArguments& arguments, CommandContext& context) {
+  constexpr std::uint64_t kSample = 50'000;
+  TuneOptions tuning;
+  tuning.gather = arguments.options;
+  tuning.sample_receivers = kSample;
+  SURFEIT_ASSIGN_OR_RETURN(const TuneReport report, tuneGather(arguments.scene, arguments.receivers,
+                                                               tuning, context.progress()));
+  const GatherOptions options = withDefaults(arguments.options);
+  const std::uint64_t memory = options.memory_bytes;
+  const TuneRow& row = rowFor(report, memory);
+  const std::uint64_t result_bytes = resultFloats(options.outputs) * sizeof(float);
+  const std::uint64_t temporary =
+      report.receivers * (sizeof(SortedReceiver) + result_bytes + sizeof(std::uint32_t));
+  SURFEIT_ASSIGN_OR_RETURN(const InputFile receivers, InputFile::open(arguments.receivers));
+  const std::uint64_t output = receivers.size() + report.receivers * result_bytes;
+  context.answer(fmt::format(
+      "{}: {} receivers, by a sample of {}:\n"
+      "  memory           {} (the least that works {}, recommended {})\n"
+      "  temporary files  at most {}\n"
+      "  result           about {}, where it is no text and not compressed\n"
+      "  time             about {:.0f} s with {} threads\n"
+      "Nothing was written.",
+      arguments.result, formatCount(report.receivers), formatCount(report.sampled_receivers),
+      formatBytes(memory), formatBytes(report.rows.front().memory_bytes),
+      formatBytes(report.recommended.memory_bytes), formatBytes(temporary), formatBytes(output),
+      row.predicted.seconds, report.threads));
+  return context.writeStats({{"command", "gather"},
+                             {"dry_run", true},
+                             {"receivers", report.receivers},
+                             {"sampled_receivers", report.sampled_receivers},
+                             {"memory_bytes", memory},
+                             {"recommended_memory_bytes", report.recommended.memory_bytes},
+                             {"temporary_bytes", temporary},
+                             {"output_bytes", output},
+                             {"seconds", row.predicted.seconds}});
+}
 
 Status runGather(GatherArguments& arguments, CommandContext& context) {
   GatherOptions& options = arguments.options;
   options.threads = context.threads();
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
+  if (arguments.is_dry_run) return sayForecast(arguments, context);
   SURFEIT_ASSIGN_OR_RETURN(const GatherStats stats,
                            gatherCloud(arguments.scene, arguments.receivers, arguments.result,
                                        options, context.progress()));
@@ -78,6 +134,8 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
   addSubsetOption(*command, arguments->options.groups);
   command->add_option("--cache-series", arguments->series,
                       "Write what the caches did over time to this file, .csv or .json");
+  command->add_flag("--dry-run", arguments->is_dry_run,
+                    "Write no result; say what memory, files and time it would take, by a sample");
   context.addCommonOptions(*command);
   command->footer(
       "The result holds the receivers in their order with all their properties, and `occlusion`;\n"
@@ -88,6 +146,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
       "  surfeit gather lion.sft lion.ply -o lion_ao.ply\n"
       "  surfeit gather city.sft street.ply -o street_gi.ply --mode bleeding --memory 2G\n"
       "  surfeit gather city.sft street.ply -o look.ply --quality draft\n"
+      "  surfeit gather city.sft street.ply -o street_gi.ply --mode bleeding --dry-run\n"
       "  surfeit gather lion.sft lion.ply -o lit.ply --environment sky.exr \\\n"
       "      --outputs occlusion,bent_normal,environment\n"
       "  surfeit gather hall.sft floor.ply -o mirror.ply --mode glossy --roughness 0.05 \\\n"

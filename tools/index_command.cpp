@@ -19,8 +19,35 @@ struct IndexArguments {
   std::vector<std::string> inputs;
   std::string output;
   std::string precision = "quantized";
+  bool is_dry_run = false;
   IndexOptions options;
 };
+
+// --dry-run
+Status sayForecast(const IndexArguments& arguments, CommandContext& context) {
+  SURFEIT_ASSIGN_OR_RETURN(
+      const IndexForecast forecast,
+      forecastIndex(arguments.inputs, arguments.output, arguments.options, context.progress()));
+  context.answer(fmt::format(
+      "{}: {} surfels in {} to read, by a sample of {}:\n"
+      "  memory           {}\n"
+      "  temporary files  about {}\n"
+      "  scene            about {}\n"
+      "  time             about {:.0f} s, and that to read the input\n"
+      "Nothing was written.",
+      arguments.output, formatCount(forecast.records), formatBytes(forecast.input_bytes),
+      formatCount(forecast.sampled_surfels), formatBytes(forecast.memory_bytes),
+      formatBytes(forecast.temporary_bytes), formatBytes(forecast.file_bytes), forecast.seconds));
+  return context.writeStats({{"command", "index"},
+                             {"dry_run", true},
+                             {"records", forecast.records},
+                             {"sampled_surfels", forecast.sampled_surfels},
+                             {"input_bytes", forecast.input_bytes},
+                             {"memory_bytes", forecast.memory_bytes},
+                             {"temporary_bytes", forecast.temporary_bytes},
+                             {"file_bytes", forecast.file_bytes},
+                             {"seconds", forecast.seconds}});
+}
 
 Status runIndex(IndexArguments& arguments, CommandContext& context) {
   IndexOptions& options = arguments.options;
@@ -28,6 +55,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
   options.full_precision = arguments.precision == "full";
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
+  if (arguments.is_dry_run) return sayForecast(arguments, context);
   SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
                                                                options, context.progress()));
   const double seconds = context.wallSeconds();
@@ -92,6 +120,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   addUpOption(*command, options.up, "Axis that is up in the scene",
               "what the clouds say, z for LAS, else y");
   addTemporaryOption(*command, options.temporary_directory);
+  command->add_flag("--dry-run", arguments->is_dry_run,
+                    "Write no scene; say what memory, files and time it would take, by a sample");
   context.addCommonOptions(*command);
   command->footer(
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
@@ -102,6 +132,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "for one thread, 72M for two.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"
+      "  surfeit index city.ply -o city.sft --memory 512M --dry-run\n"
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
       "  surfeit index city.ply -o city.sft --memory 80%\n"
       "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");

@@ -25,7 +25,9 @@ struct CropBox {
 struct ConvertOptions {
   std::string channels{};   // channels to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md)
   std::string part{};       // of files with several: the one to read; empty: the first with a cloud
-  std::uint64_t every = 1;  // takes records 0, every, 2 every, ... of each input; at least 1
+  // Takes records 0, every, 2 every, ... of each input; at least 1. Those stand for all: area and
+  // power (of photons) are multiplied by it, radius, pscale and width by its root.
+  std::uint64_t every = 1;
 
   // The rows of an affine 3x4 matrix: x' = t[0] x + t[1] y + t[2] z + t[3]. All in double
   // precision. Positions are points. Normals are turned by the inverse transpose and keep their

@@ -63,4 +63,21 @@ struct IndexStats {
 Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
                                const IndexOptions& options, Progress& progress);
 
+// What indexClouds will take, about.
+struct IndexForecast {
+  std::uint64_t records = 0, sampled_surfels = 0;
+  std::uint64_t input_bytes = 0;
+  std::uint64_t memory_bytes = 0;
+  std::uint64_t temporary_bytes = 0;
+  std::uint64_t file_bytes = 0;
+  double seconds = 0;  // without the reading of the inputs
+};
+
+// Indexes a sample from all over the inputs, in the folder of temporary files, and multiplies: a
+// sample is less dense, so the file will be somewhat smaller. Writes nothing else. Errors: as of
+// indexClouds.
+Result<IndexForecast> forecastIndex(const std::vector<std::string>& inputs,
+                                    const std::string& output, const IndexOptions& options,
+                                    Progress& progress);
+
 }  // namespace surfeit

@@ -31,7 +31,6 @@ struct NormalsOptions {
   // spheres; or that of the plane through these, seen from both sides.
   bool thin_is_two_sided = false;
   bool with_sizes = false;                   // radius and area, too, as index would find them
-  float overlap = 2;                         // of these: disk area over surfel area
   std::string channels{}, part{}, filter{};  // of the input, as in IndexOptions
   ColorRange color_range = ColorRange::kAuto;
   std::uint64_t memory_bytes =

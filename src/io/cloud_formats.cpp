@@ -210,11 +210,13 @@ void noteLostUpAxis(const std::string& path, const CloudFormat& format,
                     const RowWriterOptions& options) {
   const UpAxis up = statedUpAxis(options.comments).value_or(kDefaultUpAxis);
   const UpAxis own = format.has(CloudFormat::kHasUpZ) ? UpAxis::kZ : kDefaultUpAxis;
-  if (format.has(CloudFormat::kStatesUp) || own == up || options.progress == nullptr) return;
+  const bool is_csv = hasExtension(withoutCompression(path), ".csv");
+  const bool states_up = format.has(CloudFormat::kStatesUp) && !is_csv;
+  if (states_up || own == up || options.progress == nullptr) return;
   if (format.create == createExr) return;
   options.progress->note(
       fmt::format("{}: {} has no place for the up axis, {}: give --up {} where it is read", path,
-                  format.name, upAxisName(up), upAxisName(up)));
+                  is_csv ? "CSV" : format.name, upAxisName(up), upAxisName(up)));
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ RowTransform::RowTransform(const Matrix& matrix)
   }
 }
 
-Result<RowTransform> RowTransform::create(const Matrix& matrix) {
+Result<RowTransform> RowTransform::create(const Matrix& matrix, double growth) {
   for (const double value : matrix) {
     if (!std::isfinite(value)) {
       return Status::invalidArgument(
@@ -91,6 +91,7 @@ Result<RowTransform> RowTransform::create(const Matrix& matrix) {
     }
   }
   RowTransform transform(matrix);
+  transform.growth_ = growth;
   double edges = 1;  // of what becomes of a unit cube
   for (std::size_t axis = 0; axis < 3; ++axis) {
     edges *= std::hypot(matrix[axis], matrix[4 + axis], matrix[8 + axis]);
@@ -126,6 +127,7 @@ RowTransform::Role RowTransform::roleOf(const RowChannel& channel) {
     return channel.name == "area" ? Role::kArea : Role::kNone;
   }
   if (channel.properties.size() != 3) return Role::kNone;
+  if (channel.name == "power") return Role::kPower;
   switch (channel.kind) {
     case ChannelKind::kPoint:
       return Role::kPoint;
@@ -139,12 +141,18 @@ RowTransform::Role RowTransform::roleOf(const RowChannel& channel) {
   }
 }
 
+bool RowTransform::changes(Role role) const {
+  const bool grows = role == Role::kLength || role == Role::kArea || role == Role::kPower;
+  if (grows && growth_ != 1) return true;
+  return role != Role::kNone && role != Role::kPower && !isIdentity();
+}
+
 void RowTransform::widenTypes(std::vector<PlyProperty>& properties) const {
   PlyElement element;
   element.properties = properties;
   packPlyRow(element);
   for (const RowChannel& channel : channelsOf(element)) {
-    if (roleOf(channel) == Role::kNone) continue;
+    if (!changes(roleOf(channel))) continue;
     for (const std::size_t i : channel.properties) {
       PlyType& type = properties[i].type;
       if (isPlyFloat(type)) continue;
@@ -157,15 +165,14 @@ void RowTransform::bind(const PlyElement& element) {
   row_bytes_ = element.row_bytes;
   tasks_.clear();
   notes_.clear();
-  if (isIdentity()) return;
   const std::vector<RowChannel> channels = channelsOf(element);
   for (const RowChannel& channel : channels) {
     Task task{roleOf(channel), {}};
-    if (task.role == Role::kNone) continue;
+    if (!changes(task.role)) continue;
     for (const std::size_t i : channel.properties) task.properties.push_back(element.properties[i]);
     tasks_.push_back(std::move(task));
   }
-  noteWhatStays(channels);
+  if (!isIdentity()) noteWhatStays(channels);
 }
 
 void RowTransform::noteWhatStays(const std::vector<RowChannel>& channels) {
@@ -194,7 +201,7 @@ void RowTransform::apply(std::byte* rows, std::size_t count) const {
     const std::size_t block_rows = std::min(kBlockRows, count - begin);
     std::byte* const block = rows + begin * row_bytes_;
     for (const Task& task : tasks_) {
-      if (task.properties.size() == 3) {
+      if (task.properties.size() == 3 && task.role != Role::kPower) {
         applyTriple(task, block, block_rows);
       } else {
         applyScale(task, block, block_rows);
@@ -242,12 +249,16 @@ void RowTransform::applyTriple(const Task& task, std::byte* rows, std::size_t co
 }
 
 void RowTransform::applyScale(const Task& task, std::byte* rows, std::size_t count) const {
-  const double scale =
-      std::pow(std::abs(determinant_), task.role == Role::kArea ? 2.0 / 3 : 1.0 / 3);
-  Column values;
-  load(task.properties[0], rows, row_bytes_, count, values);
-  for (std::size_t i = 0; i < count; ++i) values[i] *= scale;
-  store(values, task.properties[0], rows, row_bytes_, count);
+  const double length = std::cbrt(std::abs(determinant_));
+  const double scale = task.role == Role::kPower  ? growth_
+                       : task.role == Role::kArea ? length * length * growth_
+                                                  : length * std::sqrt(growth_);
+  for (const PlyProperty& property : task.properties) {
+    Column values;
+    load(property, rows, row_bytes_, count, values);
+    for (std::size_t i = 0; i < count; ++i) values[i] *= scale;
+    store(values, property, rows, row_bytes_, count);
+  }
 }
 
 }  // namespace surfeit

@@ -20,9 +20,11 @@ class RowTransform {
   // The rows of a 3x4 matrix: x' = m[0] x + m[1] y + m[2] z + m[3].
   using Matrix = std::array<double, 12>;
 
-  // kInvalidArgument unless all values are finite and the map can be inverted.
-  static Result<RowTransform> create(const Matrix& matrix);
+  // kInvalidArgument unless all values are finite and the map can be inverted. With `growth` each
+  // row stands for so many: areas and powers of photons grow by it, radii by its root.
+  static Result<RowTransform> create(const Matrix& matrix, double growth = 1);
 
+  // Whether nothing is moved; sizes may grow all the same.
   bool isIdentity() const;
   // Whether it scales all directions alike.
   bool isUniform() const;
@@ -39,7 +41,7 @@ class RowTransform {
   void apply(std::byte* rows, std::size_t count) const;
 
  private:
-  enum class Role : std::uint8_t { kNone, kPoint, kVector, kDirection, kNormal, kLength, kArea };
+  enum class Role : std::uint8_t { kNone, kPoint, kVector, kDirection, kNormal, kLength, kArea, kPower };
   struct Task {  // properties of a channel that change together
     Role role = Role::kNone;
     std::vector<PlyProperty> properties;  // 3, or 1 of lengths and areas
@@ -47,13 +49,14 @@ class RowTransform {
 
   explicit RowTransform(const Matrix& matrix);
   static Role roleOf(const RowChannel& channel);
+  bool changes(Role role) const;
   void noteWhatStays(const std::vector<RowChannel>& channels);
   void applyTriple(const Task& task, std::byte* rows, std::size_t count) const;
   void applyScale(const Task& task, std::byte* rows, std::size_t count) const;
 
   Matrix matrix_;
   std::array<double, 9> normal_matrix_{};  // the inverse transpose, up to a positive factor
-  double determinant_ = 1;
+  double determinant_ = 1, growth_ = 1;
   std::size_t row_bytes_ = 0;
   std::vector<Task> tasks_;
   std::vector<std::string> notes_;

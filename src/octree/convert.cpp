@@ -216,7 +216,8 @@ class Converter {
       return {};
     }
     SURFEIT_ASSIGN_OR_RETURN(
-        transform_, RowTransform::create(behindTurn(options_.transform, from, *options_.up)));
+        transform_, RowTransform::create(behindTurn(options_.transform, from, *options_.up),
+                                         double(options_.every)));
     return {};
   }
 
@@ -361,7 +362,8 @@ Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
   if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   try {
     SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
-    SURFEIT_ASSIGN_OR_RETURN(RowTransform transform, RowTransform::create(options.transform));
+    SURFEIT_ASSIGN_OR_RETURN(RowTransform transform,
+                             RowTransform::create(options.transform, double(options.every)));
     return Converter(inputs, output, options, std::move(transform), progress).run();
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

@@ -41,7 +41,6 @@ constexpr double kUsualOutputBytes = 26;
 constexpr double kLeastPackedBytes = 10;
 // The octree of bare positions, at full precision.
 constexpr double kBareOutputBytes = 40;
-constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;  // more saves little time
 
 // kIoError when a directory's file system has less room.
 Status checkRoom(const std::string& directory, double needed, const char* advice) {
@@ -463,7 +462,7 @@ Result<SceneFile> indexPlaces(const std::string& input, const std::string& besid
 Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
                                const IndexOptions& given, Progress& progress) {
   IndexOptions options = given;
-  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualIndexMemory);
   int threads = options.threads;
   if (threads <= 0) {
     const int available = defaultThreadCount();

@@ -16,6 +16,8 @@ namespace surfeit {
 
 // The least that indexClouds accepts; many threads and many surfels need more.
 inline constexpr std::uint64_t kLeastIndexMemory = 64 << 20;
+// What it takes unless it is told, at most.
+inline constexpr std::uint64_t kUsualIndexMemory = 1 << 30;
 
 // What has to be planned for.
 struct IndexTask {

@@ -34,7 +34,7 @@ Status SizedSurfelStream::prepare() {
   const SceneFile& file = octree_.file();
   const std::uint32_t pages = file.surfelPageCount();
   const std::uint32_t step = std::max<std::uint32_t>(1, pages / kSamplePages);
-  std::vector<float> areas;
+  std::vector<float> radii;
   for (std::uint32_t page = 0; page < pages; page += step) {
     surfels_.resize(file.header().surfel_group_capacity);
     SceneFile::Scratch scratch;
@@ -42,20 +42,20 @@ Status SizedSurfelStream::prepare() {
                              file.decodeSurfels(page, scratch, surfels_));
     for (std::uint32_t i = 0; i < count; i += 16) {
       SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, searchers_[0].at(surfels_[i]));
-      if (surface.area > 0) areas.push_back(surface.area);
+      if (surface.area > 0) radii.push_back(surface.radius);
     }
   }
   // One position for all: any size will do, so take a thousandth of the scene
   const float fallback = float(file.header().cube.size) * 1e-3f;
-  if (areas.empty()) {
+  if (radii.empty()) {
     largest_radius_ = fallback;
     return {};
   }
-  const auto median = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
-  std::nth_element(areas.begin(), median, areas.end());
-  largest_radius_ = kStrayLimit * std::sqrt(*median * overlap_ / kPi);
+  const auto median = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+  std::nth_element(radii.begin(), median, radii.end());
+  largest_radius_ = kStrayLimit * *median;
   for (SurfaceSearch& searcher : searchers_) {
-    searcher.limitLooseAreas(kStrayLimit * kStrayLimit * *median);
+    searcher.limitLooseRadii(largest_radius_);
   }
   return {};
 }
@@ -90,20 +90,22 @@ float SizedSurfelStream::coveringArea(float coverage, float radius, float local_
   return std::max(coverage * area, std::numeric_limits<float>::min());
 }
 
-void SizedSurfelStream::applyArea(Surfel& surfel, float area) const {
+void SizedSurfelStream::applySize(Surfel& surfel, const SurfaceAt& surface) const {
   surfel.flags &= ~kSurfelNeedsSize;
   if (surfel.radius > kPlaceholderSize) {
-    surfel.area = coveringArea(std::min(surfel.area / kPlaceholderSize, 1.f), surfel.radius, area);
+    surfel.area =
+        coveringArea(std::min(surfel.area / kPlaceholderSize, 1.f), surfel.radius, surface.area);
     return;
   }
-  surfel.radius = area > 0 ? std::sqrt(area * overlap_ / kPi) : largest_radius_;
-  surfel.area = areaOfDisk(surfel.radius, overlap_);
+  const bool is_known = surface.area > 0 && surface.radius > 0;
+  surfel.radius = is_known ? std::sqrt(overlap_) * surface.radius : largest_radius_;
+  surfel.area = is_known ? surface.area : areaOfDisk(surfel.radius, overlap_);
 }
 
 Status SizedSurfelStream::fillSizes(SurfaceSearch& searcher, std::span<Surfel> surfels) const {
   return searcher.find(
       surfels, [&](std::size_t i) { return (surfels[i].flags & kSurfelNeedsSize) != 0; },
-      [&](std::size_t i, const SurfaceAt& surface) { applyArea(surfels[i], surface.area); });
+      [&](std::size_t i, const SurfaceAt& surface) { applySize(surfels[i], surface); });
 }
 
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {

@@ -47,7 +47,7 @@ class SizedSurfelStream : public SortedSurfelStream {
  private:
   float coveringArea(float coverage, float radius, float local_area) const;
   Status readPages(std::uint32_t end_page);
-  void applyArea(Surfel& surfel, float area) const;
+  void applySize(Surfel& surfel, const SurfaceAt& surface) const;
   Status fillSizes(SurfaceSearch& searcher, std::span<Surfel> surfels) const;
 
   PagedOctree& octree_;

@@ -245,7 +245,7 @@ class NormalsJob {
     } else {
       stats_.mean_confidence += double(surface.confidence);
     }
-    const float radius = std::sqrt(surface.area * options_.overlap / kPi);
+    const float radius = std::sqrt(IndexOptions().overlap) * surface.radius;
     const float values[] = {normal.x, normal.y, normal.z, surface.confidence, radius, surface.area};
     const std::size_t count = options_.with_sizes ? 6 : 4;
     std::byte* const found = to + writer_->element().find("nx")->offset;
@@ -300,10 +300,6 @@ Status checkOptions(const NormalsOptions& options) {
   const glm::dvec3& sensor = options.orientation.sensor;
   if (!std::isfinite(sensor.x + sensor.y + sensor.z)) {
     return Status::invalidArgument("sensor: a coordinate is not finite");
-  }
-  if (!(options.overlap >= 1 && options.overlap <= 16)) {
-    return Status::invalidArgument(
-        fmt::format("overlap factor {}, expected 1 to 16", options.overlap));
   }
   return {};
 }

@@ -208,6 +208,15 @@ class Cell {
     }
     return 0.5f * twice;
   }
+  // The mean squared distance from the place.
+  float meanSquare() const {
+    float sum = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
+      sum += (a.x * b.y - a.y * b.x) * (glm::dot(a, a) + glm::dot(a, b) + glm::dot(b, b));
+    }
+    return sum / (12 * area());
+  }
   // Its width along a direction of unit length.
   float width(const glm::vec2& direction) const {
     float low = 0, high = 0;
@@ -225,14 +234,16 @@ class Cell {
   float reach_sq_;  // of the farthest corner
 };
 
+// In units of `unit`: fourth powers of lengths must stay finite.
 void flatten(std::span<const Neighbour> neighbours, const glm::vec3& own_normal,
-             const glm::vec3& normal, std::vector<Flat>& flat) {
+             const glm::vec3& normal, float unit, std::vector<Flat>& flat) {
   flat.clear();
   const TangentFrame frame(normal);
   for (const Neighbour& n : neighbours) {
     if (glm::dot(n.normal, own_normal) < 0) continue;  // the other side of something thin
-    flat.push_back({{glm::dot(n.offset, frame.tangent), glm::dot(n.offset, frame.bitangent)},
-                    glm::dot(n.offset, normal)});
+    const glm::vec3 offset = n.offset / unit;
+    flat.push_back({{glm::dot(offset, frame.tangent), glm::dot(offset, frame.bitangent)},
+                    glm::dot(offset, normal)});
   }
 }
 
@@ -254,18 +265,19 @@ SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float re
   SurfaceCell cell;
   if (neighbours.empty()) return cell;
   const float farthest = glm::length(neighbours.back().offset);
-  const float spacing = farthest * std::sqrt(kPi / float(neighbours.size() + 1));
-  const Plane plane = fitSheet(neighbours, spacing, scratch_->weights);
+  // In units of that
+  const float spacing = std::sqrt(kPi / float(neighbours.size() + 1));
+  const Plane plane = fitSheet(neighbours, spacing * farthest, scratch_->weights);
   const glm::vec3 normal = own_normal != glm::vec3(0) ? own_normal : plane.normal;
   std::vector<Flat>& flat = scratch_->flat;
-  flatten(neighbours, own_normal, normal, flat);
+  flatten(neighbours, own_normal, normal, farthest, flat);
   if (mayBeSheets(flat, spacing)) {
     const float thickness = thicknessOf(flat, scratch_->heights);
     dropSheet(1, spacing, thickness, flat, scratch_->heights);
     dropSheet(-1, spacing, thickness, flat, scratch_->heights);
   }
 
-  Cell polygon(2 * farthest);
+  Cell polygon(2);
   float sharers = 1;
   std::vector<glm::vec2>& cutters = scratch_->cutters;
   cutters.clear();
@@ -279,10 +291,10 @@ SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float re
   cell.normal = plane.normal;
   cell.confidence = plane.confidence;
   cell.is_line = plane.is_line;
-  cell.thickness = plane.thickness / spacing;
+  cell.thickness = plane.thickness / (spacing * farthest);
   if (cutters.empty()) return cell;
   // Where all places are known, what is open reaches farther than any of them
-  cell.is_settled = 2 * polygon.reach() <= std::min(reach, 2 * farthest);
+  cell.is_settled = 2 * polygon.reach() <= std::min(reach / farthest, 2.f);
   if (!cell.is_settled && is_last) {
     // One close by shares the cell rather than telling its size
     for (const glm::vec2& cutter : cutters) {
@@ -292,7 +304,12 @@ SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float re
   }
   // Of a line all that is known is a width: the piece is a square of it
   const float width = plane.is_line ? polygon.width(glm::normalize(cutters[0])) : 0;
-  cell.area = (plane.is_line ? width * width : polygon.area()) / sharers;
+  const float area = plane.is_line ? width * width : polygon.area();
+  cell.area = area / sharers * farthest * farthest;
+  // A disk's mean squared distance from its middle is half of its radius squared, a square's a
+  // sixth of its side squared
+  const float mean_square = plane.is_line ? width * width / 6 : polygon.meanSquare();
+  cell.radius = std::sqrt(2 * mean_square) * farthest;
   return cell;
 }
 

@@ -16,7 +16,9 @@ struct Neighbour {
 };
 
 struct SurfaceCell {
-  float area = 0;        // 0: the neighbours do not tell
+  float area = 0;    // 0: the neighbours do not tell
+  float radius = 0;  // of the disk around the place that is spread out as far: the same second
+                     // moment over its area
   glm::vec3 normal{0};   // of the plane through them, either way
   float confidence = 0;  // 1 - 3 l0 / (l0 + l1 + l2), with the variances along its axes
   bool is_line = false;  // the neighbours lie on one: any plane through it will do

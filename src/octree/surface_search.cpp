@@ -21,7 +21,7 @@ constexpr float kMarginSpacings = 6;
 // each other.
 constexpr float kOpenLimit = 4;
 // Of the neighbours of strays, in spacings; a surface with noise may have as much, which does no
-// harm: only areas 64 times the median's are limited.
+// harm: only radii 8 times the median's are limited.
 constexpr float kLooseThickness = 0.4f;
 
 Bounds3 boundsOf(std::span<const Surfel> surfels) {
@@ -90,13 +90,17 @@ Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
   }
   // The plane is that of the nearest, unless they lie on a line
   const SurfaceCell& plane = first.is_line ? cell : first;
-  last_ = {cell.area / float(std::max<std::uint64_t>(found_.coincident, 1)), plane.normal,
-           plane.confidence, plane.thickness};
+  float area = cell.area, radius = cell.radius;
+  const auto limit = [&](float largest_radius) {
+    radius = std::min(radius, largest_radius);
+    area = std::min(area, kPi * largest_radius * largest_radius);
+  };
   // What is open may be a stray, far from neighbours that are close to each other; and strays may
   // lie all around each other
-  const float most_radius = kOpenLimit * cell.neighbour_spacing;
-  if (!cell.is_settled) last_.area = std::min(last_.area, kPi * most_radius * most_radius);
-  if (plane.thickness > kLooseThickness) last_.area = std::min(last_.area, largest_loose_area_);
+  if (!cell.is_settled) limit(kOpenLimit * cell.neighbour_spacing);
+  if (plane.thickness > kLooseThickness) limit(largest_loose_radius_);
+  area /= float(std::max<std::uint64_t>(found_.coincident, 1));
+  last_ = {area, radius, plane.normal, plane.confidence, plane.thickness};
   last_position_ = position;
   has_last_ = true;
   return last_;

@@ -18,7 +18,8 @@
 namespace surfeit {
 
 struct SurfaceAt {
-  float area = 0;        // per surfel at the place; 0: unknown
+  float area = 0;    // per surfel at the place; 0: unknown
+  float radius = 0;  // of a disk that is spread out as far as the piece of surface around the place
   glm::vec3 normal{0};   // of the plane through the neighbours, unit, either way; zero: unknown
   float confidence = 0;  // 1: they lie on the plane; 0: all around (Pauly et al. 2002)
   float thickness = 0;   // how far they lie off it, over the spacing: about 1 all around
@@ -40,9 +41,9 @@ class SurfaceSearch {
   // The same at one place.
   Result<SurfaceAt> at(const Surfel& place);
 
-  // No area off a surface becomes larger.
-  void limitLooseAreas(float largest) {
-    largest_loose_area_ = largest;
+  // No radius off a surface becomes larger.
+  void limitLooseRadii(float largest) {
+    largest_loose_radius_ = largest;
     has_last_ = false;
   }
 
@@ -54,7 +55,7 @@ class SurfaceSearch {
   PlaceIndex index_;
   SurfaceCells cells_;
   NearestPlaces found_;
-  float largest_loose_area_ = std::numeric_limits<float>::infinity();
+  float largest_loose_radius_ = std::numeric_limits<float>::infinity();
   // Surfels at one position follow each other, and a search among a million of them should happen
   // once.
   bool has_last_ = false;

@@ -68,6 +68,14 @@ statisticsHaveTheDocumentedFields() {
   run 0 generate --surfels 1k -o city.ply --stats generate.json
   jsonHas generate.json "${common[@]}" kind scene_surfels seed order surfels scene_area \
     surfels_per_second
+  run 0 index cornell.ply -o dry.sft --dry-run --stats dry.json
+  [[ ! -e dry.sft ]] || fail "a dry run wrote a scene"
+  jsonHas dry.json "${common[@]}" dry_run records sampled_surfels memory_bytes temporary_bytes \
+    file_bytes seconds
+  run 0 gather cornell.sft again.ply -o dry.ply --dry-run --stats dry.json
+  [[ ! -e dry.ply ]] || fail "a dry run wrote a result"
+  jsonHas dry.json "${common[@]}" dry_run receivers recommended_memory_bytes temporary_bytes \
+    output_bytes seconds
   run 0 normals cornell.ply -o normals.csv --orient outward --sizes --stats normals.json
   jsonHas normals.json "${common[@]}" points points_without_surface mean_confidence memory_bytes \
     temporary_bytes points_per_second phases order

@@ -32,7 +32,7 @@ everyFormatComesBack() {
 cloudsMergeMoveAndThin() {
   makePoints
   run 0 convert points.ply points.ply -o a.csv --every 3 --drop group --quiet
-  [[ $(cat a.csv) == $'x,y,z,radius\n0,0,0,1\n637000.25,0,0,4\n0,0,0,1\n637000.25,0,0,4' ]] ||
+  [[ $(cat a.csv) == $'x,y,z,radius\n0,0,0,1.7320508\n637000.25,0,0,6.928203\n0,0,0,1.7320508\n637000.25,0,0,6.928203' ]] ||
     fail "$(cat a.csv)"
   run 0 convert points.ply -o b.csv --units m:cm --up y --keep radius --crop -1,0,-1,150,501,1
   [[ $(cat b.csv) == $'x,y,z,radius\n0,0,0,100\n100,0,0,200' ]] || fail "$(cat b.csv)"

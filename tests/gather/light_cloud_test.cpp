@@ -77,6 +77,7 @@ TEST_F(LightCloud, OutputsArePropertiesOfTheResult) {
 TEST_F(LightCloud, EnvironmentComesWithTheModeAndFillsWhatIsOpen) {
   GatherOptions lit = options();
   lit.environment.path = directory_.file("sky.exr");
+  lit.environment.up = UpAxis::kZ;
   const Table table = gatherTable(lit);
   const std::vector<double> open = table.column("occlusion"), light = table.column("environment_r");
   const std::vector<double> up = table.column("nz");
@@ -96,6 +97,7 @@ TEST_F(LightCloud, MemoryAndThreadsDoNotChangeTheLights) {
   GatherOptions lit = options();
   lit.mode = GatherMode::kBleeding;
   lit.environment.path = directory_.file("sky.exr");
+  lit.environment.up = UpAxis::kZ;
   lit.weights.falloff = .5f;
   lit.outputs = kOutputOcclusion | kOutputIrradiance | kOutputEnvironment | kOutputRadianceSh;
   ASSERT_TRUE(gather(lit).ok());

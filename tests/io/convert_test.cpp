@@ -243,6 +243,27 @@ TEST_F(ConvertTest, EveryNthRecordOfEachInputIsTaken) {
   }
 }
 
+TEST_F(ConvertTest, WhatIsTakenStandsForAll) {
+  Table table = tableOf({{"x", kFloat},
+                         {"y", kFloat},
+                         {"z", kFloat},
+                         {"radius", kFloat},
+                         {"area", kFloat},
+                         {"power_r", kFloat},
+                         {"power_g", kFloat},
+                         {"power_b", kFloat}});
+  for (int i = 0; i < 8; ++i) table.rows.push_back({double(i), 1, 2, .5, .25, 1, 2, 3});
+  writeTable("a.ply", table);
+  ConvertOptions options;
+  options.every = 4;
+  convertOk({"a.ply"}, "b.ply", options);
+  EXPECT_THAT(readTable("b.ply").rows, ElementsAre(ElementsAre(0, 1, 2, 1, 1, 4, 8, 12),
+                                                   ElementsAre(4, 1, 2, 1, 1, 4, 8, 12)));
+  options.transform = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
+  convertOk({"a.ply"}, "b.ply", options);
+  EXPECT_THAT(readTable("b.ply").rows[1], ElementsAre(8, 2, 4, 2, 4, 4, 8, 12));
+}
+
 TEST_F(ConvertTest, CropsSideBySideShareNoRecord) {
   Table table = pointsOf({{0.5, 0, 0}, {NAN, 0, 0}, {INFINITY, 0, 0}});
   std::mt19937 random(5);

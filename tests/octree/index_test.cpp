@@ -287,8 +287,8 @@ TEST_F(IndexTest, GridOfPointsGetsDisksThatJustCoverIt) {
   const Result<ReadScene> scene = readScene(scene_path);
   ASSERT_TRUE(scene.ok());
   for (const Surfel& surfel : scene->surfels) {
-    // A cell of s^2, and a disk of twice that
-    ASSERT_NEAR(surfel.radius, 0.0798f, 1e-4f);
+    // A cell of s^2, and a disk of twice its second moment
+    ASSERT_NEAR(surfel.radius, 0.0816f, 1e-4f);
     ASSERT_NEAR(surfel.area, 0.01f, 1e-5f);
     ASSERT_TRUE(surfel.isSphere());
     ASSERT_EQ(surfel.flags, kSurfelSphere);

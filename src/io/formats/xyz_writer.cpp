@@ -32,7 +32,10 @@ class XyzWriter final : public RowWriter {
 
   Status writeHead(std::vector<std::string> comments) {
     std::string head;
-    std::erase(comments, upComment(kDefaultUpAxis));  // as all text that says nothing
+    // Text that says nothing has y up; tables begin with the names of their columns
+    for (const UpAxis up : {UpAxis::kX, UpAxis::kY, UpAxis::kZ}) {
+      if (separator_ == ',' || up == kDefaultUpAxis) std::erase(comments, upComment(up));
+    }
     for (std::string& comment : comments) {
       std::replace_if(
           comment.begin(), comment.end(), [](char c) { return c >= '\0' && c < ' '; }, ' ');
