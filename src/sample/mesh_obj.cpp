@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <istream>
 #include <map>
+#include <new>
 #include <set>
 #include <unordered_map>
 
@@ -64,10 +65,16 @@ class MaterialFiles final : public tinyobj::MaterialReader {
     if (const std::string whole = find(shown(names)); !whole.empty()) {
       found.push_back(whole);
     } else {
+      std::string missing;
       for (const std::string& name : splitAt(names, kNameBlank)) {
-        if (const std::string part = find(name); !part.empty()) found.push_back(part);
+        if (const std::string part = find(name); !part.empty()) {
+          found.push_back(part);
+        } else {
+          missing += "material file \"" + name + "\" not found\n";
+        }
       }
-      if (found.empty()) *warnings += "material file \"" + shown(names) + "\" not found\n";
+      if (found.empty()) missing = "material file \"" + shown(names) + "\" not found\n";
+      *warnings += missing;
     }
     for (const std::string& path : found) load(path, materials, ids, warnings, errors);
     return true;  // else the parser adds words of its own
@@ -112,6 +119,8 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
     // Polygons stay whole and colors are not made up: we want to see what the file says
     ok = tinyobj::LoadObj(&parsed.attributes, &parsed.shapes, &parsed.materials, &parsed.warnings,
                           &errors, &stream, &material_files, false, false);
+  } catch (const std::bad_alloc&) {
+    throw;
   } catch (const std::exception& exception) {
     errors = exception.what();
   }
@@ -195,8 +204,8 @@ class ObjImporter {
       material.albedo = {parsed.diffuse[0], parsed.diffuse[1], parsed.diffuse[2]};
       material.emission =
           kPi * glm::vec3(parsed.emission[0], parsed.emission[1], parsed.emission[2]);
-      material.opacity = float(std::clamp(parsed.dissolve, 0.0, 1.0));
-      // Written so that NaN becomes 0 as well
+      // Written so that NaN is opaque, and becomes 0 below
+      material.opacity = parsed.dissolve < 1 ? float(std::max(parsed.dissolve, 0.0)) : 1;
       for (int i = 0; i < 3; ++i) {
         if (!(material.albedo[i] >= 0)) material.albedo[i] = 0;
         if (!(material.emission[i] >= 0)) material.emission[i] = 0;

@@ -229,5 +229,15 @@ TEST_F(ObjFiles, MaterialFilesThatAreMissingAreToldByTheirNames) {
       testing::ElementsAre(HasSubstr("material file \"my paints.mtl\" not found (and 1 more)")));
 }
 
+TEST_F(ObjFiles, OneOfSeveralMaterialFilesMayBeMissing) {
+  write("a.mtl", "newmtl a\nKd 1 0 0\nd nan\n");
+  const Result<Mesh> mesh = load(
+      write("m.obj", std::string("mtllib a.mtl gone.mtl\n") + kSquare + "usemtl a\nf 1 2 3\n"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_EQ(surfacePoint(*mesh, 0, .3f, .3f).albedo, glm::vec3(1, 0, 0));
+  EXPECT_EQ(surfacePoint(*mesh, 0, .3f, .3f).opacity, 1);
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("\"gone.mtl\" not found")));
+}
+
 }  // namespace
 }  // namespace surfeit
