@@ -100,7 +100,10 @@ class MaterialFiles final : public tinyobj::MaterialReader {
     }
     ObjLines lines(std::move(*input));
     std::istream stream(&lines);
-    tinyobj::LoadMtl(ids, materials, &stream, warnings, errors);
+    std::string warned, failed;  // it replaces what is there
+    tinyobj::LoadMtl(ids, materials, &stream, &warned, &failed);
+    *warnings += warned;
+    *errors += failed;
     if (!lines.status().ok()) status_ = lines.status();
   }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <span>
 
@@ -37,8 +38,9 @@ bool isNumber(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double value = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  // Too large or too small for a double is a number, too
-  return error != std::errc::invalid_argument && end == word.data() + word.size();
+  // Too large or too small for a double is a number, too; the parser knows no nan and no inf
+  return error != std::errc::invalid_argument && end == word.data() + word.size() &&
+         std::isfinite(value);
 }
 
 constexpr std::string_view kNumberStatements[] = {"v",  "vn", "vt", "Ka", "Kd",
