@@ -195,12 +195,7 @@ Status Indexer::checkOptions() const {
 
 // Opens the inputs, takes a sample where that is possible, and plans.
 Status Indexer::openInputs() {
-  RowReaderOptions reading;
-  SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options_.channels));
-  reading.part = options_.part;
-  reading.filter = options_.filter;
-  reading.selections = std::make_shared<RowSelections>();
-  reading.color_range = options_.color_range;
+  SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions reading, readingOf(options_));
   SURFEIT_ASSIGN_OR_RETURN(
       reader_,
       CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes), reading));

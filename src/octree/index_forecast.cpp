@@ -68,12 +68,7 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
                                const IndexOptions& options, Progress& progress) {
   IndexForecast forecast;
   forecast.memory_bytes = options.memory_bytes;
-  RowReaderOptions reading;
-  SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options.channels));
-  reading.part = options.part;
-  reading.filter = options.filter;
-  reading.selections = std::make_shared<RowSelections>();
-  reading.color_range = options.color_range;
+  SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions reading, readingOf(options));
   SURFEIT_ASSIGN_OR_RETURN(
       const CloudReader reader,
       CloudReader::open(inputs, options.strict, readBytesWithin(options.memory_bytes), reading));

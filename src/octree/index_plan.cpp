@@ -61,6 +61,16 @@ void planBuckets(std::uint64_t records, std::uint64_t open_bytes, IndexPlan& pla
 
 }  // namespace
 
+Result<RowReaderOptions> readingOf(const IndexOptions& options) {
+  RowReaderOptions reading;
+  SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options.channels));
+  reading.part = options.part;
+  reading.filter = options.filter;
+  reading.selections = std::make_shared<RowSelections>();
+  reading.color_range = options.color_range;
+  return reading;
+}
+
 std::size_t readBytesWithin(std::uint64_t memory_bytes) {
   return static_cast<std::size_t>(
       std::clamp<std::uint64_t>(memory_bytes / 256, kMega / 4, 4 * kMega));

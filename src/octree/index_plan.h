@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "core/bounds.h"
+#include "io/cloud_formats.h"
 #include "octree/octree_builder.h"
 #include "octree/surfel_store.h"
+#include "surfeit/index.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
@@ -44,6 +46,9 @@ int threadsWithin(std::uint64_t memory_bytes, const SlabForm& slabs, int wanted)
 
 // kBudgetTooSmall, with the least that works, when it cannot be done.
 Result<IndexPlan> planIndex(const IndexTask& task);
+
+// How the inputs are opened.
+Result<RowReaderOptions> readingOf(const IndexOptions& options);
 
 // Bytes that are read at once within a budget.
 std::size_t readBytesWithin(std::uint64_t memory_bytes);

@@ -4,9 +4,6 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <thread>
-
-#include "core/worker_threads.h"
 
 namespace surfeit {
 namespace {
@@ -102,34 +99,16 @@ void SizedSurfelStream::applySize(Surfel& surfel, const SurfaceAt& surface) cons
   surfel.area = is_known ? surface.area : areaOfDisk(surfel.radius, overlap_);
 }
 
-Status SizedSurfelStream::fillSizes(SurfaceSearch& searcher, std::span<Surfel> surfels) const {
-  return searcher.find(
-      surfels, [&](std::size_t i) { return (surfels[i].flags & kSurfelNeedsSize) != 0; },
-      [&](std::size_t i, const SurfaceAt& surface) { applySize(surfels[i], surface); });
-}
-
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const SceneFile& file = octree_.file();
   if (next_page_ == file.surfelPageCount()) return std::shared_ptr<const SortedBatch>();
   SURFEIT_RETURN_IF_ERROR(
       readPages(std::min<std::uint32_t>(next_page_ + kBatchPages, file.surfelPageCount())));
 
-  // One slice per searcher, in order: neighbours find the same pages
-  std::vector<Status> statuses(searchers_.size());
-  const auto search_slice = [&](std::size_t r) {
-    const std::size_t begin = surfels_.size() * r / searchers_.size();
-    const std::size_t end = surfels_.size() * (r + 1) / searchers_.size();
-    statuses[r] = catchAll("find neighbours", [&] {
-      return fillSizes(searchers_[r], std::span(surfels_).subspan(begin, end - begin));
-    });
-  };
-  {
-    // Threads for a batch, which takes them tens of milliseconds: they join here
-    std::vector<std::jthread> others;
-    for (std::size_t r = 1; r < searchers_.size(); ++r) others.emplace_back(search_slice, r);
-    search_slice(0);
-  }
-  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
+  SURFEIT_RETURN_IF_ERROR(findOnThreads(
+      searchers_, surfels_,
+      [&](std::size_t i) { return (surfels_[i].flags & kSurfelNeedsSize) != 0; },
+      [&](std::size_t i, const SurfaceAt& surface) { applySize(surfels_[i], surface); }));
 
   const auto batch = std::make_shared<SortedBatch>();
   batch->resize(surfels_.size());

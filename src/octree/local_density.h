@@ -48,7 +48,6 @@ class SizedSurfelStream : public SortedSurfelStream {
   float coveringArea(float coverage, float radius, float local_area) const;
   Status readPages(std::uint32_t end_page);
   void applySize(Surfel& surfel, const SurfaceAt& surface) const;
-  Status fillSizes(SurfaceSearch& searcher, std::span<Surfel> surfels) const;
 
   PagedOctree& octree_;
   float overlap_;

@@ -9,27 +9,27 @@
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <new>
-#include <thread>
 #include <vector>
 
+#include "core/curve_key.h"
 #include "core/job_limits.h"
 #include "core/program_memory.h"
 #include "core/seconds_since.h"
-#include "core/worker_threads.h"
 #include "io/cloud_formats.h"
-#include "io/output_target.h"
 #include "io/surfel_names.h"
 #include "io/up_comment.h"
 #include "octree/index_places.h"
-#include "octree/local_density.h"
+#include "octree/index_plan.h"
 #include "octree/scene_rows.h"
 #include "octree/surface_search.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;
 constexpr std::size_t kRowsPerThread = 8192;
+// Besides its bytes in the input and the output, of a row: its place, twice, with what is found.
+constexpr std::size_t kPlaceBytes =
+    2 * sizeof(Surfel) + sizeof(SurfaceAt) + sizeof(std::pair<CurveKey, std::uint32_t>) + 1;
 // Neighbours that lie farther off their plane than this, in spacings, lie all around; those of a
 // surface with noise of half a spacing lie half a spacing off.
 constexpr float kThinThickness = 0.75f;
@@ -65,7 +65,7 @@ class NormalsJob {
              Progress& progress)
       : input_(input), output_(output), options_(options), progress_(progress) {
     stats_.memory_bytes =
-        options.memory_bytes > 0 ? options.memory_bytes : defaultMemoryBytes(kUsualMemory);
+        options.memory_bytes > 0 ? options.memory_bytes : defaultMemoryBytes(kUsualIndexMemory);
     threads_ = options.threads > 0 ? options.threads : defaultThreadCount();
   }
 
@@ -85,11 +85,14 @@ class NormalsJob {
 
  private:
   Status openInput() {
-    RowReaderOptions reading;
-    SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options_.channels));
-    reading.part = options_.part;
-    reading.filter = options_.filter;
-    reading.color_range = options_.color_range;
+    indexing_.memory_bytes = stats_.memory_bytes;
+    indexing_.threads = threads_;
+    indexing_.temporary_directory = options_.temporary_directory;
+    indexing_.channels = options_.channels;
+    indexing_.part = options_.part;
+    indexing_.filter = options_.filter;
+    indexing_.color_range = options_.color_range;
+    SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions reading, readingOf(indexing_));
     SURFEIT_ASSIGN_OR_RETURN(reader_, openCloud(input_, reading));
     const PlyElement& element = reader_->element();
     for (std::size_t i = 0; i < 3; ++i) {
@@ -104,23 +107,16 @@ class NormalsJob {
   }
 
   Status indexInput() {
-    IndexOptions indexing;
-    indexing.memory_bytes = stats_.memory_bytes;
-    indexing.threads = threads_;
-    indexing.temporary_directory = options_.temporary_directory;
-    indexing.channels = options_.channels;
-    indexing.part = options_.part;
-    indexing.filter = options_.filter;
-    indexing.color_range = options_.color_range;
-    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, indexPlaces(input_, output_, indexing, progress_));
+    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, indexPlaces(input_, output_, indexing_, progress_));
     stats_.temporary_bytes = scene.fileBytes();
     places_.origin = scene.header().origin;
     centre_ = scene.header().bounds.centre();
 
     const std::uint64_t beside =
         programBytes(threads_) + PagedOctree::fixedBytes(scene, threads_) +
-        std::uint64_t(threads_) * (SurfaceSearch::memoryBytes() +
-                                   kRowsPerThread * (2 * reader_->element().row_bytes + 128));
+        std::uint64_t(threads_) *
+            (SurfaceSearch::memoryBytes() +
+             kRowsPerThread * (2 * reader_->element().row_bytes + kPlaceBytes));
     const std::uint64_t caches =
         std::min<std::uint64_t>(stats_.memory_bytes - std::min(stats_.memory_bytes, beside),
                                 PagedOctree::unlimitedCacheBytes(scene));
@@ -197,24 +193,17 @@ class NormalsJob {
       surfels_[i].position = last;  // what is no place must not widen the box of the others
       surfels_[i].flags = kSurfelSphere;
     }
-    std::vector<Status> statuses(searches_.size());
-    const auto search = [&](std::size_t t) {
-      const std::size_t begin = count * t / searches_.size();
-      const std::size_t end = count * (t + 1) / searches_.size();
-      statuses[t] = catchAll("find neighbours", [&] {
-        return searches_[t].find(
-            std::span<const Surfel>(surfels_).subspan(begin, end - begin),
-            [&](std::size_t i) { return is_place_[begin + i]; },
-            [&](std::size_t i, const SurfaceAt& found) { surfaces_[begin + i] = found; });
-      });
-    };
-    {
-      std::vector<std::jthread> others;
-      for (std::size_t t = 1; t < searches_.size(); ++t) others.emplace_back(search, t);
-      search(0);
+    // Along the curve, so that those that follow each other are close in any order of the file
+    order_.clear();
+    for (std::uint32_t i = 0; i < count; ++i) {
+      order_.emplace_back(curveKey(surfels_[i].position, octree_->file().header().cube), i);
     }
-    for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
-    return {};
+    std::sort(order_.begin(), order_.end());
+    sorted_.clear();
+    for (const auto& [key, i] : order_) sorted_.push_back(surfels_[i]);
+    return findOnThreads(
+        searches_, sorted_, [&](std::size_t i) { return is_place_[order_[i].second] != 0; },
+        [&](std::size_t i, const SurfaceAt& found) { surfaces_[order_[i].second] = found; });
   }
 
   glm::vec3 oriented(const glm::vec3& normal, const glm::vec3& place) const {
@@ -280,6 +269,7 @@ class NormalsJob {
   Progress& progress_;
   int threads_ = 1;
   UpAxis up_ = kDefaultUpAxis;
+  IndexOptions indexing_;  // of the places
   std::unique_ptr<RowReader> reader_;
   PlaceReader places_;
   glm::vec3 centre_{0};  // from the origin
@@ -289,7 +279,8 @@ class NormalsJob {
   std::vector<Copy> copies_;
   std::vector<std::string> told_;
   AlignedBuffer buffer_;
-  std::vector<Surfel> surfels_;
+  std::vector<Surfel> surfels_, sorted_;  // places of rows; the same along the curve
+  std::vector<std::pair<CurveKey, std::uint32_t>> order_;
   std::vector<SurfaceAt> surfaces_;
   std::vector<char> is_place_;
   std::vector<std::byte> packed_;

@@ -4,8 +4,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <thread>
+#include <vector>
 
 #include "core/spherical_harmonics.h"
+#include "core/worker_threads.h"
 
 namespace surfeit {
 namespace {
@@ -104,6 +107,28 @@ Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
   last_position_ = position;
   has_last_ = true;
   return last_;
+}
+
+Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,
+                     const SurfaceSearch::Wants& wants, const SurfaceSearch::Take& take) {
+  std::vector<Status> statuses(searches.size());
+  const auto search = [&](std::size_t t) {
+    const std::size_t begin = places.size() * t / searches.size();
+    const std::size_t end = places.size() * (t + 1) / searches.size();
+    statuses[t] = catchAll("find neighbours", [&] {
+      return searches[t].find(
+          places.subspan(begin, end - begin), [&](std::size_t i) { return wants(begin + i); },
+          [&](std::size_t i, const SurfaceAt& surface) { take(begin + i, surface); });
+    });
+  };
+  {
+    // Threads for a batch, which takes them tens of milliseconds: they join here
+    std::vector<std::jthread> others;
+    for (std::size_t t = 1; t < searches.size(); ++t) others.emplace_back(search, t);
+    search(0);
+  }
+  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
+  return {};
 }
 
 }  // namespace surfeit

@@ -63,4 +63,9 @@ class SurfaceSearch {
   SurfaceAt last_;
 };
 
+// The same by a thread for each search, in slices of the places; wants and take are called by all
+// at once.
+Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,
+                     const SurfaceSearch::Wants& wants, const SurfaceSearch::Take& take);
+
 }  // namespace surfeit
