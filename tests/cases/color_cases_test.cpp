@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "cases/case_notes.h"
+#include "cases/case_files.h"
 #include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/surfel_source.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "cases/case_notes.h"
+#include "cases/case_files.h"
 #include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/surfel_source.h"
@@ -24,11 +24,6 @@ using testing::HasSubstr;
 
 class MeshCasesTest : public DirectoryTest {
  protected:
-  // Where the case lies, if it is there.
-  static std::string sharedCase(const std::string& name) {
-    return std::string(SURFEIT_SHARED_DATA_DIR) + "/../cases/" + name;
-  }
-
   std::vector<Surfel> sample(const std::string& mesh, std::uint64_t count = 2000) {
     SampleOptions options;
     options.count = count;

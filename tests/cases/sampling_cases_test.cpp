@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cases/case_files.h"
 #include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
@@ -17,30 +18,17 @@ namespace {
 
 class SamplingCasesTest : public DirectoryTest {
  protected:
-  static std::string sharedCase(const std::string& name) {
-    return std::string(SURFEIT_SHARED_DATA_DIR) + "/../cases/" + name;
-  }
   void SetUp() override {
     DirectoryTest::SetUp();
     if (!std::filesystem::exists(sharedCase("lines"))) GTEST_SKIP() << "shared cases are not here";
   }
 
-  std::vector<double> column(const std::string& file, const char* name) {
-    const auto reader = openRowReader(file);
-    EXPECT_TRUE(reader.ok()) << reader.status().message();
-    const std::vector<std::byte> rows = readAllRows(**reader);
-    std::vector<double> values;
-    for (std::size_t i = 0; i < (*reader)->element().count; ++i) {
-      values.push_back(valueOf(**reader, rows, i, name));
-    }
-    return values;
-  }
   std::vector<double> occlusion(const std::string& cloud, const std::string& receivers) {
     Progress quiet;
     EXPECT_TRUE(indexClouds({sharedCase(cloud)}, path("scene.sft"), {}, quiet).ok());
     EXPECT_TRUE(
         gatherCloud(path("scene.sft"), sharedCase(receivers), path("result.ply"), {}, quiet).ok());
-    return column(path("result.ply"), "occlusion");
+    return columnOf(path("result.ply"), "occlusion");
   }
 };
 
@@ -57,7 +45,7 @@ TEST_F(SamplingCasesTest, GridsOccludeAsTheirExactAreas) {
 }
 
 TEST_F(SamplingCasesTest, PointsThatComeTwiceOccludeOnce) {
-  const std::vector<double> z = column(sharedCase("dups/clean.ply"), "z");
+  const std::vector<double> z = columnOf(sharedCase("dups/clean.ply"), "z");
   const auto meansOf = [&](const char* cloud) {
     const std::vector<double> found = occlusion(cloud, "dups/clean.ply");
     double floor = 0, wall = 0;
@@ -91,9 +79,9 @@ TEST_F(SamplingCasesTest, PhantomsAtZeroChangeNothing) {
   EXPECT_TRUE(
       gatherCloud(path("scene.sft"), sharedCase("dups/phantom.ply"), path("result.ply"), {}, quiet)
           .ok());
-  const std::vector<double> x = column(path("result.ply"), "x");
-  const std::vector<double> z = column(path("result.ply"), "z");
-  const std::vector<double> found = column(path("result.ply"), "occlusion");
+  const std::vector<double> x = columnOf(path("result.ply"), "x");
+  const std::vector<double> z = columnOf(path("result.ply"), "z");
+  const std::vector<double> found = columnOf(path("result.ply"), "occlusion");
   double floor = 0;
   int count = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "cases/case_notes.h"
+#include "cases/case_files.h"
 #include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
@@ -27,9 +27,6 @@ using testing::Not;
 
 class ScanCasesTest : public DirectoryTest {
  protected:
-  static std::string sharedCase(const std::string& name) {
-    return std::string(SURFEIT_SHARED_DATA_DIR) + "/../cases/" + name;
-  }
   static bool isHere(const std::string& name) { return std::filesystem::exists(sharedCase(name)); }
 
   std::unique_ptr<RowReader> open(const std::string& name) {
@@ -51,14 +48,7 @@ class ScanCasesTest : public DirectoryTest {
     const std::string cloud = sharedCase(name);
     EXPECT_TRUE(indexClouds({cloud}, path("scene.sft"), {}, notes_).ok());
     EXPECT_TRUE(gatherCloud(path("scene.sft"), cloud, path("result.ply"), {}, notes_).ok());
-    const auto reader = openRowReader(path("result.ply"));
-    EXPECT_TRUE(reader.ok());
-    const std::vector<std::byte> rows = readAllRows(**reader);
-    std::vector<double> values;
-    for (std::size_t i = 0; i < (*reader)->element().count; ++i) {
-      values.push_back(valueOf(**reader, rows, i, "occlusion"));
-    }
-    return values;
+    return columnOf(path("result.ply"), "occlusion");
   }
   Notes notes_;
 };

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "cases/case_notes.h"
+#include "cases/case_files.h"
 #include "gather/environment_pictures.h"
 #include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
@@ -51,16 +51,6 @@ class UpAxisTest : public DirectoryTest {
     const auto reader = openRowReader(file);
     EXPECT_TRUE(reader.ok()) << reader.status().message();
     return statedUpAxis((*reader)->comments());
-  }
-  std::vector<double> column(const std::string& file, const char* name) {
-    const auto reader = openRowReader(file);
-    EXPECT_TRUE(reader.ok()) << reader.status().message();
-    const std::vector<std::byte> rows = readAllRows(**reader);
-    std::vector<double> values;
-    for (std::size_t i = 0; i < (*reader)->element().count; ++i) {
-      values.push_back(valueOf(**reader, rows, i, name));
-    }
-    return values;
   }
   Notes notes_;
 };
@@ -108,13 +98,13 @@ TEST_F(UpAxisTest, ConvertTurnsFromWhatIsStated) {
   to_z.up = UpAxis::kZ;
   for (const std::string& from : {z, plain}) {
     const std::string turned = convert(from, "turned.ply", to_y);
-    EXPECT_THAT(column(turned, "y"), ElementsAre(0, 0, 1));
-    EXPECT_THAT(column(turned, "z"), ElementsAre(0, 0, -5));
+    EXPECT_THAT(columnOf(turned, "y"), ElementsAre(0, 0, 1));
+    EXPECT_THAT(columnOf(turned, "z"), ElementsAre(0, 0, -5));
     EXPECT_EQ(statedBy(turned), UpAxis::kY);
-    EXPECT_EQ(column(convert(turned, "again.ply", to_y), "y"), column(turned, "y"));
-    EXPECT_EQ(column(convert(turned, "back.ply", to_z), "y"), column(z, "y"));
+    EXPECT_EQ(columnOf(convert(turned, "again.ply", to_y), "y"), columnOf(turned, "y"));
+    EXPECT_EQ(columnOf(convert(turned, "back.ply", to_z), "y"), columnOf(z, "y"));
   }
-  EXPECT_EQ(column(convert(z, "same.ply", to_z), "y"), column(z, "y"));
+  EXPECT_EQ(columnOf(convert(z, "same.ply", to_z), "y"), columnOf(z, "y"));
 }
 
 TEST_F(UpAxisTest, TheSkyStandsOnIt) {
@@ -129,7 +119,7 @@ TEST_F(UpAxisTest, TheSkyStandsOnIt) {
     options.environment.up = up;
     const auto stats = gatherCloud(path("scene.sft"), surfels, path("lit.ply"), options, notes_);
     EXPECT_TRUE(stats.ok()) << stats.status().message();
-    return column(path("lit.ply"), "environment_r");
+    return columnOf(path("lit.ply"), "environment_r");
   };
   const std::string z = cloud("z.ply", "comment up z\n");
   ConvertOptions to_y;
