@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "surfeit/tune.h"
+
 namespace surfeit {
 namespace {
 
@@ -70,6 +72,16 @@ std::uint64_t leastMemoryThat(const SceneFile& file, const GatherWork& work,
     }
   }
   return high * kMemoryUnit;
+}
+
+std::optional<MemoryAdvice> adviseMemory(const SceneFile& file, const GatherMemory& plan,
+                                         const GatherLoads& loads, double working_seconds) {
+  const double least = loads.leastLoadSeconds();
+  const double best = working_seconds + least;
+  const double longer = predictSplit(file, plan, loads).load_seconds - least;
+  if (longer <= kShortOfMemory * kTuneTimeMargin * best) return std::nullopt;
+  const double most = least + kTuneTimeMargin * (working_seconds / kStarvedWork + least);
+  return MemoryAdvice{memoryForLoads(file, plan.work, loads, most), longer / (best + longer)};
 }
 
 }  // namespace surfeit

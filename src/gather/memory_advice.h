@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 
 #include "cache/miss_ratio_curve.h"
 #include "gather/cache_split.h"
@@ -11,10 +12,15 @@
 
 namespace surfeit {
 
-// A budget is advised with which a gather takes no more than this part longer than with all pages
-// in memory (kTuneTimeMargin); it is called too small when it takes twice as much longer. What
-// loads cost differs between runs, and the one who follows the advice is not to be advised again.
+// A budget is advised with which a gather takes no more than kTuneTimeMargin longer than with all
+// pages in memory; it is called too small when it takes twice as much longer. Loads cost other times
+// in each run, and whoever follows the advice is not advised again.
 inline constexpr double kShortOfMemory = 2;
+
+// What a gather works beside loads takes up to so many times as long where it has too little
+// memory: evictions, processor caches that decoding empties (mostly 1 to 2 times, 4.3 at worst in
+// gathers of random balls on a loaded machine). Advice counts on no more than the rest.
+inline constexpr double kStarvedWork = 4;
 
 // The look-ups of each cache, and the time that one thread spends on a load.
 struct GatherLoads {
@@ -40,5 +46,15 @@ std::uint64_t leastMemoryThat(const SceneFile& file, const GatherWork& work,
 // The least budget, in whole MiB, with which loads take no longer than that.
 std::uint64_t memoryForLoads(const SceneFile& file, const GatherWork& work,
                              const GatherLoads& loads, double most_load_seconds);
+
+struct MemoryAdvice {
+  std::uint64_t memory_bytes = 0;  // would do
+  double part_of_time = 0;         // that goes into reading evicted pages again, 0 .. 1
+};
+
+// What the monitor of a gather with this plan says, which spent `working_seconds` of all threads
+// beside loads. Nothing where its memory is enough.
+std::optional<MemoryAdvice> adviseMemory(const SceneFile& file, const GatherMemory& plan,
+                                         const GatherLoads& loads, double working_seconds);
 
 }  // namespace surfeit

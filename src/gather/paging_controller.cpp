@@ -38,11 +38,6 @@ constexpr double kMuchRepeated = 0.1;
 
 std::uint64_t loads(const CacheCounters& counters) { return counters.misses + counters.prefetches; }
 
-// What a gather works beside loads takes up to so many times as long where it has too little
-// memory: evictions, processor caches that decoding empties (mostly 1 to 2 times, 4.3 at worst in
-// tests/gather/memory_advice_test.cpp on a loaded machine). Advice counts on no more than the rest.
-constexpr double kStarvedWork = 4;
-
 double secondsPerLoad(const CacheCounters& counters) {
   return loads(counters) > 0 ? double(counters.load_ns) * 1e-9 / double(loads(counters)) : 0;
 }
@@ -238,17 +233,13 @@ void PagingController::advise(const Moment& now) const {
   const double ahead = double(now.nodes.prefetches) * loads.node_load_seconds +
                        double(now.surfels.prefetches) * loads.surfel_load_seconds;
   const double working = std::max(now.seconds * options_.threads - stalled - ahead, 0.0);
-  const double best = working + loads.leastLoadSeconds();
-  const double longer = working + predictSplit(file, *plan, loads).load_seconds - best;
-  if (longer <= kShortOfMemory * kTuneTimeMargin * best) return;
-  const double least = loads.leastLoadSeconds();
-  const std::uint64_t enough = memoryForLoads(
-      file, options_.work, loads, least + kTuneTimeMargin * (working / kStarvedWork + least));
+  const std::optional<MemoryAdvice> advice = adviseMemory(file, *plan, loads, working);
+  if (!advice) return;
   progress_.inform(fmt::format(
       "memory: to read pages again that were evicted takes {:.0f} % of the time with {}; --memory "
       "{} would do",
-      100 * longer / (best + longer), mebibytes(options_.memory_bytes + options_.beside_bytes),
-      mebibytes(enough + options_.beside_bytes)));
+      100 * advice->part_of_time, mebibytes(options_.memory_bytes + options_.beside_bytes),
+      mebibytes(advice->memory_bytes + options_.beside_bytes)));
 }
 
 GatherCacheStats PagingController::nodeStats() const {

@@ -100,19 +100,23 @@ resultIsOpen() { ls -l "/proc/$1/fd" 2> /dev/null | grep -q -e '(deleted)' -e '\
 # stoppedLeavesNothing NAME ARGUMENT...: runs surfeit, which is to write NAME and takes long, and
 # stops it by each signal when it has begun.
 stoppedLeavesNothing() {
-  local name=$1 signal expected process status i
+  local name=$1 signal expected process status began i
   shift
   set -m # jobs of their own take SIGINT
   for signal in INT TERM; do
     expected=$([[ $signal == INT ]] && echo 130 || echo 143)
     "$surfeit" "$@" -o "$name" --quiet &
     process=$!
+    began=no
     for ((i = 0; i < 1500; ++i)); do
-      resultIsOpen "$process" && break
+      if resultIsOpen "$process"; then
+        began=yes
+        break
+      fi
       sleep 0.02
     done
-    resultIsOpen "$process" || fail "did not begin: surfeit $*"
-    kill -"$signal" "$process"
+    [[ $began == yes ]] || fail "did not begin: surfeit $*; open are $(ls -l "/proc/$process/fd" 2>&1)"
+    kill -"$signal" "$process" || fail "ended before SIG$signal: surfeit $*"
     status=0
     wait "$process" || status=$?
     [[ $status == "$expected" ]] || fail "exit status $status after SIG$signal, expected $expected"
