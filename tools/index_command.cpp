@@ -9,6 +9,7 @@
 #include "surfeit/index.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/normal_options.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
 
@@ -19,6 +20,8 @@ struct IndexArguments {
   std::vector<std::string> inputs;
   std::string output;
   std::string precision = "quantized";
+  std::string normals = "none";
+  NormalEstimation estimation;
   bool is_dry_run = false;
   IndexOptions options;
 };
@@ -54,6 +57,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
   options.threads = context.common.threads;
   options.full_precision = arguments.precision == "full";
   options.strict = context.common.strict;
+  if (arguments.normals == "estimate") options.normals = arguments.estimation;
   options.memory_bytes = context.common.memory_bytes;
   if (arguments.is_dry_run) return sayForecast(arguments, context);
   SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
@@ -73,6 +77,8 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                              {"input_bytes", stats.input_bytes},
                              {"surfels", stats.surfels},
                              {"skipped_records", stats.skipped_records},
+                             {"normals_found", stats.normals_found},
+                             {"thin_surfels", stats.thin_surfels},
                              {"nodes", stats.nodes},
                              {"node_pages", stats.node_pages},
                              {"surfel_pages", stats.surfel_pages},
@@ -105,6 +111,12 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
                    "Disk area over surfel area, where radius or area is missing")
       ->check(CLI::Range(1.0, 16.0))
       ->capture_default_str();
+  command
+      ->add_option("--normals", arguments->normals,
+                   "Surfels without a normal: none (spheres), or estimate from their neighbours")
+      ->check(CLI::IsMember({"none", "estimate"}))
+      ->capture_default_str();
+  addNormalOptions(*command, arguments->estimation);
   command->add_option("--precision", arguments->precision, "quantized, or full (floats)")
       ->check(CLI::IsMember({"quantized", "full"}))
       ->capture_default_str();

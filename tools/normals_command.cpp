@@ -9,7 +9,7 @@
 #include "surfeit/normals.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
-#include "tools/number_list.h"
+#include "tools/normal_options.h"
 #include "tools/up_option.h"
 
 namespace surfeit {
@@ -19,21 +19,6 @@ struct NormalsArguments {
   std::string input, output;
   NormalsOptions options;
 };
-
-// "up", "outward" or "sensor X,Y,Z".
-NormalOrientation parseOrientation(const std::string& text) {
-  using Toward = NormalOrientation::Toward;
-  if (text == "up") return {Toward::kUp, {}};
-  if (text == "outward") return {Toward::kOutward, {}};
-  constexpr std::string_view kSensor = "sensor";
-  if (!text.starts_with(kSensor)) {
-    throw CLI::ValidationError(
-        "--orient", fmt::format("found \"{}\", expected up, outward or \"sensor X,Y,Z\"", text));
-  }
-  const auto at =
-      parseNumberList<3>("--orient", text.substr(kSensor.size()), "\"sensor X,Y,Z\", a place");
-  return {Toward::kSensor, {at[0], at[1], at[2]}};
-}
 
 Status runNormals(NormalsArguments& arguments, CommandContext& context) {
   NormalsOptions& options = arguments.options;
@@ -62,24 +47,8 @@ Status runNormals(NormalsArguments& arguments, CommandContext& context) {
 }
 
 void addNormalsOptions(CLI::App& command, NormalsOptions& options) {
-  command
-      .add_option_function<std::string>(
-          "--orient",
-          [&options](const std::string& text) { options.orientation = parseOrientation(text); },
-          "Which way they point: up (terrain, airborne scans), outward from the middle of the "
-          "cloud "
-          "(single objects), or \"sensor X,Y,Z\": to the place that all points were seen from")
-      ->type_name("up|outward|\"sensor X,Y,Z\"")
-      ->default_str("up");
+  addNormalOptions(command, options.estimation);
   addUpOption(command, options.up, "Axis that is up", "what the cloud says, z for LAS, else y");
-  command
-      .add_option_function<std::string>(
-          "--thin",
-          [&options](const std::string& text) { options.thin_is_two_sided = text == "two-sided"; },
-          "Points on no surface (foliage, wires): spheres, without a normal, or two-sided disks")
-      ->check(CLI::IsMember({"spheres", "two-sided"}))
-      ->type_name("spheres|two-sided")
-      ->default_str("spheres");
   command.add_flag("--sizes", options.with_sizes,
                    "Write radius and area, too, as index finds them without");
   addChannelOptions(command, options.channels, options.part, options.filter);

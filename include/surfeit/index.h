@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "surfeit/color_range.h"
+#include "surfeit/normal_estimation.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/up_axis.h"
@@ -40,6 +41,9 @@ struct IndexOptions {
   std::string filter{};
   // How colors are read whose numbers do not say what they mean.
   ColorRange color_range = ColorRange::kAuto;
+  // Surfels without a normal get one from their neighbours, as those of surfeit/normals.h do; those
+  // on no surface stay spheres or are seen from both sides. Absent: they are spheres.
+  std::optional<NormalEstimation> normals{};
 };
 
 struct IndexStats {
@@ -47,6 +51,8 @@ struct IndexStats {
   std::uint64_t input_bytes = 0;   // of the input files
   std::uint64_t surfels = 0;
   std::uint64_t skipped_records = 0;
+  std::uint64_t normals_found = 0;  // from the neighbours
+  std::uint64_t thin_surfels = 0;   // on no surface, of those that lacked a normal
   std::uint64_t nodes = 0;
   std::uint64_t node_pages = 0;
   std::uint64_t surfel_pages = 0;

@@ -2,34 +2,20 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 
 #include "surfeit/color_range.h"
+#include "surfeit/normal_estimation.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/up_axis.h"
 
 namespace surfeit {
 
-// Which of its two sides a plane faces.
-struct NormalOrientation {
-  enum class Toward : std::uint8_t {
-    kUp,      // the up axis of the cloud: terrain, airborne scans
-    kSensor,  // the place that the points were seen from
-    kOutward  // away from the middle of the cloud's bounds: single objects
-  };
-  Toward toward = Toward::kUp;
-  glm::dvec3 sensor{0};  // in the cloud's coordinates, for kSensor
-};
-
 struct NormalsOptions {
-  NormalOrientation orientation;
-  std::optional<UpAxis> up{};  // absent: what the cloud says (surfeit/up_axis.h)
-  // Points of which the neighbours lie all around (foliage, wires) get no normal, so that they are
-  // spheres; or that of the plane through these, seen from both sides.
-  bool thin_is_two_sided = false;
+  NormalEstimation estimation;
+  std::optional<UpAxis> up{};                // absent: what the cloud says (surfeit/up_axis.h)
   bool with_sizes = false;                   // radius and area, too, as index would find them
   std::string channels{}, part{}, filter{};  // of the input, as in IndexOptions
   ColorRange color_range = ColorRange::kAuto;
@@ -50,11 +36,10 @@ struct NormalsStats {
 
 // Writes `output`, whose format its name tells, with all that the input has and the properties nx
 // ny nz and normal_confidence (0 to 1: how flat the neighbours lie, Pauly et al. 2002), and what
-// the options ask for. Normals that the input has are replaced, which is told. An octree of the
-// places stands in a temporary file meanwhile. Memory does not grow with the cloud, but where
-// points come in random order it may pass a small budget by a tenth (105 of 96 MiB was seen), and
-// they take ten times as long as those that come beside their neighbours. Errors: as of indexClouds
-// and of the formats.
+// the options ask for; rows stay in their order. Normals that the input has are replaced, which is
+// told. An octree of the places stands in a temporary file meanwhile. Neither memory nor time per
+// point depends on the size of the cloud or the order of its points. Errors: as of indexClouds and
+// of the formats.
 Result<NormalsStats> estimateNormals(const std::string& input, const std::string& output,
                                      const NormalsOptions& options, Progress& progress);
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "brick/brick_layout.h"
-#include "brick/record_sorter.h"
+#include "octree/record_sorter.h"
 #include "io/formats/vdb_output.h"
 #include "surfeit/brick.h"
 #include "surfeit/progress.h"

@@ -13,8 +13,8 @@
 namespace surfeit {
 
 // A budget is advised with which a gather takes no more than kTuneTimeMargin longer than with all
-// pages in memory; it is called too small when it takes twice as much longer. Loads cost other times
-// in each run, and whoever follows the advice is not advised again.
+// pages in memory; it is called too small when it takes twice as much longer. Loads cost other
+// times in each run, and whoever follows the advice is not advised again.
 inline constexpr double kShortOfMemory = 2;
 
 // What a gather works beside loads takes up to so many times as long where it has too little

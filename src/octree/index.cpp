@@ -71,24 +71,6 @@ glm::vec3 moved(const glm::vec3& position, const glm::dvec3& shift) {
   return glm::vec3(glm::dvec3(position) + shift);
 }
 
-// The rules that need no neighbourhood (docs/format.md, "Rules for what is missing").
-void applySizeRules(Surfel& surfel, float overlap) {
-  if (surfel.radius > 0 && surfel.area > 0) return;
-  if (surfel.radius > 0) {
-    if (surfel.area < 0) {  // a coverage
-      surfel.area *= -kPlaceholderSize;
-      surfel.flags |= kSurfelNeedsSize;
-    } else {
-      surfel.area = areaOfDisk(surfel.radius, overlap);
-    }
-  } else if (surfel.area > 0) {
-    surfel.radius = std::sqrt(surfel.area * overlap / kPi);
-  } else {
-    surfel.radius = surfel.area = kPlaceholderSize;
-    surfel.flags |= kSurfelNeedsSize;
-  }
-}
-
 class Indexer {
  public:
   Indexer(const std::vector<std::string>& inputs, const std::string& output,
@@ -115,6 +97,10 @@ class Indexer {
   Status takeSample();
   glm::dvec3 originAsked(const Bounds3& bounds) const;
   bool moveOrigin(const glm::dvec3& origin);
+  bool mayNeedNeighbours() const { return reader_->lacksSizes() || options_.normals.has_value(); }
+  bool estimatesNormals() const { return options_.normals && totals_.spheres > 0; }
+  UpAxis up() const { return options_.up.value_or(reader_->up()); }
+  std::optional<NormalRule> normalRule() const;
   Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
   Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path, bool full_precision);
   Result<std::unique_ptr<BucketStream>> readBuckets();
@@ -140,10 +126,10 @@ class Indexer {
 
 Result<IndexStats> Indexer::run() {
   SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
-  noteIndexRules(totals_, *reader_, options_.overlap, progress_);
+  noteIndexRules(totals_, *reader_, options_, progress_);
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
-  if (totals_.missing_both + totals_.covering > 0) {
+  if (totals_.missing_both + totals_.covering > 0 || estimatesNormals()) {
     SURFEIT_RETURN_IF_ERROR(buildWithDensity(std::move(buckets)));
     return stats_;
   }
@@ -186,6 +172,7 @@ Status Indexer::checkOptions() const {
     return Status::invalidArgument(
         fmt::format("origin {}, expected a number of at most 1e12", (*options_.origin)[axis]));
   }
+  if (options_.normals) SURFEIT_RETURN_IF_ERROR(NormalRule::check(*options_.normals));
   if (!(options_.overlap >= 1 && options_.overlap <= 16)) {
     return Status::invalidArgument(
         fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
@@ -204,7 +191,7 @@ Status Indexer::openInputs() {
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) SURFEIT_RETURN_IF_ERROR(takeSample());
   // The octree of bare positions is built at full precision
-  const SlabForm form = {options_.leaf_capacity, options_.full_precision || reader_->lacksSizes()};
+  const SlabForm form = {options_.leaf_capacity, options_.full_precision || mayNeedNeighbours()};
   const double packed_bytes = packedBytesPerSurfel(sample_);
   SURFEIT_ASSIGN_OR_RETURN(
       plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form}));
@@ -247,7 +234,7 @@ bool Indexer::moveOrigin(const glm::dvec3& origin) {
 Status Indexer::checkFreeSpace(double packed_bytes) {
   const double records = double(reader_->recordCount());
   double spilled = plan_.spills ? records * packed_bytes : 0;
-  if (reader_->lacksSizes()) spilled += records * kBareOutputBytes;
+  if (mayNeedNeighbours()) spilled += records * kBareOutputBytes;
   SURFEIT_RETURN_IF_ERROR(
       checkRoom(temporary_directory_, 0.9 * spilled,
                 "make room, or choose another place for temporary files (--temp)"));
@@ -345,10 +332,11 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
   header.surfel_group_capacity = kDefaultSurfelGroup;
   header.flatness_limit = kDefaultFlatnessLimit;
   header.origin = reader_->origin();
-  header.up = options_.up.value_or(reader_->up());
+  header.up = up();
   header.bounds = totals_.bounds;
   header.cube = rootCube(totals_.bounds);
   header.channels = totals_.channels;
+  header.channels.normal = header.channels.normal || estimatesNormals();
   header.full_precision = full_precision;
   return SceneWriter::create(path, header, identity(full_precision));
 }
@@ -380,8 +368,14 @@ Result<SceneFile> Indexer::buildPlaces(std::unique_ptr<BucketStream> buckets) {
   return bare;
 }
 
-// Without sizes, an octree over the bare positions is built first; its neighbour searches give
-// every surfel its size, and its curve order is the input of the real build.
+// Absent where no surfel asks for it.
+std::optional<NormalRule> Indexer::normalRule() const {
+  if (!estimatesNormals()) return std::nullopt;
+  return NormalRule(*options_.normals, up(), reader_->origin(), glm::vec3(totals_.bounds.centre()));
+}
+
+// What surfels lack is found by neighbour searches in an octree over the bare positions, which is
+// built first; its curve order is the input of the real build.
 Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
   SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, buildPlaces(std::move(buckets)));
 
@@ -395,10 +389,13 @@ Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
                            PagedOctree::planMemory(bare, cache_bytes, threads_));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(bare), memory));
-  SizedSurfelStream sized(*octree, options_.overlap, threads_);
+  SizedSurfelStream sized(*octree, options_.overlap, normalRule(), threads_);
   SURFEIT_RETURN_IF_ERROR(sized.prepare());
   SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
   SURFEIT_RETURN_IF_ERROR(build(*writer, sized, "build"));
+  stats_.normals_found = sized.normalsFound();
+  stats_.thin_surfels = sized.thinSurfels();
+  noteThinSurfels(stats_, options_, progress_);
   SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
   stats_.file_bytes = writer->fileBytes();
   clock_.finish("finish");
@@ -429,16 +426,17 @@ std::uint64_t Indexer::identity(bool full_precision) const {
 // Only what the surfels themselves do not say, and nothing that differs between equal runs: no
 // time, no paths, no order.
 std::string Indexer::provenance() const {
-  const nlohmann::json json = {{"program", "surfeit"},
-                               {"version", kVersion},
-                               {"leaf_capacity", options_.leaf_capacity},
-                               {"overlap", options_.overlap},
-                               {"precision", options_.full_precision ? "full" : "quantized"},
-                               {"skipped_records", totals_.skipped},
-                               {"sizes_from_neighbours", totals_.missing_both},
-                               {"areas_from_radius", totals_.missing_area},
-                               {"radii_from_area", totals_.missing_radius},
-                               {"spheres", totals_.spheres}};
+  nlohmann::json json = {{"program", "surfeit"},
+                         {"version", kVersion},
+                         {"leaf_capacity", options_.leaf_capacity},
+                         {"overlap", options_.overlap},
+                         {"precision", options_.full_precision ? "full" : "quantized"},
+                         {"skipped_records", totals_.skipped},
+                         {"sizes_from_neighbours", totals_.missing_both},
+                         {"areas_from_radius", totals_.missing_area},
+                         {"radii_from_area", totals_.missing_radius},
+                         {"spheres", totals_.spheres}};
+  if (const std::optional<NormalRule> rule = normalRule()) json["normals"] = rule->describe();
   return json.dump();
 }
 

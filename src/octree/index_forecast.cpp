@@ -102,7 +102,8 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
   forecast.file_bytes = std::uint64_t(double(stats.file_bytes) * times);
   forecast.temporary_bytes = std::uint64_t(double(stats.temporary_bytes) * times);
 
-  const SlabForm form = {options.leaf_capacity, options.full_precision || reader.lacksSizes()};
+  const SlabForm form = {options.leaf_capacity,
+                         options.full_precision || reader.lacksSizes() || options.normals};
   const double packed_bytes = packedBytesPerSurfel(sample);
   SURFEIT_ASSIGN_OR_RETURN(const IndexPlan plan, planIndex({options.memory_bytes, options.threads,
                                                             forecast.records, packed_bytes, form}));

@@ -6,8 +6,8 @@
 
 namespace surfeit {
 
-void noteIndexRules(const CloudTotals& totals, const CloudReader& reader, float overlap,
-                    Progress& progress) {
+void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
+                    const IndexOptions& options, Progress& progress) {
   for (const std::string& note : reader.notesOfFloats(totals)) progress.note(note);
   if (totals.missing_both > 0) {
     progress.note(
@@ -22,19 +22,31 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader, float 
         totals.covering));
   }
   if (totals.missing_area > 0) {
-    progress.note(
-        fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area, overlap));
+    progress.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area,
+                              options.overlap));
   }
   if (totals.missing_radius > 0) {
     progress.note(fmt::format("{} surfels have no radius: a disk of {} times the area is used",
-                              totals.missing_radius, overlap));
+                              totals.missing_radius, options.overlap));
   }
-  if (totals.spheres > 0) {
+  if (totals.spheres == 0) return;
+  if (options.normals) {
+    progress.note(
+        fmt::format("{} surfels have no normal: it follows from their neighbours", totals.spheres));
+  } else {
     progress.note(
         fmt::format("warning: {} surfels have no normal: they are spheres, which look "
-                    "the same from everywhere",
+                    "the same from everywhere (--normals estimate finds some)",
                     totals.spheres));
   }
+}
+
+void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress) {
+  if (stats.thin_surfels == 0) return;
+  progress.inform(
+      fmt::format("{} of {} surfels without a normal lie on no surface: they are {}",
+                  stats.thin_surfels, stats.thin_surfels + stats.normals_found,
+                  options.normals->thin_is_two_sided ? "seen from both sides" : "spheres"));
 }
 
 }  // namespace surfeit

@@ -2,13 +2,17 @@
 #pragma once
 
 #include "octree/cloud_reader.h"
+#include "surfeit/index.h"
 #include "surfeit/progress.h"
 
 namespace surfeit {
 
 // One note for each rule by which something was made up (docs/format.md, "Rules for what is
 // missing"), and for coarse positions.
-void noteIndexRules(const CloudTotals& totals, const CloudReader& reader, float overlap,
-                    Progress& progress);
+void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
+                    const IndexOptions& options, Progress& progress);
+
+// How many surfels lie on no surface, of those that got normals.
+void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress);
 
 }  // namespace surfeit

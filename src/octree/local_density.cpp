@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 namespace surfeit {
 namespace {
@@ -14,10 +15,13 @@ constexpr std::size_t kSamplePages = 64;
 // Pages whose surfels are sized at once.
 constexpr std::uint32_t kBatchPages = 32;
 
+bool needsSize(const Surfel& surfel) { return (surfel.flags & kSurfelNeedsSize) != 0; }
+
 }  // namespace
 
-SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap, int threads)
-    : octree_(octree), overlap_(overlap) {
+SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap,
+                                     std::optional<NormalRule> normals, int threads)
+    : octree_(octree), overlap_(overlap), normals_(std::move(normals)) {
   for (int i = 0; i < threads; ++i) searchers_.emplace_back(octree);
 }
 
@@ -99,6 +103,15 @@ void SizedSurfelStream::applySize(Surfel& surfel, const SurfaceAt& surface) cons
   surfel.area = is_known ? surface.area : areaOfDisk(surfel.radius, overlap_);
 }
 
+void SizedSurfelStream::applyNormal(Surfel& surfel, const SurfaceAt& surface) {
+  const FoundNormal found = normals_->at(surfel.position, surface);
+  ++(found.is_thin ? thin_surfels_ : normals_found_);
+  if (found.normal == glm::vec3(0)) return;
+  surfel.normal = found.normal;
+  surfel.flags &= ~kSurfelSphere;
+  if (found.is_two_sided) surfel.flags |= kSurfelTwoSided;
+}
+
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const SceneFile& file = octree_.file();
   if (next_page_ == file.surfelPageCount()) return std::shared_ptr<const SortedBatch>();
@@ -107,8 +120,12 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
 
   SURFEIT_RETURN_IF_ERROR(findOnThreads(
       searchers_, surfels_,
-      [&](std::size_t i) { return (surfels_[i].flags & kSurfelNeedsSize) != 0; },
-      [&](std::size_t i, const SurfaceAt& surface) { applySize(surfels_[i], surface); }));
+      [&](std::size_t i) { return needsSize(surfels_[i]) || needsNormal(surfels_[i]); },
+      [&](std::size_t i, const SurfaceAt& surface) {
+        Surfel& surfel = surfels_[i];
+        if (needsSize(surfel)) applySize(surfel, surface);
+        if (needsNormal(surfel)) applyNormal(surfel, surface);
+      }));
 
   const auto batch = std::make_shared<SortedBatch>();
   batch->resize(surfels_.size());
@@ -117,6 +134,23 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
     batch->tickets[i] = {curveKey(surfels_[i].position, file.header().cube), i};
   }
   return std::shared_ptr<const SortedBatch>(batch);
+}
+
+void applySizeRules(Surfel& surfel, float overlap) {
+  if (surfel.radius > 0 && surfel.area > 0) return;
+  if (surfel.radius > 0) {
+    if (surfel.area < 0) {  // a coverage
+      surfel.area *= -kPlaceholderSize;
+      surfel.flags |= kSurfelNeedsSize;
+    } else {
+      surfel.area = areaOfDisk(surfel.radius, overlap);
+    }
+  } else if (surfel.area > 0) {
+    surfel.radius = std::sqrt(surfel.area * overlap / kPi);
+  } else {
+    surfel.radius = surfel.area = kPlaceholderSize;
+    surfel.flags |= kSurfelNeedsSize;
+  }
 }
 
 }  // namespace surfeit

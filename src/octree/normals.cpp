@@ -7,8 +7,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <glm/geometric.hpp>
+#include <memory>
 #include <new>
+#include <optional>
 #include <vector>
 
 #include "core/curve_key.h"
@@ -16,23 +17,45 @@
 #include "core/program_memory.h"
 #include "core/seconds_since.h"
 #include "io/cloud_formats.h"
+#include "io/output_target.h"
 #include "io/surfel_names.h"
 #include "io/up_comment.h"
 #include "octree/index_places.h"
 #include "octree/index_plan.h"
+#include "octree/normal_rule.h"
+#include "octree/parallel.h"
+#include "octree/record_sorter.h"
 #include "octree/scene_rows.h"
 #include "octree/surface_search.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kRowsPerThread = 8192;
-// Besides its bytes in the input and the output, of a row: its place, twice, with what is found.
-constexpr std::size_t kPlaceBytes =
-    2 * sizeof(Surfel) + sizeof(SurfaceAt) + sizeof(std::pair<CurveKey, std::uint32_t>) + 1;
-// Neighbours that lie farther off their plane than this, in spacings, lie all around; those of a
-// surface with noise of half a spacing lie half a spacing off.
-constexpr float kThinThickness = 0.75f;
+// Places that a thread searches at once, and rows that are read at once.
+constexpr std::size_t kPlacesPerThread = 8192, kRows = 8192;
+
+// A place along the curve: rows may come in any order, and neighbours are found fast where places
+// come beside each other.
+struct OrderedPlace {
+  std::uint64_t key = 0, row = 0;
+  glm::vec3 place{0};
+  std::uint32_t reserved = 0;  // no padding: records are written as bytes
+};
+static_assert(sizeof(OrderedPlace) == 32);
+
+// What was found, by row.
+struct FoundRow {
+  std::uint64_t row = 0, reserved = 0;
+  glm::vec3 normal{0};
+  float confidence = 0, radius = 0, area = 0;
+  std::uint32_t is_thin = 1, is_two_sided = 0;
+};
+static_assert(sizeof(FoundRow) == 48);
+
+// A row that has no place.
+constexpr FoundRow kNoPlace;
+
+constexpr std::size_t kPlaceBytes = sizeof(OrderedPlace) + sizeof(Surfel) + sizeof(FoundRow);
 
 PlyProperty floatProperty(const char* name) {
   PlyProperty property;
@@ -62,11 +85,10 @@ bool isFinite(const glm::vec3& v) {
 class NormalsJob {
  public:
   NormalsJob(const std::string& input, const std::string& output, const NormalsOptions& options,
-             Progress& progress)
-      : input_(input), output_(output), options_(options), progress_(progress) {
+             int threads, Progress& progress)
+      : input_(input), output_(output), options_(options), progress_(progress), threads_(threads) {
     stats_.memory_bytes =
         options.memory_bytes > 0 ? options.memory_bytes : defaultMemoryBytes(kUsualIndexMemory);
-    threads_ = options.threads > 0 ? options.threads : defaultThreadCount();
   }
 
   Result<NormalsStats> run() {
@@ -74,6 +96,9 @@ class NormalsJob {
     SURFEIT_RETURN_IF_ERROR(openInput());
     SURFEIT_RETURN_IF_ERROR(indexInput());
     stats_.index_seconds = secondsSince(start);
+    SURFEIT_RETURN_IF_ERROR(orderRows());
+    SURFEIT_RETURN_IF_ERROR(findNormals());
+    octree_.reset();
     SURFEIT_RETURN_IF_ERROR(createWriter());
     SURFEIT_RETURN_IF_ERROR(writeRows());
     SURFEIT_RETURN_IF_ERROR(writer_->finish());
@@ -102,7 +127,6 @@ class NormalsJob {
       }
       places_.properties[i] = *property;
     }
-    up_ = options_.up.value_or(statedUpAxis(reader_->comments()).value_or(kDefaultUpAxis));
     return {};
   }
 
@@ -110,21 +134,115 @@ class NormalsJob {
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, indexPlaces(input_, output_, indexing_, progress_));
     stats_.temporary_bytes = scene.fileBytes();
     places_.origin = scene.header().origin;
-    centre_ = scene.header().bounds.centre();
 
-    const std::uint64_t beside =
-        programBytes(threads_) + PagedOctree::fixedBytes(scene, threads_) +
-        std::uint64_t(threads_) *
-            (SurfaceSearch::memoryBytes() +
-             kRowsPerThread * (2 * reader_->element().row_bytes + kPlaceBytes));
-    const std::uint64_t caches =
-        std::min<std::uint64_t>(stats_.memory_bytes - std::min(stats_.memory_bytes, beside),
-                                PagedOctree::unlimitedCacheBytes(scene));
-    SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
-                             PagedOctree::planMemory(scene, caches, threads_));
+    const UpAxis up =
+        options_.up.value_or(statedUpAxis(reader_->comments()).value_or(kDefaultUpAxis));
+    rule_.emplace(options_.estimation, up, places_.origin,
+                  glm::vec3(scene.header().bounds.centre()));
+    SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t third, planMemory(scene));
+    SURFEIT_ASSIGN_OR_RETURN(
+        const PagedOctree::Memory memory,
+        PagedOctree::planMemory(
+            scene, std::min<std::uint64_t>(third, PagedOctree::unlimitedCacheBytes(scene)),
+            threads_));
     SURFEIT_ASSIGN_OR_RETURN(octree_, PagedOctree::create(std::move(scene), memory));
-    for (int i = 0; i < threads_; ++i) searches_.emplace_back(*octree_);
     return {};
+  }
+
+  // What each of both sorters and the caches get; fewer threads where that is too little.
+  Result<std::uint64_t> planMemory(const SceneFile& scene) {
+    const std::uint64_t rows = kRows * std::uint64_t{reader_->element().row_bytes + 64};
+    for (;; --threads_) {
+      const std::uint64_t beside =
+          programBytes(threads_) + PagedOctree::fixedBytes(scene, threads_) + rows +
+          std::uint64_t(threads_) * (SurfaceSearch::memoryBytes() + kPlacesPerThread * kPlaceBytes);
+      const std::uint64_t least = beside + 3 * RecordSorter::kLeastMemory;
+      if (stats_.memory_bytes >= least) {
+        sorter_bytes_ = (stats_.memory_bytes - beside) / 3;
+        return sorter_bytes_;
+      }
+      if (threads_ > 1) continue;
+      return Status::budgetTooSmall(
+          fmt::format("--memory of {} MiB is too small for normals: {} MiB is the least that works",
+                      stats_.memory_bytes >> 20, (least + (1 << 20) - 1) >> 20));
+    }
+  }
+
+  RecordSorter::Options sorting(std::size_t record_bytes) const {
+    return {record_bytes, sorter_bytes_, temporaryDirectory(options_.temporary_directory, output_)};
+  }
+
+  // The next rows; none at the end.
+  Result<Bytes> readRows() {
+    if (progress_.isCancelled()) return Status::interrupted();
+    return reader_->readRows(kRows, buffer_);
+  }
+
+  // The places of all rows along the curve, into places_in_order_.
+  Status orderRows() {
+    progress_.beginPhase("sort", reader_->element().count, "points");
+    places_in_order_.emplace(sorting(sizeof(OrderedPlace)));
+    const RootCube& cube = octree_->file().header().cube;
+    const std::size_t row_bytes = reader_->element().row_bytes;
+    for (std::uint64_t row = 0;;) {
+      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, readRows());
+      if (rows.empty()) break;
+      for (std::size_t at = 0; at < rows.size(); at += row_bytes, ++row) {
+        OrderedPlace ordered{0, row, places_.place(rows.data() + at)};
+        if (!isFinite(ordered.place)) continue;
+        ordered.key = curveKey(ordered.place, cube);
+        SURFEIT_RETURN_IF_ERROR(
+            places_in_order_->add(reinterpret_cast<const std::byte*>(&ordered)));
+      }
+      progress_.advance(rows.size() / row_bytes);
+    }
+    return places_in_order_->finish();
+  }
+
+  // Normals of all places, into found_rows_, by row.
+  Status findNormals() {
+    progress_.beginPhase("normals", places_in_order_->count(), "points");
+    found_rows_.emplace(sorting(sizeof(FoundRow)));
+    std::vector<SurfaceSearch> searches;
+    for (int i = 0; i < threads_; ++i) searches.emplace_back(*octree_);
+    std::vector<OrderedPlace> batch;
+    std::vector<Surfel> surfels;
+    std::vector<FoundRow> found;
+    while (places_in_order_->current() != nullptr) {
+      if (progress_.isCancelled()) return Status::interrupted();
+      batch.clear(), surfels.clear();
+      const std::size_t most = kPlacesPerThread * std::size_t(threads_);
+      while (batch.size() < most && places_in_order_->current() != nullptr) {
+        std::memcpy(&batch.emplace_back(), places_in_order_->current(), sizeof(OrderedPlace));
+        SURFEIT_RETURN_IF_ERROR(places_in_order_->advance());
+        surfels.emplace_back().position = batch.back().place;
+        surfels.back().flags = kSurfelSphere;
+      }
+      found.resize(batch.size());
+      SURFEIT_RETURN_IF_ERROR(findOnThreads(
+          searches, surfels, [](std::size_t) { return true; },
+          [&](std::size_t i, const SurfaceAt& surface) { found[i] = foundAt(batch[i], surface); }));
+      for (const FoundRow& row : found) {
+        SURFEIT_RETURN_IF_ERROR(found_rows_->add(reinterpret_cast<const std::byte*>(&row)));
+      }
+      progress_.advance(batch.size());
+    }
+    stats_.temporary_bytes += places_in_order_->temporaryBytes();
+    places_in_order_.reset();
+    return found_rows_->finish();
+  }
+
+  FoundRow foundAt(const OrderedPlace& at, const SurfaceAt& surface) const {
+    const FoundNormal found = rule_->at(at.place, surface);
+    FoundRow row;
+    row.row = at.row;
+    row.normal = found.normal;
+    row.confidence = surface.confidence;
+    row.radius = std::sqrt(IndexOptions().overlap) * surface.radius;
+    row.area = surface.area;
+    row.is_thin = found.is_thin;
+    row.is_two_sided = found.is_two_sided;
+    return row;
   }
 
   Status createWriter() {
@@ -132,7 +250,7 @@ class NormalsJob {
     RowWriterOptions writing;
     std::vector<std::string> found = {"nx", "ny", "nz", "normal_confidence"};
     if (options_.with_sizes) found.insert(found.end(), {"radius", "area"});
-    if (options_.thin_is_two_sided) found.emplace_back("two_sided");
+    if (options_.estimation.thin_is_two_sided) found.emplace_back("two_sided");
     for (const PlyProperty& property : element.properties) {
       if (std::find(found.begin(), found.end(), property.name) == found.end()) {
         writing.properties.push_back(property);
@@ -159,87 +277,54 @@ class NormalsJob {
   }
 
   Status writeRows() {
-    progress_.beginPhase("normals", reader_->element().count, "points");
-    const std::size_t most = kRowsPerThread * std::size_t(threads_);
-    const std::size_t row_bytes = reader_->element().row_bytes;
+    SURFEIT_RETURN_IF_ERROR(reader_->rewind());
+    progress_.beginPhase("write", reader_->element().count, "points");
+    const std::size_t from_bytes = reader_->element().row_bytes;
+    const std::size_t to_bytes = writer_->element().row_bytes;
+    std::vector<std::byte> packed;
     for (;;) {
-      if (progress_.isCancelled()) return Status::interrupted();
-      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, reader_->readRows(most, buffer_));
-      if (rows.empty()) return {};
-      const std::size_t count = rows.size() / row_bytes;
-      SURFEIT_RETURN_IF_ERROR(findSurfaces(rows, count));
-      const std::size_t to_bytes = writer_->element().row_bytes;
-      packed_.resize(count * to_bytes);
+      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, readRows());
+      if (rows.empty()) break;
+      const std::size_t count = rows.size() / from_bytes;
+      packed.resize(count * to_bytes);
       for (std::size_t i = 0; i < count; ++i) {
-        pack(rows.data() + i * row_bytes, i, packed_.data() + i * to_bytes);
+        SURFEIT_ASSIGN_OR_RETURN(const FoundRow found, takeFound());
+        pack(rows.data() + i * from_bytes, found, packed.data() + i * to_bytes);
       }
-      SURFEIT_RETURN_IF_ERROR(writer_->writeRows(packed_));
-      stats_.points += count;
+      SURFEIT_RETURN_IF_ERROR(writer_->writeRows(packed));
       progress_.advance(count);
     }
+    stats_.temporary_bytes += found_rows_->temporaryBytes();
+    if (found_rows_->current() == nullptr) return {};
+    return Status::failed(fmt::format("{}: fewer points when read again", input_));
   }
 
-  // Of the rows' places, into surfaces_, by all threads.
-  Status findSurfaces(Bytes rows, std::size_t count) {
-    const std::size_t row_bytes = reader_->element().row_bytes;
-    surfels_.resize(count);
-    surfaces_.assign(count, {});
-    is_place_.assign(count, false);
-    glm::vec3 last(centre_);
-    for (std::size_t i = 0; i < count; ++i) {
-      const glm::vec3 place = places_.place(rows.data() + i * row_bytes);
-      is_place_[i] = isFinite(place);
-      if (is_place_[i]) last = place;
-      surfels_[i].position = last;  // what is no place must not widen the box of the others
-      surfels_[i].flags = kSurfelSphere;
-    }
-    // Along the curve, so that those that follow each other are close in any order of the file
-    order_.clear();
-    for (std::uint32_t i = 0; i < count; ++i) {
-      order_.emplace_back(curveKey(surfels_[i].position, octree_->file().header().cube), i);
-    }
-    std::sort(order_.begin(), order_.end());
-    sorted_.clear();
-    for (const auto& [key, i] : order_) sorted_.push_back(surfels_[i]);
-    return findOnThreads(
-        searches_, sorted_, [&](std::size_t i) { return is_place_[order_[i].second] != 0; },
-        [&](std::size_t i, const SurfaceAt& found) { surfaces_[order_[i].second] = found; });
+  // Of the next row.
+  Result<FoundRow> takeFound() {
+    FoundRow found;
+    const std::uint64_t row = stats_.points++;
+    const std::byte* const current = found_rows_->current();
+    if (current != nullptr) std::memcpy(&found, current, sizeof found);
+    if (current == nullptr || found.row != row) return kNoPlace;
+    SURFEIT_RETURN_IF_ERROR(found_rows_->advance());
+    return found;
   }
 
-  glm::vec3 oriented(const glm::vec3& normal, const glm::vec3& place) const {
-    float toward = 0;
-    switch (options_.orientation.toward) {
-      case NormalOrientation::Toward::kUp:
-        toward = normal[int(up_)];
-        break;
-      case NormalOrientation::Toward::kSensor:
-        toward = glm::dot(normal, glm::vec3(options_.orientation.sensor - places_.origin) - place);
-        break;
-      case NormalOrientation::Toward::kOutward:
-        toward = glm::dot(normal, place - centre_);
-        break;
-    }
-    return toward < 0 ? -normal : normal;
-  }
-
-  void pack(const std::byte* row, std::size_t i, std::byte* to) {
+  void pack(const std::byte* row, const FoundRow& found, std::byte* to) {
     for (const Copy& copy : copies_) std::memcpy(to + copy.to, row + copy.from, copy.bytes);
-    const SurfaceAt& surface = surfaces_[i];
-    const bool is_thin =
-        !is_place_[i] || surface.normal == glm::vec3(0) || surface.thickness > kThinThickness;
-    glm::vec3 normal = oriented(surface.normal, surfels_[i].position);
-    if (is_thin) {
+    if (found.is_thin != 0) {
       ++stats_.without;
-      if (!options_.thin_is_two_sided) normal = glm::vec3(0);
     } else {
-      stats_.mean_confidence += double(surface.confidence);
+      stats_.mean_confidence += double(found.confidence);
     }
-    const float radius = std::sqrt(IndexOptions().overlap) * surface.radius;
-    const float values[] = {normal.x, normal.y, normal.z, surface.confidence, radius, surface.area};
+    const float values[] = {found.normal.x,   found.normal.y, found.normal.z,
+                            found.confidence, found.radius,   found.area};
     const std::size_t count = options_.with_sizes ? 6 : 4;
-    std::byte* const found = to + writer_->element().find("nx")->offset;
-    std::memcpy(found, values, count * sizeof(float));
-    if (options_.thin_is_two_sided) found[count * sizeof(float)] = std::byte{is_thin};
+    std::byte* const at = to + writer_->element().find("nx")->offset;
+    std::memcpy(at, values, count * sizeof(float));
+    if (options_.estimation.thin_is_two_sided) {
+      at[count * sizeof(float)] = std::byte(found.is_two_sided);
+    }
   }
 
   void noteOfWriter() {
@@ -256,7 +341,8 @@ class NormalsJob {
     if (stats_.without == 0) return;
     progress_.inform(fmt::format(
         "{}: {} of {} points lie on no surface: they {}", output_, stats_.without, stats_.points,
-        options_.thin_is_two_sided ? "are seen from both sides" : "get no normal and are spheres"));
+        options_.estimation.thin_is_two_sided ? "are seen from both sides"
+                                              : "get no normal and are spheres"));
   }
 
   struct Copy {
@@ -268,40 +354,31 @@ class NormalsJob {
   const NormalsOptions& options_;
   Progress& progress_;
   int threads_ = 1;
-  UpAxis up_ = kDefaultUpAxis;
   IndexOptions indexing_;  // of the places
   std::unique_ptr<RowReader> reader_;
   PlaceReader places_;
-  glm::vec3 centre_{0};  // from the origin
+  std::optional<NormalRule> rule_;
+  std::uint64_t sorter_bytes_ = 0;  // of each
   std::unique_ptr<PagedOctree> octree_;
-  std::vector<SurfaceSearch> searches_;  // by thread
+  std::optional<RecordSorter> places_in_order_, found_rows_;
   std::unique_ptr<RowWriter> writer_;
   std::vector<Copy> copies_;
   std::vector<std::string> told_;
   AlignedBuffer buffer_;
-  std::vector<Surfel> surfels_, sorted_;  // places of rows; the same along the curve
-  std::vector<std::pair<CurveKey, std::uint32_t>> order_;
-  std::vector<SurfaceAt> surfaces_;
-  std::vector<char> is_place_;
-  std::vector<std::byte> packed_;
   NormalsStats stats_;
 };
-
-Status checkOptions(const NormalsOptions& options) {
-  const glm::dvec3& sensor = options.orientation.sensor;
-  if (!std::isfinite(sensor.x + sensor.y + sensor.z)) {
-    return Status::invalidArgument("sensor: a coordinate is not finite");
-  }
-  return {};
-}
 
 }  // namespace
 
 Result<NormalsStats> estimateNormals(const std::string& input, const std::string& output,
                                      const NormalsOptions& options, Progress& progress) {
   try {
-    SURFEIT_RETURN_IF_ERROR(checkOptions(options));
-    return NormalsJob(input, output, options, progress).run();
+    SURFEIT_RETURN_IF_ERROR(NormalRule::check(options.estimation));
+    const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
+    Result<NormalsStats> result = Status::failed("normals: not run");
+    withThreads(threads,
+                [&] { result = NormalsJob(input, output, options, threads, progress).run(); });
+    return result;
   } catch (const std::bad_alloc&) {
     return Status::failed(
         fmt::format("{}: the system gave no more memory; try a smaller --memory", output));

@@ -38,24 +38,43 @@ struct Plane {
   bool is_line = false;  // the places lie on one: the plane is any through it
 };
 
-Eigen::Vector3f eigenVector(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+// Offsets of the neighbours in units of the farthest, as the vectorizer likes them, with weights.
+struct Columns {
+  std::vector<float> x, y, z, weight;
 
-// The plane through the neighbours and the place itself, each with its weight, which is 1 without
-// `weights`.
-Plane fitPlane(std::span<const Neighbour> neighbours, std::span<const float> weights = {}) {
-  const auto weightOf = [&](std::size_t i) { return weights.empty() ? 1.f : weights[i]; };
-  float sum = 1;
-  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
-  for (std::size_t i = 0; i < neighbours.size(); ++i) {
-    mean += weightOf(i) * eigenVector(neighbours[i].offset);
-    sum += weightOf(i);
+  void fill(std::span<const Neighbour> neighbours, float unit) {
+    const std::size_t count = neighbours.size();
+    for (std::vector<float>* column : {&x, &y, &z, &weight}) column->resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const glm::vec3 offset = neighbours[i].offset / unit;
+      x[i] = offset.x, y[i] = offset.y, z[i] = offset.z, weight[i] = 1;
+    }
   }
-  mean /= sum;
-  Eigen::Matrix3f covariance = mean * mean.transpose();
-  for (std::size_t i = 0; i < neighbours.size(); ++i) {
-    const Eigen::Vector3f d = eigenVector(neighbours[i].offset) - mean;
-    covariance += weightOf(i) * d * d.transpose();
+
+  // Cauchy's: what lies off the plane counts the less, the farther it does.
+  void weigh(const glm::vec3& normal, float width) {
+    const glm::vec3 across = normal / width;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      const float above = x[i] * across.x + y[i] * across.y + z[i] * across.z;
+      weight[i] = 1 / (1 + above * above);
+    }
   }
+};
+
+// The plane through the neighbours and the place itself, each with its weight.
+Plane fitPlane(const Columns& at) {
+  float sum = 1, x = 0, y = 0, z = 0, xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
+  for (std::size_t i = 0; i < at.x.size(); ++i) {
+    const float wx = at.weight[i] * at.x[i], wy = at.weight[i] * at.y[i],
+                wz = at.weight[i] * at.z[i];
+    sum += at.weight[i], x += wx, y += wy, z += wz;
+    xx += wx * at.x[i], yy += wy * at.y[i], zz += wz * at.z[i];
+    xy += wx * at.y[i], yz += wy * at.z[i], zx += wz * at.x[i];
+  }
+  Eigen::Matrix3f covariance;
+  covariance << xx - x * x / sum, xy - x * y / sum, zx - z * x / sum,  //
+      xy - x * y / sum, yy - y * y / sum, yz - y * z / sum,            //
+      zx - z * x / sum, yz - y * z / sum, zz - z * z / sum;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
   solver.computeDirect(covariance);
   const Eigen::Vector3f normal = solver.eigenvectors().col(0);
@@ -71,17 +90,12 @@ Plane fitPlane(std::span<const Neighbour> neighbours, std::span<const float> wei
 }
 
 // The plane of the place's own sheet, where several lie close to each other: what lies off it
-// counts the less, the farther it does (Cauchy's weights, again and again).
-Plane fitSheet(std::span<const Neighbour> neighbours, float spacing, std::vector<float>& weights) {
-  Plane plane = fitPlane(neighbours);
-  weights.resize(neighbours.size());
+// counts the less, again and again. `spacing` and thickness are in units of the farthest.
+Plane fitSheet(Columns& at, float spacing) {
+  Plane plane = fitPlane(at);
   for (int pass = 0; pass < kSheetPasses && plane.thickness > kThick * spacing; ++pass) {
-    const float width = kNarrowGap * spacing;
-    for (std::size_t i = 0; i < neighbours.size(); ++i) {
-      const float above = glm::dot(neighbours[i].offset, plane.normal) / width;
-      weights[i] = 1 / (1 + above * above);
-    }
-    const Plane again = fitPlane(neighbours, weights);
+    at.weigh(plane.normal, kNarrowGap * spacing);
+    const Plane again = fitPlane(at);
     plane.normal = again.normal;
     plane.is_line = again.is_line;
   }
@@ -251,7 +265,8 @@ void flatten(std::span<const Neighbour> neighbours, const glm::vec3& own_normal,
 
 struct SurfaceCells::Scratch {
   std::vector<Flat> flat;
-  std::vector<float> heights, weights;
+  Columns columns;
+  std::vector<float> heights;
   std::vector<glm::vec2> cutters;
 };
 
@@ -267,7 +282,8 @@ SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float re
   const float farthest = glm::length(neighbours.back().offset);
   // In units of that
   const float spacing = std::sqrt(kPi / float(neighbours.size() + 1));
-  const Plane plane = fitSheet(neighbours, spacing * farthest, scratch_->weights);
+  scratch_->columns.fill(neighbours, farthest);
+  const Plane plane = fitSheet(scratch_->columns, spacing);
   const glm::vec3 normal = own_normal != glm::vec3(0) ? own_normal : plane.normal;
   std::vector<Flat>& flat = scratch_->flat;
   flatten(neighbours, own_normal, normal, farthest, flat);
@@ -291,7 +307,7 @@ SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float re
   cell.normal = plane.normal;
   cell.confidence = plane.confidence;
   cell.is_line = plane.is_line;
-  cell.thickness = plane.thickness / (spacing * farthest);
+  cell.thickness = plane.thickness / spacing;
   if (cutters.empty()) return cell;
   // Where all places are known, what is open reaches farther than any of them
   cell.is_settled = 2 * polygon.reach() <= std::min(reach / farthest, 2.f);

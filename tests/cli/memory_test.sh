@@ -8,6 +8,8 @@ source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 commands=(
   "index cloud.ply -o out.sft"
   "index bare.ply -o out.sft"
+  "index points.ply -o out.sft --normals estimate"
+  "normals points.ply -o out.ply"
   "verify scene.sft"
   "gather scene.sft receivers.ply -o out.ply --quality draft"
   "gather scene.sft receivers.ply -o out.ply --quality draft --mode bleeding --order input"
@@ -34,6 +36,7 @@ makeInputs() {
   mv cornell.ply cloud.ply
   mv cornell.sft scene.sft
   run 0 convert cloud.ply -o bare.ply --keep position,normal --quiet
+  run 0 convert cloud.ply -o points.ply --keep position --quiet
   run 0 convert cloud.ply -o receivers.ply --every 100 --quiet
   run 0 sample cornell.obj -o photons.ply --photons 50000 --quiet
 }

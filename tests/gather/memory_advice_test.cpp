@@ -138,8 +138,7 @@ TEST_F(MemoryAdvice, WhoFollowsItIsNotAdvisedAgain) {
   ASSERT_TRUE(scene.ok() && input.ok());
   const GatherWork work = gatherWork(input->receivers(), options_);
   const std::uint64_t least_memory = leastGatherMemory(*scene, work);
-  const std::uint64_t all =
-      memoryForCaches(*scene, work, PagedOctree::unlimitedCacheBytes(*scene));
+  const std::uint64_t all = memoryForCaches(*scene, work, PagedOctree::unlimitedCacheBytes(*scene));
   int advised_count = 0;
   for (unsigned seed = 0; seed < 400; ++seed) {
     std::mt19937 random(seed);

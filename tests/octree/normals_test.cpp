@@ -6,9 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <map>
 #include <random>
 #include <string>
 #include <vector>
@@ -16,6 +18,8 @@
 #include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
+#include "octree/scene_rows.h"
+#include "surfeit/index.h"
 
 namespace surfeit {
 namespace {
@@ -110,7 +114,7 @@ class NormalsTest : public DirectoryTest {
 
 TEST_F(NormalsTest, SpheresGetTheirsWithAndWithoutNoise) {
   NormalsOptions outward;
-  outward.orientation.toward = Toward::kOutward;
+  outward.estimation.orientation.toward = Toward::kOutward;
   const auto truth = [](const glm::dvec3& p) { return glm::normalize(p); };
   write(sphere(20000, 0));
   const Found clean = find(outward);
@@ -128,7 +132,7 @@ TEST_F(NormalsTest, RowsKeepTheirOrderAndAllThatTheyHave) {
   std::vector<glm::dvec3> points = sphere(5000, 0, {500000, 5000000, 100});
   write(points);
   NormalsOptions outward;
-  outward.orientation.toward = Toward::kOutward;
+  outward.estimation.orientation.toward = Toward::kOutward;
   const Found found = find(outward);
   ASSERT_EQ(found.number.size(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -180,8 +184,8 @@ TEST_F(NormalsTest, RoomsFaceTheirSensor) {
   }
   write(points);
   NormalsOptions options;
-  options.orientation = {Toward::kSensor, {1000.3, .6, .4}};
-  const glm::dvec3 sensor = options.orientation.sensor;
+  options.estimation.orientation = {Toward::kSensor, {1000.3, .6, .4}};
+  const glm::dvec3 sensor = options.estimation.orientation.sensor;
   const Found found = find(options);
   for (std::size_t i = 0; i < found.normal.size(); ++i) {
     EXPECT_GE(glm::dot(found.normal[i], sensor - found.position[i]), -1e-4);
@@ -197,7 +201,7 @@ TEST_F(NormalsTest, PointsAllAroundHaveNoneOrAreTwoSided) {
   EXPECT_GT(none, 3750);  // all but those at the faces of the cube
   EXPECT_EQ(stats_.without, std::uint64_t(none));
   NormalsOptions options;
-  options.thin_is_two_sided = true;
+  options.estimation.thin_is_two_sided = true;
   found = find(options);
   EXPECT_EQ(std::count(found.normal.begin(), found.normal.end(), glm::dvec3(0)), 0);
   const auto reader = openRowReader(path("normals.ply"));
@@ -216,6 +220,63 @@ TEST_F(NormalsTest, SizesAreThoseOfTheSurface) {
   EXPECT_NEAR(area, 4 * 3.14159265, .05);
 }
 
+std::array<long, 3> rounded(const glm::dvec3& p) {
+  return {std::lround(p.x * 1e5), std::lround(p.y * 1e5), std::lround(p.z * 1e5)};
+}
+
+// The scene's normals by rounded position.
+std::map<std::array<long, 3>, glm::dvec3> normalsOfScene(const std::string& path) {
+  const auto reader = openCloud(path, {});
+  EXPECT_TRUE(reader.ok()) << reader.status().message();
+  const std::vector<std::byte> rows = readAllRows(**reader);
+  std::map<std::array<long, 3>, glm::dvec3> normals;
+  for (std::size_t i = 0; i < (*reader)->element().count; ++i) {
+    const auto value = [&](const char* property) { return valueOf(**reader, rows, i, property); };
+    normals[rounded({value("x"), value("y"), value("z")})] = {value("nx"), value("ny"),
+                                                              value("nz")};
+  }
+  return normals;
+}
+
+TEST_F(NormalsTest, IndexFindsTheSame) {
+  std::vector<glm::dvec3> points = sphere(5000, .1);
+  for (int i = 0; i < 1000; ++i) points.emplace_back(4 + unit(), unit(), unit());
+  write(points);
+  for (const bool is_two_sided : {false, true}) {
+    NormalsOptions options;
+    options.estimation = {{Toward::kOutward, {}}, is_two_sided};
+    const Found found = find(options);
+    IndexOptions indexing;
+    indexing.full_precision = true;
+    indexing.normals = options.estimation;
+    const auto stats = indexClouds({path("cloud.ply")}, path("cloud.sft"), indexing, notes_);
+    ASSERT_TRUE(stats.ok()) << stats.status().message();
+    EXPECT_EQ(stats->thin_surfels, stats_.without);
+    EXPECT_EQ(stats->normals_found + stats->thin_surfels, points.size());
+    const auto normals = normalsOfScene(path("cloud.sft"));
+    std::size_t different = 0, compared = 0;
+    for (std::size_t i = 0; i < found.normal.size(); ++i) {
+      const auto at = normals.find(rounded(found.position[i]));
+      if (at == normals.end()) continue;  // rounded the other way
+      ++compared;
+      different += glm::length(at->second - found.normal[i]) > 1e-5 ? 1 : 0;
+    }
+    EXPECT_EQ(different, 0u);
+    EXPECT_GT(compared, points.size() * 9 / 10);
+  }
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("it follows from their neighbours")));
+}
+
+TEST_F(NormalsTest, IndexLeavesNormalsAloneThatAreThere) {
+  write(sphere(2000, 0));
+  find({});  // up, which is wrong for half of them
+  IndexOptions indexing;
+  indexing.normals = NormalEstimation{{Toward::kOutward, {}}, false};
+  const auto stats = indexClouds({path("normals.ply")}, path("cloud.sft"), indexing, notes_);
+  ASSERT_TRUE(stats.ok()) << stats.status().message();
+  EXPECT_EQ(stats->normals_found, 0u);
+}
+
 TEST_F(NormalsTest, WhatCannotBeDoneIsSaid) {
   write(sphere(1000, 0));
   NormalsOptions options;
@@ -223,7 +284,7 @@ TEST_F(NormalsTest, WhatCannotBeDoneIsSaid) {
   EXPECT_EQ(estimateNormals(path("cloud.ply"), path("a.ply"), options, notes_).status().code(),
             StatusCode::kBudgetTooSmall);
   options.memory_bytes = 0;
-  options.orientation = {Toward::kSensor, {NAN, 0, 0}};
+  options.estimation.orientation = {Toward::kSensor, {NAN, 0, 0}};
   EXPECT_EQ(estimateNormals(path("cloud.ply"), path("a.ply"), options, notes_).status().code(),
             StatusCode::kInvalidArgument);
   EXPECT_EQ(estimateNormals(path("gone.ply"), path("a.ply"), {}, notes_).status().code(),

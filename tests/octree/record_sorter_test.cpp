@@ -1,4 +1,4 @@
-#include "brick/record_sorter.h"
+#include "octree/record_sorter.h"
 
 #include <gtest/gtest.h>
 

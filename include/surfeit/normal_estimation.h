@@ -1,0 +1,27 @@
+// How normals are found where a cloud has none: `surfeit normals` and `surfeit index --normals`.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+
+namespace surfeit {
+
+// Which of its two sides a plane faces.
+struct NormalOrientation {
+  enum class Toward : std::uint8_t {
+    kUp,      // the up axis of the cloud: terrain, airborne scans
+    kSensor,  // the place that the points were seen from
+    kOutward  // away from the middle of the cloud's bounds: single objects
+  };
+  Toward toward = Toward::kUp;
+  glm::dvec3 sensor{0};  // finite, in the cloud's coordinates, for kSensor
+};
+
+struct NormalEstimation {
+  NormalOrientation orientation;
+  // Points of which the neighbours lie all around (foliage, wires) get no normal, so that they are
+  // spheres; or that of the plane through these, seen from both sides.
+  bool thin_is_two_sided = false;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,43 @@
+// The normal of a place, from the surface through its neighbours.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <string>
+
+#include "octree/surface_search.h"
+#include "surfeit/normal_estimation.h"
+#include "surfeit/status.h"
+#include "surfeit/up_axis.h"
+
+namespace surfeit {
+
+struct FoundNormal {
+  glm::vec3 normal{0};  // unit, oriented; zero where the place becomes a sphere
+  bool is_thin = true;  // on no surface
+  bool is_two_sided = false;
+};
+
+// Immutable: threads may share it.
+class NormalRule {
+ public:
+  // kInvalidArgument for a sensor that is not finite.
+  static Status check(const NormalEstimation& estimation);
+
+  // Places, and the middle of the cloud's bounds, are counted from `origin`.
+  NormalRule(const NormalEstimation& estimation, UpAxis up, const glm::dvec3& origin,
+             const glm::vec3& centre);
+
+  FoundNormal at(const glm::vec3& place, const SurfaceAt& surface) const;
+
+  // For provenance: "up, thin spheres".
+  std::string describe() const;
+
+ private:
+  glm::vec3 oriented(const glm::vec3& normal, const glm::vec3& place) const;
+
+  NormalEstimation estimation_;
+  UpAxis up_;
+  glm::vec3 sensor_, centre_;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,54 @@
+#include "tools/normal_options.h"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <string_view>
+
+#include "tools/number_list.h"
+
+namespace surfeit {
+namespace {
+
+// "up", "outward" or "sensor X,Y,Z".
+NormalOrientation parseOrientation(const std::string& text) {
+  using Toward = NormalOrientation::Toward;
+  if (text == "up") return {Toward::kUp, {}};
+  if (text == "outward") return {Toward::kOutward, {}};
+  constexpr std::string_view kSensor = "sensor";
+  if (!text.starts_with(kSensor)) {
+    throw CLI::ValidationError(
+        "--orient", fmt::format("found \"{}\", expected up, outward or \"sensor X,Y,Z\"", text));
+  }
+  const auto at =
+      parseNumberList<3>("--orient", text.substr(kSensor.size()), "\"sensor X,Y,Z\", a place");
+  return {Toward::kSensor, {at[0], at[1], at[2]}};
+}
+
+}  // namespace
+
+void addNormalOptions(CLI::App& command, NormalEstimation& estimation) {
+  command
+      .add_option_function<std::string>(
+          "--orient",
+          [&estimation](const std::string& text) {
+            estimation.orientation = parseOrientation(text);
+          },
+          "Which way normals point: up (terrain, airborne scans), outward from the middle of the "
+          "cloud (single objects), or \"sensor X,Y,Z\": to the place that all points were seen "
+          "from")
+      ->type_name("up|outward|\"sensor X,Y,Z\"")
+      ->default_str("up");
+  command
+      .add_option_function<std::string>(
+          "--thin",
+          [&estimation](const std::string& text) {
+            estimation.thin_is_two_sided = text == "two-sided";
+          },
+          "Points on no surface (foliage, wires): spheres, without a normal, or two-sided disks")
+      ->check(CLI::IsMember({"spheres", "two-sided"}))
+      ->type_name("spheres|two-sided")
+      ->default_str("spheres");
+}
+
+}  // namespace surfeit
