@@ -9,8 +9,9 @@
 namespace surfeit {
 namespace {
 
-// Strays: radii off surfaces are limited to this many times the cloud's median.
-constexpr float kStrayLimit = 8;
+// Strays: radii off surfaces are limited to this many times the cloud's median; and those of what is
+// sparse beside dense, for densities that change by 1:1600.
+constexpr float kStrayLimit = 8, kSparseLimit = 40;
 constexpr std::size_t kSamplePages = 64;
 // Pages whose surfels are sized at once.
 constexpr std::uint32_t kBatchPages = 32;
@@ -56,7 +57,7 @@ Status SizedSurfelStream::prepare() {
   std::nth_element(radii.begin(), median, radii.end());
   largest_radius_ = kStrayLimit * *median;
   for (SurfaceSearch& searcher : searchers_) {
-    searcher.limitLooseRadii(largest_radius_);
+    searcher.limitRadii(largest_radius_, kSparseLimit / kStrayLimit * largest_radius_);
   }
   return {};
 }

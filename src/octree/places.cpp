@@ -282,4 +282,77 @@ Status findPlaces(const glm::vec3& position, std::size_t count, PagedOctree::Rea
   return {};
 }
 
+namespace {
+
+// Depth first, nearest child first, as above.
+class WantedSearch {
+ public:
+  using MayHold = std::function<bool(const glm::vec3&, float)>;
+  using IsWanted = std::function<bool(const Neighbour&)>;
+
+  WantedSearch(const glm::vec3& position, float most_distance, PagedOctree::Reader& reader,
+               const MayHold& mayHold, const IsWanted& isWanted)
+      : position_(position),
+        limit_(most_distance),
+        reader_(reader),
+        mayHold_(mayHold),
+        isWanted_(isWanted) {}
+
+  Status visit(const NodeRange& range) {
+    SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader_.nodes(range));
+    std::array<std::pair<float, Node>, 8> candidates;
+    std::size_t count = 0;
+    for (const Node& node : nodes) {
+      const glm::vec3 offset = node.position - position_;
+      const float radius = node.radius * 1.000001f;
+      if (mayHold_(offset, radius)) candidates[count++] = {glm::length(offset) - radius, node};
+    }
+    const auto order = std::span(candidates).first(count);
+    std::sort(order.begin(), order.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [distance, node] : order) {
+      if (distance > limit_) break;
+      if (!node.isLeaf()) {
+        SURFEIT_RETURN_IF_ERROR(visit(childrenOf(node)));
+        continue;
+      }
+      SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
+        for (const Surfel& surfel : surfels) consider(surfel);
+      }));
+    }
+    return {};
+  }
+
+  const std::optional<Neighbour>& found() const { return found_; }
+
+ private:
+  void consider(const Surfel& surfel) {
+    const Neighbour other{surfel.position - position_,
+                          surfel.isSphere() ? glm::vec3(0) : surfel.normal};
+    const float distance = glm::length(other.offset);
+    if (distance == 0 || distance > limit_ || !isWanted_(other)) return;
+    if (found_ && !isBefore(other, *found_)) return;
+    found_ = other;
+    limit_ = distance;
+  }
+
+  const glm::vec3 position_;
+  float limit_;
+  PagedOctree::Reader& reader_;
+  const MayHold& mayHold_;
+  const IsWanted& isWanted_;
+  std::optional<Neighbour> found_;
+};
+
+}  // namespace
+
+Result<std::optional<Neighbour>> findPlace(
+    const glm::vec3& position, float most_distance, PagedOctree::Reader& reader,
+    const std::function<bool(const glm::vec3&, float)>& mayHold,
+    const std::function<bool(const Neighbour&)>& isWanted) {
+  WantedSearch search(position, most_distance, reader, mayHold, isWanted);
+  SURFEIT_RETURN_IF_ERROR(search.visit(kRootRange));
+  return search.found();
+}
+
 }  // namespace surfeit

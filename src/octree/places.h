@@ -4,8 +4,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/bounds.h"
@@ -48,5 +50,12 @@ class PlaceIndex {
 // The same of all places, through the octree.
 Status findPlaces(const glm::vec3& position, std::size_t count, PagedOctree::Reader& reader,
                   NearestPlaces& found);
+
+// The nearest place that isWanted(place), nearer than `most_distance`; none where there is none.
+// Offsets are from `position`. Spheres around places are visited where mayHold(centre, radius).
+Result<std::optional<Neighbour>> findPlace(
+    const glm::vec3& position, float most_distance, PagedOctree::Reader& reader,
+    const std::function<bool(const glm::vec3&, float)>& mayHold,
+    const std::function<bool(const Neighbour&)>& isWanted);
 
 }  // namespace surfeit

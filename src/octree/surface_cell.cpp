@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <limits>
+#include <numeric>
+#include <optional>
 #include <vector>
 
 #include "core/spherical_harmonics.h"
@@ -30,6 +32,13 @@ constexpr float kThick = 0.1f;
 constexpr int kSheetPasses = 6;
 // Of a slope from the place to a neighbour that is another sheet's, not its own.
 constexpr float kSteep = 0.7f;
+// At the edge of a surface cells are closed by other places of the edge, far outside: they reach
+// farther than this, in distances of the places that cut them.
+constexpr float kSpike = 2;
+// What cuts from farther away lies flatter than this, root mean square, or all of it are strays.
+constexpr float kLooseSlope = 0.3f;
+// How far an open cell reaches, in units of the farthest neighbour.
+constexpr float kOpen = 2;
 
 struct Plane {
   glm::vec3 normal{0};
@@ -214,6 +223,23 @@ class Cell {
   }
 
   float reach() const { return std::sqrt(reach_sq_); }
+  // Whether what is nearer to a corner than the place is lies within `radius` of there: only that
+  // cuts the cell.
+  bool mayCut(const glm::vec2& there, float radius) const {
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (glm::length(there - corners_[i]) < glm::length(corners_[i]) + radius) return true;
+    }
+    return false;
+  }
+  bool wouldCut(const glm::vec2& there) const { return mayCut(there, -kTouching); }
+  // Whether any side of the first square is left, which had corners at (+-size, +-size).
+  bool touches(float size) const {
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec2& corner = corners_[i];
+      if (std::max(std::abs(corner.x), std::abs(corner.y)) > size * (1 - kTouching)) return true;
+    }
+    return false;
+  }
   float area() const {
     float twice = 0;
     for (std::size_t i = 0; i < count_; ++i) {
@@ -242,24 +268,12 @@ class Cell {
   }
 
  private:
+  static constexpr float kTouching = 1e-4f;
   static constexpr std::size_t kMostCorners = 64;
   std::array<glm::vec2, kMostCorners> corners_;
   std::size_t count_;
   float reach_sq_;  // of the farthest corner
 };
-
-// In units of `unit`: fourth powers of lengths must stay finite.
-void flatten(std::span<const Neighbour> neighbours, const glm::vec3& own_normal,
-             const glm::vec3& normal, float unit, std::vector<Flat>& flat) {
-  flat.clear();
-  const TangentFrame frame(normal);
-  for (const Neighbour& n : neighbours) {
-    if (glm::dot(n.normal, own_normal) < 0) continue;  // the other side of something thin
-    const glm::vec3 offset = n.offset / unit;
-    flat.push_back({{glm::dot(offset, frame.tangent), glm::dot(offset, frame.bitangent)},
-                    glm::dot(offset, normal)});
-  }
-}
 
 }  // namespace
 
@@ -268,6 +282,28 @@ struct SurfaceCells::Scratch {
   Columns columns;
   std::vector<float> heights;
   std::vector<glm::vec2> cutters;
+  std::vector<float> slopes_sq;  // of those from farther away
+
+  // Of the cell in the making. Lengths are in units of the farthest neighbour: fourth powers of
+  // them must stay finite.
+  float unit = 1, spacing = 1, sharers = 1;
+  Plane plane;
+  glm::vec3 own_normal{0}, normal{0};
+  std::optional<TangentFrame> frame;
+  Cell polygon{kOpen};
+
+  Flat flatten(const glm::vec3& place) const {
+    const glm::vec3 offset = place / unit;
+    return {{glm::dot(offset, frame->tangent), glm::dot(offset, frame->bitangent)},
+            glm::dot(offset, normal)};
+  }
+  // Not on the other side of something thin.
+  bool mayShareSheet(const Neighbour& n) const { return glm::dot(n.normal, own_normal) >= 0; }
+
+  void begin(std::span<const Neighbour> neighbours, const glm::vec3& given_normal);
+  void flattenAll(std::span<const Neighbour> neighbours);
+  float usualCutter();
+  SurfaceCell cell() const;
 };
 
 SurfaceCells::SurfaceCells() : scratch_(std::make_unique<Scratch>()) {}
@@ -275,57 +311,125 @@ SurfaceCells::SurfaceCells(SurfaceCells&&) noexcept = default;
 SurfaceCells& SurfaceCells::operator=(SurfaceCells&&) noexcept = default;
 SurfaceCells::~SurfaceCells() = default;
 
-SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float reach,
-                                 const glm::vec3& own_normal, bool is_last) {
-  SurfaceCell cell;
-  if (neighbours.empty()) return cell;
-  const float farthest = glm::length(neighbours.back().offset);
-  // In units of that
-  const float spacing = std::sqrt(kPi / float(neighbours.size() + 1));
-  scratch_->columns.fill(neighbours, farthest);
-  const Plane plane = fitSheet(scratch_->columns, spacing);
-  const glm::vec3 normal = own_normal != glm::vec3(0) ? own_normal : plane.normal;
-  std::vector<Flat>& flat = scratch_->flat;
-  flatten(neighbours, own_normal, normal, farthest, flat);
-  if (mayBeSheets(flat, spacing)) {
-    const float thickness = thicknessOf(flat, scratch_->heights);
-    dropSheet(1, spacing, thickness, flat, scratch_->heights);
-    dropSheet(-1, spacing, thickness, flat, scratch_->heights);
-  }
-
-  Cell polygon(2);
-  float sharers = 1;
-  std::vector<glm::vec2>& cutters = scratch_->cutters;
+void SurfaceCells::Scratch::begin(std::span<const Neighbour> neighbours,
+                                  const glm::vec3& given_normal) {
+  unit = glm::length(neighbours.back().offset);
+  spacing = std::sqrt(kPi / float(neighbours.size() + 1));
+  columns.fill(neighbours, unit);
+  plane = fitSheet(columns, spacing);
+  own_normal = given_normal;
+  normal = own_normal != glm::vec3(0) ? own_normal : plane.normal;
+  frame.emplace(normal);
+  polygon = Cell(kOpen);
+  sharers = 1;
   cutters.clear();
-  for (const Flat& n : flat) {
-    if (glm::length(n.beside) < kCoincident * spacing) {
-      ++sharers;
-    } else if (polygon.cut(n.beside)) {
-      cutters.push_back(n.beside);
+  slopes_sq.clear();
+}
+
+// Of the place's own sheet.
+void SurfaceCells::Scratch::flattenAll(std::span<const Neighbour> neighbours) {
+  flat.clear();
+  for (const Neighbour& n : neighbours) {
+    if (mayShareSheet(n)) flat.push_back(flatten(n.offset));
+  }
+  if (!mayBeSheets(flat, spacing)) return;
+  const float thickness = thicknessOf(flat, heights);
+  dropSheet(1, spacing, thickness, flat, heights);
+  dropSheet(-1, spacing, thickness, flat, heights);
+}
+
+SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float reach,
+                                 const glm::vec3& normal) {
+  Scratch& at = *scratch_;
+  at.cutters.clear();
+  if (neighbours.empty()) return {};
+  at.begin(neighbours, normal);
+  at.flattenAll(neighbours);
+  for (const Flat& n : at.flat) {
+    if (glm::length(n.beside) < kCoincident * at.spacing) {
+      ++at.sharers;
+    } else if (at.polygon.cut(n.beside)) {
+      at.cutters.push_back(n.beside);
     }
   }
+  SurfaceCell cell = at.cell();
+  // Where all places are known, what is open reaches farther than any of them
+  cell.is_settled =
+      !at.cutters.empty() && 2 * at.polygon.reach() <= std::min(reach / at.unit, kOpen);
+  return cell;
+}
+
+float SurfaceCells::reach() const { return 2 * scratch_->polygon.reach() * scratch_->unit; }
+
+bool SurfaceCells::isOpen() const {
+  const Scratch& at = *scratch_;
+  const bool has_plane = !at.plane.is_line || at.own_normal != glm::vec3(0);
+  return !at.cutters.empty() && has_plane;
+}
+
+bool SurfaceCells::mayCut(const glm::vec3& centre, float radius) const {
+  return scratch_->polygon.mayCut(scratch_->flatten(centre).beside, radius / scratch_->unit);
+}
+
+bool SurfaceCells::wouldCut(const Neighbour& place) const {
+  const Scratch& at = *scratch_;
+  const Flat flat = at.flatten(place.offset);
+  return at.mayShareSheet(place) && std::abs(flat.above) < kSteep * glm::length(flat.beside) &&
+         at.polygon.wouldCut(flat.beside);
+}
+
+bool SurfaceCells::cut(const Neighbour& place) {
+  Scratch& at = *scratch_;
+  const Flat flat = at.flatten(place.offset);
+  if (!at.polygon.cut(flat.beside)) return false;
+  at.cutters.push_back(flat.beside);
+  const float slope = flat.above / glm::length(flat.beside);
+  at.slopes_sq.push_back(slope * slope);
+  return true;
+}
+
+SurfaceCell SurfaceCells::closed(std::span<const Neighbour> neighbours) {
+  Scratch& at = *scratch_;
+  const float slopes_sq = std::accumulate(at.slopes_sq.begin(), at.slopes_sq.end(), 0.f);
+  const bool is_loose = slopes_sq > kLooseSlope * kLooseSlope * float(at.slopes_sq.size());
+  const bool is_open = !at.cutters.empty() && (at.polygon.touches(kOpen) || is_loose ||
+                                               at.polygon.reach() > kSpike * at.usualCutter());
+  if (is_open) {
+    // One close by shares the cell rather than telling its size
+    for (const glm::vec2& cutter : at.cutters) {
+      if (glm::length(cutter) > kSharing * at.spacing) at.polygon.cut(-cutter);
+    }
+  }
+  SurfaceCell cell = at.cell();
+  cell.is_settled = !is_open;
+  if (is_open) cell.neighbour_spacing = spacingAmong(neighbours, at.heights);
+  return cell;
+}
+
+float SurfaceCells::Scratch::usualCutter() {
+  heights.clear();
+  for (const glm::vec2& cutter : cutters) heights.push_back(glm::length(cutter));
+  const auto middle = heights.begin() + std::ptrdiff_t(heights.size() * 3 / 4);
+  std::nth_element(heights.begin(), middle, heights.end());
+  return *middle;
+}
+
+SurfaceCell SurfaceCells::Scratch::cell() const {
+  SurfaceCell cell;
   cell.normal = plane.normal;
   cell.confidence = plane.confidence;
   cell.is_line = plane.is_line;
   cell.thickness = plane.thickness / spacing;
   if (cutters.empty()) return cell;
-  // Where all places are known, what is open reaches farther than any of them
-  cell.is_settled = 2 * polygon.reach() <= std::min(reach / farthest, 2.f);
-  if (!cell.is_settled && is_last) {
-    // One close by shares the cell rather than telling its size
-    for (const glm::vec2& cutter : cutters) {
-      if (glm::length(cutter) > kSharing * spacing) polygon.cut(-cutter);
-    }
-    cell.neighbour_spacing = spacingAmong(neighbours, scratch_->heights);
-  }
   // Of a line all that is known is a width: the piece is a square of it
-  const float width = plane.is_line ? polygon.width(glm::normalize(cutters[0])) : 0;
-  const float area = plane.is_line ? width * width : polygon.area();
-  cell.area = area / sharers * farthest * farthest;
+  const bool is_strip = plane.is_line && polygon.touches(kOpen);
+  const float width = is_strip ? polygon.width(glm::normalize(cutters[0])) : 0;
+  const float area = is_strip ? width * width : polygon.area();
+  cell.area = area / sharers * unit * unit;
   // A disk's mean squared distance from its middle is half of its radius squared, a square's a
   // sixth of its side squared
-  const float mean_square = plane.is_line ? width * width / 6 : polygon.meanSquare();
-  cell.radius = std::sqrt(2 * mean_square) * farthest;
+  const float mean_square = is_strip ? width * width / 6 : polygon.meanSquare();
+  cell.radius = std::sqrt(2 * mean_square) * unit;
   return cell;
 }
 

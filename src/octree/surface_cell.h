@@ -16,9 +16,9 @@ struct Neighbour {
 };
 
 struct SurfaceCell {
-  float area = 0;    // 0: the neighbours do not tell
-  float radius = 0;  // of the disk around the place that is spread out as far: the same second
-                     // moment over its area
+  float area = 0;        // 0: the neighbours do not tell
+  float radius = 0;      // of the disk around the place that is spread out as far: the same second
+                         // moment over its area
   glm::vec3 normal{0};   // of the plane through them, either way
   float confidence = 0;  // 1 - 3 l0 / (l0 + l1 + l2), with the variances along its axes
   bool is_line = false;  // the neighbours lie on one: any plane through it will do
@@ -30,7 +30,7 @@ struct SurfaceCell {
   float neighbour_spacing = 0;
 };
 
-// One thread at a time: it keeps memory between calls.
+// One thread at a time: it keeps memory, and the cell that it made last.
 class SurfaceCells {
  public:
   SurfaceCells();
@@ -40,10 +40,21 @@ class SurfaceCells {
 
   // `neighbours`: all that are nearer than `reach`, ascending; none at the place itself. `normal`:
   // of the place; zero: that of the plane through all. Neighbours on another sheet (turned away, or
-  // above or below with nothing between) do not count. With `is_last` there will be no more of
-  // them: a cell that is open, at the edge of a surface, is closed by their mirror images.
-  SurfaceCell cellOf(std::span<const Neighbour> neighbours, float reach, const glm::vec3& normal,
-                     bool is_last);
+  // above or below with nothing between) do not count.
+  SurfaceCell cellOf(std::span<const Neighbour> neighbours, float reach, const glm::vec3& normal);
+
+  // A cell that is not settled may be cut by places farther away. Whether any could, which would be
+  // nearer than reach(): a place, or one within a sphere.
+  bool isOpen() const;
+  float reach() const;
+  bool mayCut(const glm::vec3& centre, float radius) const;
+  bool wouldCut(const Neighbour& place) const;
+  // False when it does not after all.
+  bool cut(const Neighbour& place);
+
+  // The cell when nothing else cuts it: where it is still open, at the edge of a surface, it is
+  // closed by the mirror images of the places that cut it. `neighbours` as before.
+  SurfaceCell closed(std::span<const Neighbour> neighbours);
 
  private:
   struct Scratch;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -16,6 +17,8 @@ namespace {
 // Neighbours looked at first, and while cells are open: of random places all but one of a thousand
 // cells are settled by 24; scan lines twenty times as far apart as their points take 96.
 constexpr std::size_t kNeighbours[] = {24, 48, 96};
+// Farther places that cut a cell: each is the nearest that does, so few suffice.
+constexpr int kMostFarther = 32;
 // Places in the box, and surfels that it serves at most.
 constexpr std::size_t kMostPlaces = 16384, kServedSurfels = 4096, kFewSurfels = 64;
 // How far the box goes beyond the surfels: so many times their spacing, if they are a sheet.
@@ -86,10 +89,14 @@ Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
     if (!index_.find(position, count, found_)) {
       SURFEIT_RETURN_IF_ERROR(findPlaces(position, count, *reader_, found_));
     }
-    const bool is_last = count == std::end(kNeighbours)[-1] || std::isinf(found_.reach);
-    cell = cells_.cellOf(found_.neighbours, found_.reach, normalOf(place), is_last);
+    cell = cells_.cellOf(found_.neighbours, found_.reach, normalOf(place));
     if (count == kNeighbours[0]) first = cell;
-    if (cell.is_settled || is_last) break;
+    if (cell.is_settled || std::isinf(found_.reach)) break;
+  }
+  const bool is_sparse = !cell.is_settled;
+  if (is_sparse) {
+    SURFEIT_RETURN_IF_ERROR(cutByFarther(position));
+    cell = cells_.closed(found_.neighbours);
   }
   // The plane is that of the nearest, unless they lie on a line
   const SurfaceCell& plane = first.is_line ? cell : first;
@@ -101,12 +108,29 @@ Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
   // What is open may be a stray, far from neighbours that are close to each other; and strays may
   // lie all around each other
   if (!cell.is_settled) limit(kOpenLimit * cell.neighbour_spacing);
+  if (is_sparse) limit(largest_sparse_radius_);
   if (plane.thickness > kLooseThickness) limit(largest_loose_radius_);
   area /= float(std::max<std::uint64_t>(found_.coincident, 1));
   last_ = {area, radius, plane.normal, plane.confidence, plane.thickness};
   last_position_ = position;
   has_last_ = true;
   return last_;
+}
+
+// Cuts the open cell by what lies beyond its neighbours: the other rows of a scan, what is sparse
+// beside something dense.
+Status SurfaceSearch::cutByFarther(const glm::vec3& position) {
+  if (std::isinf(found_.reach)) return {};  // there is nothing
+  for (int i = 0; i < kMostFarther && cells_.isOpen(); ++i) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        const std::optional<Neighbour> place,
+        findPlace(
+            position, cells_.reach(), *reader_,
+            [&](const glm::vec3& centre, float radius) { return cells_.mayCut(centre, radius); },
+            [&](const Neighbour& other) { return cells_.wouldCut(other); }));
+    if (!place || !cells_.cut(*place)) break;
+  }
+  return {};
 }
 
 Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,

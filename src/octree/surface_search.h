@@ -41,9 +41,11 @@ class SurfaceSearch {
   // The same at one place.
   Result<SurfaceAt> at(const Surfel& place);
 
-  // No radius off a surface becomes larger.
-  void limitLooseRadii(float largest) {
-    largest_loose_radius_ = largest;
+  // Of places off a surface, and of those that only places farther away tell the size of (sparse
+  // beside dense): no radius becomes larger.
+  void limitRadii(float largest_loose, float largest_sparse) {
+    largest_loose_radius_ = largest_loose;
+    largest_sparse_radius_ = largest_sparse;
     has_last_ = false;
   }
 
@@ -51,11 +53,14 @@ class SurfaceSearch {
   Status serve(std::span<const Surfel> places, std::size_t first, const Wants& wants,
                const Take& take);
 
+  Status cutByFarther(const glm::vec3& position);
+
   std::unique_ptr<PagedOctree::Reader> reader_;
   PlaceIndex index_;
   SurfaceCells cells_;
   NearestPlaces found_;
   float largest_loose_radius_ = std::numeric_limits<float>::infinity();
+  float largest_sparse_radius_ = std::numeric_limits<float>::infinity();
   // Surfels at one position follow each other, and a search among a million of them should happen
   // once.
   bool has_last_ = false;
