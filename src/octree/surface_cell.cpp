@@ -32,6 +32,8 @@ constexpr float kThick = 0.1f;
 constexpr int kSheetPasses = 6;
 // Of a slope from the place to a neighbour that is another sheet's, not its own.
 constexpr float kSteep = 0.7f;
+// Places that lie this far off their surface, in spacings, are noisy.
+constexpr float kNoisy = 0.1f;
 // At the edge of a surface cells are closed by other places of the edge, far outside: they reach
 // farther than this, in distances of the places that cut them.
 constexpr float kSpike = 2;
@@ -109,6 +111,52 @@ Plane fitSheet(Columns& at, float spacing) {
     plane.is_line = again.is_line;
   }
   return plane;
+}
+
+// The quadric over a plane that fits the neighbours and the place best (jets of order 2: Cazals and
+// Pouget 2005): places on one side alone do not turn it as they turn a plane.
+struct Quadric {
+  float slope_u = 0, slope_v = 0;  // at the place
+  float noise = 0;                 // what lies off it, root mean square
+
+  // Neighbours count by their weight and, with `is_narrow`, the less, the farther they are.
+  static Quadric fit(const Columns& at, const glm::vec3& normal, const TangentFrame& frame,
+                     bool is_narrow) {
+    constexpr int kTerms = 6;
+    float sums[kTerms][kTerms] = {}, heights[kTerms] = {}, squares = 0;
+    sums[0][0] = 1;  // the place itself
+    for (std::size_t i = 0; i < at.x.size(); ++i) {
+      const glm::vec3 p(at.x[i], at.y[i], at.z[i]);
+      const float u = glm::dot(p, frame.tangent), v = glm::dot(p, frame.bitangent);
+      const float h = glm::dot(p, normal), near = std::max(1 - glm::dot(p, p), 0.f);
+      const float weight = at.weight[i] * (is_narrow ? near * near * near * near : 1.f);
+      const float terms[kTerms] = {1, u, v, u * u, u * v, v * v};
+      for (int r = 0; r < kTerms; ++r) {
+        const float weighted = weight * terms[r];
+        for (int c = 0; c < kTerms; ++c) sums[r][c] += weighted * terms[c];
+        heights[r] += weighted * h;
+      }
+      squares += weight * h * h;
+    }
+    using Column = Eigen::Matrix<float, kTerms, 1>;
+    Eigen::Matrix<float, kTerms, kTerms> matrix =
+        Eigen::Map<const Eigen::Matrix<float, kTerms, kTerms>>(&sums[0][0]);
+    matrix.diagonal().array() += 1e-6f * matrix.trace();
+    const Eigen::Map<const Column> right(heights);
+    const Column fit = matrix.ldlt().solve(right);
+    return {fit[1], fit[2], std::sqrt(std::max(squares - fit.dot(right), 0.f) / sums[0][0])};
+  }
+};
+
+// Of the surface at the place. Where there is no noise the nearest tell it best.
+glm::vec3 normalAt(const Columns& at, const glm::vec3& normal, float spacing) {
+  const TangentFrame frame(normal);
+  Quadric quadric = Quadric::fit(at, normal, frame, false);
+  if (quadric.noise < kNoisy * spacing) quadric = Quadric::fit(at, normal, frame, true);
+  const glm::vec3 turned =
+      normal - quadric.slope_u * frame.tangent - quadric.slope_v * frame.bitangent;
+  const float length = glm::length(turned);
+  return length > 0 && std::isfinite(length) ? turned / length : normal;
 }
 
 // A neighbour in the plane: beside the place, and above it.
@@ -288,7 +336,7 @@ struct SurfaceCells::Scratch {
   // them must stay finite.
   float unit = 1, spacing = 1, sharers = 1;
   Plane plane;
-  glm::vec3 own_normal{0}, normal{0};
+  glm::vec3 own_normal{0}, normal{0}, surface_normal{0};
   std::optional<TangentFrame> frame;
   Cell polygon{kOpen};
 
@@ -319,6 +367,7 @@ void SurfaceCells::Scratch::begin(std::span<const Neighbour> neighbours,
   plane = fitSheet(columns, spacing);
   own_normal = given_normal;
   normal = own_normal != glm::vec3(0) ? own_normal : plane.normal;
+  surface_normal = plane.is_line ? plane.normal : normalAt(columns, plane.normal, spacing);
   frame.emplace(normal);
   polygon = Cell(kOpen);
   sharers = 1;
@@ -416,7 +465,7 @@ float SurfaceCells::Scratch::usualCutter() {
 
 SurfaceCell SurfaceCells::Scratch::cell() const {
   SurfaceCell cell;
-  cell.normal = plane.normal;
+  cell.normal = surface_normal;
   cell.confidence = plane.confidence;
   cell.is_line = plane.is_line;
   cell.thickness = plane.thickness / spacing;

@@ -1,0 +1,179 @@
+// Normals of places scattered over meshes, beside those of the triangles: angle, flips, rate.
+//
+//   normals_bench MESH... [--count N] [--orient up|outward|consistent]
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/job_limits.h"
+#include "core/seconds_since.h"
+#include "io/cloud_formats.h"
+#include "io/surfel_writer.h"
+#include "sample/mesh.h"
+#include "surfeit/normals.h"
+#include "tools/normal_options.h"
+
+namespace surfeit {
+namespace {
+
+template <typename T>
+T take(Result<T> result) {
+  if (!result.ok()) {
+    fmt::print(stderr, "normals_bench: {}\n", result.status().message());
+    std::exit(1);
+  }
+  return std::move(*result);
+}
+void need(const Status& status) {
+  if (status.ok()) return;
+  fmt::print(stderr, "normals_bench: {}\n", status.message());
+  std::exit(1);
+}
+
+struct Places {
+  std::vector<Surfel> surfels;  // with the normals of their triangles
+  double spacing = 0;
+};
+
+// Evenly over the area, in random order; moved by Gauss' `noise` in spacings, every way.
+Places scatter(const Mesh& mesh, std::size_t count, double noise) {
+  std::vector<double> sums;
+  double area = 0;
+  for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+    sums.push_back(area += triangleArea(mesh, t));
+  }
+  Places places;
+  places.spacing = std::sqrt(area / double(count));
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit;
+  std::normal_distribution<double> gauss;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto t = std::upper_bound(sums.begin(), sums.end(), unit(random) * area);
+    const glm::uvec3& corners = mesh.triangle[std::min<std::size_t>(std::size_t(t - sums.begin()),
+                                                                    mesh.triangle.size() - 1)];
+    const glm::dvec3 a(mesh.position[corners.x]), b(mesh.position[corners.y]),
+        c(mesh.position[corners.z]);
+    const double root = std::sqrt(unit(random)), v = unit(random) * root;
+    glm::dvec3 at = a * (1 - root) + b * (root - v) + c * v;
+    for (int axis = 0; axis < 3; ++axis) at[axis] += noise * places.spacing * gauss(random);
+    Surfel surfel;
+    surfel.position = glm::vec3(at);
+    surfel.normal = glm::vec3(glm::normalize(glm::cross(b - a, c - a)));
+    places.surfels.push_back(surfel);
+  }
+  return places;
+}
+
+std::vector<glm::vec3> normalsIn(const std::string& path) {
+  const std::unique_ptr<RowReader> reader = take(openRowReader(path));
+  const PlyElement& element = reader->element();
+  const std::size_t offset = element.find("nx")->offset;
+  AlignedBuffer buffer;
+  std::vector<glm::vec3> normals;
+  for (;;) {
+    const Bytes rows = take(reader->readRows(4096, buffer));
+    if (rows.empty()) return normals;
+    for (std::size_t at = 0; at < rows.size(); at += element.row_bytes) {
+      glm::vec3& normal = normals.emplace_back();
+      for (int i = 0; i < 3; ++i) {
+        normal[i] =
+            float(plyValue(rows.data() + at + offset + 4 * std::size_t(i), PlyType::kFloat32));
+      }
+    }
+  }
+}
+
+class Bench {
+ public:
+  explicit Bench(NormalsOptions options) : options_(std::move(options)) {
+    std::string name = (std::filesystem::temp_directory_path() / "normals-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) std::exit(1);
+    directory_ = name + "/";
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+  ~Bench() { std::filesystem::remove_all(directory_); }
+
+  void row(const std::string& mesh_path, const Mesh& mesh, std::size_t count, double noise) const {
+    const Places places = scatter(mesh, count, noise);
+    SurfelWriter writer = take(SurfelWriter::create(directory_ + "cloud.ply", {}));
+    need(writer.write(places.surfels));
+    need(writer.finish());
+    Progress quiet;
+    const double before = processCpuSeconds();
+    const NormalsStats stats = take(
+        estimateNormals(directory_ + "cloud.ply", directory_ + "normals.ply", options_, quiet));
+    const double cpu = processCpuSeconds() - before;
+    print(std::filesystem::path(mesh_path).stem().string(), places.surfels,
+          normalsIn(directory_ + "normals.ply"), noise, double(count) / cpu, stats.seconds);
+  }
+
+ private:
+  static void print(const std::string& name, const std::vector<Surfel>& truth,
+                    const std::vector<glm::vec3>& found, double noise, double rate,
+                    double seconds) {
+    std::vector<float> angles;
+    std::size_t without = 0, flipped = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      if (found[i] == glm::vec3(0)) {
+        ++without;
+        continue;
+      }
+      const float cosine = glm::dot(truth[i].normal, found[i]);
+      flipped += cosine < 0 ? 1 : 0;
+      angles.push_back(std::acos(std::min(std::abs(cosine), 1.f)) * 57.29578f);
+    }
+    std::sort(angles.begin(), angles.end());
+    const double with = double(angles.size());
+    fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.3f} | {:.3f} | {:.0f} | {:.1f} |\n", name, noise,
+               angles[angles.size() / 2], angles[angles.size() * 9 / 10],
+               100 * double(flipped) / with, 100 * double(without) / double(truth.size()),
+               rate / 1e3, seconds);
+    std::fflush(stdout);
+  }
+
+  NormalsOptions options_;
+  std::string directory_;
+};
+
+void run(const std::vector<std::string>& meshes, std::size_t count, const NormalsOptions& options) {
+  fmt::print(
+      "{} places on each mesh. Angles from the triangle's normal in degrees, either way; noise in\n"
+      "spacings; flips of those with a normal, %.\n\n"
+      "| mesh | noise | median | 90 % | flips | without | k/s and core | wall s |\n"
+      "|---|---|---|---|---|---|---|---|\n",
+      count);
+  Progress quiet;
+  const Bench bench(options);
+  for (const std::string& path : meshes) {
+    const Mesh mesh = take(loadMeshes({path}, glm::vec3(0.5f), quiet));
+    for (const double noise : {0., .2}) bench.row(path, mesh, count, noise);
+  }
+}
+
+}  // namespace
+}  // namespace surfeit
+
+int main(int argc, char** argv) {
+  CLI::App app("Normals found for places on meshes");
+  std::vector<std::string> meshes;
+  std::size_t count = 200000;
+  surfeit::NormalsOptions options;
+  app.add_option("MESH", meshes, "PLY or OBJ")->required();
+  app.add_option("--count", count, "Places on each")->capture_default_str();
+  app.add_option("--threads", options.threads, "Threads");
+  surfeit::addNormalOptions(app, options.estimation);
+  CLI11_PARSE(app, argc, argv);
+  surfeit::run(meshes, count, options);
+  return 0;
+}
