@@ -10,15 +10,17 @@
 namespace surfeit {
 namespace {
 
-// "up", "outward" or "sensor X,Y,Z".
+// "up", "outward", "consistent" or "sensor X,Y,Z".
 NormalOrientation parseOrientation(const std::string& text) {
   using Toward = NormalOrientation::Toward;
   if (text == "up") return {Toward::kUp, {}};
   if (text == "outward") return {Toward::kOutward, {}};
+  if (text == "consistent") return {Toward::kConsistent, {}};
   constexpr std::string_view kSensor = "sensor";
   if (!text.starts_with(kSensor)) {
     throw CLI::ValidationError(
-        "--orient", fmt::format("found \"{}\", expected up, outward or \"sensor X,Y,Z\"", text));
+        "--orient",
+        fmt::format("found \"{}\", expected up, outward, consistent or \"sensor X,Y,Z\"", text));
   }
   const auto at =
       parseNumberList<3>("--orient", text.substr(kSensor.size()), "\"sensor X,Y,Z\", a place");
@@ -35,9 +37,9 @@ void addNormalOptions(CLI::App& command, NormalEstimation& estimation) {
             estimation.orientation = parseOrientation(text);
           },
           "Which way normals point: up (terrain, airborne scans), outward from the middle of the "
-          "cloud (single objects), or \"sensor X,Y,Z\": to the place that all points were seen "
-          "from")
-      ->type_name("up|outward|\"sensor X,Y,Z\"")
+          "cloud (round things), consistent with their neighbours (closed surfaces outward, open "
+          "ones up), or \"sensor X,Y,Z\": to the place that all points were seen from")
+      ->type_name("up|outward|consistent|\"sensor X,Y,Z\"")
       ->default_str("up");
   command
       .add_option_function<std::string>(

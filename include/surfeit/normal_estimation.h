@@ -9,9 +9,10 @@ namespace surfeit {
 // Which of its two sides a plane faces.
 struct NormalOrientation {
   enum class Toward : std::uint8_t {
-    kUp,      // the up axis of the cloud: terrain, airborne scans
-    kSensor,  // the place that the points were seen from
-    kOutward  // away from the middle of the cloud's bounds: single objects
+    kUp,         // the up axis of the cloud: terrain, airborne scans
+    kSensor,     // the place that the points were seen from
+    kOutward,    // away from the middle of the cloud's bounds: single objects, about round
+    kConsistent  // as the neighbours do: closed surfaces outward, open ones up
   };
   Toward toward = Toward::kUp;
   glm::dvec3 sensor{0};  // finite, in the cloud's coordinates, for kSensor

@@ -20,12 +20,12 @@
 #include "io/output_target.h"
 #include "octree/bucket_stream.h"
 #include "octree/cloud_reader.h"
+#include "octree/index_neighbours.h"
 #include "octree/index_notes.h"
 #include "octree/index_places.h"
 #include "octree/index_plan.h"
 #include "octree/local_density.h"
 #include "octree/octree_builder.h"
-#include "octree/paged_octree.h"
 #include "octree/parallel.h"
 #include "octree/phase_clock.h"
 #include "octree/scene_writer.h"
@@ -84,8 +84,8 @@ class Indexer {
         clock_(stats_) {}
 
   Result<IndexStats> run();
-  // The places alone, without a name.
-  Result<SceneFile> runPlaces();
+  // Without a name: the places alone, or with normals where options say so.
+  Result<SceneFile> runUnnamed();
 
  private:
   Status checkOptions() const;
@@ -104,8 +104,10 @@ class Indexer {
   Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
   Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path, bool full_precision);
   Result<std::unique_ptr<BucketStream>> readBuckets();
+  std::string unnamedPath() const { return temporary_directory_ + "/surfeit-octree.sft"; }
+  Result<SceneFile> buildUnnamed(SortedSurfelStream& stream, const char* phase);
   Result<SceneFile> buildPlaces(std::unique_ptr<BucketStream> buckets);
-  Status buildWithDensity(std::unique_ptr<BucketStream> buckets);
+  Status buildWithNeighbours(std::unique_ptr<BucketStream> buckets, SceneWriter& writer);
   std::uint64_t identity(bool full_precision) const;
   std::string provenance() const;
 
@@ -129,23 +131,26 @@ Result<IndexStats> Indexer::run() {
   noteIndexRules(totals_, *reader_, options_, progress_);
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
-  if (totals_.missing_both + totals_.covering > 0 || estimatesNormals()) {
-    SURFEIT_RETURN_IF_ERROR(buildWithDensity(std::move(buckets)));
-    return stats_;
-  }
   SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
-  SURFEIT_RETURN_IF_ERROR(build(*writer, *buckets, "build"));
-  stats_.temporary_bytes = buckets->temporaryBytes();
-  buckets.reset();
+  if (totals_.missing_both + totals_.covering > 0 || estimatesNormals()) {
+    SURFEIT_RETURN_IF_ERROR(buildWithNeighbours(std::move(buckets), *writer));
+  } else {
+    SURFEIT_RETURN_IF_ERROR(build(*writer, *buckets, "build"));
+    stats_.temporary_bytes = buckets->temporaryBytes();
+    buckets.reset();
+  }
   SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
   stats_.file_bytes = writer->fileBytes();
   clock_.finish("finish");
   return stats_;
 }
 
-Result<SceneFile> Indexer::runPlaces() {
+Result<SceneFile> Indexer::runUnnamed() {
   SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
-  return buildPlaces(std::move(buckets));
+  if (!estimatesNormals()) return buildPlaces(std::move(buckets));
+  SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(unnamedPath(), true));
+  SURFEIT_RETURN_IF_ERROR(buildWithNeighbours(std::move(buckets), *writer));
+  return writer->finishUnnamed(provenance());
 }
 
 Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
@@ -356,16 +361,17 @@ Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const cha
   return {};
 }
 
+Result<SceneFile> Indexer::buildUnnamed(SortedSurfelStream& stream, const char* phase) {
+  SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(unnamedPath(), true));
+  SURFEIT_RETURN_IF_ERROR(build(*writer, stream, phase));
+  return writer->finishUnnamed(provenance());
+}
+
 // An octree over the bare positions.
 Result<SceneFile> Indexer::buildPlaces(std::unique_ptr<BucketStream> buckets) {
-  const std::string bare_path = temporary_directory_ + "/surfeit-density.sft";
-  SURFEIT_ASSIGN_OR_RETURN(auto bare_writer, createWriter(bare_path, /* full_precision= */ true));
-  SURFEIT_RETURN_IF_ERROR(build(*bare_writer, *buckets, "order"));
-  const std::uint64_t bucket_bytes = buckets->temporaryBytes();
-  buckets.reset();
-  SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, bare_writer->finishUnnamed(provenance()));
-  stats_.temporary_bytes = bucket_bytes + bare.fileBytes();
-  return bare;
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile places, buildUnnamed(*buckets, "order"));
+  stats_.temporary_bytes = buckets->temporaryBytes() + places.fileBytes();
+  return places;
 }
 
 // Absent where no surfel asks for it.
@@ -374,31 +380,21 @@ std::optional<NormalRule> Indexer::normalRule() const {
   return NormalRule(*options_.normals, up(), reader_->origin(), glm::vec3(totals_.bounds.centre()));
 }
 
-// What surfels lack is found by neighbour searches in an octree over the bare positions, which is
-// built first; its curve order is the input of the real build.
-Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
-  SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, buildPlaces(std::move(buckets)));
-
-  // Its directory is another one of the same size
-  const std::uint64_t beside =
-      bare.pages().pageCount() * sizeof(PageEntry) + SizedSurfelStream::searcherBytes(threads_);
-  const std::uint64_t cache_bytes =
-      std::min<std::uint64_t>(plan_.octree_memory - std::min(plan_.octree_memory, beside),
-                              PagedOctree::unlimitedCacheBytes(bare));
-  SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
-                           PagedOctree::planMemory(bare, cache_bytes, threads_));
-  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
-                           PagedOctree::create(std::move(bare), memory));
-  SizedSurfelStream sized(*octree, options_.overlap, normalRule(), threads_);
-  SURFEIT_RETURN_IF_ERROR(sized.prepare());
-  SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
-  SURFEIT_RETURN_IF_ERROR(build(*writer, sized, "build"));
-  stats_.normals_found = sized.normalsFound();
-  stats_.thin_surfels = sized.thinSurfels();
+Status Indexer::buildWithNeighbours(std::unique_ptr<BucketStream> buckets, SceneWriter& writer) {
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile places, buildPlaces(std::move(buckets)));
+  NeighbourBuild how;
+  how.overlap = options_.overlap;
+  how.threads = threads_;
+  how.memory_bytes = plan_.octree_memory;
+  how.temporary_directory = temporary_directory_;
+  how.up = up();
+  how.normals = normalRule();
+  how.build_unnamed = [&](SortedSurfelStream& stream, const char* phase) {
+    return buildUnnamed(stream, phase);
+  };
+  how.build = [&](SortedSurfelStream& stream) { return build(writer, stream, "build"); };
+  SURFEIT_RETURN_IF_ERROR(buildFromNeighbours(std::move(places), how, stats_, clock_, progress_));
   noteThinSurfels(stats_, options_, progress_);
-  SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
-  stats_.file_bytes = writer->fileBytes();
-  clock_.finish("finish");
   return {};
 }
 
@@ -447,7 +443,7 @@ Result<SceneFile> indexPlaces(const std::string& input, const std::string& besid
   const std::vector<std::string> inputs = {input};
   Result<SceneFile> places = Status::failed("places: not indexed");
   withThreads(options.threads, [&] {
-    places = Indexer(inputs, beside, options, options.threads, progress).runPlaces();
+    places = Indexer(inputs, beside, options, options.threads, progress).runUnnamed();
   });
   return places;
 }

@@ -9,8 +9,8 @@
 namespace surfeit {
 namespace {
 
-// Strays: radii off surfaces are limited to this many times the cloud's median; and those of what is
-// sparse beside dense, for densities that change by 1:1600.
+// Strays: radii off surfaces are limited to this many times the cloud's median; and those of what
+// is sparse beside dense, for densities that change by 1:1600.
 constexpr float kStrayLimit = 8, kSparseLimit = 40;
 constexpr std::size_t kSamplePages = 64;
 // Pages whose surfels are sized at once.
@@ -110,7 +110,11 @@ void SizedSurfelStream::applyNormal(Surfel& surfel, const SurfaceAt& surface) {
   if (found.normal == glm::vec3(0)) return;
   surfel.normal = found.normal;
   surfel.flags &= ~kSurfelSphere;
-  if (found.is_two_sided) surfel.flags |= kSurfelTwoSided;
+  if (found.is_two_sided) {
+    surfel.flags |= kSurfelTwoSided;
+  } else if (normals_->needsSides()) {
+    surfel.flags |= kSurfelNeedsSide;
+  }
 }
 
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {

@@ -43,6 +43,8 @@ glm::vec3 NormalRule::oriented(const glm::vec3& normal, const glm::vec3& place) 
     case Toward::kOutward:
       toward = glm::dot(normal, place - centre_);
       break;
+    case Toward::kConsistent:
+      break;
   }
   return toward < 0 ? -normal : normal;
 }
@@ -69,6 +71,9 @@ std::string NormalRule::describe() const {
       break;
     case Toward::kOutward:
       text = "outward";
+      break;
+    case Toward::kConsistent:
+      text = fmt::format("consistent, up {}", upAxisName(up_));
       break;
   }
   return text + (estimation_.thin_is_two_sided ? ", thin two-sided" : ", thin spheres");

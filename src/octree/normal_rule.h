@@ -12,7 +12,7 @@
 namespace surfeit {
 
 struct FoundNormal {
-  glm::vec3 normal{0};  // unit, oriented; zero where the place becomes a sphere
+  glm::vec3 normal{0};  // unit, oriented unless needsSides(); zero: a sphere
   bool is_thin = true;  // on no surface
   bool is_two_sided = false;
 };
@@ -26,6 +26,12 @@ class NormalRule {
   // Places, and the middle of the cloud's bounds, are counted from `origin`.
   NormalRule(const NormalEstimation& estimation, UpAxis up, const glm::dvec3& origin,
              const glm::vec3& centre);
+
+  // Whether normals from at() point to either side, and neighbours must agree on one
+  // (orientation.h).
+  bool needsSides() const {
+    return estimation_.orientation.toward == NormalOrientation::Toward::kConsistent;
+  }
 
   FoundNormal at(const glm::vec3& place, const SurfaceAt& surface) const;
 

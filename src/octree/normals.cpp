@@ -131,6 +131,14 @@ class NormalsJob {
   }
 
   Status indexInput() {
+    // Neighbours agree on sides over the whole cloud, so an octree of normals is needed
+    if (options_.estimation.orientation.toward == NormalOrientation::Toward::kConsistent) {
+      indexing_.normals = options_.estimation;
+      indexing_.up = options_.up;
+      if (reader_->element().find("nx") != nullptr) {
+        indexing_.channels += indexing_.channels.empty() ? "nx=-,ny=-,nz=-" : ",nx=-,ny=-,nz=-";
+      }
+    }
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, indexPlaces(input_, output_, indexing_, progress_));
     stats_.temporary_bytes = scene.fileBytes();
     places_.origin = scene.header().origin;
@@ -236,7 +244,7 @@ class NormalsJob {
     const FoundNormal found = rule_->at(at.place, surface);
     FoundRow row;
     row.row = at.row;
-    row.normal = found.normal;
+    row.normal = rule_->needsSides() && !found.is_thin ? surface.own_normal : found.normal;
     row.confidence = surface.confidence;
     row.radius = std::sqrt(IndexOptions().overlap) * surface.radius;
     row.area = surface.area;

@@ -224,6 +224,8 @@ PagedOctree::Reader::Reader(PagedOctree& octree, CacheFront::Role role)
     : state_(std::make_unique<State>(*octree.state_, role)) {}
 PagedOctree::Reader::~Reader() = default;
 
+const SceneFile& PagedOctree::Reader::file() const { return state_->file; }
+
 void PagedOctree::Reader::release() {
   state_->nodes.release();
   state_->surfels.release();

@@ -71,6 +71,8 @@ class PagedOctree {
     explicit Reader(PagedOctree& octree, CacheFront::Role role = CacheFront::Role::kRequests);
     ~Reader();
 
+    const SceneFile& file() const;
+
     // Lets go of all pages.
     void release();
 

@@ -13,12 +13,18 @@
 namespace surfeit {
 namespace {
 
+// Places in the box of a PlaceIndex, and surfels that it serves at most.
+constexpr std::size_t kMostPlaces = 16384, kServedSurfels = 4096, kFewSurfels = 64;
+// How far the box goes beyond the surfels: so many times their spacing, if they are a sheet.
+constexpr float kMarginSpacings = 6;
+
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 struct Place {
   glm::vec3 position{0};
   glm::vec3 normal{0};  // of the first surfel there
   std::uint32_t count = 0;
+  std::uint64_t id = 0;  // of that one
 };
 
 // What nanoflann searches.
@@ -37,6 +43,25 @@ struct Points {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points>,
                                                  Points, 3, std::uint32_t>;
 constexpr std::size_t kTreeLeaf = 16;
+
+glm::vec3 normalOf(const Surfel& surfel) {
+  return surfel.isSphere() ? glm::vec3(0) : surfel.normal;
+}
+
+// Calls visit(surfel, id) for all of a leaf.
+template <typename Visit>
+Status visitLeaf(const Node& leaf, const SceneFile& file, PagedOctree::Reader& reader,
+                 const Visit& visit) {
+  std::uint32_t page = leaf.page, first = leaf.first;
+  for (std::uint64_t left = leaf.surfel_count; left > 0; ++page, first = 0) {
+    SURFEIT_ASSIGN_OR_RETURN(const std::span<const Surfel> run, reader.surfels(page, first, left));
+    for (std::size_t i = 0; i < run.size(); ++i) {
+      visit(run[i], surfelId(file, page, first + std::uint32_t(i)));
+    }
+    left -= run.size();
+  }
+  return {};
+}
 
 float distanceSq(const glm::vec3& d) { return glm::dot(d, d); }
 
@@ -73,15 +98,16 @@ class PlaceSet {
     slots_.assign(1024, kFree);
   }
 
-  void add(const Surfel& surfel) {
+  void add(const Surfel& surfel, std::uint64_t id) {
     if (2 * (places_->size() + 1) > slots_.size()) grow();
     std::uint32_t& slot = slotOf(surfel.position);
     if (slot == kFree) {
       slot = std::uint32_t(places_->size());
-      const glm::vec3 normal = (surfel.flags & kSurfelSphere) != 0 ? glm::vec3(0) : surfel.normal;
-      places_->push_back({surfel.position, normal, 0});
+      places_->push_back({surfel.position, normalOf(surfel), 0, id});
     }
-    ++(*places_)[slot].count;
+    Place& place = (*places_)[slot];
+    ++place.count;
+    if (id < place.id) place.id = id, place.normal = normalOf(surfel);
   }
 
  private:
@@ -137,11 +163,10 @@ struct PlaceIndex::State {
       if (distanceToBox(node.position, box) > node.radius * 1.000001f) continue;
       bool fits = true;
       if (node.isLeaf()) {
-        SURFEIT_RETURN_IF_ERROR(reader.visitLeaf(node, [&](std::span<const Surfel> surfels) {
-          for (const Surfel& surfel : surfels) {
-            if (isInside(surfel.position, box)) set.add(surfel);
-          }
-        }));
+        SURFEIT_RETURN_IF_ERROR(
+            visitLeaf(node, reader.file(), reader, [&](const Surfel& surfel, std::uint64_t id) {
+              if (isInside(surfel.position, box)) set.add(surfel, id);
+            }));
         fits = points.places.size() <= most;
       } else {
         SURFEIT_ASSIGN_OR_RETURN(fits, addRange(childrenOf(node), most, reader));
@@ -174,8 +199,8 @@ Result<bool> PlaceIndex::read(const Bounds3& box, std::size_t most, PagedOctree:
 
 bool PlaceIndex::find(const glm::vec3& position, std::size_t count, NearestPlaces& found) {
   State& state = *state_;
+  found = {std::move(found.neighbours)};
   found.neighbours.clear();
-  found.coincident = 0;
   if (!state.tree || !isInside(position, state.box)) return false;
   state.indices.resize(count + 1);
   state.distances_sq.resize(count + 1);
@@ -185,8 +210,9 @@ bool PlaceIndex::find(const glm::vec3& position, std::size_t count, NearestPlace
     const Place& place = state.points.places[state.indices[i]];
     if (place.position == position) {
       found.coincident = place.count;
+      found.own_normal = place.normal;
     } else {
-      found.neighbours.push_back({place.position - position, place.normal});
+      found.neighbours.push_back({place.position - position, place.normal, place.id});
     }
   }
   // The tree gives them by distance, but those as far away in any order
@@ -203,10 +229,42 @@ bool PlaceIndex::find(const glm::vec3& position, std::size_t count, NearestPlace
   return size == count + 1 && found.reach <= std::min({room.x, room.y, room.z});
 }
 
-std::size_t PlaceIndex::memoryBytes(std::size_t most) {
+Status PlaceIndex::serve(std::span<const Surfel> places, PagedOctree::Reader& reader,
+                         const Visit& visit) {
+  for (std::size_t begin = 0; begin < places.size(); begin += kServedSurfels) {
+    const std::size_t count = std::min(kServedSurfels, places.size() - begin);
+    SURFEIT_RETURN_IF_ERROR(serveFrom(places.subspan(begin, count), begin, reader, visit));
+  }
+  return {};
+}
+
+// The box around the surfels with a margin for their neighbours, as wide as the room for places
+// allows. Surfels of which the box has no room are served in two halves.
+Status PlaceIndex::serveFrom(std::span<const Surfel> places, std::size_t first,
+                             PagedOctree::Reader& reader, const Visit& visit) {
+  Bounds3 inner;
+  for (const Surfel& surfel : places) inner.add(surfel.position);
+  const float spacing = glm::length(inner.extent()) / std::sqrt(float(places.size()));
+  bool fits = false;
+  for (float margin = kMarginSpacings * spacing; !fits && margin >= spacing; margin *= 0.5f) {
+    Bounds3 box = inner;
+    box.min -= margin;
+    box.max += margin;
+    SURFEIT_ASSIGN_OR_RETURN(fits, read(box, kMostPlaces, reader));
+  }
+  if (!fits && places.size() > kFewSurfels) {
+    const std::size_t half = places.size() / 2;
+    SURFEIT_RETURN_IF_ERROR(serveFrom(places.first(half), first, reader, visit));
+    return serveFrom(places.subspan(half), first + half, reader, visit);
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) SURFEIT_RETURN_IF_ERROR(visit(first + i));
+  return {};
+}
+
+std::size_t PlaceIndex::memoryBytes() {
   // Places, slots, indices, and nodes of the tree, all of which may have grown to twice that
-  return most * (2 * sizeof(Place) + 4 * sizeof(std::uint32_t) + 2 * sizeof(std::uint32_t) +
-                 2 * 64 / (kTreeLeaf / 4));
+  return kMostPlaces * (2 * sizeof(Place) + 4 * sizeof(std::uint32_t) + 2 * sizeof(std::uint32_t) +
+                        2 * 64 / (kTreeLeaf / 4));
 }
 
 namespace {
@@ -237,9 +295,9 @@ class PlaceSearch {
         SURFEIT_RETURN_IF_ERROR(visit(childrenOf(node)));
         continue;
       }
-      SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
-        for (const Surfel& surfel : surfels) add(surfel);
-      }));
+      SURFEIT_RETURN_IF_ERROR(
+          visitLeaf(node, reader_.file(), reader_,
+                    [&](const Surfel& surfel, std::uint64_t id) { add(surfel, id); }));
     }
     return {};
   }
@@ -247,13 +305,13 @@ class PlaceSearch {
   void end() { finish(found_, found_.neighbours.size() < most_); }
 
  private:
-  void add(const Surfel& surfel) {
+  void add(const Surfel& surfel, std::uint64_t id) {
     if (surfel.position == position_) {
       ++found_.coincident;
+      if (id < own_id_) own_id_ = id, found_.own_normal = normalOf(surfel);
       return;
     }
-    const Neighbour other{surfel.position - position_,
-                          (surfel.flags & kSurfelSphere) != 0 ? glm::vec3(0) : surfel.normal};
+    const Neighbour other{surfel.position - position_, normalOf(surfel), id};
     if (distanceSq(other.offset) > limit_sq_) return;
     std::vector<Neighbour>& neighbours = found_.neighbours;
     const auto at = std::lower_bound(neighbours.begin(), neighbours.end(), other, isBefore);
@@ -268,14 +326,15 @@ class PlaceSearch {
   PagedOctree::Reader& reader_;
   NearestPlaces& found_;
   float limit_sq_ = kInfinity;
+  std::uint64_t own_id_ = std::numeric_limits<std::uint64_t>::max();  // the first at the place
 };
 
 }  // namespace
 
 Status findPlaces(const glm::vec3& position, std::size_t count, PagedOctree::Reader& reader,
                   NearestPlaces& found) {
+  found = {std::move(found.neighbours)};
   found.neighbours.clear();
-  found.coincident = 0;
   PlaceSearch search(position, count, reader, found);
   SURFEIT_RETURN_IF_ERROR(search.visit(kRootRange));
   search.end();
@@ -316,9 +375,9 @@ class WantedSearch {
         SURFEIT_RETURN_IF_ERROR(visit(childrenOf(node)));
         continue;
       }
-      SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
-        for (const Surfel& surfel : surfels) consider(surfel);
-      }));
+      SURFEIT_RETURN_IF_ERROR(
+          visitLeaf(node, reader_.file(), reader_,
+                    [&](const Surfel& surfel, std::uint64_t id) { consider(surfel, id); }));
     }
     return {};
   }
@@ -326,9 +385,8 @@ class WantedSearch {
   const std::optional<Neighbour>& found() const { return found_; }
 
  private:
-  void consider(const Surfel& surfel) {
-    const Neighbour other{surfel.position - position_,
-                          surfel.isSphere() ? glm::vec3(0) : surfel.normal};
+  void consider(const Surfel& surfel, std::uint64_t id) {
+    const Neighbour other{surfel.position - position_, normalOf(surfel), id};
     const float distance = glm::length(other.offset);
     if (distance == 0 || distance > limit_ || !isWanted_(other)) return;
     if (found_ && !isBefore(other, *found_)) return;

@@ -8,6 +8,7 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/bounds.h"
@@ -23,7 +24,13 @@ struct NearestPlaces {
   std::vector<Neighbour> neighbours;
   float reach = 0;               // infinity: there are no others
   std::uint64_t coincident = 0;  // surfels at the place itself
+  glm::vec3 own_normal{0};       // of the first of them, zero: none
 };
+
+// Of a surfel: numbers that rise along the curve, with gaps.
+inline std::uint64_t surfelId(const SceneFile& file, std::uint32_t page, std::uint32_t index) {
+  return std::uint64_t{page} * file.header().surfel_group_capacity + index;
+}
 
 // A box of places, with a k-d tree (nanoflann). One thread at a time.
 class PlaceIndex {
@@ -39,10 +46,18 @@ class PlaceIndex {
   // The nearest places, `count` or fewer. False when some may lie outside of the box.
   bool find(const glm::vec3& position, std::size_t count, NearestPlaces& found);
 
-  // For `most` places.
-  static std::size_t memoryBytes(std::size_t most);
+  // Calls visit(i) for all places, with a box around them read each time that serves as many as it
+  // can. Those that follow each other are close to each other, or it takes long.
+  using Visit = std::function<Status(std::size_t)>;
+  Status serve(std::span<const Surfel> places, PagedOctree::Reader& reader, const Visit& visit);
+
+  // While it serves.
+  static std::size_t memoryBytes();
 
  private:
+  Status serveFrom(std::span<const Surfel> places, std::size_t first, PagedOctree::Reader& reader,
+                   const Visit& visit);
+
   struct State;
   std::unique_ptr<State> state_;
 };

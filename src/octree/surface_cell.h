@@ -3,6 +3,7 @@
 // given (docs/format.md, "Rules for what is missing").
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
@@ -12,7 +13,8 @@ namespace surfeit {
 // Another place, from the one in question.
 struct Neighbour {
   glm::vec3 offset{0};
-  glm::vec3 normal{0};  // zero: none
+  glm::vec3 normal{0};   // zero: none
+  std::uint64_t id = 0;  // of the surfel, or the first one there (places.h)
 };
 
 struct SurfaceCell {

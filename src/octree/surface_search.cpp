@@ -19,22 +19,12 @@ namespace {
 constexpr std::size_t kNeighbours[] = {24, 48, 96};
 // Farther places that cut a cell: each is the nearest that does, so few suffice.
 constexpr int kMostFarther = 32;
-// Places in the box, and surfels that it serves at most.
-constexpr std::size_t kMostPlaces = 16384, kServedSurfels = 4096, kFewSurfels = 64;
-// How far the box goes beyond the surfels: so many times their spacing, if they are a sheet.
-constexpr float kMarginSpacings = 6;
 // Strays: radii of open cells are limited to this many times the distance of the neighbours from
 // each other.
 constexpr float kOpenLimit = 4;
 // Of the neighbours of strays, in spacings; a surface with noise may have as much, which does no
 // harm: only radii 8 times the median's are limited.
 constexpr float kLooseThickness = 0.4f;
-
-Bounds3 boundsOf(std::span<const Surfel> surfels) {
-  Bounds3 bounds;
-  for (const Surfel& surfel : surfels) bounds.add(surfel.position);
-  return bounds;
-}
 
 glm::vec3 normalOf(const Surfel& surfel) {
   return (surfel.flags & kSurfelSphere) != 0 ? glm::vec3(0) : surfel.normal;
@@ -45,40 +35,15 @@ glm::vec3 normalOf(const Surfel& surfel) {
 SurfaceSearch::SurfaceSearch(PagedOctree& octree)
     : reader_(std::make_unique<PagedOctree::Reader>(octree)) {}
 
-std::size_t SurfaceSearch::memoryBytes() { return PlaceIndex::memoryBytes(kMostPlaces); }
+std::size_t SurfaceSearch::memoryBytes() { return PlaceIndex::memoryBytes(); }
 
 Status SurfaceSearch::find(std::span<const Surfel> places, const Wants& wants, const Take& take) {
-  for (std::size_t begin = 0; begin < places.size(); begin += kServedSurfels) {
-    const std::size_t count = std::min(kServedSurfels, places.size() - begin);
-    SURFEIT_RETURN_IF_ERROR(serve(places.subspan(begin, count), begin, wants, take));
-  }
-  return {};
-}
-
-// The box around the surfels with a margin for their neighbours, as wide as the room for places
-// allows. Surfels of which the box has no room are served in two halves.
-Status SurfaceSearch::serve(std::span<const Surfel> places, std::size_t first, const Wants& wants,
-                            const Take& take) {
-  const Bounds3 inner = boundsOf(places);
-  const float spacing = glm::length(inner.extent()) / std::sqrt(float(places.size()));
-  bool fits = false;
-  for (float margin = kMarginSpacings * spacing; !fits && margin >= spacing; margin *= 0.5f) {
-    Bounds3 box = inner;
-    box.min -= margin;
-    box.max += margin;
-    SURFEIT_ASSIGN_OR_RETURN(fits, index_.read(box, kMostPlaces, *reader_));
-  }
-  if (!fits && places.size() > kFewSurfels) {
-    const std::size_t half = places.size() / 2;
-    SURFEIT_RETURN_IF_ERROR(serve(places.first(half), first, wants, take));
-    return serve(places.subspan(half), first + half, wants, take);
-  }
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (!wants(first + i)) continue;
+  return index_.serve(places, *reader_, [&](std::size_t i) -> Status {
+    if (!wants(i)) return {};
     SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, at(places[i]));
-    take(first + i, surface);
-  }
-  return {};
+    take(i, surface);
+    return {};
+  });
 }
 
 Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
@@ -111,7 +76,7 @@ Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
   if (is_sparse) limit(largest_sparse_radius_);
   if (plane.thickness > kLooseThickness) limit(largest_loose_radius_);
   area /= float(std::max<std::uint64_t>(found_.coincident, 1));
-  last_ = {area, radius, plane.normal, plane.confidence, plane.thickness};
+  last_ = {area, radius, plane.normal, plane.confidence, plane.thickness, found_.own_normal};
   last_position_ = position;
   has_last_ = true;
   return last_;

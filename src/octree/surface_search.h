@@ -20,9 +20,10 @@ namespace surfeit {
 struct SurfaceAt {
   float area = 0;    // per surfel at the place; 0: unknown
   float radius = 0;  // of a disk that is spread out as far as the piece of surface around the place
-  glm::vec3 normal{0};   // of the plane through the neighbours, unit, either way; zero: unknown
-  float confidence = 0;  // 1: they lie on the plane; 0: all around (Pauly et al. 2002)
-  float thickness = 0;   // how far they lie off it, over the spacing: about 1 all around
+  glm::vec3 normal{0};      // of the plane through the neighbours, unit, either way; zero: unknown
+  float confidence = 0;     // 1: they lie on the plane; 0: all around (Pauly et al. 2002)
+  float thickness = 0;      // how far they lie off it, over the spacing: about 1 all around
+  glm::vec3 own_normal{0};  // of a surfel at the place itself; zero: none
 };
 
 // One thread at a time; several search one octree.
@@ -50,9 +51,6 @@ class SurfaceSearch {
   }
 
  private:
-  Status serve(std::span<const Surfel> places, std::size_t first, const Wants& wants,
-               const Take& take);
-
   Status cutByFarther(const glm::vec3& position);
 
   std::unique_ptr<PagedOctree::Reader> reader_;

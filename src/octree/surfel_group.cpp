@@ -17,8 +17,9 @@ namespace {
 // Position error allowed, as a part of the smallest radius in the group (docs/format.md).
 constexpr float kPositionTolerance = 1e-3f;
 
-// Flags that a page may hold; the last only in the indexer's own temporary files.
-constexpr std::uint8_t kStoredFlags = kSurfelSphere | kSurfelTwoSided | kSurfelNeedsSize;
+// Flags that a page may hold; the last two only in the indexer's own temporary files.
+constexpr std::uint8_t kStoredFlags =
+    kSurfelSphere | kSurfelTwoSided | kSurfelNeedsSize | kSurfelNeedsSide;
 
 Status damaged(const char* field) {
   return Status::corruption(fmt::format("surfel group: damaged field {}", field));
