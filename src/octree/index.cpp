@@ -199,7 +199,8 @@ Status Indexer::openInputs() {
   const SlabForm form = {options_.leaf_capacity, options_.full_precision || mayNeedNeighbours()};
   const double packed_bytes = packedBytesPerSurfel(sample_);
   SURFEIT_ASSIGN_OR_RETURN(
-      plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form}));
+      plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form,
+                        options_.normals ? leastNeighbourBytes(*options_.normals, threads_) : 0}));
   stats_.input_bytes = reader_->fileBytes();
   SURFEIT_RETURN_IF_ERROR(checkFreeSpace(sample_.empty() ? kLeastPackedBytes : packed_bytes));
   clock_.finish("sample");

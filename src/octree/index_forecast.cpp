@@ -105,8 +105,9 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
   const SlabForm form = {options.leaf_capacity,
                          options.full_precision || reader.lacksSizes() || options.normals};
   const double packed_bytes = packedBytesPerSurfel(sample);
-  SURFEIT_ASSIGN_OR_RETURN(const IndexPlan plan, planIndex({options.memory_bytes, options.threads,
-                                                            forecast.records, packed_bytes, form}));
+  SURFEIT_ASSIGN_OR_RETURN(
+      const IndexPlan plan,
+      planIndex({options.memory_bytes, options.threads, forecast.records, packed_bytes, form, 0}));
   if (plan.spills) {
     forecast.temporary_bytes += std::uint64_t(double(forecast.records) * packed_bytes);
   }

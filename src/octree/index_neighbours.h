@@ -29,6 +29,9 @@ struct NeighbourBuild {
   std::function<Status(SortedSurfelStream&)> build;
 };
 
+// The least memory_bytes for so many threads, but for what grows with the scene.
+std::uint64_t leastNeighbourBytes(const NormalEstimation& estimation, int threads);
+
 Status buildFromNeighbours(SceneFile places, const NeighbourBuild& how, IndexStats& stats,
                            PhaseClock& clock, Progress& progress);
 

@@ -101,8 +101,8 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
   const std::uint64_t read_fixed = CloudReader::memoryBytes(plan.read_bytes, task.threads) + beside;
   const std::uint64_t build_fixed =
       buildOctreeBytes(task.slabs, task.threads) + directoryBytes(task) + beside;
-  const std::uint64_t least_bucket =
-      std::min(kLeastBucket, task.records) * BucketStream::kBytesPerSurfel;
+  const std::uint64_t least_bucket = std::max(
+      std::min(kLeastBucket, task.records) * BucketStream::kBytesPerSurfel, task.search_bytes);
   const std::uint64_t least = std::max({kLeastIndexMemory, build_fixed + least_bucket,
                                         read_fixed + 64 * kMinBlockSurfels * sizeof(Surfel)});
   if (task.memory_bytes < least) {

@@ -28,6 +28,7 @@ struct IndexTask {
   std::uint64_t records = 0;  // at most so many surfels
   double packed_bytes = 64;   // of a surfel in a packed block, about
   SlabForm slabs;
+  std::uint64_t search_bytes = 0;  // that searches of neighbours take at least
 };
 
 struct IndexPlan {

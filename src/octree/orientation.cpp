@@ -13,6 +13,7 @@
 #include "octree/local_density.h"
 #include "octree/places.h"
 #include "octree/record_sorter.h"
+#include "octree/scene_writer.h"
 #include "octree/side_forest.h"
 
 namespace surfeit {
@@ -367,8 +368,9 @@ Result<Sides> Sides::find(PagedOctree& octree, const OrientationOptions& options
 }
 
 std::uint64_t Sides::searcherBytes(int threads) {
-  constexpr std::uint64_t kChunkBytes =
-      8192 * (2 * sizeof(Surfel) + 2 * kNeighbours * sizeof(Edge) + 24);
+  // Surfels twice, edges in vectors that grow by doubling, labels
+  constexpr std::uint64_t kChunkBytes = kChunkPages * kDefaultSurfelGroup *
+                                        (2 * sizeof(Surfel) + 2 * kNeighbours * sizeof(Edge) + 32);
   return std::uint64_t(threads) * (PlaceIndex::memoryBytes() + kChunkBytes);
 }
 

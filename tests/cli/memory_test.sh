@@ -10,6 +10,7 @@ commands=(
   "index bare.ply -o out.sft"
   "index points.ply -o out.sft --normals estimate"
   "normals points.ply -o out.ply"
+  "normals points.ply -o out.ply --orient consistent"
   "verify scene.sft"
   "gather scene.sft receivers.ply -o out.ply --quality draft"
   "gather scene.sft receivers.ply -o out.ply --quality draft --mode bleeding --order input"
