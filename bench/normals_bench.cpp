@@ -1,6 +1,11 @@
 // Normals of places scattered over meshes, beside those of the triangles: angle, flips, rate.
 //
-//   normals_bench MESH... [--count N] [--orient up|outward|consistent]
+//   normals_bench MESH... [--count N] [--orient up|outward|consistent] [--save DIRECTORY]
+//   normals_bench --check FOUND --truth TRUTH
+//
+// --save keeps the places, NAME_NOISE.ply, and with the normals of their triangles,
+// NAME_NOISE_truth.ply; --check compares two files of those places, whoever found the normals
+// (bench/normals_peers.sh).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -95,7 +100,8 @@ std::vector<glm::vec3> normalsIn(const std::string& path) {
 
 class Bench {
  public:
-  explicit Bench(NormalsOptions options) : options_(std::move(options)) {
+  Bench(NormalsOptions options, std::string saved)
+      : options_(std::move(options)), saved_(std::move(saved)) {
     std::string name = (std::filesystem::temp_directory_path() / "normals-XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) std::exit(1);
     directory_ = name + "/";
@@ -106,22 +112,30 @@ class Bench {
 
   void row(const std::string& mesh_path, const Mesh& mesh, std::size_t count, double noise) const {
     const Places places = scatter(mesh, count, noise);
-    SurfelWriter writer = take(SurfelWriter::create(directory_ + "cloud.ply", {}));
-    need(writer.write(places.surfels));
-    need(writer.finish());
+    const std::string name = std::filesystem::path(mesh_path).stem().string();
+    write(directory_ + "cloud.ply", places.surfels, false);
+    if (!saved_.empty()) {
+      const std::string saved = fmt::format("{}/{}_{}", saved_, name, noise);
+      write(saved + ".ply", places.surfels, false);
+      write(saved + "_truth.ply", places.surfels, true);
+      return;
+    }
     Progress quiet;
     const double before = processCpuSeconds();
     const NormalsStats stats = take(
         estimateNormals(directory_ + "cloud.ply", directory_ + "normals.ply", options_, quiet));
     const double cpu = processCpuSeconds() - before;
-    print(std::filesystem::path(mesh_path).stem().string(), places.surfels,
-          normalsIn(directory_ + "normals.ply"), noise, double(count) / cpu, stats.seconds);
+    std::vector<glm::vec3> truth;
+    for (const Surfel& surfel : places.surfels) truth.push_back(surfel.normal);
+    fmt::print("| {} | {} | {} | {:.0f} | {:.1f} |\n", name, noise,
+               errors(truth, normalsIn(directory_ + "normals.ply")), double(count) / cpu / 1e3,
+               stats.seconds);
+    std::fflush(stdout);
   }
 
- private:
-  static void print(const std::string& name, const std::vector<Surfel>& truth,
-                    const std::vector<glm::vec3>& found, double noise, double rate,
-                    double seconds) {
+  // "median | 90 % | flips | without"
+  static std::string errors(const std::vector<glm::vec3>& truth,
+                            const std::vector<glm::vec3>& found) {
     std::vector<float> angles;
     std::size_t without = 0, flipped = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) {
@@ -129,24 +143,32 @@ class Bench {
         ++without;
         continue;
       }
-      const float cosine = glm::dot(truth[i].normal, found[i]);
+      const float cosine = glm::dot(truth[i], found[i]);
       flipped += cosine < 0 ? 1 : 0;
       angles.push_back(std::acos(std::min(std::abs(cosine), 1.f)) * 57.29578f);
     }
     std::sort(angles.begin(), angles.end());
     const double with = double(angles.size());
-    fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.3f} | {:.3f} | {:.0f} | {:.1f} |\n", name, noise,
-               angles[angles.size() / 2], angles[angles.size() * 9 / 10],
-               100 * double(flipped) / with, 100 * double(without) / double(truth.size()),
-               rate / 1e3, seconds);
-    std::fflush(stdout);
+    return fmt::format("{:.2f} | {:.2f} | {:.3f} | {:.3f}", angles[angles.size() / 2],
+                       angles[angles.size() * 9 / 10], 100 * double(flipped) / with,
+                       100 * double(without) / double(truth.size()));
+  }
+
+ private:
+  static void write(const std::string& path, const std::vector<Surfel>& surfels, bool has_normals) {
+    CloudChannels channels;
+    channels.normal = has_normals;
+    SurfelWriter writer = take(SurfelWriter::create(path, channels));
+    need(writer.write(surfels));
+    need(writer.finish());
   }
 
   NormalsOptions options_;
-  std::string directory_;
+  std::string saved_, directory_;
 };
 
-void run(const std::vector<std::string>& meshes, std::size_t count, const NormalsOptions& options) {
+void run(const std::vector<std::string>& meshes, std::size_t count, const NormalsOptions& options,
+         const std::string& saved) {
   fmt::print(
       "{} places on each mesh. Angles from the triangle's normal in degrees, either way; noise in\n"
       "spacings; flips of those with a normal, %.\n\n"
@@ -154,7 +176,7 @@ void run(const std::vector<std::string>& meshes, std::size_t count, const Normal
       "|---|---|---|---|---|---|---|---|\n",
       count);
   Progress quiet;
-  const Bench bench(options);
+  const Bench bench(options, saved);
   for (const std::string& path : meshes) {
     const Mesh mesh = take(loadMeshes({path}, glm::vec3(0.5f), quiet));
     for (const double noise : {0., .2}) bench.row(path, mesh, count, noise);
@@ -169,11 +191,20 @@ int main(int argc, char** argv) {
   std::vector<std::string> meshes;
   std::size_t count = 200000;
   surfeit::NormalsOptions options;
-  app.add_option("MESH", meshes, "PLY or OBJ")->required();
+  std::string saved, found, truth;
+  app.add_option("MESH", meshes, "PLY or OBJ");
+  app.add_option("--save", saved, "Write the places there, and do nothing else");
+  app.add_option("--check", found, "Cloud with normals");
+  app.add_option("--truth", truth, "The same places with the true ones");
   app.add_option("--count", count, "Places on each")->capture_default_str();
   app.add_option("--threads", options.threads, "Threads");
   surfeit::addNormalOptions(app, options.estimation);
   CLI11_PARSE(app, argc, argv);
-  surfeit::run(meshes, count, options);
+  if (!found.empty()) {
+    fmt::print("{}\n",
+               surfeit::Bench::errors(surfeit::normalsIn(truth), surfeit::normalsIn(found)));
+    return 0;
+  }
+  surfeit::run(meshes, count, options, saved);
   return 0;
 }
