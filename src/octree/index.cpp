@@ -28,6 +28,7 @@
 #include "octree/paged_octree.h"
 #include "octree/parallel.h"
 #include "octree/phase_clock.h"
+#include "octree/repeated_surfels.h"
 #include "octree/scene_writer.h"
 #include "surfeit/version.h"
 
@@ -48,17 +49,6 @@ Status checkRoom(const std::string& directory, double needed, const char* advice
   if (double(available) >= needed) return {};
   return Status::ioError(fmt::format("{}: {} MiB are free, expected at least {:.0f} MiB: {}",
                                      directory, available >> 20, needed / (1 << 20), advice));
-}
-
-// Whether the positions lie in the cube.
-bool contains(const RootCube& cube, const Bounds3& bounds) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (double(bounds.min[axis]) < cube.origin[axis] ||
-        double(bounds.max[axis]) > cube.origin[axis] + cube.size) {
-      return false;
-    }
-  }
-  return true;
 }
 
 Bounds3 boundsOf(std::span<const Surfel> surfels) {
@@ -101,6 +91,7 @@ class Indexer {
   bool estimatesNormals() const { return options_.normals && totals_.spheres > 0; }
   UpAxis up() const { return options_.up.value_or(reader_->up()); }
   std::optional<NormalRule> normalRule() const;
+  Status tellRepeats();
   Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
   Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path, bool full_precision);
   Result<std::unique_ptr<BucketStream>> readBuckets();
@@ -120,6 +111,7 @@ class Indexer {
   IndexPlan plan_;
   bool gives_space_back_ = false;
   CloudTotals totals_;
+  std::optional<RepeatFilter> distinct_;  // of the sorted buckets
   IndexStats stats_;
   PhaseClock clock_;
 };
@@ -134,7 +126,8 @@ Result<IndexStats> Indexer::run() {
     return stats_;
   }
   SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
-  SURFEIT_RETURN_IF_ERROR(build(*writer, *buckets, "build"));
+  SURFEIT_RETURN_IF_ERROR(build(*writer, *distinct_, "build"));
+  SURFEIT_RETURN_IF_ERROR(tellRepeats());
   stats_.temporary_bytes = buckets->temporaryBytes();
   buckets.reset();
   SURFEIT_RETURN_IF_ERROR(writer->finish(provenance()));
@@ -154,11 +147,13 @@ Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
   SURFEIT_RETURN_IF_ERROR(openInputs());
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
   stats_.skipped_records = totals_.skipped;
-  return std::make_unique<BucketStream>(
+  auto buckets = std::make_unique<BucketStream>(
       std::move(store),
       BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
                             temporary_directory_},
       progress_);
+  distinct_.emplace(*buckets, options_.repeats);
+  return buckets;
 }
 
 Status Indexer::checkOptions() const {
@@ -175,7 +170,7 @@ Status Indexer::checkOptions() const {
   if (options_.normals) SURFEIT_RETURN_IF_ERROR(NormalRule::check(*options_.normals));
   if (!(options_.overlap >= 1 && options_.overlap <= 16)) {
     return Status::invalidArgument(
-        fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
+        fmt::format("disk overlap {}, expected 1 to 16", options_.overlap));
   }
   return {};
 }
@@ -194,7 +189,8 @@ Status Indexer::openInputs() {
   const SlabForm form = {options_.leaf_capacity, options_.full_precision || mayNeedNeighbours()};
   const double packed_bytes = packedBytesPerSurfel(sample_);
   SURFEIT_ASSIGN_OR_RETURN(
-      plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form}));
+      plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form,
+                        options_.repeats == Repeats::kThin ? RepeatFilter::kBytesPerSurfel : 0}));
   stats_.input_bytes = reader_->fileBytes();
   SURFEIT_RETURN_IF_ERROR(checkFreeSpace(sample_.empty() ? kLeastPackedBytes : packed_bytes));
   clock_.finish("sample");
@@ -310,7 +306,11 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
       }
       curveKeys(&surfels.front().position, sizeof(Surfel), *cube, keys);
     }
-    for (Surfel& surfel : surfels) applySizeRules(surfel, options_.overlap);
+    for (Surfel& surfel : surfels) {
+      applySizeRules(surfel, options_.overlap);
+      // Positions are told apart by their bits: 0 and -0 are one
+      if (options_.repeats == Repeats::kThin) surfel.position += glm::vec3(0);
+    }
     return store->add(surfels, keys);
   };
   progress_.beginPhase("read", reader_->recordCount(), "surfels");
@@ -342,11 +342,12 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
 }
 
 Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase) {
-  progress_.beginPhase(phase, totals_.surfels, "surfels");
+  progress_.beginPhase(phase, totals_.surfels - distinct_->leftOut(), "surfels");
   SURFEIT_RETURN_IF_ERROR(buildOctree(stream, writer, threads_, progress_));
-  if (writer.header().surfel_count != totals_.surfels) {
+  const std::uint64_t expected = totals_.surfels - distinct_->leftOut();
+  if (writer.header().surfel_count != expected) {
     return Status::failed(fmt::format("{}: {} surfels written, expected {}: this is a bug", output_,
-                                      writer.header().surfel_count, totals_.surfels));
+                                      writer.header().surfel_count, expected));
   }
   stats_.surfels = writer.header().surfel_count;
   stats_.nodes = writer.header().node_count;
@@ -356,11 +357,18 @@ Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const cha
   return {};
 }
 
+// Before the scene has its name: with --strict it gets none.
+Status Indexer::tellRepeats() {
+  stats_.repeated_surfels = distinct_->repeated();
+  noteRepeats(stats_, options_, progress_);
+  return progress_.isCancelled() ? Status::interrupted() : Status();
+}
+
 // An octree over the bare positions.
 Result<SceneFile> Indexer::buildPlaces(std::unique_ptr<BucketStream> buckets) {
   const std::string bare_path = temporary_directory_ + "/surfeit-density.sft";
   SURFEIT_ASSIGN_OR_RETURN(auto bare_writer, createWriter(bare_path, /* full_precision= */ true));
-  SURFEIT_RETURN_IF_ERROR(build(*bare_writer, *buckets, "order"));
+  SURFEIT_RETURN_IF_ERROR(build(*bare_writer, *distinct_, "order"));
   const std::uint64_t bucket_bytes = buckets->temporaryBytes();
   buckets.reset();
   SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, bare_writer->finishUnnamed(provenance()));
@@ -378,6 +386,7 @@ std::optional<NormalRule> Indexer::normalRule() const {
 // built first; its curve order is the input of the real build.
 Status Indexer::buildWithDensity(std::unique_ptr<BucketStream> buckets) {
   SURFEIT_ASSIGN_OR_RETURN(SceneFile bare, buildPlaces(std::move(buckets)));
+  SURFEIT_RETURN_IF_ERROR(tellRepeats());
 
   // Its directory is another one of the same size
   const std::uint64_t beside =
@@ -436,6 +445,7 @@ std::string Indexer::provenance() const {
                          {"areas_from_radius", totals_.missing_area},
                          {"radii_from_area", totals_.missing_radius},
                          {"spheres", totals_.spheres}};
+  if (options_.repeats == Repeats::kThin) json["repeats"] = "thin";
   if (const std::optional<NormalRule> rule = normalRule()) json["normals"] = rule->describe();
   return json.dump();
 }

@@ -28,6 +28,7 @@ struct IndexTask {
   std::uint64_t records = 0;  // at most so many surfels
   double packed_bytes = 64;   // of a surfel in a packed block, about
   SlabForm slabs;
+  std::size_t filter_bytes = 0;  // per surfel of a bucket, of a filter behind it
 };
 
 struct IndexPlan {

@@ -62,7 +62,7 @@ statisticsHaveTheDocumentedFields() {
   run 0 sample cornell.obj -o again.ply --count 1000 --stats sample.json
   jsonHas sample.json "${common[@]}" triangles surfels area spacing phases
   run 0 index cornell.ply -o again.sft --stats index.json
-  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records nodes node_pages \
+  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records repeated_surfels nodes node_pages \
     surfel_pages file_bytes bytes_per_surfel temporary_bytes surfels_per_second phases \
     sample read build finish
   run 0 generate --surfels 1k -o city.ply --stats generate.json
@@ -216,7 +216,11 @@ impossibleValuesAreUsageErrors() {
   run 2 "${gather[@]}" --max-dist 0
   run 2 tune cornell.sft cornell.ply --sample -1
   run 2 "${index[@]}" --leaf 0
-  run 2 "${index[@]}" --overlap 0.5
+  run 2 "${index[@]}" --disk-overlap 0.5
+  run 2 "${index[@]}" --overlap 2.5
+  says "--disk-overlap 2.5"
+  run 2 "${index[@]}" --overlap some
+  says "expected keep or thin"
   run 2 "${index[@]}" --precision double
   run 2 sample cornell.obj -o result.ply --count 0
   run 2 sample cornell.obj -o result.ply --light-point "1 2 3"
