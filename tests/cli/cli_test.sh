@@ -374,6 +374,50 @@ PLY
   leavesNothing result
 }
 
+# A grid of 50 x 50 points half a unit apart, from x = 0 and from x = 20.
+makeTiles() {
+  awk -v from="${1:-0}" 'BEGIN {
+    print "x,y,z,radius,area"
+    for (y = 0; y < 50; ++y) for (x = 0; x < 50; ++x) print from + x / 2 "," y / 2 ",1,.4,.25"
+  }'
+}
+
+tilesThatOverlapAreToldOrThinned() {
+  makeTiles 0 > left.csv
+  makeTiles 20 > right.csv
+  run 0 index left.csv right.csv -o kept.sft
+  says "500 surfels repeat another at its place" "--overlap thin"
+  run 3 index left.csv right.csv -o strict.sft --strict
+  leavesNothing strict
+  run 0 index left.csv right.csv -o thin.sft --overlap thin --stats thin.json
+  says "500 surfels repeat another at its place: they are left out"
+  jsonIs thin.json surfels 4500 repeated_surfels 500
+  run 0 verify thin.sft
+  run 0 index right.csv left.csv -o turned.sft --overlap thin
+  sameBytes thin.sft turned.sft
+  run 0 info kept.sft
+  says "% of the places have several points: \`index --overlap thin\` keeps one" "spacing        0.443"
+  run 0 info thin.sft
+  says "repeated       0 % of the places"
+}
+
+infoTellsDensityAndWhatIsMissing() {
+  makeTiles > grid.csv
+  run 0 info grid.csv
+  says "spacing        0.4431" "by a sample of 1,000 points" "points per unit of area" \
+    "repeated       0 % of the places" "no normals     \`surfeit normals\` finds them" "no colors"
+  [[ $said != *"no sizes"* ]] || fail "sizes are there: $said"
+  run 0 convert grid.csv grid.csv -o twice.ply --drop radius,area
+  run 0 info twice.ply --json
+  says '"repeated_places": 1.0' '"median": 0.443' '"sampled_points": 1000' '"sizes": "`surfeit index`'
+  printf '1 2 3\n1 2 4\n1 3 3\n' > three.xyz
+  run 0 info three.xyz
+  says "spacing        "
+  printf '1 2 3\n1 2 3\n' > one.xyz
+  run 0 info one.xyz
+  says "none: all points are at one place"
+}
+
 interruptLeavesNoFile() {
   makeScene 60000
   stoppedLeavesNothing result.ply gather cornell.sft cornell.ply --mode bleeding --memory 1G \
