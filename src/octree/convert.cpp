@@ -440,10 +440,11 @@ Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
     SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
     SURFEIT_ASSIGN_OR_RETURN(RowTransform transform,
                              RowTransform::create(options.transform, double(options.every)));
+    Converter converter(inputs, output, options, std::move(transform), progress);
+    if (!options.spacing) return converter.run();
+    // What is planned for sorting is that of one thread
     Result<ConvertStats> stats = Status::failed("convert: not run");
-    withThreads(1, [&] {
-      stats = Converter(inputs, output, options, std::move(transform), progress).run();
-    });
+    withThreads(1, [&] { stats = converter.run(); });
     return stats;
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

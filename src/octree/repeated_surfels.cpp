@@ -60,7 +60,10 @@ std::vector<Ticket> RepeatFilter::ticketsLeft(const SortedBatch& batch) {
     last_key_ = tickets[i].key;
     if (is_repeated) {
       ++repeated_;
-      if (!is_thinned) left.assign(tickets.begin(), tickets.begin() + std::ptrdiff_t(i));
+      if (!is_thinned) {
+        left.reserve(tickets.size() - 1);
+        left.assign(tickets.begin(), tickets.begin() + std::ptrdiff_t(i));
+      }
       is_thinned = true;
     } else if (is_thinned) {
       left.push_back(tickets[i]);
