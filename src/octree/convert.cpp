@@ -239,6 +239,10 @@ class Converter {
     }
     progress_.inform(fmt::format("{}: {} of {} records are kept, one per cell of {}", output_,
                                  thinner_->kept(), thinner_->measured(), *options_.spacing));
+    // Now the writer can tell what it will need; nothing was written yet
+    writing_.count = thinner_->kept();
+    SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing_));
+    noteOfWriter();
     return {};
   }
 
@@ -259,26 +263,24 @@ class Converter {
   }
 
   Status createWriter() {
-    RowWriterOptions writing;
-    SURFEIT_ASSIGN_OR_RETURN(writing.properties, chooseProperties(union_.properties(), options_));
-    transform_.widenTypes(writing.properties);
-    if (options_.spacing) RowTransform::widenSizes(writing.properties);
-    writing.comments = first_->comments();
-    if (options_.up) stateUpAxis(*options_.up, writing.comments);
-    if (!options_.crop && !options_.spacing) writing.count = rows_to_write_;
-    SURFEIT_RETURN_IF_ERROR(planMemory(writing));
-    writing.progress = &progress_;
-    std::unique_ptr<RowReader> like;
+    SURFEIT_ASSIGN_OR_RETURN(writing_.properties, chooseProperties(union_.properties(), options_));
+    transform_.widenTypes(writing_.properties);
+    if (options_.spacing) RowTransform::widenSizes(writing_.properties);
+    writing_.comments = first_->comments();
+    if (options_.up) stateUpAxis(*options_.up, writing_.comments);
+    if (!options_.crop && !options_.spacing) writing_.count = rows_to_write_;
+    SURFEIT_RETURN_IF_ERROR(planMemory());
+    writing_.progress = &progress_;
     if (!options_.like.empty()) {
       RowReaderOptions as_stored;
       as_stored.filter = "true";  // its rows are not read, so nothing is to be counted
       as_stored.color_range.reset();
-      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like, as_stored));
-      writing.like = like.get();
+      SURFEIT_ASSIGN_OR_RETURN(like_, openRowReader(options_.like, as_stored));
+      writing_.like = like_.get();
     } else if (transform_.isIdentity() && inputs_.size() == 1) {
-      writing.like = first_.get();
+      writing_.like = first_.get();
     }
-    SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing));
+    SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing_));
     noteOfWriter();
 
     const PlyElement& element = writer_->element();
@@ -302,7 +304,7 @@ class Converter {
   }
 
   // What writer and thinner get. A writer that holds what it writes comes first.
-  Status planMemory(RowWriterOptions& writing) {
+  Status planMemory() {
     const std::uint64_t fixed = programBytes(1) + kStreamBytes;
     const std::uint64_t least = fixed + (options_.spacing ? GridThinner::kLeastMemory : 0);
     if (options_.memory_bytes < least) {
@@ -314,13 +316,13 @@ class Converter {
     const std::uint64_t rest = options_.memory_bytes - fixed;
     if (options_.spacing) {
       PlyElement row;
-      row.properties = writing.properties;
+      row.properties = writing_.properties;
       packPlyRow(row);
       const std::uint64_t held = heldWriterBytes(output_, rows_to_write_, row.row_bytes);
       thinner_bytes_ = std::max(rest - std::min(rest, held), GridThinner::kLeastMemory);
     }
-    writing.memory_bytes = rest - thinner_bytes_;
-    writing.memory_beside_bytes = fixed + thinner_bytes_;
+    writing_.memory_bytes = rest - thinner_bytes_;
+    writing_.memory_beside_bytes = fixed + thinner_bytes_;
     return {};
   }
 
@@ -403,6 +405,8 @@ class Converter {
   RowUnion union_;
   std::unique_ptr<RowReader> first_;
   std::uint64_t rows_to_write_ = 0;  // without cropping
+  std::unique_ptr<RowReader> like_;
+  RowWriterOptions writing_;
   std::unique_ptr<RowWriter> writer_;
   std::set<std::string> told_;
   std::optional<Cropper> cropper_;
