@@ -121,6 +121,8 @@ Status runConvert(ConvertArguments& arguments, CommandContext& context) {
                              {"records", stats.records},
                              {"skipped_records", stats.skipped_records},
                              {"cropped_records", stats.cropped_records},
+                             {"thinned_records", stats.thinned_records},
+                             {"placeless_records", stats.placeless_records},
                              {"written_records", stats.written_records},
                              {"properties", stats.properties},
                              {"input_bytes", stats.input_bytes},
@@ -166,9 +168,17 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
 void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
   addChannelOptions(command, options.channels, options.part, options.filter);
   addColorRangeOption(command, options.color_range);
-  command.add_option("--every", options.every, "Only records 0, N, 2N, ... of each input")
-      ->type_name("N")
-      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53).description(""));
+  CLI::Option* const every =
+      command.add_option("--every", options.every, "Only records 0, N, 2N, ... of each input")
+          ->type_name("N")
+          ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53).description(""));
+  command
+      .add_option("--spacing", options.spacing,
+                  "Only one record per cell of a grid of edge D, the one nearest to its middle, "
+                  "which stands for all of them")
+      ->type_name("D")
+      ->excludes(every);
+  addTemporaryOption(command, options.temporary_directory);
   CLI::Option* const keep =
       command.add_option("--keep", options.keep, "Only these channels, and the position")
           ->type_name("NAME,...")
@@ -201,12 +211,13 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
   context.addCommonOptions(*command, {.threads = false, .works_in_place = true});
   command->footer(
       "Several clouds become one with the properties of all; what one of them lacks is 0 there.\n"
-      "Memory is some MiB, whatever the size of the clouds; only .vdb holds what it writes, up to\n"
-      "--memory (default 2G).\n"
+      "Memory is some MiB, whatever the size of the clouds; only .vdb holds what it writes, and\n"
+      "--spacing sorts, both within --memory (default 2G).\n"
       "Examples:\n"
       "  surfeit convert scan.las -o scan.ply --units ft:m --up y\n"
       "  surfeit convert a.ptc b.ptc -o both.ply.zst\n"
       "  surfeit convert city.ply -o block.vdb --crop 0,0,0,100,100,50 --drop normal\n"
+      "  surfeit convert tile1.las tile2.las -o even.ply --spacing 0.05\n"
       "  surfeit convert baked.bgeo -o thin.csv --every 100 --channels bake=radiosity");
   command->callback(
       [arguments, &context] { context.run([&] { return runConvert(*arguments, context); }); });

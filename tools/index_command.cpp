@@ -52,6 +52,18 @@ Status sayForecast(const IndexArguments& arguments, CommandContext& context) {
                              {"seconds", forecast.seconds}});
 }
 
+Repeats parseRepeats(const std::string& text) {
+  if (text == "keep") return Repeats::kKeep;
+  if (text == "thin") return Repeats::kThin;
+  const bool is_number = !text.empty() && text.find_first_not_of("+-.0123456789e") == text.npos;
+  throw CLI::ValidationError(
+      "--overlap",
+      fmt::format("found {}, expected keep or thin{}", text,
+                  is_number
+                      ? fmt::format(" (disk area over surfel area is --disk-overlap {})", text)
+                      : ""));
+}
+
 Status runIndex(IndexArguments& arguments, CommandContext& context) {
   IndexOptions& options = arguments.options;
   options.threads = context.common.threads;
@@ -77,6 +89,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                              {"input_bytes", stats.input_bytes},
                              {"surfels", stats.surfels},
                              {"skipped_records", stats.skipped_records},
+                             {"repeated_surfels", stats.repeated_surfels},
                              {"normals_found", stats.normals_found},
                              {"thin_surfels", stats.thin_surfels},
                              {"nodes", stats.nodes},
@@ -107,10 +120,17 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   command
-      ->add_option("--overlap", options.overlap,
+      ->add_option("--disk-overlap", options.overlap,
                    "Disk area over surfel area, where radius or area is missing")
       ->check(CLI::Range(1.0, 16.0))
       ->capture_default_str();
+  command
+      ->add_option_function<std::string>(
+          "--overlap",
+          [&options](const std::string& text) { options.repeats = parseRepeats(text); },
+          "Surfels that repeat another at its place, where tiles overlap: keep all, or thin to one")
+      ->type_name("keep|thin")
+      ->default_str("keep");
   command
       ->add_option("--normals", arguments->normals,
                    "Surfels without a normal: none (spheres), or estimate from their neighbours")
@@ -137,7 +157,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   context.addCommonOptions(*command);
   command->footer(
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
-      "overlap;\n"
+      "disk overlap;\n"
       "no radius, that of the area; neither, its cell among the neighbours; no normal, a sphere.\n"
       "--memory defaults to 1G, or 3/4 of what the job may hold where that is less; 64M is the "
       "least\n"
@@ -146,6 +166,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "  surfeit index lion.ply -o lion.sft\n"
       "  surfeit index city.ply -o city.sft --memory 512M --dry-run\n"
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
+      "  surfeit index tile1.las tile2.las -o survey.sft --overlap thin\n"
       "  surfeit index city.ply -o city.sft --memory 80%\n"
       "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");
   command->callback(

@@ -14,7 +14,9 @@
 #include "io/ply_reader.h"
 #include "io/surfel_source.h"
 #include "io/up_comment.h"
+#include "octree/cloud_density.h"
 #include "octree/group_set.h"
+#include "octree/scene_file.h"
 #include "surfeit/scene.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
@@ -41,6 +43,62 @@ std::vector<std::string> channelNames(const CloudChannels& channels) {
   if (channels.group) names.emplace_back("group");
   if (channels.long_side) names.emplace_back("long_side");
   return names;
+}
+
+// Of a cloud or a scene, into `json`; nothing without points.
+void addDensity(const CloudDensity& density, nlohmann::json& json) {
+  if (density.sampled == 0) return;
+  if (density.median_spacing > 0) {
+    json["spacing"] = {{"median", density.median_spacing},
+                       {"low", density.low_spacing},
+                       {"high", density.high_spacing}};
+    json["points_per_area"] = density.points_per_area;
+  }
+  json["repeated_places"] = density.repeated_share;
+  json["sampled_points"] = density.sampled;
+}
+
+std::string densityText(const nlohmann::json& json) {
+  std::string text;
+  if (!json.contains("sampled_points")) return text;
+  const std::uint64_t sampled = json["sampled_points"];
+  if (json.contains("spacing")) {
+    const nlohmann::json& spacing = json["spacing"];
+    text += fmt::format(
+        "\n  spacing        {:.4g}, from {:.4g} (5 % are below) to {:.4g} (95 %), by a sample of "
+        "{} "
+        "points\n  density        {:.4g} points per unit of area",
+        spacing["median"].get<double>(), spacing["low"].get<double>(),
+        spacing["high"].get<double>(), formatCount(sampled), json["points_per_area"].get<double>());
+  } else {
+    text += "\n  spacing        none: all points are at one place";
+  }
+  const double repeated = json["repeated_places"];
+  text += fmt::format("\n  repeated       {:.3g} % of the places have several points{}",
+                      100 * repeated, repeated > 0 ? ": `index --overlap thin` keeps one" : "");
+  return text;
+}
+
+// What surfels lack, and what finds it.
+void addMissing(const CloudChannels& channels, const std::string& normals, const std::string& sizes,
+                nlohmann::json& json) {
+  nlohmann::json missing = nlohmann::json::object();
+  if (!normals.empty()) missing["normals"] = normals;
+  if (!sizes.empty()) missing["sizes"] = sizes;
+  if (!channels.radiosity && !channels.albedo) {
+    missing["colors"] =
+        "occlusion needs none; --channels NAME=color reads what is called otherwise";
+  }
+  json["missing"] = missing;
+}
+
+std::string missingText(const nlohmann::json& json) {
+  std::string text;
+  if (!json.contains("missing")) return text;
+  for (const auto& [what, found_by] : json["missing"].items()) {
+    text += fmt::format("\n  no {:11} {}", what, found_by.get<std::string>());
+  }
+  return text;
 }
 
 nlohmann::json sceneJson(const SceneInfo& info) {
@@ -117,44 +175,62 @@ Result<RowReaderOptions> readingOf(const InfoArguments& arguments) {
   return options;
 }
 
-// Reads all surfels, which are counted from `origin`, for their number and their bounds.
-Result<std::uint64_t> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Bounds3d& bounds,
-                                  Progress& progress) {
+// What a pass over a cloud finds.
+struct CloudScan {
+  Bounds3d bounds;
+  std::uint64_t spheres = 0;  // surfels without a normal
+  PlaceSample sample;
+};
+
+// Reads all surfels, which are counted from `origin`.
+Result<CloudScan> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(source.rewind());
-  bounds = {};
-  std::uint64_t surfels = 0;
+  source.setOrigin(origin);
+  CloudScan scan{{}, 0, PlaceSample(source.recordCount())};
   std::vector<Surfel> batch(16384);
   progress.beginPhase("scan", source.recordCount(), "surfels");
   for (;;) {
     if (progress.isCancelled()) return Status::interrupted();
     SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source.read(batch));
-    if (count == 0) return surfels;
+    if (count == 0) return scan;
     for (const Surfel& surfel : std::span(batch).first(count)) {
-      bounds.add(glm::dvec3(surfel.position) + origin);
+      scan.bounds.add(glm::dvec3(surfel.position) + origin);
+      scan.spheres += surfel.isSphere() ? 1 : 0;
     }
-    surfels += count;
+    scan.sample.add(std::span(batch).first(count));
     progress.advance(count);
   }
 }
 
-// Of records that are surfels: how many are valid, their channels and bounds. Those of a cloud
-// without surfels are left out.
+void addMissing(const SurfelSource& source, const CloudScan& scan, nlohmann::json& json) {
+  const CloudChannels channels = source.channels();
+  std::string normals, sizes;
+  if (scan.spheres > 0) {
+    normals = "`surfeit normals` finds them, or `surfeit index --normals estimate`";
+    if (channels.normal) {
+      normals = fmt::format("of {} surfels: {}", formatCount(scan.spheres), normals);
+    }
+  }
+  if (!channels.radius && !channels.area) {
+    sizes = "`surfeit index` finds them from the neighbours; `surfeit normals --sizes` writes them";
+  }
+  addMissing(channels, normals, sizes, json);
+}
+
+// Of records that are surfels: how many are valid, their channels, bounds and density, and what
+// they lack. Those of a cloud without surfels are left out.
 Status addSurfels(const InfoArguments& arguments, nlohmann::json& json, Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions options, readingOf(arguments));
   Result<std::unique_ptr<SurfelSource>> source =
       openSurfelSource(arguments.path, /* strict= */ false, options);
   if (!source.ok()) return {};
-  Bounds3d bounds;
-  std::uint64_t surfels = 0;
+  SURFEIT_ASSIGN_OR_RETURN(CloudScan scan, scanSurfels(**source, glm::dvec3(0), progress));
   // Floats about an origin near the cloud have its digits: once more when 0 is far
-  glm::dvec3 origin(0);
-  for (int pass = 0; pass < 2; ++pass) {
-    (*source)->setOrigin(origin);
-    SURFEIT_ASSIGN_OR_RETURN(surfels, scanSurfels(**source, origin, bounds, progress));
-    if (bounds.isEmpty() || originFor(bounds) == origin) break;
-    origin = originFor(bounds);
+  if (!scan.bounds.isEmpty() && originFor(scan.bounds) != glm::dvec3(0)) {
+    SURFEIT_ASSIGN_OR_RETURN(scan, scanSurfels(**source, originFor(scan.bounds), progress));
   }
-  json["surfels"] = surfels;
+  const Bounds3d& bounds = scan.bounds;
+  json["surfels"] = scan.sample.surfelCount();
   json["notes"] = (*source)->notes();
   json["input_channels"] = channelNames((*source)->channels());
   if (!bounds.isEmpty()) {
@@ -162,6 +238,11 @@ Status addSurfels(const InfoArguments& arguments, nlohmann::json& json, Progress
   }
   const std::string defects = (*source)->defects().describe();
   if (!defects.empty()) json["defects"] = defects;
+  if (bounds.isEmpty()) return {};
+  addMissing(**source, scan, json);
+  SURFEIT_ASSIGN_OR_RETURN(const CloudDensity density,
+                           measureDensity(**source, scan.sample, progress));
+  addDensity(density, json);
   return {};
 }
 
@@ -181,7 +262,7 @@ std::string surfelsText(const nlohmann::json& json) {
                         formatCount(json["surfels"].get<std::uint64_t>()), json["bounds"].dump());
   }
   if (json.contains("defects")) text += "\n  defects        " + json["defects"].get<std::string>();
-  return text;
+  return text + densityText(json) + missingText(json);
 }
 
 // Any PLY as it is stored: elements and properties; bounds when the records are surfels.
@@ -262,6 +343,25 @@ Result<std::string> firstBytes(const std::string& path) {
   return bytes;
 }
 
+// Density of a scene, and what it lacks. Where pages are damaged, that is told, and the rest all
+// the same.
+Status addSurfelsOfScene(const std::string& path, const SceneInfo& info, nlohmann::json& json,
+                         Progress& progress) {
+  addMissing(
+      info.channels,
+      info.channels.normal ? "" : "`surfeit index --normals estimate` of the cloud finds them", "",
+      json);
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(path));
+  const Result<CloudDensity> density = measureDensity(std::move(scene), progress);
+  if (density.status().code() == StatusCode::kCorruption) {
+    progress.note(density.status().message() + ": the density is not known");
+    return {};
+  }
+  SURFEIT_RETURN_IF_ERROR(density.status());
+  addDensity(*density, json);
+  return {};
+}
+
 Status runInfo(const InfoArguments& arguments, CommandContext& context) {
   SURFEIT_ASSIGN_OR_RETURN(const std::string first_bytes, firstBytes(arguments.path));
   nlohmann::json json;
@@ -279,7 +379,8 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
     }
     SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.path));
     json = sceneJson(info);
-    text = sceneText(arguments.path, info);
+    SURFEIT_RETURN_IF_ERROR(addSurfelsOfScene(arguments.path, info, json, context.progress()));
+    text = sceneText(arguments.path, info) + densityText(json) + missingText(json);
   } else {
     SURFEIT_ASSIGN_OR_RETURN(json, cloudJson(arguments, context.progress()));
     text = cloudText(arguments.path, json);
@@ -305,7 +406,11 @@ void addInfoCommand(CLI::App& app, CommandContext& context) {
   command->add_flag("--json", arguments->json, "JSON on standard output");
   context.addCommonOptions(*command, {.threads = false, .memory = false, .stats = false});
   command->footer(
-      "Example:\n"
+      "Spacing is that of places on a surface, sqrt(pi r^2 / 8) with the 8th nearest place at r, "
+      "by a\n"
+      "sample of 1,000 points; a cloud is read twice for it, or three times on a map.\n"
+      "Examples:\n"
+      "  surfeit info scan.las\n"
       "  surfeit info lion.sft --json");
   command->callback(
       [arguments, &context] { context.run([&] { return runInfo(*arguments, context); }); });

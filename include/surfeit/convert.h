@@ -21,13 +21,21 @@ struct CropBox {
 };
 
 // What is done to the records of every input, in this order: channels are named, every n-th record
-// is taken, it is moved, cropped, and given the channels that are kept.
+// is taken, it is moved, cropped, given the channels that are kept, and thinned by a grid.
 struct ConvertOptions {
-  std::string channels{};   // channels to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md)
-  std::string part{};       // of files with several: the one to read; empty: the first with a cloud
+  std::string channels{};  // channels to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md)
+  std::string part{};      // of files with several: the one to read; empty: the first with a cloud
   // Takes records 0, every, 2 every, ... of each input; at least 1. Those stand for all: area and
   // power (of photons) are multiplied by it, radius, pscale and width by its root.
   std::uint64_t every = 1;
+
+  // Thins all inputs together to one record per cell of a grid with this edge, in units of what is
+  // written, counted from 0: the one nearest to the middle of its cell, the first of several. It
+  // stands for all of them: areas and powers are summed, radius, pscale and width grow by the root
+  // of the ratio of the areas, or of the count where there is no area. Records keep their order;
+  // those without a finite position are left out, which a note tells. The inputs are read twice.
+  // Not together with `every`.
+  std::optional<double> spacing{};
 
   // The rows of an affine 3x4 matrix: x' = t[0] x + t[1] y + t[2] z + t[3]. All in double
   // precision. Positions are points. Normals are turned by the inverse transpose and keep their
@@ -49,10 +57,11 @@ struct ConvertOptions {
   // attributes of a picture (.exr), the grid of a volume (.vdb), the camera of a .ptc, the header
   // of a .las. Empty: the input, where there is only one, which is not moved.
   std::string like{};
-  // Memory that a format may take that must hold what it writes until the end (OpenVDB); others
-  // take some MiB, whatever the clouds' size. 0: 2 GiB, or three quarters of what the job may hold
-  // where that is less.
+  // Memory that a format may take that must hold what it writes until the end (OpenVDB), and that
+  // thinning by a grid sorts in; all else takes some MiB, whatever the clouds' size. 0: 2 GiB, or
+  // three quarters of what the job may hold where that is less.
   std::uint64_t memory_bytes = 0;
+  std::string temporary_directory{};  // of thinning by a grid; empty: as of index
   // Which records of the inputs are taken, "classification == 2" (docs/files.md, "Filters"), before
   // all else but `channels`; empty: all but those that the format marks as not to be used.
   std::string filter{};
@@ -64,6 +73,8 @@ struct ConvertStats {
   std::uint64_t records = 0;                        // of all inputs
   std::uint64_t skipped_records = 0;                // left out by `every`
   std::uint64_t cropped_records = 0;                // left out by `crop`
+  std::uint64_t thinned_records = 0;                // left out by `spacing`
+  std::uint64_t placeless_records = 0;              // of these, without a finite position
   std::uint64_t written_records = 0;                // handed to the writer
   std::uint64_t input_bytes = 0, output_bytes = 0;  // of the files
   std::vector<std::string> properties;              // of a record that is written: "float x"

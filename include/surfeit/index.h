@@ -16,6 +16,13 @@
 
 namespace surfeit {
 
+// What becomes of surfels that repeat another: of one position, as the scene counts it (floats
+// about its origin), one group, and facing the same way.
+enum class Repeats {
+  kKeep,  // all stay, and their areas count twice, which is told
+  kThin,  // one stays, the same for any order of the inputs; how many do not is told
+};
+
 struct IndexOptions {
   // Budget, as in GatherOptions. 0: 1 GiB, or three quarters of what the job may hold where that is
   // less.
@@ -23,6 +30,8 @@ struct IndexOptions {
   int threads = 0;                    // 0: all that the job may use and the budget feeds
   std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
   float overlap = 2;                  // disk area over surfel area where one must be made up
+                                      // (--disk-overlap)
+  Repeats repeats = Repeats::kKeep;   // of overlapping clouds, such as tiles (--overlap)
   bool full_precision = false;        // keep floats instead of quantized values
   bool strict = false;                // refuse invalid records instead of skipping them
   std::string temporary_directory{};  // empty: where the job wants them (SLURM_TMPDIR, TMPDIR),
@@ -51,6 +60,9 @@ struct IndexStats {
   std::uint64_t input_bytes = 0;   // of the input files
   std::uint64_t surfels = 0;
   std::uint64_t skipped_records = 0;
+  // That repeat another: left out with Repeats::kThin; else kept, and counted where they bring
+  // their sizes.
+  std::uint64_t repeated_surfels = 0;
   std::uint64_t normals_found = 0;  // from the neighbours
   std::uint64_t thin_surfels = 0;   // on no surface, of those that lacked a normal
   std::uint64_t nodes = 0;

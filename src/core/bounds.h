@@ -49,6 +49,17 @@ struct RootCube {
   bool operator==(const RootCube&) const = default;
 };
 
+// Whether the box lies in the cube.
+inline bool contains(const RootCube& cube, const Bounds3& bounds) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (double(bounds.min[axis]) < cube.origin[axis] ||
+        double(bounds.max[axis]) > cube.origin[axis] + cube.size) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // The cube for a box: its size is a power of two and its origin a multiple of a 16th of that, so
 // that a sample of a cloud nearly always gives the cube of the whole. A box of size zero gets 1.
 inline RootCube rootCube(const Bounds3d& bounds) {

@@ -71,6 +71,22 @@ std::array<double, 9> cofactors(const RowTransform::Matrix& m) {
           m[1] * m[6] - m[2] * m[5],  m[2] * m[4] - m[0] * m[6],  m[0] * m[5] - m[1] * m[4]};
 }
 
+// Makes floats of the integers of channels with such a role.
+template <typename Condition>
+void widenWhere(std::vector<PlyProperty>& properties, const Condition& condition) {
+  PlyElement element;
+  element.properties = properties;
+  packPlyRow(element);
+  for (const RowChannel& channel : channelsOf(element)) {
+    if (!condition(RowTransform::roleOf(channel))) continue;
+    for (const std::size_t i : channel.properties) {
+      PlyType& type = properties[i].type;
+      if (isPlyFloat(type)) continue;
+      type = plyTypeBytes(type) <= 2 ? PlyType::kFloat32 : PlyType::kFloat64;
+    }
+  }
+}
+
 }  // namespace
 
 RowTransform::RowTransform(const Matrix& matrix)
@@ -141,24 +157,21 @@ RowTransform::Role RowTransform::roleOf(const RowChannel& channel) {
   }
 }
 
+bool RowTransform::isSize(Role role) {
+  return role == Role::kLength || role == Role::kArea || role == Role::kPower;
+}
+
 bool RowTransform::changes(Role role) const {
-  const bool grows = role == Role::kLength || role == Role::kArea || role == Role::kPower;
-  if (grows && growth_ != 1) return true;
+  if (isSize(role) && growth_ != 1) return true;
   return role != Role::kNone && role != Role::kPower && !isIdentity();
 }
 
 void RowTransform::widenTypes(std::vector<PlyProperty>& properties) const {
-  PlyElement element;
-  element.properties = properties;
-  packPlyRow(element);
-  for (const RowChannel& channel : channelsOf(element)) {
-    if (!changes(roleOf(channel))) continue;
-    for (const std::size_t i : channel.properties) {
-      PlyType& type = properties[i].type;
-      if (isPlyFloat(type)) continue;
-      type = plyTypeBytes(type) <= 2 ? PlyType::kFloat32 : PlyType::kFloat64;
-    }
-  }
+  widenWhere(properties, [this](Role role) { return changes(role); });
+}
+
+void RowTransform::widenSizes(std::vector<PlyProperty>& properties) {
+  widenWhere(properties, isSize);
 }
 
 void RowTransform::bind(const PlyElement& element) {

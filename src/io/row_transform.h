@@ -29,8 +29,25 @@ class RowTransform {
   // Whether it scales all directions alike.
   bool isUniform() const;
 
+  // What becomes of a channel.
+  enum class Role : std::uint8_t {
+    kNone,
+    kPoint,
+    kVector,
+    kDirection,
+    kNormal,
+    kLength,
+    kArea,
+    kPower
+  };
+  static Role roleOf(const RowChannel& channel);
+  // Whether it grows where a row stands for several.
+  static bool isSize(Role role);
+
   // Gives integers that it will change a type of floats that holds them.
   void widenTypes(std::vector<PlyProperty>& properties) const;
+  // The same of the integers among sizes, which someone else will change.
+  static void widenSizes(std::vector<PlyProperty>& properties);
   // Rows will be those of `element`. What it does to each channel follows from the names
   // (surfeit/convert.h).
   void bind(const PlyElement& element);
@@ -41,14 +58,12 @@ class RowTransform {
   void apply(std::byte* rows, std::size_t count) const;
 
  private:
-  enum class Role : std::uint8_t { kNone, kPoint, kVector, kDirection, kNormal, kLength, kArea, kPower };
   struct Task {  // properties of a channel that change together
     Role role = Role::kNone;
     std::vector<PlyProperty> properties;  // 3, or 1 of lengths and areas
   };
 
   explicit RowTransform(const Matrix& matrix);
-  static Role roleOf(const RowChannel& channel);
   bool changes(Role role) const;
   void noteWhatStays(const std::vector<RowChannel>& channels);
   void applyTriple(const Task& task, std::byte* rows, std::size_t count) const;

@@ -1,8 +1,9 @@
 // Rows go through in batches of a MiB:
 //
-//   reader --take, widen--> rows of the output --move--> --crop--> writer
+//   reader --take, widen--> rows of the output --move--> --crop--> --thin--> writer
 //
-// What nothing is done to goes from reader to writer without a copy.
+// What nothing is done to goes from reader to writer without a copy. Thinning by a grid looks at
+// all rows before, in a pass of its own.
 #include "surfeit/convert.h"
 
 #include <fmt/format.h>
@@ -28,6 +29,8 @@
 #include "io/row_union.h"
 #include "io/surfel_names.h"
 #include "io/up_comment.h"
+#include "octree/grid_thinner.h"
+#include "octree/parallel.h"
 #include "octree/scene_rows.h"
 
 namespace surfeit {
@@ -166,13 +169,12 @@ class Converter {
     SURFEIT_RETURN_IF_ERROR(openInputs());
     SURFEIT_RETURN_IF_ERROR(placeRows());
     SURFEIT_RETURN_IF_ERROR(createWriter());
+    if (thinner_) SURFEIT_RETURN_IF_ERROR(chooseRows());
     progress_.beginPhase("convert", stats_.records, "records");
-    for (std::size_t i = 0; i < inputs_.size(); ++i) {
-      std::unique_ptr<RowReader> reader = std::move(first_);
-      if (i > 0) {
-        SURFEIT_ASSIGN_OR_RETURN(reader, openCloud(inputs_[i], reading_));
-      }
-      SURFEIT_RETURN_IF_ERROR(convert(*reader));
+    SURFEIT_RETURN_IF_ERROR(convertInputs());
+    if (thinner_ && !thinner_->isComplete()) {
+      return Status::failed(
+          fmt::format("{}: fewer records when read again: an input changed meanwhile", output_));
     }
     progress_.beginPhase("finish", 0, "records");
     SURFEIT_RETURN_IF_ERROR(writer_->finish());
@@ -205,6 +207,45 @@ class Converter {
     return {};
   }
 
+  // All records, one input after the other.
+  Status convertInputs() {
+    SURFEIT_RETURN_IF_ERROR(convert(*first_));
+    if (is_measuring_) {
+      SURFEIT_RETURN_IF_ERROR(first_->rewind());
+    } else {
+      first_.reset();
+    }
+    for (std::size_t i = 1; i < inputs_.size(); ++i) {
+      SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader,
+                               openCloud(inputs_[i], reading_));
+      SURFEIT_RETURN_IF_ERROR(convert(*reader));
+    }
+    return {};
+  }
+
+  // Which records are kept of those that share a cell.
+  Status chooseRows() {
+    progress_.beginPhase("measure", stats_.records, "records");
+    is_measuring_ = true;
+    SURFEIT_RETURN_IF_ERROR(convertInputs());
+    is_measuring_ = false;
+    progress_.beginPhase("choose", 0, "records");
+    SURFEIT_RETURN_IF_ERROR(thinner_->choose(progress_));
+    stats_.placeless_records = thinner_->placeless();
+    if (thinner_->placeless() > 0) {
+      progress_.note(fmt::format(
+          "{}: {} records without a finite position are left out: they lie in no cell of the grid",
+          output_, thinner_->placeless()));
+    }
+    progress_.inform(fmt::format("{}: {} of {} records are kept, one per cell of {}", output_,
+                                 thinner_->kept(), thinner_->measured(), *options_.spacing));
+    // Now the writer can tell what it will need; nothing was written yet
+    writing_.count = thinner_->kept();
+    SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing_));
+    noteOfWriter();
+    return {};
+  }
+
   // Turns up what is to be up.
   Status placeRows() {
     if (!options_.up) return {};
@@ -222,33 +263,24 @@ class Converter {
   }
 
   Status createWriter() {
-    RowWriterOptions writing;
-    SURFEIT_ASSIGN_OR_RETURN(writing.properties, chooseProperties(union_.properties(), options_));
-    transform_.widenTypes(writing.properties);
-    writing.comments = first_->comments();
-    if (options_.up) stateUpAxis(*options_.up, writing.comments);
-    if (!options_.crop) writing.count = rows_to_write_;
-    const std::uint64_t beside = programBytes(1) + kStreamBytes;
-    if (options_.memory_bytes < beside) {
-      return Status::budgetTooSmall(
-          fmt::format("a memory budget of {:.1f} MiB is too small to convert: {} MiB is the least "
-                      "that works",
-                      double(options_.memory_bytes) / (1 << 20), (beside >> 20) + 1));
-    }
-    writing.memory_bytes = options_.memory_bytes - beside;
-    writing.memory_beside_bytes = beside;
-    writing.progress = &progress_;
-    std::unique_ptr<RowReader> like;
+    SURFEIT_ASSIGN_OR_RETURN(writing_.properties, chooseProperties(union_.properties(), options_));
+    transform_.widenTypes(writing_.properties);
+    if (options_.spacing) RowTransform::widenSizes(writing_.properties);
+    writing_.comments = first_->comments();
+    if (options_.up) stateUpAxis(*options_.up, writing_.comments);
+    if (!options_.crop && !options_.spacing) writing_.count = rows_to_write_;
+    SURFEIT_RETURN_IF_ERROR(planMemory());
+    writing_.progress = &progress_;
     if (!options_.like.empty()) {
       RowReaderOptions as_stored;
       as_stored.filter = "true";  // its rows are not read, so nothing is to be counted
       as_stored.color_range.reset();
-      SURFEIT_ASSIGN_OR_RETURN(like, openRowReader(options_.like, as_stored));
-      writing.like = like.get();
+      SURFEIT_ASSIGN_OR_RETURN(like_, openRowReader(options_.like, as_stored));
+      writing_.like = like_.get();
     } else if (transform_.isIdentity() && inputs_.size() == 1) {
-      writing.like = first_.get();
+      writing_.like = first_.get();
     }
-    SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing));
+    SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing_));
     noteOfWriter();
 
     const PlyElement& element = writer_->element();
@@ -259,9 +291,38 @@ class Converter {
     if (options_.crop) {
       SURFEIT_ASSIGN_OR_RETURN(cropper_, Cropper::create(*options_.crop, element));
     }
+    if (options_.spacing) {
+      SURFEIT_ASSIGN_OR_RETURN(
+          thinner_, GridThinner::create({*options_.spacing, thinner_bytes_,
+                                         temporaryDirectory(options_.temporary_directory, output_)},
+                                        element));
+    }
     for (const PlyProperty& property : element.properties) {
       stats_.properties.push_back(fmt::format("{} {}", plyTypeName(property.type), property.name));
     }
+    return {};
+  }
+
+  // What writer and thinner get. A writer that holds what it writes comes first.
+  Status planMemory() {
+    const std::uint64_t fixed = programBytes(1) + kStreamBytes;
+    const std::uint64_t least = fixed + (options_.spacing ? GridThinner::kLeastMemory : 0);
+    if (options_.memory_bytes < least) {
+      return Status::budgetTooSmall(
+          fmt::format("a memory budget of {:.1f} MiB is too small to convert: {} MiB is the least "
+                      "that works",
+                      double(options_.memory_bytes) / (1 << 20), (least >> 20) + 1));
+    }
+    const std::uint64_t rest = options_.memory_bytes - fixed;
+    if (options_.spacing) {
+      PlyElement row;
+      row.properties = writing_.properties;
+      packPlyRow(row);
+      const std::uint64_t held = heldWriterBytes(output_, rows_to_write_, row.row_bytes);
+      thinner_bytes_ = std::max(rest - std::min(rest, held), GridThinner::kLeastMemory);
+    }
+    writing_.memory_bytes = rest - thinner_bytes_;
+    writing_.memory_beside_bytes = fixed + thinner_bytes_;
     return {};
   }
 
@@ -277,12 +338,12 @@ class Converter {
     const PlyElement& to = writer_->element();
     if (from.count == 0) return {};
     const RowCopier copier(from, to);
-    if (!copier.absent().empty()) {
+    if (!copier.absent().empty() && !is_measuring_) {
       progress_.note(
           fmt::format("{}: not there, 0 is written:{}", reader.path(), listNames(copier.absent())));
     }
-    const bool keeps_rows =
-        copier.keepsRows() && options_.every == 1 && transform_.isIdentity() && !cropper_;
+    const bool keeps_rows = copier.keepsRows() && options_.every == 1 && transform_.isIdentity() &&
+                            !cropper_ && !thinner_;
     const std::size_t batch_rows =
         std::max<std::size_t>(1, kBatchBytes / std::max(from.row_bytes, to.row_bytes));
     for (std::uint64_t record = 0;;) {
@@ -310,7 +371,7 @@ class Converter {
     const std::uint64_t skipped = (every - record % every) % every;
     const std::size_t taken =
         skipped < count ? static_cast<std::size_t>((count - 1 - skipped) / every + 1) : 0;
-    stats_.skipped_records += count - taken;
+    if (!is_measuring_) stats_.skipped_records += count - taken;
     if (taken == 0) return {};
     const std::size_t to_bytes = writer_->element().row_bytes;
     rows_.resize(taken * to_bytes);
@@ -320,8 +381,16 @@ class Converter {
 
     // Move and crop
     transform_.apply(rows_.data(), taken);
-    const std::size_t kept = cropper_ ? cropper_->crop(rows_.data(), taken) : taken;
+    std::size_t kept = cropper_ ? cropper_->crop(rows_.data(), taken) : taken;
+    if (is_measuring_) return thinner_->measure(rows_.data(), kept);
     stats_.cropped_records += taken - kept;
+
+    // Thin
+    if (thinner_) {
+      const std::size_t before = kept;
+      SURFEIT_ASSIGN_OR_RETURN(kept, thinner_->thin(rows_.data(), kept));
+      stats_.thinned_records += before - kept;
+    }
     stats_.written_records += kept;
     return writer_->writeRows(std::span(rows_).first(kept * to_bytes));
   }
@@ -336,9 +405,14 @@ class Converter {
   RowUnion union_;
   std::unique_ptr<RowReader> first_;
   std::uint64_t rows_to_write_ = 0;  // without cropping
+  std::unique_ptr<RowReader> like_;
+  RowWriterOptions writing_;
   std::unique_ptr<RowWriter> writer_;
   std::set<std::string> told_;
   std::optional<Cropper> cropper_;
+  std::unique_ptr<GridThinner> thinner_;
+  std::uint64_t thinner_bytes_ = 0;
+  bool is_measuring_ = false;  // all records for the thinner, nothing is written
   AlignedBuffer buffer_;
   std::vector<std::byte> rows_;
   ConvertStats stats_;
@@ -347,6 +421,12 @@ class Converter {
 Status checkOptions(const std::vector<std::string>& inputs, const ConvertOptions& options) {
   if (inputs.empty()) return Status::invalidArgument("convert: no input cloud");
   if (options.every == 0) return Status::invalidArgument("every is 0, expected 1 or more");
+  if (options.spacing) {
+    SURFEIT_RETURN_IF_ERROR(GridThinner::checkSpacing(*options.spacing));
+    if (options.every > 1) {
+      return Status::invalidArgument("found both every and spacing, expected one of them");
+    }
+  }
   if (!options.keep.empty() && !options.drop.empty()) {
     return Status::invalidArgument("found channels both to keep and to drop, expected one of them");
   }
@@ -364,7 +444,12 @@ Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
     SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
     SURFEIT_ASSIGN_OR_RETURN(RowTransform transform,
                              RowTransform::create(options.transform, double(options.every)));
-    return Converter(inputs, output, options, std::move(transform), progress).run();
+    Converter converter(inputs, output, options, std::move(transform), progress);
+    if (!options.spacing) return converter.run();
+    // What is planned for sorting is that of one thread
+    Result<ConvertStats> stats = Status::failed("convert: not run");
+    withThreads(1, [&] { stats = converter.run(); });
+    return stats;
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));
   } catch (const std::exception& exception) {

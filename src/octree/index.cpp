@@ -28,6 +28,7 @@
 #include "octree/octree_builder.h"
 #include "octree/parallel.h"
 #include "octree/phase_clock.h"
+#include "octree/repeated_surfels.h"
 #include "octree/scene_writer.h"
 #include "surfeit/version.h"
 
@@ -48,17 +49,6 @@ Status checkRoom(const std::string& directory, double needed, const char* advice
   if (double(available) >= needed) return {};
   return Status::ioError(fmt::format("{}: {} MiB are free, expected at least {:.0f} MiB: {}",
                                      directory, available >> 20, needed / (1 << 20), advice));
-}
-
-// Whether the positions lie in the cube.
-bool contains(const RootCube& cube, const Bounds3& bounds) {
-  for (int axis = 0; axis < 3; ++axis) {
-    if (double(bounds.min[axis]) < cube.origin[axis] ||
-        double(bounds.max[axis]) > cube.origin[axis] + cube.size) {
-      return false;
-    }
-  }
-  return true;
 }
 
 Bounds3 boundsOf(std::span<const Surfel> surfels) {
@@ -101,6 +91,7 @@ class Indexer {
   bool estimatesNormals() const { return options_.normals && totals_.spheres > 0; }
   UpAxis up() const { return options_.up.value_or(reader_->up()); }
   std::optional<NormalRule> normalRule() const;
+  Status tellRepeats();
   Status build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase);
   Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path, bool full_precision);
   Result<std::unique_ptr<BucketStream>> readBuckets();
@@ -122,6 +113,7 @@ class Indexer {
   IndexPlan plan_;
   bool gives_space_back_ = false;
   CloudTotals totals_;
+  std::optional<RepeatFilter> distinct_;  // of the sorted buckets
   IndexStats stats_;
   PhaseClock clock_;
 };
@@ -135,7 +127,8 @@ Result<IndexStats> Indexer::run() {
   if (totals_.missing_both + totals_.covering > 0 || estimatesNormals()) {
     SURFEIT_RETURN_IF_ERROR(buildWithNeighbours(std::move(buckets), *writer));
   } else {
-    SURFEIT_RETURN_IF_ERROR(build(*writer, *buckets, "build"));
+    SURFEIT_RETURN_IF_ERROR(build(*writer, *distinct_, "build"));
+    SURFEIT_RETURN_IF_ERROR(tellRepeats());
     stats_.temporary_bytes = buckets->temporaryBytes();
     buckets.reset();
   }
@@ -159,11 +152,13 @@ Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
   SURFEIT_RETURN_IF_ERROR(openInputs());
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
   stats_.skipped_records = totals_.skipped;
-  return std::make_unique<BucketStream>(
+  auto buckets = std::make_unique<BucketStream>(
       std::move(store),
       BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
                             temporary_directory_},
       progress_);
+  distinct_.emplace(*buckets, options_.repeats);
+  return buckets;
 }
 
 Status Indexer::checkOptions() const {
@@ -180,7 +175,7 @@ Status Indexer::checkOptions() const {
   if (options_.normals) SURFEIT_RETURN_IF_ERROR(NormalRule::check(*options_.normals));
   if (!(options_.overlap >= 1 && options_.overlap <= 16)) {
     return Status::invalidArgument(
-        fmt::format("overlap factor {}, expected 1 to 16", options_.overlap));
+        fmt::format("disk overlap {}, expected 1 to 16", options_.overlap));
   }
   return {};
 }
@@ -200,7 +195,8 @@ Status Indexer::openInputs() {
   const double packed_bytes = packedBytesPerSurfel(sample_);
   SURFEIT_ASSIGN_OR_RETURN(
       plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form,
-                        options_.normals ? leastNeighbourBytes(*options_.normals, threads_) : 0}));
+                        options_.normals ? leastNeighbourBytes(*options_.normals, threads_) : 0,
+                        options_.repeats == Repeats::kThin ? RepeatFilter::kBytesPerSurfel : 0}));
   stats_.input_bytes = reader_->fileBytes();
   SURFEIT_RETURN_IF_ERROR(checkFreeSpace(sample_.empty() ? kLeastPackedBytes : packed_bytes));
   clock_.finish("sample");
@@ -316,7 +312,11 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
       }
       curveKeys(&surfels.front().position, sizeof(Surfel), *cube, keys);
     }
-    for (Surfel& surfel : surfels) applySizeRules(surfel, options_.overlap);
+    for (Surfel& surfel : surfels) {
+      applySizeRules(surfel, options_.overlap);
+      // Positions are told apart by their bits: 0 and -0 are one
+      if (options_.repeats == Repeats::kThin) surfel.position += glm::vec3(0);
+    }
     return store->add(surfels, keys);
   };
   progress_.beginPhase("read", reader_->recordCount(), "surfels");
@@ -348,11 +348,12 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
 }
 
 Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase) {
-  progress_.beginPhase(phase, totals_.surfels, "surfels");
+  progress_.beginPhase(phase, totals_.surfels - distinct_->leftOut(), "surfels");
   SURFEIT_RETURN_IF_ERROR(buildOctree(stream, writer, threads_, progress_));
-  if (writer.header().surfel_count != totals_.surfels) {
+  const std::uint64_t expected = totals_.surfels - distinct_->leftOut();
+  if (writer.header().surfel_count != expected) {
     return Status::failed(fmt::format("{}: {} surfels written, expected {}: this is a bug", output_,
-                                      writer.header().surfel_count, totals_.surfels));
+                                      writer.header().surfel_count, expected));
   }
   stats_.surfels = writer.header().surfel_count;
   stats_.nodes = writer.header().node_count;
@@ -368,9 +369,16 @@ Result<SceneFile> Indexer::buildUnnamed(SortedSurfelStream& stream, const char* 
   return writer->finishUnnamed(provenance());
 }
 
+// Before the scene has its name: with --strict it gets none.
+Status Indexer::tellRepeats() {
+  stats_.repeated_surfels = distinct_->repeated();
+  noteRepeats(stats_, options_, progress_);
+  return progress_.isCancelled() ? Status::interrupted() : Status();
+}
+
 // An octree over the bare positions.
 Result<SceneFile> Indexer::buildPlaces(std::unique_ptr<BucketStream> buckets) {
-  SURFEIT_ASSIGN_OR_RETURN(SceneFile places, buildUnnamed(*buckets, "order"));
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile places, buildUnnamed(*distinct_, "order"));
   stats_.temporary_bytes = buckets->temporaryBytes() + places.fileBytes();
   return places;
 }
@@ -383,6 +391,7 @@ std::optional<NormalRule> Indexer::normalRule() const {
 
 Status Indexer::buildWithNeighbours(std::unique_ptr<BucketStream> buckets, SceneWriter& writer) {
   SURFEIT_ASSIGN_OR_RETURN(SceneFile places, buildPlaces(std::move(buckets)));
+  SURFEIT_RETURN_IF_ERROR(tellRepeats());
   NeighbourBuild how;
   how.overlap = options_.overlap;
   how.threads = threads_;
@@ -433,6 +442,7 @@ std::string Indexer::provenance() const {
                          {"areas_from_radius", totals_.missing_area},
                          {"radii_from_area", totals_.missing_radius},
                          {"spheres", totals_.spheres}};
+  if (options_.repeats == Repeats::kThin) json["repeats"] = "thin";
   if (const std::optional<NormalRule> rule = normalRule()) json["normals"] = rule->describe();
   return json.dump();
 }

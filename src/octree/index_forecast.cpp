@@ -11,8 +11,10 @@
 #include "io/output_target.h"
 #include "io/surfel_writer.h"
 #include "octree/cloud_reader.h"
+#include "octree/index_neighbours.h"
 #include "octree/index_plan.h"
 #include "octree/parallel.h"
+#include "octree/repeated_surfels.h"
 #include "octree/scene_rows.h"
 #include "surfeit/index.h"
 
@@ -107,7 +109,9 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
   const double packed_bytes = packedBytesPerSurfel(sample);
   SURFEIT_ASSIGN_OR_RETURN(
       const IndexPlan plan,
-      planIndex({options.memory_bytes, options.threads, forecast.records, packed_bytes, form, 0}));
+      planIndex({options.memory_bytes, options.threads, forecast.records, packed_bytes, form,
+                 options.normals ? leastNeighbourBytes(*options.normals, options.threads) : 0,
+                 options.repeats == Repeats::kThin ? RepeatFilter::kBytesPerSurfel : 0}));
   if (plan.spills) {
     forecast.temporary_bytes += std::uint64_t(double(forecast.records) * packed_bytes);
   }

@@ -41,6 +41,19 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
   }
 }
 
+void noteRepeats(const IndexStats& stats, const IndexOptions& options, Progress& progress) {
+  if (stats.repeated_surfels == 0) return;
+  if (options.repeats == Repeats::kThin) {
+    progress.inform(fmt::format("{} surfels repeat another at its place: they are left out",
+                                stats.repeated_surfels));
+  } else {
+    progress.note(
+        fmt::format("{} surfels repeat another at its place, and their areas count twice "
+                    "(--overlap thin keeps one at a place, as tiles that overlap need)",
+                    stats.repeated_surfels));
+  }
+}
+
 void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress) {
   if (stats.thin_surfels == 0) return;
   progress.inform(

@@ -15,4 +15,7 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
 // How many surfels lie on no surface, of those that got normals.
 void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress);
 
+// How many surfels repeat another; nothing where none does.
+void noteRepeats(const IndexStats& stats, const IndexOptions& options, Progress& progress);
+
 }  // namespace surfeit

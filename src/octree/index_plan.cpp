@@ -101,8 +101,9 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
   const std::uint64_t read_fixed = CloudReader::memoryBytes(plan.read_bytes, task.threads) + beside;
   const std::uint64_t build_fixed =
       buildOctreeBytes(task.slabs, task.threads) + directoryBytes(task) + beside;
-  const std::uint64_t least_bucket = std::max(
-      std::min(kLeastBucket, task.records) * BucketStream::kBytesPerSurfel, task.search_bytes);
+  const std::size_t surfel_bytes = BucketStream::kBytesPerSurfel + task.filter_bytes;
+  const std::uint64_t least_bucket =
+      std::max(std::min(kLeastBucket, task.records) * surfel_bytes, task.search_bytes);
   const std::uint64_t least = std::max({kLeastIndexMemory, build_fixed + least_bucket,
                                         read_fixed + 64 * kMinBlockSurfels * sizeof(Surfel)});
   if (task.memory_bytes < least) {
@@ -119,7 +120,7 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
   const std::uint64_t packed =
       static_cast<std::uint64_t>(double(task.records) * task.packed_bytes * 1.05) + 8 * kMega;
   const std::uint64_t bucket = std::clamp<std::uint64_t>(task.records, 1024, kUsefulBucket);
-  const std::uint64_t bucket_bytes = bucket * BucketStream::kBytesPerSurfel;
+  const std::uint64_t bucket_bytes = bucket * surfel_bytes;
   plan.spills = packed + bucket_bytes > std::min(reading, building);
   if (!plan.spills) {
     plan.block_memory = packed;
@@ -131,8 +132,7 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
   const std::uint64_t useful = std::max(
       kUsefulBucket, static_cast<std::uint64_t>(double(task.records) * kUnevenness) / kFewBuckets);
   plan.bucket_capacity = static_cast<std::size_t>(std::clamp<std::uint64_t>(
-      static_cast<std::uint64_t>(double(building) * kBucketShare) / BucketStream::kBytesPerSurfel,
-      1024, useful));
+      static_cast<std::uint64_t>(double(building) * kBucketShare) / surfel_bytes, 1024, useful));
   planBuckets(task.records, reading / 2, plan);
   return plan;
 }

@@ -29,6 +29,7 @@ struct IndexTask {
   double packed_bytes = 64;   // of a surfel in a packed block, about
   SlabForm slabs;
   std::uint64_t search_bytes = 0;  // that searches of neighbours take at least
+  std::size_t filter_bytes = 0;  // per surfel of a bucket, of a filter behind it
 };
 
 struct IndexPlan {

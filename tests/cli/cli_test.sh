@@ -62,7 +62,7 @@ statisticsHaveTheDocumentedFields() {
   run 0 sample cornell.obj -o again.ply --count 1000 --stats sample.json
   jsonHas sample.json "${common[@]}" triangles surfels area spacing phases
   run 0 index cornell.ply -o again.sft --stats index.json
-  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records nodes node_pages \
+  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records repeated_surfels nodes node_pages \
     surfel_pages file_bytes bytes_per_surfel temporary_bytes surfels_per_second phases \
     sample read build finish
   run 0 generate --surfels 1k -o city.ply --stats generate.json
@@ -216,7 +216,11 @@ impossibleValuesAreUsageErrors() {
   run 2 "${gather[@]}" --max-dist 0
   run 2 tune cornell.sft cornell.ply --sample -1
   run 2 "${index[@]}" --leaf 0
-  run 2 "${index[@]}" --overlap 0.5
+  run 2 "${index[@]}" --disk-overlap 0.5
+  run 2 "${index[@]}" --overlap 2.5
+  says "--disk-overlap 2.5"
+  run 2 "${index[@]}" --overlap some
+  says "expected keep or thin"
   run 2 "${index[@]}" --precision double
   run 2 sample cornell.obj -o result.ply --count 0
   run 2 sample cornell.obj -o result.ply --light-point "1 2 3"
@@ -368,6 +372,50 @@ PLY
   run 3 gather cornell.sft receivers.ply -o result.ply --memory 64M --strict
   says "record 1"
   leavesNothing result
+}
+
+# A grid of 50 x 50 points half a unit apart, from x = 0 and from x = 20.
+makeTiles() {
+  awk -v from="${1:-0}" 'BEGIN {
+    print "x,y,z,radius,area"
+    for (y = 0; y < 50; ++y) for (x = 0; x < 50; ++x) print from + x / 2 "," y / 2 ",1,.4,.25"
+  }'
+}
+
+tilesThatOverlapAreToldOrThinned() {
+  makeTiles 0 > left.csv
+  makeTiles 20 > right.csv
+  run 0 index left.csv right.csv -o kept.sft
+  says "500 surfels repeat another at its place" "--overlap thin"
+  run 3 index left.csv right.csv -o strict.sft --strict
+  leavesNothing strict
+  run 0 index left.csv right.csv -o thin.sft --overlap thin --stats thin.json
+  says "500 surfels repeat another at its place: they are left out"
+  jsonIs thin.json surfels 4500 repeated_surfels 500
+  run 0 verify thin.sft
+  run 0 index right.csv left.csv -o turned.sft --overlap thin
+  sameBytes thin.sft turned.sft
+  run 0 info kept.sft
+  says "% of the places have several points: \`index --overlap thin\` keeps one" "spacing        0.443"
+  run 0 info thin.sft
+  says "repeated       0 % of the places"
+}
+
+infoTellsDensityAndWhatIsMissing() {
+  makeTiles > grid.csv
+  run 0 info grid.csv
+  says "spacing        0.4431" "by a sample of 1,000 points" "points per unit of area" \
+    "repeated       0 % of the places" "no normals     \`surfeit normals\` finds them" "no colors"
+  [[ $said != *"no sizes"* ]] || fail "sizes are there: $said"
+  run 0 convert grid.csv grid.csv -o twice.ply --drop radius,area
+  run 0 info twice.ply --json
+  says '"repeated_places": 1.0' '"median": 0.443' '"sampled_points": 1000' '"sizes": "`surfeit index`'
+  printf '1 2 3\n1 2 4\n1 3 3\n' > three.xyz
+  run 0 info three.xyz
+  says "spacing        "
+  printf '1 2 3\n1 2 3\n' > one.xyz
+  run 0 info one.xyz
+  says "none: all points are at one place"
 }
 
 interruptLeavesNoFile() {

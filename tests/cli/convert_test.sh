@@ -42,6 +42,10 @@ cloudsMergeMoveAndThin() {
   printf '1 2 3\n' > one.xyz
   run 0 convert points.ply one.xyz -o d.ply
   says "one.xyz: not there, 0 is written: radius group"
+  run 0 convert - one.xyz -o e.csv --spacing 2.5 --keep radius --stats stats.json < <(cat points.ply)
+  says "e.csv: 4 of 5 records are kept, one per cell of 2.5"
+  [[ $(cat e.csv) == $'x,y,z,radius\n1,0,0,2.828427\n2,0,5,3\n637000.25,0,0,4\n1,2,3,0' ]] || fail "$(cat e.csv)"
+  jsonIs stats.json records 5 written_records 4 thinned_records 1 placeless_records 0
   run 0 convert d.ply -o d.csv --quiet
   [[ $(tail -n 1 d.csv) == "1,2,3,0,0" ]] || fail "$(cat d.csv)"
   [[ -z $said ]] || fail "said: $said"
@@ -156,6 +160,12 @@ badOptionsAreUsageErrors() {
   says "crop: found 0 to -1 along x"
   run 2 convert points.ply -o none.ply --every 0
   run 2 convert points.ply -o none.ply --keep x --drop radius
+  run 2 convert points.ply -o none.ply --spacing 1 --every 2
+  run 2 convert points.ply -o none.ply --spacing 0
+  says "spacing: found 0, expected a finite length above 0"
+  run 2 convert points.ply -o none.ply --spacing 1e-11
+  says "position 637000.25 along x" "give a larger spacing"
+  run 33 convert points.ply -o none.ply --spacing 1 --memory 20M
   run 2 convert points.ply -o none.ply --keep colour
   says "found no channel 'colour', expected one of position radius group"
   run 2 convert points.ply -o none.exr

@@ -8,6 +8,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 commands=(
   "index cloud.ply -o out.sft"
   "index bare.ply -o out.sft"
+  "index cloud.ply cloud.ply -o out.sft --overlap thin"
   "index points.ply -o out.sft --normals estimate"
   "normals points.ply -o out.ply"
   "normals points.ply -o out.ply --orient consistent"
@@ -25,6 +26,8 @@ commands=(
   "cube scene.sft --at 0.5,0.1,0.5 --normal 0,1,0 -o out.png"
   "convert cloud.ply -o out.vdb"
   "convert cloud.ply -o out.las"
+  "convert cloud.ply cloud.ply -o out.ply --spacing 0.001"
+  "convert cloud.ply -o out.vdb --spacing 0.01"
 )
 
 skipWhereSanitized() {
