@@ -10,21 +10,26 @@
 namespace surfeit {
 namespace {
 
-// "up", "outward", "consistent" or "sensor X,Y,Z".
+// "up", "outward", "consistent", "sensor X,Y,Z" or "trajectory FILE".
 NormalOrientation parseOrientation(const std::string& text) {
   using Toward = NormalOrientation::Toward;
-  if (text == "up") return {Toward::kUp, {}};
-  if (text == "outward") return {Toward::kOutward, {}};
-  if (text == "consistent") return {Toward::kConsistent, {}};
-  constexpr std::string_view kSensor = "sensor";
+  if (text == "up") return {Toward::kUp, {}, {}};
+  if (text == "outward") return {Toward::kOutward, {}, {}};
+  if (text == "consistent") return {Toward::kConsistent, {}, {}};
+  constexpr std::string_view kSensor = "sensor", kTrajectory = "trajectory ";
+  if (text.starts_with(kTrajectory) && text.size() > kTrajectory.size()) {
+    return {Toward::kTrajectory, {}, text.substr(kTrajectory.size())};
+  }
   if (!text.starts_with(kSensor)) {
     throw CLI::ValidationError(
         "--orient",
-        fmt::format("found \"{}\", expected up, outward, consistent or \"sensor X,Y,Z\"", text));
+        fmt::format("found \"{}\", expected up, outward, consistent, \"sensor X,Y,Z\" or "
+                    "\"trajectory FILE\"",
+                    text));
   }
   const auto at =
       parseNumberList<3>("--orient", text.substr(kSensor.size()), "\"sensor X,Y,Z\", a place");
-  return {Toward::kSensor, {at[0], at[1], at[2]}};
+  return {Toward::kSensor, {at[0], at[1], at[2]}, {}};
 }
 
 }  // namespace
@@ -38,8 +43,11 @@ void addNormalOptions(CLI::App& command, NormalEstimation& estimation) {
           },
           "Which way normals point: up (terrain, airborne scans), outward from the middle of the "
           "cloud (round things), consistent with their neighbours (closed surfaces outward, open "
-          "ones up), or \"sensor X,Y,Z\": to the place that all points were seen from")
-      ->type_name("up|outward|consistent|\"sensor X,Y,Z\"")
+          "ones up), \"sensor X,Y,Z\": to the place that all points were seen from, or of the "
+          "command "
+          "normals \"trajectory FILE\": to where the sensor was at their gps_time; FILE is a cloud "
+          "of its places with gps_time")
+      ->type_name("up|outward|consistent|\"sensor X,Y,Z\"|\"trajectory FILE\"")
       ->default_str("up");
   command
       .add_option_function<std::string>(

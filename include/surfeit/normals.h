@@ -27,8 +27,9 @@ struct NormalsOptions {
 
 struct NormalsStats {
   std::uint64_t points = 0;
-  std::uint64_t without = 0;   // points that get no normal, or one seen from both sides
-  double mean_confidence = 0;  // of those with one
+  std::uint64_t without = 0;             // points that get no normal, or one seen from both sides
+  std::uint64_t outside_trajectory = 0;  // points seen before its first place or after its last
+  double mean_confidence = 0;            // of those with one
   std::uint64_t memory_bytes = 0;
   std::uint64_t temporary_bytes = 0;
   double index_seconds = 0, seconds = 0;

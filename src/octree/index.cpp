@@ -172,7 +172,13 @@ Status Indexer::checkOptions() const {
     return Status::invalidArgument(
         fmt::format("origin {}, expected a number of at most 1e12", (*options_.origin)[axis]));
   }
-  if (options_.normals) SURFEIT_RETURN_IF_ERROR(NormalRule::check(*options_.normals));
+  if (options_.normals) {
+    SURFEIT_RETURN_IF_ERROR(NormalRule::check(*options_.normals));
+    if (options_.normals->orientation.toward == NormalOrientation::Toward::kTrajectory) {
+      return Status::invalidArgument(
+          "surfels of a scene have no time: find normals by a trajectory with surfeit normals");
+    }
+  }
   if (!(options_.overlap >= 1 && options_.overlap <= 16)) {
     return Status::invalidArgument(
         fmt::format("disk overlap {}, expected 1 to 16", options_.overlap));

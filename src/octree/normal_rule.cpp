@@ -31,14 +31,16 @@ NormalRule::NormalRule(const NormalEstimation& estimation, UpAxis up, const glm:
       sensor_(estimation.orientation.sensor - origin),
       centre_(centre) {}
 
-glm::vec3 NormalRule::oriented(const glm::vec3& normal, const glm::vec3& place) const {
+glm::vec3 NormalRule::oriented(const glm::vec3& normal, const glm::vec3& place,
+                               const glm::vec3& sensor) const {
   float toward = 0;
   switch (estimation_.orientation.toward) {
     case Toward::kUp:
       toward = normal[int(up_)];
       break;
     case Toward::kSensor:
-      toward = glm::dot(normal, sensor_ - place);
+    case Toward::kTrajectory:
+      toward = glm::dot(normal, sensor - place);
       break;
     case Toward::kOutward:
       toward = glm::dot(normal, place - centre_);
@@ -49,12 +51,13 @@ glm::vec3 NormalRule::oriented(const glm::vec3& normal, const glm::vec3& place) 
   return toward < 0 ? -normal : normal;
 }
 
-FoundNormal NormalRule::at(const glm::vec3& place, const SurfaceAt& surface) const {
+FoundNormal NormalRule::at(const glm::vec3& place, const SurfaceAt& surface,
+                           const glm::vec3& sensor) const {
   FoundNormal found;
   found.is_thin = surface.normal == glm::vec3(0) || surface.thickness > kThinThickness;
   found.is_two_sided =
       found.is_thin && estimation_.thin_is_two_sided && surface.normal != glm::vec3(0);
-  if (!found.is_thin || found.is_two_sided) found.normal = oriented(surface.normal, place);
+  if (!found.is_thin || found.is_two_sided) found.normal = oriented(surface.normal, place, sensor);
   return found;
 }
 
@@ -71,6 +74,9 @@ std::string NormalRule::describe() const {
       break;
     case Toward::kOutward:
       text = "outward";
+      break;
+    case Toward::kTrajectory:
+      text = "trajectory";
       break;
     case Toward::kConsistent:
       text = fmt::format("consistent, up {}", upAxisName(up_));

@@ -33,13 +33,22 @@ class NormalRule {
     return estimation_.orientation.toward == NormalOrientation::Toward::kConsistent;
   }
 
-  FoundNormal at(const glm::vec3& place, const SurfaceAt& surface) const;
+  // Whether at() must be told where the sensor was, from the origin.
+  bool needsTrajectory() const {
+    return estimation_.orientation.toward == NormalOrientation::Toward::kTrajectory;
+  }
+
+  FoundNormal at(const glm::vec3& place, const SurfaceAt& surface) const {
+    return at(place, surface, sensor_);
+  }
+  FoundNormal at(const glm::vec3& place, const SurfaceAt& surface, const glm::vec3& sensor) const;
 
   // For provenance: "up, thin spheres".
   std::string describe() const;
 
  private:
-  glm::vec3 oriented(const glm::vec3& normal, const glm::vec3& place) const;
+  glm::vec3 oriented(const glm::vec3& normal, const glm::vec3& place,
+                     const glm::vec3& sensor) const;
 
   NormalEstimation estimation_;
   UpAxis up_;

@@ -27,6 +27,7 @@
 #include "octree/record_sorter.h"
 #include "octree/scene_rows.h"
 #include "octree/surface_search.h"
+#include "octree/trajectory.h"
 
 namespace surfeit {
 namespace {
@@ -39,9 +40,9 @@ constexpr std::size_t kPlacesPerThread = 8192, kRows = 8192;
 struct OrderedPlace {
   std::uint64_t key = 0, row = 0;
   glm::vec3 place{0};
-  std::uint32_t reserved = 0;  // no padding: records are written as bytes
+  glm::vec3 sensor{0};  // with a trajectory; no padding: records are written as bytes
 };
-static_assert(sizeof(OrderedPlace) == 32);
+static_assert(sizeof(OrderedPlace) == 40);
 
 // What was found, by row.
 struct FoundRow {
@@ -127,6 +128,21 @@ class NormalsJob {
       }
       places_.properties[i] = *property;
     }
+    return openTrajectory();
+  }
+
+  Status openTrajectory() {
+    const NormalOrientation& orientation = options_.estimation.orientation;
+    if (orientation.toward != NormalOrientation::Toward::kTrajectory) return {};
+    const PlyProperty* const time = reader_->element().find("gps_time");
+    if (time == nullptr) {
+      return Status::invalidArgument(fmt::format(
+          "{}: no property gps_time, by which a trajectory is looked up; --channels NAME=gps_time "
+          "takes another",
+          input_));
+    }
+    time_ = *time;
+    SURFEIT_ASSIGN_OR_RETURN(trajectory_, Trajectory::read(orientation.trajectory, progress_));
     return {};
   }
 
@@ -196,15 +212,23 @@ class NormalsJob {
       SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, readRows());
       if (rows.empty()) break;
       for (std::size_t at = 0; at < rows.size(); at += row_bytes, ++row) {
-        OrderedPlace ordered{0, row, places_.place(rows.data() + at)};
+        OrderedPlace ordered{0, row, places_.place(rows.data() + at), {}};
         if (!isFinite(ordered.place)) continue;
         ordered.key = curveKey(ordered.place, cube);
+        if (trajectory_) ordered.sensor = sensorAt(rows.data() + at);
         SURFEIT_RETURN_IF_ERROR(
             places_in_order_->add(reinterpret_cast<const std::byte*>(&ordered)));
       }
       progress_.advance(rows.size() / row_bytes);
     }
     return places_in_order_->finish();
+  }
+
+  // Where the sensor was when it saw the point of a row.
+  glm::vec3 sensorAt(const std::byte* row) {
+    const double time = plyValue(row + time_.offset, time_.type);
+    if (!trajectory_->covers(time)) ++stats_.outside_trajectory;
+    return glm::vec3(trajectory_->at(time) - places_.origin);
   }
 
   // Normals of all places, into found_rows_, by row.
@@ -241,7 +265,8 @@ class NormalsJob {
   }
 
   FoundRow foundAt(const OrderedPlace& at, const SurfaceAt& surface) const {
-    const FoundNormal found = rule_->at(at.place, surface);
+    const FoundNormal found = rule_->needsTrajectory() ? rule_->at(at.place, surface, at.sensor)
+                                                       : rule_->at(at.place, surface);
     FoundRow row;
     row.row = at.row;
     row.normal = rule_->needsSides() && !found.is_thin ? surface.own_normal : found.normal;
@@ -344,6 +369,12 @@ class NormalsJob {
   }
 
   void tell() {
+    if (stats_.outside_trajectory > 0) {
+      progress_.note(fmt::format(
+          "{}: {} points were seen before or after the trajectory: its nearest end stands for the "
+          "sensor",
+          input_, stats_.outside_trajectory));
+    }
     const std::uint64_t with = stats_.points - stats_.without;
     if (with > 0) stats_.mean_confidence /= double(with);
     if (stats_.without == 0) return;
@@ -365,6 +396,8 @@ class NormalsJob {
   IndexOptions indexing_;  // of the places
   std::unique_ptr<RowReader> reader_;
   PlaceReader places_;
+  PlyProperty time_;  // with a trajectory
+  std::optional<Trajectory> trajectory_;
   std::optional<NormalRule> rule_;
   std::uint64_t sorter_bytes_ = 0;  // of each
   std::unique_ptr<PagedOctree> octree_;

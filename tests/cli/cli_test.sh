@@ -62,7 +62,7 @@ statisticsHaveTheDocumentedFields() {
   run 0 sample cornell.obj -o again.ply --count 1000 --stats sample.json
   jsonHas sample.json "${common[@]}" triangles surfels area spacing phases
   run 0 index cornell.ply -o again.sft --stats index.json
-  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records repeated_surfels nodes node_pages \
+  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records repeated_surfels normals_found thin_surfels nodes node_pages \
     surfel_pages file_bytes bytes_per_surfel temporary_bytes surfels_per_second phases \
     sample read build finish
   run 0 generate --surfels 1k -o city.ply --stats generate.json
@@ -80,7 +80,7 @@ statisticsHaveTheDocumentedFields() {
   jsonHas normals.json "${common[@]}" points points_without_surface mean_confidence memory_bytes \
     temporary_bytes points_per_second phases order
   run 2 normals cornell.ply -o normals.csv --orient sideways
-  says "expected up, outward or"
+  says "expected up, outward, consistent, "
   run 0 verify cornell.sft --stats verify.json
   jsonHas verify.json "${common[@]}" pages bytes finding_count findings
   run 0 gather cornell.sft again.ply -o lit.ply --memory 64M --stats gather.json --cache-series series.csv

@@ -184,12 +184,64 @@ TEST_F(NormalsTest, RoomsFaceTheirSensor) {
   }
   write(points);
   NormalsOptions options;
-  options.estimation.orientation = {Toward::kSensor, {1000.3, .6, .4}};
+  options.estimation.orientation = {Toward::kSensor, {1000.3, .6, .4}, {}};
   const glm::dvec3 sensor = options.estimation.orientation.sensor;
   const Found found = find(options);
   for (std::size_t i = 0; i < found.normal.size(); ++i) {
     EXPECT_GE(glm::dot(found.normal[i], sensor - found.position[i]), -1e-4);
   }
+}
+
+// A corridor along x, driven through: its walls, floor and ceiling face the middle.
+TEST_F(NormalsTest, CorridorsFaceWhereTheSensorWasAtTheirTime) {
+  std::string text = "x,y,z,t\n", trajectory = "t,x,y,z\n";
+  std::vector<glm::dvec3> inward;
+  for (int i = 0; i < 20000; ++i) {
+    const double x = 40 * unit();
+    const int side = i % 4;
+    const double along = 2 * unit() - 1, far = side % 2 == 0 ? -1 : 1;
+    const glm::dvec3 p = side < 2 ? glm::dvec3(x, along, far) : glm::dvec3(x, far, along);
+    text += fmt::format("{},{},{},{}\n", p.x, p.y, p.z, 1000 + x / 2 + unit());
+    inward.push_back(side < 2 ? glm::dvec3(0, 0, -far) : glm::dvec3(0, -far, 0));
+  }
+  for (int i = 21; i >= 0; --i) trajectory += fmt::format("{},{},0,0\n", 1000 + i, 2 * i);
+  DirectoryTest::write("corridor.csv", text);
+  DirectoryTest::write("trajectory.csv", trajectory);
+  NormalsOptions options;
+  options.channels = "t=gps_time";
+  options.estimation.orientation = {Toward::kTrajectory, {}, path("trajectory.csv")};
+  const auto stats = estimateNormals(path("corridor.csv"), path("normals.ply"), options, notes_);
+  ASSERT_TRUE(stats.ok()) << stats.status().message();
+  EXPECT_EQ(stats->outside_trajectory, 0u);
+  const auto reader = openRowReader(path("normals.ply"));
+  const std::vector<std::byte> rows = readAllRows(**reader);
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < inward.size(); ++i) {
+    const auto value = [&](const char* property) { return valueOf(**reader, rows, i, property); };
+    const glm::dvec3 normal(value("nx"), value("ny"), value("nz"));
+    wrong += glm::dot(normal, inward[i]) < 0 ? 1 : 0;
+  }
+  EXPECT_LT(wrong, inward.size() / 200);  // a few at the edges of the corridor
+
+  // Times outside, no times, no trajectory
+  DirectoryTest::write("trajectory.csv", "t,x,y,z\n1005,10,0,0\n1008,16,0,0\n");
+  const auto outside = estimateNormals(path("corridor.csv"), path("normals.ply"), options, notes_);
+  ASSERT_TRUE(outside.ok()) << outside.status().message();
+  EXPECT_GT(outside->outside_trajectory, 10000u);
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("before or after the trajectory")));
+  options.channels.clear();
+  EXPECT_EQ(estimateNormals(path("corridor.csv"), path("a.ply"), options, notes_).status().code(),
+            StatusCode::kInvalidArgument);
+  options.channels = "t=gps_time";
+  options.estimation.orientation.trajectory = path("corridor.csv");
+  DirectoryTest::write("trajectory.csv", "x,y,z\n1,2,3\n");
+  options.estimation.orientation.trajectory = path("trajectory.csv");
+  EXPECT_EQ(estimateNormals(path("corridor.csv"), path("a.ply"), options, notes_).status().code(),
+            StatusCode::kCorruption);
+  IndexOptions indexing;
+  indexing.normals = options.estimation;
+  EXPECT_EQ(indexClouds({path("corridor.csv")}, path("a.sft"), indexing, notes_).status().code(),
+            StatusCode::kInvalidArgument);
 }
 
 TEST_F(NormalsTest, PointsAllAroundHaveNoneOrAreTwoSided) {
@@ -244,7 +296,7 @@ TEST_F(NormalsTest, IndexFindsTheSame) {
   write(points);
   for (const bool is_two_sided : {false, true}) {
     NormalsOptions options;
-    options.estimation = {{Toward::kOutward, {}}, is_two_sided};
+    options.estimation = {{Toward::kOutward, {}, {}}, is_two_sided};
     const Found found = find(options);
     IndexOptions indexing;
     indexing.full_precision = true;
@@ -271,7 +323,7 @@ TEST_F(NormalsTest, IndexLeavesNormalsAloneThatAreThere) {
   write(sphere(2000, 0));
   find({});  // up, which is wrong for half of them
   IndexOptions indexing;
-  indexing.normals = NormalEstimation{{Toward::kOutward, {}}, false};
+  indexing.normals = NormalEstimation{{Toward::kOutward, {}, {}}, false};
   const auto stats = indexClouds({path("normals.ply")}, path("cloud.sft"), indexing, notes_);
   ASSERT_TRUE(stats.ok()) << stats.status().message();
   EXPECT_EQ(stats->normals_found, 0u);
@@ -284,7 +336,7 @@ TEST_F(NormalsTest, WhatCannotBeDoneIsSaid) {
   EXPECT_EQ(estimateNormals(path("cloud.ply"), path("a.ply"), options, notes_).status().code(),
             StatusCode::kBudgetTooSmall);
   options.memory_bytes = 0;
-  options.estimation.orientation = {Toward::kSensor, {NAN, 0, 0}};
+  options.estimation.orientation = {Toward::kSensor, {NAN, 0, 0}, {}};
   EXPECT_EQ(estimateNormals(path("cloud.ply"), path("a.ply"), options, notes_).status().code(),
             StatusCode::kInvalidArgument);
   EXPECT_EQ(estimateNormals(path("gone.ply"), path("a.ply"), {}, notes_).status().code(),

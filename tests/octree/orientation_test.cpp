@@ -180,7 +180,7 @@ TEST_F(OrientationTest, IndexTurnsThemTheSameWay) {
   addTerrain(20000);
   write();
   IndexOptions options;
-  options.normals = NormalEstimation{{Toward::kConsistent, {}}, false};
+  options.normals = NormalEstimation{{Toward::kConsistent, {}, {}}, false};
   Progress quiet;
   const auto stats = indexClouds({path("cloud.ply")}, path("cloud.sft"), options, quiet);
   ASSERT_TRUE(stats.ok()) << stats.status().message();
