@@ -120,7 +120,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   command
-      ->add_option("--disk-overlap", options.overlap,
+      ->add_option("--disk-overlap", options.disk_overlap,
                    "Disk area over surfel area, where radius or area is missing")
       ->check(CLI::Range(1.0, 16.0))
       ->capture_default_str();

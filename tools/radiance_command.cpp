@@ -76,7 +76,8 @@ void addEstimateOptions(CLI::App& command, RadianceOptions& options) {
           "Reflectance where photons bring none [\"0.5 0.5 0.5\"]")
       ->type_name("\"r g b\"");
   command
-      .add_option("--overlap", options.overlap, "Disk area over surfel area of the surfels written")
+      .add_option("--disk-overlap", options.disk_overlap,
+                  "Disk area over surfel area of the surfels written")
       ->check(CLI::Range(1.0, 16.0))
       ->capture_default_str();
 }

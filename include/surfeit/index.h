@@ -29,7 +29,7 @@ struct IndexOptions {
   std::uint64_t memory_bytes = 0;
   int threads = 0;                    // 0: all that the job may use and the budget feeds
   std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
-  float overlap = 2;                  // disk area over surfel area where one must be made up
+  float disk_overlap = 2;             // disk area over surfel area where one must be made up
                                       // (--disk-overlap)
   Repeats repeats = Repeats::kKeep;   // of overlapping clouds, such as tiles (--overlap)
   bool full_precision = false;        // keep floats instead of quantized values

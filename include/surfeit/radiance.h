@@ -23,7 +23,7 @@ struct RadianceOptions {
   glm::vec3 default_albedo{0.5f};  // reflectance where the photons bring none, 0 to 1
   // Disk area over surfel area, 1 to 16. Photons lie at random, so disks must overlap more than
   // those cut from a mesh to leave no gaps: e^-overlap of the surface stays uncovered.
-  float overlap = 7;
+  float disk_overlap = 7;
   // As in GatherOptions; at least 64 MiB.
   std::uint64_t memory_bytes = 0;
   int threads = 0;                    // 0: all that the job may use

@@ -71,8 +71,8 @@ Status checkOptions(const RadianceOptions& options) {
     if (options.default_albedo[i] >= 0 && options.default_albedo[i] <= 1) continue;
     return refuse("albedo", options.default_albedo[i], "0 to 1");
   }
-  if (!(options.overlap >= 1 && options.overlap <= 16)) {
-    return refuse("overlap", options.overlap, "1 to 16");
+  if (!(options.disk_overlap >= 1 && options.disk_overlap <= 16)) {
+    return refuse("disk overlap", options.disk_overlap, "1 to 16");
   }
   if (options.threads < 0 || options.threads > kMostThreads) {
     return refuse("thread count", options.threads, fmt::format("0 to {}", kMostThreads));
@@ -356,7 +356,7 @@ Status RadianceJob::estimatePage(Worker& worker, PageWork& work) const {
     for (std::size_t i = 0; i < run.size(); ++i) {
       const RadianceEstimate estimate = worker.estimator.estimate(worker.nearest.nearest(i));
       run[i].area = estimate.area;
-      run[i].radius = std::sqrt(options_.overlap * estimate.area / kPi);
+      run[i].radius = std::sqrt(options_.disk_overlap * estimate.area / kPi);
       run[i].radiosity = run[i].albedo * estimate.irradiance;
       work.sparse += estimate.is_sparse ? 1 : 0;
       work.radius_sum += double(estimate.radius);

@@ -179,9 +179,9 @@ Status Indexer::checkOptions() const {
           "surfels of a scene have no time: find normals by a trajectory with surfeit normals");
     }
   }
-  if (!(options_.overlap >= 1 && options_.overlap <= 16)) {
+  if (!(options_.disk_overlap >= 1 && options_.disk_overlap <= 16)) {
     return Status::invalidArgument(
-        fmt::format("disk overlap {}, expected 1 to 16", options_.overlap));
+        fmt::format("disk overlap {}, expected 1 to 16", options_.disk_overlap));
   }
   return {};
 }
@@ -217,7 +217,7 @@ Status Indexer::takeSample() {
   if (moveOrigin(originAsked(boundsOf(sample_)))) {
     SURFEIT_ASSIGN_OR_RETURN(sample_, reader_->sample(buckets));
   }
-  for (Surfel& surfel : sample_) applySizeRules(surfel, options_.overlap);
+  for (Surfel& surfel : sample_) applySizeRules(surfel, options_.disk_overlap);
   return {};
 }
 
@@ -319,7 +319,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
       curveKeys(&surfels.front().position, sizeof(Surfel), *cube, keys);
     }
     for (Surfel& surfel : surfels) {
-      applySizeRules(surfel, options_.overlap);
+      applySizeRules(surfel, options_.disk_overlap);
       // Positions are told apart by their bits: 0 and -0 are one
       if (options_.repeats == Repeats::kThin) surfel.position += glm::vec3(0);
     }
@@ -399,7 +399,7 @@ Status Indexer::buildWithNeighbours(std::unique_ptr<BucketStream> buckets, Scene
   SURFEIT_ASSIGN_OR_RETURN(SceneFile places, buildPlaces(std::move(buckets)));
   SURFEIT_RETURN_IF_ERROR(tellRepeats());
   NeighbourBuild how;
-  how.overlap = options_.overlap;
+  how.disk_overlap = options_.disk_overlap;
   how.threads = threads_;
   how.memory_bytes = plan_.octree_memory;
   how.temporary_directory = temporary_directory_;
@@ -441,7 +441,7 @@ std::string Indexer::provenance() const {
   nlohmann::json json = {{"program", "surfeit"},
                          {"version", kVersion},
                          {"leaf_capacity", options_.leaf_capacity},
-                         {"overlap", options_.overlap},
+                         {"overlap", options_.disk_overlap},
                          {"precision", options_.full_precision ? "full" : "quantized"},
                          {"skipped_records", totals_.skipped},
                          {"sizes_from_neighbours", totals_.missing_both},

@@ -32,7 +32,7 @@ Result<std::optional<SceneFile>> buildFound(SceneFile places, const NeighbourBui
   SURFEIT_ASSIGN_OR_RETURN(
       const std::unique_ptr<PagedOctree> octree,
       openOctree(std::move(places), how, SizedSurfelStream::searcherBytes(how.threads)));
-  SizedSurfelStream found(*octree, how.overlap, how.normals, how.threads);
+  SizedSurfelStream found(*octree, how.disk_overlap, how.normals, how.threads);
   SURFEIT_RETURN_IF_ERROR(found.prepare());
   std::optional<SceneFile> unoriented;
   if (how.normals && how.normals->needsSides()) {

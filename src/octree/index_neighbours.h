@@ -17,7 +17,7 @@
 namespace surfeit {
 
 struct NeighbourBuild {
-  float overlap = 2;
+  float disk_overlap = 2;
   int threads = 1;
   std::uint64_t memory_bytes = 0;  // beside what building takes
   std::string temporary_directory;

@@ -23,11 +23,11 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
   }
   if (totals.missing_area > 0) {
     progress.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area,
-                              options.overlap));
+                              options.disk_overlap));
   }
   if (totals.missing_radius > 0) {
     progress.note(fmt::format("{} surfels have no radius: a disk of {} times the area is used",
-                              totals.missing_radius, options.overlap));
+                              totals.missing_radius, options.disk_overlap));
   }
   if (totals.spheres == 0) return;
   if (options.normals) {

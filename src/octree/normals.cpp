@@ -271,7 +271,7 @@ class NormalsJob {
     row.row = at.row;
     row.normal = rule_->needsSides() && !found.is_thin ? surface.own_normal : found.normal;
     row.confidence = surface.confidence;
-    row.radius = std::sqrt(IndexOptions().overlap) * surface.radius;
+    row.radius = std::sqrt(IndexOptions().disk_overlap) * surface.radius;
     row.area = surface.area;
     row.is_thin = found.is_thin;
     row.is_two_sided = found.is_two_sided;

@@ -70,7 +70,7 @@ radianceHasItsOptions() {
     fail "no more sparse surfels within a smaller radius"
   run 0 radiance photons.ply -o few.ply --photons-per-estimate 10
   differentBytes few.ply all.ply
-  run 0 radiance photons.ply -o large.ply --overlap 9
+  run 0 radiance photons.ply -o large.ply --disk-overlap 9
   differentBytes large.ply all.ply
   run 0 radiance photons.ply -o grey.ply --channels albedo=- --albedo "0.25 0.25 0.25"
   says "0.25 0.25 0.25 is used"
@@ -79,7 +79,7 @@ radianceHasItsOptions() {
   run 74 radiance photons.ply -o none.ply --temp nowhere
   says nowhere
   run 2 radiance photons.ply -o none.ply --albedo "1 2"
-  run 2 radiance photons.ply -o none.ply --overlap 0
+  run 2 radiance photons.ply -o none.ply --disk-overlap 0
   leavesNothing none
 }
 

@@ -417,7 +417,7 @@ TEST_F(BadPhotons, AndBadOptionsLeaveNothing) {
   options.default_albedo.y = 1.5f;
   expectRefused(photons, bad, "albedo is 1.5, expected 0 to 1", options);
   options = {};
-  options.overlap = 0;
+  options.disk_overlap = 0;
   expectRefused(photons, bad, "overlap is 0, expected 1 to 16", options);
   options = {};
   options.memory_bytes = 1 << 20;

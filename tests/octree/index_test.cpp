@@ -315,7 +315,7 @@ TEST_F(IndexTest, AreaAndRadiusFollowFromEachOther) {
   for (const float overlap : {1.f, 2.f, 4.f}) {
     for (const CloudChannels& channels : {radii, areas}) {
       IndexOptions options = kFullPrecision;
-      options.overlap = overlap;
+      options.disk_overlap = overlap;
       const Result<ReadScene> scene = readScene(index(cloud, channels, options));
       ASSERT_TRUE(scene.ok());
       for (const Surfel& surfel : scene->surfels) {
@@ -401,7 +401,7 @@ TEST_F(IndexTest, FailuresSayWhyAndLeaveNothing) {
        StatusCode::kInvalidArgument,
        "leaf capacity"},
       {{path("good.ply")},
-       optionsWith(&IndexOptions::overlap, NAN),
+       optionsWith(&IndexOptions::disk_overlap, NAN),
        StatusCode::kInvalidArgument,
        "overlap"},
       {{path("good.ply")},
