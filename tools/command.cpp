@@ -12,6 +12,7 @@
 
 #include "core/job_limits.h"
 #include "core/program_memory.h"
+#include "core/resident_limit.h"
 #include "core/seconds_since.h"
 #include "io/file.h"
 #include "tools/output_check.h"
@@ -76,6 +77,9 @@ void CommandContext::run(const std::function<Status()>& body) {
   progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
                                                 common.strict);
   countProgramInBudgets();
+  if (programBytes(1) > 0) {
+    limitResidentBytes(common.memory_bytes > 0 ? common.memory_bytes : defaultMemoryBytes());
+  }
   try {
     status = checkParsed();
     if (status.ok()) status = body();

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "core/resident_limit.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/generate_scene.h"
@@ -45,6 +46,10 @@ Status runGenerate(const GenerateArguments& arguments, CommandContext& context) 
         fmt::format("{}: a recipe of {} surfels", arguments.output, formatCount(recipe.surfels)));
     return context.writeStats(std::move(fields));
   }
+  // Batches on their way; a scene that is written as it is made takes no more
+  constexpr std::uint64_t kBatchBytes = 10 << 20, kThreadBytes = 4 << 20;
+  SURFEIT_RETURN_IF_ERROR(checkResidentBytes(
+      "generate", kBatchBytes + kThreadBytes * std::uint64_t(context.threads())));
   SURFEIT_ASSIGN_OR_RETURN(
       const GenerateStats stats,
       generateScene(recipe, arguments.output, context.threads(), context.progress()));
@@ -101,7 +106,7 @@ void addGenerateCommand(CLI::App& app, CommandContext& context) {
   addSceneOptions(*command, arguments->recipe);
   command->add_flag("--recipe", arguments->is_recipe,
                     "Write a recipe: a few lines that index takes in place of the cloud");
-  context.addCommonOptions(*command, {.threads = true, .memory = false, .stats = true});
+  context.addCommonOptions(*command, {.threads = true, .stats = true});
   command->footer(
       "A kilometre by a kilometre, the same surfaces at every number of surfels.\n"
       "Examples:\n"

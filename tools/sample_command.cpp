@@ -80,8 +80,10 @@ void addSampleCommand(CLI::App& app, CommandContext& context) {
       app.add_subcommand("sample", "Turn triangle meshes into surfels with direct light");
   const auto arguments = std::make_shared<SampleArguments>();
   addSampleOptions(*command, *arguments);
-  context.addCommonOptions(*command, {.threads = true, .memory = false, .stats = true});
+  context.addCommonOptions(*command, {.threads = true, .stats = true});
   command->footer(
+      "Meshes are held whole, some 100 bytes a triangle; --memory refuses what takes more than "
+      "that.\n"
       "Examples:\n"
       "  surfeit sample cornell.obj -o cornell.ply --count 1000000\n"
       "  surfeit sample lion.ply -o lion.ply --spacing 0.01 --ground-plane --up z \\\n"

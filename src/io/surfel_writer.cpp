@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/resident_limit.h"
 #include "io/cloud_formats.h"
 #include "io/surfel_rows.h"
 
@@ -38,6 +39,11 @@ Result<SurfelWriter> SurfelWriter::create(const std::string& path, const CloudCh
                                           RowWriterOptions options, const glm::dvec3& origin) {
   SurfelRows packing(channels, origin);
   options.properties = packing.properties();
+  if (options.memory_beside_bytes == 0) {
+    const ResidentRoom room = residentRoom();
+    options.memory_bytes = std::min(options.memory_bytes, room.free_bytes);
+    options.memory_beside_bytes = room.resident_bytes;
+  }
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> file, createRowWriter(path, options));
   SurfelWriter writer(std::make_unique<State>(
       State{std::move(file), std::move(packing), {}, path, options.progress, {}}));

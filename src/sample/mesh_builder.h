@@ -1,3 +1,7 @@
+// What a mesh takes in the end, ready for tracing, over what its readers hold of it
+// (docs/architecture.md, "Memory").
+inline constexpr double kHeldTimes = 2.5, kHeldTimesOfObj = 2.1;
+
 // A mesh in the making: what the readers of mesh files add to.
 #pragma once
 

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string_view>
 
+#include "core/resident_limit.h"
 #include "io/cloud_formats.h"
 #include "io/ply_reader.h"
 #include "io/srgb_curve.h"
@@ -17,6 +18,9 @@
 
 namespace surfeit {
 namespace {
+
+// Faces after which memory is looked at.
+constexpr std::uint64_t kCheckedFaces = 65536;
 
 using Triple = std::array<const PlyProperty*, 3>;
 
@@ -90,6 +94,8 @@ Result<bool> readVertices(RowReader& reader, MeshBuilder& builder) {
   for (;;) {
     SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, reader.readRows(kBatchRows, buffer));
     if (rows.empty()) return color.has_value();
+    const double part = double(builder.position.size() - vertex_begin) / double(element.count) / 3;
+    SURFEIT_RETURN_IF_ERROR(checkResidentBytes(reader.path(), 0, part, kHeldTimes));
     for (std::size_t at = 0; at < rows.size(); at += element.row_bytes) {
       const std::byte* const row = &rows[at];
       builder.position.push_back(value(row, *position));
@@ -132,6 +138,11 @@ Status readFaces(PlyReader& reader, const PlyElement& element, std::uint32_t mat
       corners.push_back(vertex_begin + std::uint64_t(index));
     }
     SURFEIT_RETURN_IF_ERROR(builder.addFace(corners, material, vertex_begin, reader.path(), face));
+    if (face % kCheckedFaces == 0) {
+      // Vertices are some half of what faces are
+      const double part = (1 + 2 * double(face) / double(element.count)) / 3;
+      SURFEIT_RETURN_IF_ERROR(checkResidentBytes(reader.path(), 0, part, kHeldTimes));
+    }
   }
 }
 

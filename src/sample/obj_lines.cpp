@@ -8,6 +8,9 @@
 #include <cstring>
 #include <span>
 
+#include "core/resident_limit.h"
+#include "sample/mesh_builder.h"
+
 namespace surfeit {
 namespace {
 
@@ -71,6 +74,11 @@ bool ObjLines::readPhysicalLine() {
                                                number_ + 1, kLongestLine));
       return false;
     }
+    // Vertices mostly come first, and take less than the faces
+    const double read = input_.size() ? double(offset_) / double(*input_.size() + 1) : .5;
+    const double part = std::pow(read, 1.5);
+    status_ = checkResidentBytes(input_.path(), 0, part, kHeldTimesOfObj);
+    if (!status_.ok()) return false;
     buffer_.resize(kReadBytes);
     begin_ = 0;
     const Result<std::size_t> count =

@@ -10,10 +10,14 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "core/resident_limit.h"
 #include "core/split_mix.h"
 
 namespace surfeit {
 namespace {
+
+// Of a triangle, while the hierarchy is built.
+constexpr std::uint64_t kHierarchyBytes = 75;
 
 RTCRay makeRay(const glm::vec3& origin, const glm::vec3& direction, float begin, float end) {
   RTCRay ray;
@@ -62,6 +66,8 @@ RayScene& RayScene::operator=(RayScene&&) noexcept = default;
 RayScene::~RayScene() = default;
 
 Result<RayScene> RayScene::build(const Mesh& mesh, int threads) {
+  SURFEIT_RETURN_IF_ERROR(checkResidentBytes(fmt::format("{} triangles", mesh.triangle.size()),
+                                             kHierarchyBytes * mesh.triangle.size()));
   auto handles = std::make_unique<Handles>();
   handles->device = rtcNewDevice(fmt::format("threads={}", std::max(threads, 1)).c_str());
   if (handles->device == nullptr) {

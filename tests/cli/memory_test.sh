@@ -101,6 +101,55 @@ budgetsThatAreNamedDo() {
   done
 }
 
+# 79,202 triangles, as text and as PLY.
+makeMeshes() {
+  skipWhereSanitized
+  awk 'BEGIN {
+    n = 200
+    for (j = 0; j < n; ++j) for (i = 0; i < n; ++i) print "v", i, sin(i / 7) * cos(j / 5), j
+    for (j = 0; j + 1 < n; ++j) for (i = 1; i < n; ++i) {
+      a = j * n + i
+      print "f", a, a + 1, a + n + 1, a + n
+    }
+  }' > grid.obj
+  awk '/^v/ { vertices[++v] = $2 " " $3 " " $4 } /^f/ { faces[++f] = "4 " $2 - 1 " " $3 - 1 " " $4 - 1 " " $5 - 1 }
+    END {
+      print "ply\nformat ascii 1.0\nelement vertex " v "\nproperty float x\nproperty float y\nproperty float z"
+      print "element face " f "\nproperty list uchar int vertex_indices\nend_header"
+      for (i = 1; i <= v; ++i) print vertices[i]
+      for (i = 1; i <= f; ++i) print faces[i]
+    }' grid.obj > grid.ply
+}
+
+meshesAreHeldWithinTheBudget() {
+  local mesh limit command successes
+  makeMeshes
+  for mesh in grid.obj grid.ply; do
+    for command in "sample $mesh -o out.ply --count 5000 --threads 1" \
+      "sample $mesh -o out.ply --photons 5000 --threads 1 --light-point 100,-50,100,1,1,1"; do
+      successes=0
+      for limit in 12 16 24 32 48 64 96; do
+        if runWithin "$limit" "$command" --memory "${limit}M"; then
+          ((++successes))
+        else
+          [[ $successes == 0 ]] || fail "$limit MiB do not do, but less does: $command"
+          runWithin "$(awk -v least="$least" 'BEGIN { print int(least) + 1 }')" "$command" --memory "$least"M ||
+            fail "$least MiB do not do: $command: $said"
+        fi
+      done
+      ((successes >= 1)) || fail "96 MiB do not do: $command"
+    done
+  done
+  for limit in 16 32 64 128; do
+    runWithin "$limit" "generate -o out.vdb --surfels 300k --threads 1" --memory "${limit}M" ||
+      echo "$least MiB would do"
+    runWithin "$limit" "generate -o out.ply --surfels 300k --threads 1" --memory "${limit}M" ||
+      echo "$least MiB would do"
+  done
+  SLURM_MEM_PER_NODE=24 run 33 sample grid.obj -o out.ply --count 5000
+  says "MiB would do"
+}
+
 jobsLimitEveryCommand() {
   local command
   makeInputs
