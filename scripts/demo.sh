@@ -8,7 +8,7 @@ surfels=1000000
 receivers=250000
 memory=64M
 # Where examples/cornell_scene.cpp puts the camera: before the open side of the box
-camera=(--eye "0.5 0.5 2.4" --look-at "0.5 0.5 0" --fov 37 --size 900x900)
+camera=(--eye "0.5 0.5 2.4" --look-at "0.5 0.5 0" --fov 37 --size 900x900 --cull-back)
 
 say() { printf '\n== %s\n' "$*"; }
 
