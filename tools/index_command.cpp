@@ -158,7 +158,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->footer(
       "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
       "disk overlap;\n"
-      "no radius, that of the area; neither, its cell among the neighbours; no normal, a sphere.\n"
+      "no radius, that of the area; neither, its cell among the neighbours; no normal, a sphere\n"
+      "(or --normals estimate).\n"
       "--memory defaults to 1G, or 3/4 of what the job may hold where that is less; 64M is the "
       "least\n"
       "for one thread, 72M for two.\n"
@@ -168,6 +169,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
       "  surfeit index tile1.las tile2.las -o survey.sft --overlap thin\n"
       "  surfeit index city.ply -o city.sft --memory 80%\n"
+      "  surfeit index scan.las -o scan.sft --normals estimate --orient up\n"
       "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");
   command->callback(
       [arguments, &context] { context.run([&] { return runIndex(*arguments, context); }); });

@@ -69,7 +69,7 @@ void addNormalsCommand(CLI::App& app, CommandContext& context) {
       "Writes nx ny nz and normal_confidence, from 0 (neighbours all around) to 1 (on a plane).\n"
       "Examples:\n"
       "  surfeit normals scan.las -o scan_normals.ply\n"
-      "  surfeit normals statue.ply -o statue_normals.ply --orient outward\n"
+      "  surfeit normals statue.ply -o statue_normals.ply --orient consistent\n"
       "  surfeit normals room.ply -o room_normals.ply --orient \"sensor 2,3,1.6\" --thin "
       "two-sided\n"
       "  surfeit index scan_normals.ply -o scan.sft");

@@ -191,9 +191,11 @@ inline float biasPart(float height_in_radii) {
   return std::clamp(1 - height_in_radii / kBiasHeight, 0.f, 1.f);
 }
 
-// The disk of a surfel circumscribes its piece of the surface. For a sliver that says nothing about
-// where the surface is, so disks count as no wider than this times the root of the area.
-inline constexpr float kLargestRadius = 1.5f;
+// The disk of a surfel circumscribes its piece of the surface, or is spread out as far: that of a
+// cell 27 times as long as wide (rows of a scan) has this times the root of the area as radius,
+// sqrt((1 + a^2) / (3 a)). For a longer sliver it says nothing about where the surface is, so disks
+// count as no wider.
+inline constexpr float kLargestRadius = 3.f;
 inline float effectiveRadius(float radius, float area) {
   return std::min(radius, kLargestRadius * std::sqrt(area));
 }

@@ -38,10 +38,10 @@ TEST_F(SamplingCasesTest, GridsOccludeAsTheirExactAreas) {
     const std::vector<double> found = occlusion(name, "lines/receivers.ply");
     for (std::size_t i = 0; i < right.size(); ++i) EXPECT_NEAR(found[i], right[i], .01) << name;
   }
-  // Areas are right, but disks along rows leave gaps between them: .02 to .09 is missing, where .22
+  // Disks that reach the next row hide a little less between them: up to .04 is missing, where .22
   // was
   const std::vector<double> rows = occlusion("lines/ratio_10.ply", "lines/receivers.ply");
-  for (std::size_t i = 0; i < right.size(); ++i) EXPECT_NEAR(rows[i], right[i], .1);
+  for (std::size_t i = 0; i < right.size(); ++i) EXPECT_NEAR(rows[i], right[i], .045);
 }
 
 TEST_F(SamplingCasesTest, PointsThatComeTwiceOccludeOnce) {
