@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/or_exit.h"
 #include "random/closed_things.h"
 #include "random/indexed_scene.h"
 #include "surfeit/gather.h"
@@ -26,15 +27,6 @@ namespace {
 using Cloud = std::vector<Surfel>;
 constexpr double kPiExact = 3.14159265358979323846;
 
-// The value, or the end of the program.
-template <typename T>
-T take(Result<T> result) {
-  if (!result.ok()) {
-    fmt::print(stderr, "leaks: {}\n", result.status().message());
-    std::exit(1);
-  }
-  return std::move(*result);
-}
 struct Settings {
   GatherQuality quality;
   bool packets = false;

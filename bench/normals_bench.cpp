@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/or_exit.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "io/cloud_formats.h"
@@ -30,20 +31,6 @@
 
 namespace surfeit {
 namespace {
-
-template <typename T>
-T take(Result<T> result) {
-  if (!result.ok()) {
-    fmt::print(stderr, "normals_bench: {}\n", result.status().message());
-    std::exit(1);
-  }
-  return std::move(*result);
-}
-void need(const Status& status) {
-  if (status.ok()) return;
-  fmt::print(stderr, "normals_bench: {}\n", status.message());
-  std::exit(1);
-}
 
 struct Places {
   std::vector<Surfel> surfels;  // with the normals of their triangles

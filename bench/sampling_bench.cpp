@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "bench/or_exit.h"
 #include "core/spherical_harmonics.h"
 #include "io/cloud_formats.h"
 #include "io/surfel_writer.h"
@@ -28,20 +29,6 @@
 
 namespace surfeit {
 namespace {
-
-template <typename T>
-T take(Result<T> result) {
-  if (!result.ok()) {
-    fmt::print(stderr, "sampling_bench: {}\n", result.status().message());
-    std::exit(1);
-  }
-  return std::move(*result);
-}
-void need(const Status& status) {
-  if (status.ok()) return;
-  fmt::print(stderr, "sampling_bench: {}\n", status.message());
-  std::exit(1);
-}
 
 // A place of the unit square and the part of it that the place stands for; `height` above the
 // surface, in spacings.

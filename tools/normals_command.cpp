@@ -39,6 +39,7 @@ Status runNormals(NormalsArguments& arguments, CommandContext& context) {
        {"memory_bytes", stats.memory_bytes},
        {"points", stats.points},
        {"points_without_surface", stats.without},
+       {"points_outside_trajectory", stats.outside_trajectory},
        {"mean_confidence", stats.mean_confidence},
        {"temporary_bytes", stats.temporary_bytes},
        {"points_per_second", double(stats.points) / seconds},

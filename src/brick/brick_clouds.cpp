@@ -14,10 +14,10 @@
 #include "brick/brick_layout.h"
 #include "brick/brick_sweep.h"
 #include "brick/brick_writer.h"
-#include "octree/record_sorter.h"
 #include "core/job_limits.h"
 #include "io/output_target.h"
 #include "octree/parallel.h"
+#include "octree/record_sorter.h"
 #include "surfeit/brick.h"
 
 namespace surfeit {

@@ -176,12 +176,17 @@ class NormalsJob {
   // What each of both sorters and the caches get; fewer threads where that is too little.
   Result<std::uint64_t> planMemory(const SceneFile& scene) {
     const std::uint64_t rows = kRows * std::uint64_t{reader_->element().row_bytes + 64};
+    const int wanted = threads_;
     for (;; --threads_) {
       const std::uint64_t beside =
           programBytes(threads_) + PagedOctree::fixedBytes(scene, threads_) + rows +
           std::uint64_t(threads_) * (SurfaceSearch::memoryBytes() + kPlacesPerThread * kPlaceBytes);
       const std::uint64_t least = beside + 3 * RecordSorter::kLeastMemory;
       if (stats_.memory_bytes >= least) {
+        if (threads_ < wanted) {
+          progress_.inform(fmt::format("{} of {} threads: a budget of {} MiB feeds no more",
+                                       threads_, wanted, stats_.memory_bytes >> 20));
+        }
         sorter_bytes_ = (stats_.memory_bytes - beside) / 3;
         return sorter_bytes_;
       }

@@ -1,11 +1,11 @@
 #include "octree/orientation.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <thread>
 #include <unordered_map>
 #include <utility>
 
@@ -221,7 +221,6 @@ class SideSearch {
 
   TemporaryFile takeLabels() { return std::move(labels_); }
   std::vector<bool> takeTurned() { return std::move(is_turned_); }
-  std::uint64_t components() const { return components_; }
 
  private:
   Status findPieces() {
@@ -246,18 +245,12 @@ class SideSearch {
 
   static Status findOnThreads(const std::vector<std::unique_ptr<Chunk>>& chunks,
                               std::span<const std::pair<std::uint32_t, std::uint32_t>> runs) {
-    std::vector<Status> statuses(runs.size());
-    const auto search = [&](std::size_t t) {
-      statuses[t] =
-          catchAll("orient", [&] { return chunks[t]->find(runs[t].first, runs[t].second); });
-    };
-    {
-      std::vector<std::jthread> others;
-      for (std::size_t t = 1; t < runs.size(); ++t) others.emplace_back(search, t);
-      search(0);
-    }
-    for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
-    return {};
+    std::atomic<std::size_t> next{0};
+    FirstFailure failure;
+    return runOnThreads(int(runs.size()), failure, "orient", [&] {
+      const std::size_t t = next++;
+      return chunks[t]->find(runs[t].first, runs[t].second);
+    });
   }
 
   Status add(const Chunk& chunk) {
@@ -326,7 +319,6 @@ class SideSearch {
       const SideForest::Root root = forest_.rootOf(i);
       components[root.index].add(pieces_[i], root.is_opposite ? -1 : 1);
     }
-    components_ = components.size();
     is_turned_.resize(pieces_.size());
     for (std::uint32_t i = 0; i < pieces_.size(); ++i) {
       const SideForest::Root root = forest_.rootOf(i);
@@ -352,7 +344,6 @@ class SideSearch {
   std::unordered_map<std::uint64_t, double> votes_;  // by pair of pieces
   SideForest forest_;
   std::vector<bool> is_turned_;
-  std::uint64_t components_ = 0;
 };
 
 }  // namespace
@@ -363,7 +354,7 @@ Result<Sides> Sides::find(PagedOctree& octree, const OrientationOptions& options
                            TemporaryFile::create(options.temporary_directory));
   SideSearch search(octree, options, std::move(labels), progress);
   SURFEIT_RETURN_IF_ERROR(search.run());
-  return Sides(search.takeLabels(), search.takeTurned(), search.components(),
+  return Sides(search.takeLabels(), search.takeTurned(),
                octree.file().header().surfel_group_capacity);
 }
 

@@ -40,20 +40,15 @@ class Sides {
   Status read(std::uint32_t page, std::span<bool> is_turned);
 
   std::uint64_t temporaryBytes() const { return labels_.size(); }
-  std::uint64_t pieces() const { return is_turned_.size(); }
-  std::uint64_t components() const { return components_; }
 
  private:
-  Sides(TemporaryFile labels, std::vector<bool> is_turned, std::uint64_t components,
-        std::size_t page_capacity)
+  Sides(TemporaryFile labels, std::vector<bool> is_turned, std::size_t page_capacity)
       : labels_(std::move(labels)),
         is_turned_(std::move(is_turned)),
-        components_(components),
         page_capacity_(page_capacity) {}
 
   TemporaryFile labels_;         // by surfelId
   std::vector<bool> is_turned_;  // by piece
-  std::uint64_t components_ = 0;
   std::size_t page_capacity_ = 0;
   std::vector<std::uint32_t> buffer_;
 };

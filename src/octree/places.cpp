@@ -269,6 +269,30 @@ std::size_t PlaceIndex::memoryBytes() {
 
 namespace {
 
+// Calls visit(surfel, id), depth first and the nearest child first: distanceTo(node) tells, and
+// what isBeyond(distance) is left out. Nodes are copied because the reader may drop their page.
+template <typename DistanceTo, typename IsBeyond, typename Visit>
+Status visitNearestFirst(const NodeRange& range, PagedOctree::Reader& reader,
+                         const DistanceTo& distanceTo, const IsBeyond& isBeyond,
+                         const Visit& visit) {
+  SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(range));
+  std::array<std::pair<float, Node>, 8> candidates;
+  for (std::size_t i = 0; i < nodes.size(); ++i) candidates[i] = {distanceTo(nodes[i]), nodes[i]};
+  const auto order = std::span(candidates).first(nodes.size());
+  std::sort(order.begin(), order.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [distance, node] : order) {
+    if (isBeyond(distance)) break;
+    if (node.isLeaf()) {
+      SURFEIT_RETURN_IF_ERROR(visitLeaf(node, reader.file(), reader, visit));
+    } else {
+      SURFEIT_RETURN_IF_ERROR(
+          visitNearestFirst(childrenOf(node), reader, distanceTo, isBeyond, visit));
+    }
+  }
+  return {};
+}
+
 // Collects the nearest through the octree.
 class PlaceSearch {
  public:
@@ -276,33 +300,18 @@ class PlaceSearch {
               NearestPlaces& found)
       : position_(position), most_(count), reader_(reader), found_(found) {}
 
-  // Depth first, nearest child first; what is needed of a visited range is copied because the
-  // reader may drop its page.
-  Status visit(const NodeRange& range) {
-    SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader_.nodes(range));
-    std::array<std::pair<float, Node>, 8> candidates;
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      const float distance = glm::length(nodes[i].position - position_) - nodes[i].radius;
-      candidates[i] = {std::max(0.f, distance), nodes[i]};
-    }
-    const auto order = std::span(candidates).first(nodes.size());
-    std::sort(order.begin(), order.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (const auto& [distance, node] : order) {
-      // Positions count, not disks; a slack of one part in a million covers rounding
-      if (distance * distance > limit_sq_ * 1.000001f) break;
-      if (!node.isLeaf()) {
-        SURFEIT_RETURN_IF_ERROR(visit(childrenOf(node)));
-        continue;
-      }
-      SURFEIT_RETURN_IF_ERROR(
-          visitLeaf(node, reader_.file(), reader_,
-                    [&](const Surfel& surfel, std::uint64_t id) { add(surfel, id); }));
-    }
+  Status run() {
+    SURFEIT_RETURN_IF_ERROR(visitNearestFirst(
+        kRootRange, reader_,
+        [&](const Node& node) {
+          return std::max(0.f, glm::length(node.position - position_) - node.radius);
+        },
+        // Positions count, not disks; a slack of one part in a million covers rounding
+        [&](float distance) { return distance * distance > limit_sq_ * 1.000001f; },
+        [&](const Surfel& surfel, std::uint64_t id) { add(surfel, id); }));
+    finish(found_, found_.neighbours.size() < most_);
     return {};
   }
-
-  void end() { finish(found_, found_.neighbours.size() < most_); }
 
  private:
   void add(const Surfel& surfel, std::uint64_t id) {
@@ -335,15 +344,12 @@ Status findPlaces(const glm::vec3& position, std::size_t count, PagedOctree::Rea
                   NearestPlaces& found) {
   found = {std::move(found.neighbours)};
   found.neighbours.clear();
-  PlaceSearch search(position, count, reader, found);
-  SURFEIT_RETURN_IF_ERROR(search.visit(kRootRange));
-  search.end();
-  return {};
+  return PlaceSearch(position, count, reader, found).run();
 }
 
 namespace {
 
-// Depth first, nearest child first, as above.
+// Finds the nearest of some.
 class WantedSearch {
  public:
   using MayHold = std::function<bool(const glm::vec3&, float)>;
@@ -357,29 +363,16 @@ class WantedSearch {
         mayHold_(mayHold),
         isWanted_(isWanted) {}
 
-  Status visit(const NodeRange& range) {
-    SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader_.nodes(range));
-    std::array<std::pair<float, Node>, 8> candidates;
-    std::size_t count = 0;
-    for (const Node& node : nodes) {
-      const glm::vec3 offset = node.position - position_;
-      const float radius = node.radius * 1.000001f;
-      if (mayHold_(offset, radius)) candidates[count++] = {glm::length(offset) - radius, node};
-    }
-    const auto order = std::span(candidates).first(count);
-    std::sort(order.begin(), order.end(),
-              [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (const auto& [distance, node] : order) {
-      if (distance > limit_) break;
-      if (!node.isLeaf()) {
-        SURFEIT_RETURN_IF_ERROR(visit(childrenOf(node)));
-        continue;
-      }
-      SURFEIT_RETURN_IF_ERROR(
-          visitLeaf(node, reader_.file(), reader_,
-                    [&](const Surfel& surfel, std::uint64_t id) { consider(surfel, id); }));
-    }
-    return {};
+  Status run() {
+    return visitNearestFirst(
+        kRootRange, reader_,
+        [&](const Node& node) {
+          const glm::vec3 offset = node.position - position_;
+          const float radius = node.radius * 1.000001f;
+          return mayHold_(offset, radius) ? glm::length(offset) - radius : kInfinity;
+        },
+        [&](float distance) { return distance > limit_; },
+        [&](const Surfel& surfel, std::uint64_t id) { consider(surfel, id); });
   }
 
   const std::optional<Neighbour>& found() const { return found_; }
@@ -409,7 +402,7 @@ Result<std::optional<Neighbour>> findPlace(
     const std::function<bool(const glm::vec3&, float)>& mayHold,
     const std::function<bool(const Neighbour&)>& isWanted) {
   WantedSearch search(position, most_distance, reader, mayHold, isWanted);
-  SURFEIT_RETURN_IF_ERROR(search.visit(kRootRange));
+  SURFEIT_RETURN_IF_ERROR(search.run());
   return search.found();
 }
 

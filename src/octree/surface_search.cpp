@@ -1,12 +1,11 @@
 #include "octree/surface_search.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <iterator>
 #include <optional>
-#include <thread>
-#include <vector>
 
 #include "core/spherical_harmonics.h"
 #include "core/worker_threads.h"
@@ -100,24 +99,17 @@ Status SurfaceSearch::cutByFarther(const glm::vec3& position) {
 
 Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,
                      const SurfaceSearch::Wants& wants, const SurfaceSearch::Take& take) {
-  std::vector<Status> statuses(searches.size());
-  const auto search = [&](std::size_t t) {
+  std::atomic<std::size_t> next{0};
+  FirstFailure failure;
+  // Threads for a batch, which takes them tens of milliseconds
+  return runOnThreads(int(searches.size()), failure, "find neighbours", [&] {
+    const std::size_t t = next++;
     const std::size_t begin = places.size() * t / searches.size();
     const std::size_t end = places.size() * (t + 1) / searches.size();
-    statuses[t] = catchAll("find neighbours", [&] {
-      return searches[t].find(
-          places.subspan(begin, end - begin), [&](std::size_t i) { return wants(begin + i); },
-          [&](std::size_t i, const SurfaceAt& surface) { take(begin + i, surface); });
-    });
-  };
-  {
-    // Threads for a batch, which takes them tens of milliseconds: they join here
-    std::vector<std::jthread> others;
-    for (std::size_t t = 1; t < searches.size(); ++t) others.emplace_back(search, t);
-    search(0);
-  }
-  for (const Status& status : statuses) SURFEIT_RETURN_IF_ERROR(status);
-  return {};
+    return searches[t].find(
+        places.subspan(begin, end - begin), [&](std::size_t i) { return wants(begin + i); },
+        [&](std::size_t i, const SurfaceAt& surface) { take(begin + i, surface); });
+  });
 }
 
 }  // namespace surfeit

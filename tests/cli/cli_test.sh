@@ -77,7 +77,7 @@ statisticsHaveTheDocumentedFields() {
   jsonHas dry.json "${common[@]}" dry_run receivers recommended_memory_bytes temporary_bytes \
     output_bytes seconds
   run 0 normals cornell.ply -o normals.csv --orient outward --sizes --stats normals.json
-  jsonHas normals.json "${common[@]}" points points_without_surface mean_confidence memory_bytes \
+  jsonHas normals.json "${common[@]}" points points_without_surface points_outside_trajectory mean_confidence memory_bytes \
     temporary_bytes points_per_second phases order
   run 2 normals cornell.ply -o normals.csv --orient sideways
   says "expected up, outward, consistent, "
