@@ -21,12 +21,12 @@
 #include <vector>
 
 #include "core/curve_key.h"
-#include "io/page_codec.h"
-#include "io/surfel_source.h"
-#include "octree/node_group.h"
-#include "octree/node_sums.h"
-#include "octree/surfel_block.h"
-#include "octree/surfel_group.h"
+#include "octree/build/surfel_block.h"
+#include "octree/node/node_sums.h"
+#include "octree/page/node_group.h"
+#include "octree/page/surfel_group.h"
+#include "storage/page_codec.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 namespace {

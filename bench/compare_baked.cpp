@@ -82,7 +82,7 @@ void print(Property& property) {
 // Properties of `b` that lie behind the first so many bytes of its rows.
 Status compare(CloudRows& a, CloudRows& b, std::ptrdiff_t first_byte) {
   std::vector<Property> properties;
-  for (const PlyProperty& property : a.element().properties) {
+  for (const RowProperty& property : a.element().properties) {
     const RowField field_a = RowField::find(a.element(), property.name);
     const RowField field_b = RowField::find(b.element(), property.name);
     if (field_a.exists() && field_b.offset >= first_byte) {

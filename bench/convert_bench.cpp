@@ -28,9 +28,9 @@
 #include <string>
 #include <vector>
 
-#include "io/byte_output.h"
-#include "io/cloud_formats.h"
-#include "io/formats/exr_image_writer.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/exr/exr_image_writer.h"
+#include "storage/byte_output.h"
 
 namespace surfeit {
 namespace {
@@ -61,7 +61,7 @@ double seconds() {
 Status writeRows(const std::string& path, std::uint64_t points) {
   RowWriterOptions options;
   for (const char* name : kProperties) {
-    PlyProperty property;
+    RowProperty property;
     property.name = name;
     options.properties.push_back(property);
   }

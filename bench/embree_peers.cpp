@@ -13,7 +13,7 @@
 #include <limits>
 #include <utility>
 
-#include "io/square_strata.h"
+#include "core/square_strata.h"
 
 namespace surfeit {
 namespace {
@@ -102,7 +102,7 @@ class RayWorker : public Worker {
                 std::span<GatherResult> results) override {
     [[maybe_unused]] const FlushedDenormals flushed;
     for (std::size_t i = begin; i < end; ++i) {
-      const Receiver& receiver = set.receivers[i];
+      const LocalReceiver& receiver = set.receivers[i];
       directions_.turn(receiver.normal, i, x_.data(), y_.data(), z_.data());
       const float offset = scene_.offset + scene_.offset_radii * set.radii[i];
       const glm::vec3 origin = receiver.position + offset * receiver.normal;

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/seconds_since.h"
-#include "io/square_strata.h"
+#include "core/square_strata.h"
 
 namespace surfeit {
 namespace {

@@ -11,9 +11,9 @@
 #include <thread>
 
 #include "bench/embree_scene.h"
-#include "gather/gather_outputs.h"
-#include "io/file.h"
-#include "io/square_strata.h"
+#include "core/square_strata.h"
+#include "gather/rules/gather_outputs.h"
+#include "storage/file.h"
 
 namespace surfeit {
 namespace {
@@ -39,7 +39,7 @@ std::uint64_t truthKey(const GatherScene& scene, const ReceiverSet& set,
   addBytes(settings, sizeof settings);
   addBytes(geometry.mesh.position.data(), geometry.mesh.position.size() * sizeof(glm::vec3));
   addBytes(geometry.spheres.data(), geometry.spheres.size() * sizeof(TrueSphere));
-  for (const std::uint32_t i : set.judged) addBytes(&set.receivers[i], sizeof(Receiver));
+  for (const std::uint32_t i : set.judged) addBytes(&set.receivers[i], sizeof(LocalReceiver));
   return key;
 }
 
@@ -49,7 +49,7 @@ class TruthTracer {
   TruthTracer(const SceneGeometry& geometry, const EmbreeScene& scene, int rays)
       : geometry_(geometry), scene_(scene), side_(int(std::lround(std::sqrt(double(rays))))) {}
 
-  GatherResult trace(const Receiver& receiver, std::uint64_t seed) const {
+  GatherResult trace(const LocalReceiver& receiver, std::uint64_t seed) const {
     const std::vector<glm::vec3> directions = stratifiedCosineDirections(side_, mixBits(seed));
     const TangentFrame frame(receiver.normal);
     const glm::vec3 origin = receiver.position + geometry_.ray_offset * receiver.normal;

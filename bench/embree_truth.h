@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bench/gather_scenes.h"
-#include "gather/receiver_raster.h"
+#include "gather/scalar/receiver_raster.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

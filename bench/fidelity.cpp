@@ -19,9 +19,9 @@
 #include <vector>
 
 #include "bench/error_summary.h"
+#include "cloud/ply/ply_reader.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
-#include "io/ply_reader.h"
 #include "sample/reference.h"
 #include "tools/sample_options.h"
 
@@ -56,10 +56,10 @@ Result<MeasuredCloud> readResult(const std::string& path, int count) {
   SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
   const std::optional<std::size_t> index = reader.header().findElement("vertex");
   if (!index) return Status::corruption(fmt::format("{}: no element vertex", path));
-  const PlyElement& element = reader.header().elements[*index];
+  const RowLayout& element = reader.header().elements[*index];
   constexpr std::array kNames = {
       "x", "y", "z", "nx", "ny", "nz", "occlusion", "irradiance_r", "irradiance_g", "irradiance_b"};
-  std::array<const PlyProperty*, kNames.size()> properties{};
+  std::array<const RowProperty*, kNames.size()> properties{};
   for (std::size_t i = 0; i < kNames.size(); ++i) {
     properties[i] = element.find(kNames[i]);
     if (properties[i] == nullptr && i < 7) {
@@ -84,7 +84,7 @@ Result<MeasuredCloud> readResult(const std::string& path, int count) {
       for (std::size_t k = 0; k < values.size(); ++k) {
         if (properties[k] == nullptr) continue;
         values[k] = float(
-            plyValue(&rows[i * element.row_bytes + properties[k]->offset], properties[k]->type));
+            rowValue(&rows[i * element.row_bytes + properties[k]->offset], properties[k]->type));
       }
       Measured measured{{values[0], values[1], values[2]},
                         {values[3], values[4], values[5]},

@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "bench/gather_measure.h"
-#include "io/scene_recipe.h"
+#include "surfels/generated/scene_recipe.h"
 
 namespace surfeit {
 

@@ -11,8 +11,8 @@
 #include <thread>
 #include <utility>
 
-#include "gather/gather_point.h"
-#include "gather/packet_gatherer.h"
+#include "gather/packet/packet_gatherer.h"
+#include "gather/scalar/gather_point.h"
 
 namespace surfeit {
 namespace {
@@ -22,7 +22,7 @@ class ScalarEngine : public GatherEngine {
  public:
   ScalarEngine(GatherMode mode, const GatherQuality& quality) : gatherer_(mode, quality) {}
 
-  Status gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
+  Status gather(std::span<const LocalReceiver> receivers, PagedOctree::Reader& octree,
                 std::span<GatherResult> results) override {
     for (std::size_t i = 0; i < receivers.size(); ++i) {
       SURFEIT_RETURN_IF_ERROR(gatherer_.gather(receivers[i], octree, results[i]));
@@ -46,7 +46,7 @@ class PacketEngine : public GatherEngine {
  public:
   PacketEngine(GatherMode mode, const GatherQuality& quality) : gatherer_(mode, quality) {}
 
-  Status gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
+  Status gather(std::span<const LocalReceiver> receivers, PagedOctree::Reader& octree,
                 std::span<GatherResult> results) override {
     for (std::size_t i = 0; i < receivers.size(); i += kClusterReceivers) {
       const std::size_t count = std::min(kClusterReceivers, receivers.size() - i);

@@ -11,8 +11,8 @@
 
 #include "bench/error_summary.h"
 #include "bench/gather_scenes.h"
-#include "gather/receiver_raster.h"
-#include "octree/paged_octree.h"
+#include "gather/scalar/receiver_raster.h"
+#include "octree/read/paged_octree.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
 
@@ -40,7 +40,7 @@ class GatherEngine {
  public:
   virtual ~GatherEngine() = default;
   // Gathers at receivers that are neighbours along the curve. results.size() is receivers.size().
-  virtual Status gather(std::span<const Receiver> receivers, PagedOctree::Reader& octree,
+  virtual Status gather(std::span<const LocalReceiver> receivers, PagedOctree::Reader& octree,
                         std::span<GatherResult> results) = 0;
   // Of all gathers so far.
   virtual EngineWork work() const = 0;

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "bench/gather_scene_geometry.h"
-#include "io/scene_surfaces.h"
-#include "io/square_strata.h"
-#include "io/surface_surfel.h"
+#include "core/square_strata.h"
+#include "surfels/generated/scene_surfaces.h"
+#include "surfels/generated/surface_surfel.h"
 
 namespace surfeit {
 namespace {
@@ -63,7 +63,7 @@ SceneGeometry makeCity() {
   return geometry;
 }
 
-// Deals surfels to surfaces by area, as io/scene_generator.cpp does.
+// Deals surfels to surfaces by area, as surfels/generated/scene_generator.cpp does.
 Status sendCitySurfels(const SceneGeometry& geometry, std::uint64_t count, const SurfelSink& sink) {
   const std::vector<Surface> surfaces = treelessSurfaces();
   double area = 0;

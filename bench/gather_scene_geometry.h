@@ -67,8 +67,9 @@ SceneGeometry makeSpheres();
 Status sendSpheresSurfels(const SceneGeometry& geometry, std::uint64_t count,
                           const SurfelSink& sink);
 
-// The generated city (io/scene_surfaces.h) without its trees, whose leaves are disks themselves and
-// have no triangles: ground, buildings, domes and spheres. Surfels are those of the generator.
+// The generated city (surfels/generated/scene_surfaces.h) without its trees, whose leaves are disks
+// themselves and have no triangles: ground, buildings, domes and spheres. Surfels are those of the
+// generator.
 SceneGeometry makeCity();
 Status sendCitySurfels(const SceneGeometry& geometry, std::uint64_t count, const SurfelSink& sink);
 

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "bench/gather_scene_geometry.h"
-#include "io/file.h"
-#include "io/surfel_source.h"
 #include "sample/sample.h"
+#include "storage/file.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 namespace {

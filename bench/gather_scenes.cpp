@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "core/job_limits.h"
-#include "io/surfel_writer.h"
-#include "octree/scene_file.h"
+#include "octree/read/scene_file.h"
 #include "surfeit/index.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bench/gather_scene_geometry.h"
-#include "gather/receiver_raster.h"
-#include "octree/paged_octree.h"
+#include "gather/scalar/receiver_raster.h"
+#include "octree/read/paged_octree.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -74,7 +74,7 @@ class GatherScene {
 // Receivers on surfels of a scene, along its curve, in runs of neighbours.
 struct ReceiverSet {
   std::string name;
-  std::vector<Receiver> receivers{};
+  std::vector<LocalReceiver> receivers{};
   std::vector<float> radii{};           // of their surfels
   std::size_t run_length = 0;           // the last run may be shorter
   std::vector<std::uint32_t> judged{};  // those whose errors are measured, ascending

@@ -26,9 +26,9 @@
 #include <vector>
 
 #include "core/seconds_since.h"
-#include "io/file.h"
-#include "io/page_file.h"
-#include "io/square_strata.h"
+#include "core/square_strata.h"
+#include "storage/file.h"
+#include "storage/page_file.h"
 #include "surfeit/index.h"
 #include "tools/command.h"
 #include "tools/generate_scene.h"

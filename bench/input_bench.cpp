@@ -15,11 +15,11 @@
 #include <string>
 #include <vector>
 
+#include "cloud/ply/ply_reader.h"
 #include "core/curve_key.h"
-#include "io/ply_reader.h"
-#include "io/surfel_mapping.h"
-#include "io/surfel_source.h"
-#include "io/surfel_writer.h"
+#include "surfels/surfel_mapping.h"
+#include "surfels/surfel_source.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {
@@ -104,7 +104,7 @@ Status measureFile(const std::string& path, std::span<const Surfel> cloud, PlyEn
 // Records that lie in the cache.
 Status measureDecoding(const std::string& path) {
   SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, PlyReader::open(path));
-  const PlyElement& element = reader.header().elements[0];
+  const RowLayout& element = reader.header().elements[0];
   SURFEIT_ASSIGN_OR_RETURN(const SurfelMapping mapping, SurfelMapping::create(element, path));
   AlignedBuffer buffer;
   SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, reader.readRowView(kBatch, buffer));

@@ -18,13 +18,13 @@
 #include <string>
 #include <vector>
 
+#include "batch/gather_input.h"
+#include "batch/receiver_queue.h"
+#include "batch/receiver_sorter.h"
 #include "cache/reuse_distances.h"
-#include "gather/cut.h"
-#include "gather/gather_input.h"
-#include "gather/receiver_queue.h"
-#include "gather/receiver_sorter.h"
-#include "octree/paged_octree.h"
-#include "octree/scene_file.h"
+#include "gather/cut/cut.h"
+#include "octree/read/paged_octree.h"
+#include "octree/read/scene_file.h"
 
 namespace {
 

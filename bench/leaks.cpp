@@ -32,7 +32,7 @@ struct Settings {
   bool packets = false;
 };
 
-std::vector<GatherResult> gather(const Cloud& cloud, const std::vector<Receiver>& receivers,
+std::vector<GatherResult> gather(const Cloud& cloud, const std::vector<LocalReceiver>& receivers,
                                  const Settings& settings) {
   const auto scene = take(IndexedScene::make(cloud));
   const GatherRules rules(GatherMode::kBleeding, settings.quality);
@@ -40,7 +40,7 @@ std::vector<GatherResult> gather(const Cloud& cloud, const std::vector<Receiver>
                                : scene->gatherAlone(receivers, rules));
 }
 
-double meanLight(const Cloud& cloud, const std::vector<Receiver>& receivers,
+double meanLight(const Cloud& cloud, const std::vector<LocalReceiver>& receivers,
                  const Settings& settings) {
   double sum = 0;
   for (const GatherResult& result : gather(cloud, receivers, settings)) {
@@ -68,7 +68,7 @@ Closed closedness(int count, float scatter, const Settings& settings) {
   const auto direction = [&] {
     return glm::normalize(glm::vec3(normal(random), normal(random), normal(random)));
   };
-  std::vector<Receiver> receivers;
+  std::vector<LocalReceiver> receivers;
   for (int i = 0; i < 64; ++i)
     receivers.push_back({.8f * float(i) / 64 * direction(), direction()});
   Closed closed;
@@ -84,7 +84,7 @@ double floorBeside(int count, const Settings& settings) {
   Cloud cloud;
   addBall(cloud, count, {0, 0, 1}, 1);
   addSheet(cloud, 20'000, {3, -3, 0}, {0, 0, 6}, {0, 6, 0}, 1);
-  std::vector<Receiver> receivers;
+  std::vector<LocalReceiver> receivers;
   double truth = 0;
   constexpr int kReceivers = 16, kSteps = 300;
   for (int k = 0; k < kReceivers; ++k) {
@@ -123,7 +123,7 @@ Power powerOf(float radius, const Settings& settings) {
   lamp.normal = glm::vec3(0);
   lamp.flags = kSurfelSphere;
   wall.push_back(lamp);
-  std::vector<Receiver> receivers;
+  std::vector<LocalReceiver> receivers;
   for (int i = 0; i < kTrials; ++i) {
     receivers.push_back(
         {{2.8f * uniform(random), 2.8f * uniform(random), .3f * uniform(random)}, {0, 0, -1}});

@@ -13,12 +13,13 @@
 #include <string>
 #include <vector>
 
+#include "batch/environment_file.h"
 #include "bench/gather_bench_options.h"
 #include "bench/gather_measure.h"
 #include "bench/gather_scenes.h"
-#include "gather/environment_map.h"
-#include "gather/gather_outputs.h"
-#include "gather/packet_gatherer.h"
+#include "gather/light/environment_map.h"
+#include "gather/packet/packet_gatherer.h"
+#include "gather/rules/gather_outputs.h"
 
 namespace surfeit {
 namespace {
@@ -29,7 +30,7 @@ class RulesWorker : public Worker {
   RulesWorker(const GatherRules& rules, PagedOctree& octree) : gatherer_(rules), reader_(octree) {}
   Status gather(const ReceiverSet& set, std::size_t begin, std::size_t end,
                 std::span<GatherResult> results) override {
-    const std::span<const Receiver> receivers =
+    const std::span<const LocalReceiver> receivers =
         std::span(set.receivers).subspan(begin, end - begin);
     for (std::size_t i = 0; i < receivers.size(); i += kClusterReceivers) {
       const std::size_t count = std::min(kClusterReceivers, receivers.size() - i);
@@ -70,7 +71,7 @@ Result<LoadedEnvironment> loadSky(int resolution) {
   environment.path = path;
   environment.up = UpAxis::kZ;
   Progress quiet;
-  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, EnvironmentMap::load(environment, quiet));
+  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, loadEnvironmentMap(environment, quiet));
   std::filesystem::remove(path);
   EnvironmentCube cube(map, RasterGeometry(resolution));
   return LoadedEnvironment{std::move(map), std::move(cube)};

@@ -21,12 +21,12 @@
 #include <vector>
 
 #include "bench/or_exit.h"
+#include "cloud/cloud_formats.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
-#include "io/cloud_formats.h"
-#include "io/surfel_writer.h"
 #include "sample/mesh.h"
 #include "surfeit/normals.h"
+#include "surfels/surfel_writer.h"
 #include "tools/normal_options.h"
 
 namespace surfeit {
@@ -68,7 +68,7 @@ Places scatter(const Mesh& mesh, std::size_t count, double noise) {
 
 std::vector<glm::vec3> normalsIn(const std::string& path) {
   const std::unique_ptr<RowReader> reader = take(openRowReader(path));
-  const PlyElement& element = reader->element();
+  const RowLayout& element = reader->element();
   const std::size_t offset = element.find("nx")->offset;
   AlignedBuffer buffer;
   std::vector<glm::vec3> normals;
@@ -79,7 +79,7 @@ std::vector<glm::vec3> normalsIn(const std::string& path) {
       glm::vec3& normal = normals.emplace_back();
       for (int i = 0; i < 3; ++i) {
         normal[i] =
-            float(plyValue(rows.data() + at + offset + 4 * std::size_t(i), PlyType::kFloat32));
+            float(rowValue(rows.data() + at + offset + 4 * std::size_t(i), ValueType::kFloat32));
       }
     }
   }

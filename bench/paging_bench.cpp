@@ -19,12 +19,12 @@
 #include <type_traits>
 #include <vector>
 
+#include "batch/gather_input.h"
+#include "batch/gather_memory.h"
 #include "core/seconds_since.h"
-#include "gather/gather_input.h"
-#include "gather/gather_memory.h"
-#include "octree/paged_octree.h"
-#include "octree/scene_file.h"
-#include "surfeit/gather.h"
+#include "octree/read/paged_octree.h"
+#include "octree/read/scene_file.h"
+#include "surfeit/bake.h"
 
 namespace {
 

@@ -82,10 +82,10 @@ std::vector<GatherResult> truthAsResults(const std::vector<float>& truth,
 Status judge(const RandomScenesOptions& options, const RandomScene& scene, SeedResult& result) {
   GatherOptions gather = options.gather;
   gather.quality.sides = result.sides;
-  const GatherRules rules(gather, nullptr);
+  const GatherRules rules(gather);
   gather.quality.max_solid_angle = 0;
-  const GatherRules exact_rules(gather, nullptr);
-  const std::vector<Receiver> receivers = scene.plainReceivers();
+  const GatherRules exact_rules(gather);
+  const std::vector<LocalReceiver> receivers = scene.plainReceivers();
   result.surfels = scene.surfels.size();
   result.receivers = receivers.size();
   if (scene.surfels.empty()) return {};

@@ -114,7 +114,7 @@ class TruthScene {
   RTCScene scene_ = nullptr;
 };
 
-bool isOnSpheres(const RandomScene& scene, const Receiver& receiver) {
+bool isOnSpheres(const RandomScene& scene, const LocalReceiver& receiver) {
   return std::any_of(scene.spheres.begin(), scene.spheres.end(), [&](const RandomSphere& sphere) {
     return glm::distance(sphere.centre, receiver.position) < kOwnRadii * sphere.radius;
   });
@@ -142,7 +142,7 @@ Result<std::vector<float>> traceOcclusion(const RandomScene& scene, GatherSides 
   const std::vector<glm::vec3> whole_sphere = sphereDirections(side);
   std::vector<float> occlusion;
   for (const RandomReceiver& one : scene.receivers) {
-    const Receiver& receiver = one.receiver;
+    const LocalReceiver& receiver = one.receiver;
     if (receiver.isSpherical() && isOnSpheres(scene, receiver)) {
       occlusion.push_back(-1);
       continue;

@@ -20,12 +20,12 @@
 #include <vector>
 
 #include "bench/or_exit.h"
+#include "cloud/cloud_formats.h"
 #include "core/spherical_harmonics.h"
-#include "io/cloud_formats.h"
-#include "io/surfel_writer.h"
-#include "octree/scene_rows.h"
-#include "surfeit/gather.h"
+#include "index/scene_rows.h"
+#include "surfeit/bake.h"
 #include "surfeit/index.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {
@@ -276,15 +276,15 @@ class Bench {
 
   static std::vector<double> valuesOf(const std::string& path, const std::string& name) {
     const std::unique_ptr<RowReader> reader = take(openCloud(path, {}));
-    const PlyElement& element = reader->element();
-    const PlyProperty& property = *element.find(name);
+    const RowLayout& element = reader->element();
+    const RowProperty& property = *element.find(name);
     AlignedBuffer buffer;
     std::vector<double> values;
     for (;;) {
       const Bytes rows = take(reader->readRows(4096, buffer));
       if (rows.empty()) return values;
       for (std::size_t at = 0; at < rows.size(); at += element.row_bytes) {
-        values.push_back(plyValue(rows.data() + at + property.offset, property.type));
+        values.push_back(rowValue(rows.data() + at + property.offset, property.type));
       }
     }
   }

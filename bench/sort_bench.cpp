@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "core/curve_key.h"
-#include "io/scene_generator.h"
-#include "octree/curve_sort.h"
-#include "octree/parallel.h"
+#include "core/parallel.h"
+#include "octree/build/curve_sort.h"
+#include "surfels/generated/scene_generator.h"
 
 namespace {
 

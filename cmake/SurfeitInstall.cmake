@@ -1,15 +1,25 @@
-# Installs the headers, the layer libraries and a package configuration: find_package(surfeit).
+# Installs the headers, static libraries of all rooms and a shared one, and what finds them:
+# find_package(surfeit COMPONENTS engine clouds) and pkg-config.
 include(CMakePackageConfigHelpers)
 
 install(DIRECTORY include/surfeit DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(TARGETS surfeit surfeit_core surfeit_io surfeit_cache surfeit_octree surfeit_gather surfeit_brick
-  EXPORT surfeitTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS ${SURFEIT_ENGINE_TARGETS} EXPORT surfeitEngineTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+if(SURFEIT_BUILD_CLOUDS)
+  install(TARGETS ${SURFEIT_CLOUD_TARGETS} surfeit EXPORT surfeitCloudsTargets
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
+install(TARGETS surfeit_shared EXPORT surfeitSharedTargets
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 if(SURFEIT_BUILD_TOOLS)
   install(TARGETS surfeit_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 
 set(surfeit_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/surfeit)
-install(EXPORT surfeitTargets NAMESPACE surfeit:: DESTINATION ${surfeit_package_dir})
+install(EXPORT surfeitEngineTargets NAMESPACE surfeit:: DESTINATION ${surfeit_package_dir})
+install(EXPORT surfeitSharedTargets NAMESPACE surfeit:: DESTINATION ${surfeit_package_dir})
+if(SURFEIT_BUILD_CLOUDS)
+  install(EXPORT surfeitCloudsTargets NAMESPACE surfeit:: DESTINATION ${surfeit_package_dir})
+endif()
 configure_package_config_file(cmake/surfeitConfig.cmake.in surfeitConfig.cmake
   INSTALL_DESTINATION ${surfeit_package_dir})
 write_basic_package_version_file(surfeitConfigVersion.cmake COMPATIBILITY SameMinorVersion)
@@ -19,3 +29,7 @@ install(FILES
   cmake/FindBlosc.cmake
   cmake/FindxxHash.cmake
   DESTINATION ${surfeit_package_dir})
+
+file(RELATIVE_PATH SURFEIT_PREFIX_FROM_PC "/prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/prefix")
+configure_file(cmake/surfeit.pc.in surfeit.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/surfeit.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

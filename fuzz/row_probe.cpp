@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/assert.h"
-#include "io/surfel_source.h"
 #include "surfeit/surfel.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 namespace {
@@ -27,20 +27,20 @@ struct Reading {
   std::vector<std::byte> kept;  // values of the first rows, without what lies between them
 };
 
-void checkElement(const PlyElement& element) {
+void checkElement(const RowLayout& element) {
   std::size_t end = 0;
-  for (const PlyProperty& property : element.properties) {
+  for (const RowProperty& property : element.properties) {
     SURFEIT_CHECK(!property.is_list && !property.name.empty());
     SURFEIT_CHECK(property.offset >= end);
-    end = property.offset + plyTypeBytes(property.type);
+    end = property.offset + valueTypeBytes(property.type);
   }
   SURFEIT_CHECK(end <= element.row_bytes);
 }
 
-void keepValues(const PlyElement& element, Bytes rows, std::vector<std::byte>& kept) {
+void keepValues(const RowLayout& element, Bytes rows, std::vector<std::byte>& kept) {
   for (; !rows.empty() && kept.size() < kMaxKeptBytes; rows = rows.subspan(element.row_bytes)) {
-    for (const PlyProperty& property : element.properties) {
-      const std::size_t at = kept.size(), size = plyTypeBytes(property.type);
+    for (const RowProperty& property : element.properties) {
+      const std::size_t at = kept.size(), size = valueTypeBytes(property.type);
       kept.resize(at + size);
       std::memcpy(&kept[at], &rows[property.offset], size);
     }
@@ -49,7 +49,7 @@ void keepValues(const PlyElement& element, Bytes rows, std::vector<std::byte>& k
 
 // Reads on from row `first`, in batches of that many.
 Reading readFrom(RowReader& reader, std::uint64_t first, std::size_t batch) {
-  const PlyElement& element = reader.element();
+  const RowLayout& element = reader.element();
   const std::uint64_t max_rows = std::min<std::uint64_t>(
       kMaxRows, kMaxReadBytes / std::max<std::size_t>(element.row_bytes, 1) + 1);
   AlignedBuffer buffer;
@@ -95,10 +95,10 @@ void checkSame(const Reading& one, const Reading& other) {
 
 // Reads on from a row in the middle of what was kept.
 void probeSeek(RowReader& reader, const Reading& all) {
-  const PlyElement& element = reader.element();
+  const RowLayout& element = reader.element();
   std::size_t value_bytes = 0;
-  for (const PlyProperty& property : element.properties) {
-    value_bytes += plyTypeBytes(property.type);
+  for (const RowProperty& property : element.properties) {
+    value_bytes += valueTypeBytes(property.type);
   }
   SURFEIT_CHECK(!reader.seekRow(element.count + 1).ok());
   if (value_bytes == 0) return;

@@ -1,10 +1,10 @@
-// Holds a reader of rows to its contract (io/row_reader.h) on whatever file it is given.
+// Holds a reader of rows to its contract (cloud/row_reader.h) on whatever file it is given.
 #pragma once
 
 #include <memory>
 #include <string>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 
 namespace surfeit {
 

@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
   # Tools
-  g++ cmake ninja-build ccache
+  g++ cmake ninja-build ccache pkg-config
   # Library
   libglm-dev libfmt-dev libtbb-dev libzstd-dev zlib1g-dev libblosc-dev libxxhash-dev libhwy-dev nlohmann-json3-dev
   libopenexr-dev libeigen3-dev libnanoflann-dev

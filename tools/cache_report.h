@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "io/channels.h"
+#include "cloud/channels.h"
 
 namespace surfeit {
 

@@ -14,7 +14,7 @@
 #include "core/program_memory.h"
 #include "core/resident_limit.h"
 #include "core/seconds_since.h"
-#include "io/file.h"
+#include "storage/file.h"
 #include "tools/output_check.h"
 
 namespace surfeit {

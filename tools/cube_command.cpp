@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
+#include "batch/gather_memory.h"
+#include "batch/gather_options.h"
 #include "core/program_memory.h"
-#include "gather/gather_memory.h"
-#include "gather/gather_options.h"
 #include "sample/traced_cube.h"
 #include "surfeit/cube.h"
 #include "surfeit/scene.h"
@@ -28,14 +28,14 @@
 namespace surfeit {
 namespace {
 
-constexpr const char* kReceiverGroup = "Receiver";
+constexpr const char* kReceiverGroup = "LocalReceiver";
 constexpr const char* kCubePictureGroup = "Picture";
 
 struct CubeArguments {
   std::optional<UpAxis> up;  // absent: the scene's
   std::string scene, picture, receivers;
   std::uint64_t number = 0;
-  CubeReceiver receiver;
+  Receiver receiver;
   GatherOptions options;
   CubePictureOptions drawing;
   std::vector<std::string> reference;
@@ -171,7 +171,7 @@ Status runCube(CubeArguments& arguments, CommandContext& context) {
 }
 
 void addReceiverOptions(CLI::App& command, CubeArguments& arguments) {
-  CubeReceiver& receiver = arguments.receiver;
+  Receiver& receiver = arguments.receiver;
   CLI::Option* const at =
       command
           .add_option_function<std::string>(

@@ -4,12 +4,12 @@
 #include <memory>
 #include <string>
 
+#include "batch/gather_options.h"
+#include "batch/receiver_sorter.h"
 #include "core/job_limits.h"
-#include "gather/gather_options.h"
-#include "gather/gather_outputs.h"
-#include "gather/receiver_sorter.h"
-#include "io/file.h"
-#include "surfeit/gather.h"
+#include "gather/rules/gather_outputs.h"
+#include "storage/file.h"
+#include "surfeit/bake.h"
 #include "surfeit/tune.h"
 #include "tools/cache_report.h"
 #include "tools/channel_options.h"

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "octree/group_set.h"
+#include "octree/read/group_set.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 

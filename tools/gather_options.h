@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 
 namespace surfeit {
 

@@ -10,11 +10,11 @@
 #include <span>
 #include <vector>
 
-#include "io/file.h"
-#include "io/scene_generator.h"
-#include "io/surfel_source.h"
-#include "io/surfel_writer.h"
-#include "io/up_comment.h"
+#include "core/up_comment.h"
+#include "storage/file.h"
+#include "surfels/generated/scene_generator.h"
+#include "surfels/surfel_source.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

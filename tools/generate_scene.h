@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <string>
 
-#include "io/scene_recipe.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
+#include "surfels/generated/scene_recipe.h"
 
 namespace surfeit {
 

@@ -7,17 +7,17 @@
 #include <string_view>
 #include <vector>
 
+#include "cloud/channels.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/ply/ply_reader.h"
 #include "core/bounds.h"
-#include "io/byte_input.h"
-#include "io/channels.h"
-#include "io/cloud_formats.h"
-#include "io/ply_reader.h"
-#include "io/surfel_source.h"
-#include "io/up_comment.h"
-#include "octree/cloud_density.h"
-#include "octree/group_set.h"
-#include "octree/scene_file.h"
+#include "core/up_comment.h"
+#include "index/cloud_density.h"
+#include "octree/read/group_set.h"
+#include "octree/read/scene_file.h"
+#include "storage/byte_input.h"
 #include "surfeit/scene.h"
+#include "surfels/surfel_source.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 
@@ -269,11 +269,11 @@ std::string surfelsText(const nlohmann::json& json) {
 Result<nlohmann::json> plyJson(const InfoArguments& arguments, Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(const PlyReader reader, PlyReader::open(arguments.path));
   nlohmann::json json = {{"format", "ply"}, {"elements", nlohmann::json::array()}};
-  for (const PlyElement& element : reader.header().elements) {
+  for (const RowLayout& element : reader.header().elements) {
     nlohmann::json properties = nlohmann::json::array();
-    for (const PlyProperty& property : element.properties) {
+    for (const RowProperty& property : element.properties) {
       properties.push_back(std::string(property.is_list ? "list " : "") +
-                           std::string(plyTypeName(property.type)) + " " + property.name);
+                           std::string(valueTypeName(property.type)) + " " + property.name);
     }
     json["elements"].push_back(
         {{"name", element.name}, {"count", element.count}, {"properties", properties}});
@@ -301,7 +301,7 @@ Result<nlohmann::json> cloudJson(const InfoArguments& arguments, Progress& progr
   SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions options, readingOf(arguments));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader,
                            openRowReader(arguments.path, options));
-  const PlyElement& element = reader->element();
+  const RowLayout& element = reader->element();
   nlohmann::json json = {{"format", reader->formatName()},
                          {"count", element.count},
                          {"channels", nlohmann::json::array()},
@@ -312,8 +312,9 @@ Result<nlohmann::json> cloudJson(const InfoArguments& arguments, Progress& progr
     for (const std::size_t i : channel.properties) {
       properties.push_back(element.properties[i].name);
     }
-    json["channels"].push_back(
-        {{"name", channel.name}, {"type", plyTypeName(channel.type)}, {"properties", properties}});
+    json["channels"].push_back({{"name", channel.name},
+                                {"type", valueTypeName(channel.type)},
+                                {"properties", properties}});
   }
   SURFEIT_RETURN_IF_ERROR(addSurfels(arguments, json, progress));
   return json;

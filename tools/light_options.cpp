@@ -5,7 +5,7 @@
 #include <array>
 #include <string_view>
 
-#include "gather/gather_outputs.h"
+#include "gather/rules/gather_outputs.h"
 #include "tools/gather_options.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"

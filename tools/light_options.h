@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 
 namespace surfeit {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "io/output_target.h"
+#include "storage/output_target.h"
 
 namespace surfeit {
 namespace {

@@ -14,13 +14,17 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/api.h"
 #include "surfeit/gather.h"
+#include "surfeit/job.h"
 #include "surfeit/progress.h"
+#include "surfeit/statistics.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
 
-struct BounceOptions {
+// `temporary_directory` holds intermediate bounces; `strict` changes nothing.
+struct BounceOptions : JobOptions {
   int bounces = 1;  // 1 to 100
   GatherQuality quality;
   // All bounces but the last are gathered at about one of so many surfels, 1 to 64, and
@@ -29,12 +33,8 @@ struct BounceOptions {
   // Set of the groups of surfels that send light and cover, as in GatherOptions; all receive.
   std::uint64_t groups = kAllGroups;
 
-  // As in GatherOptions.
-  std::uint64_t memory_bytes = 0;
-  int threads = 0;
-  double cache_split = -1;
+  double cache_split = -1;  // as in GatherOptions
   bool direct_io = false;
-  std::string temporary_directory;  // of intermediate bounces; empty: beside the result
 };
 
 // What one bounce did.
@@ -67,7 +67,8 @@ struct BounceStats {
 // limited to 1e12.
 // Errors: as indexClouds; kCorruption for a scene without albedo or radiosity; kInvalidArgument for
 // one that bounce has written: its bounces would count again.
-Result<BounceStats> bounceScene(const std::string& scene_path, const std::string& result_path,
-                                const BounceOptions& options, Progress& progress);
+SURFEIT_API Result<BounceStats> bounceScene(const std::string& scene_path,
+                                            const std::string& result_path,
+                                            const BounceOptions& options, Progress& progress);
 
 }  // namespace surfeit

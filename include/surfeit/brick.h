@@ -7,12 +7,13 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "surfeit/api.h"
 #include "surfeit/color_range.h"
+#include "surfeit/job.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -21,7 +22,9 @@ namespace surfeit {
 // Numbers of a point that a brick map keeps at most, over all its channels.
 inline constexpr std::size_t kMaxBrickValues = 64;
 
-struct BrickOptions {
+// `memory_bytes`: at least 64 MiB; 0 stands for 1 GiB, or three quarters of what the job may hold
+// where that is less.
+struct BrickOptions : JobOptions {
   // Channels or properties to keep. Empty: what a gather writes, as far as the first cloud has it;
   // without any of that all that does not tell of the points' geometry.
   std::vector<std::string> channels;
@@ -31,12 +34,6 @@ struct BrickOptions {
   // Edge of the finest voxels, scene units. 0: twice the spacing of the points, by the median of
   // their areas, or by their density where they have no sizes.
   double voxel_size = 0;
-  // Budget, as in GatherOptions, at least 64 MiB. 0: 1 GiB, or three quarters of what the job may
-  // hold where that is less.
-  std::uint64_t memory_bytes = 0;
-  int threads = 0;                    // 0: all that the job may use
-  bool strict = false;                // refuse invalid records instead of skipping them
-  std::string temporary_directory{};  // empty: as for IndexOptions
   // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
   // that the format marks as not to be used.
   std::string filter{};
@@ -62,8 +59,9 @@ struct BrickStats {
 // their order or in which input they are. It appears under its name only when complete. Errors:
 // kInvalidArgument (options; a channel that an input lacks), kCorruption (bad input, or no valid
 // point at all), kBudgetTooSmall, kIoError, kInterrupted.
-Result<BrickStats> brickClouds(const std::vector<std::string>& inputs, const std::string& output,
-                               const BrickOptions& options, Progress& progress);
+SURFEIT_API Result<BrickStats> brickClouds(const std::vector<std::string>& inputs,
+                                           const std::string& output, const BrickOptions& options,
+                                           Progress& progress);
 
 // A channel of a brick map.
 struct BrickChannel {
@@ -72,7 +70,7 @@ struct BrickChannel {
 };
 
 // An open brick map. Safe from any thread.
-class BrickMap {
+class SURFEIT_API BrickMap {
  public:
   // Reads the file once, to find its pages. `memory_bytes` holds a list of these, 12 bytes and 8
   // for every grid per leaf of 8^3 voxels, and a cache of those that look-ups need. Errors:
@@ -96,7 +94,7 @@ class BrickMap {
   // no point that faces that way is within reach of the coarsest voxels. A first look-up of a page
   // reads it: kIoError, kCorruption.
   Result<bool> lookup(const glm::dvec3& position, const glm::vec3& normal, double filter_width,
-                      std::span<float> values) const;
+                      float* values) const;
 
   // Bytes of pages in the cache now, and of the list of pages.
   std::uint64_t cachedBytes() const;

@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "surfeit/color_range.h"
+#include "surfeit/api.h"
+#include "surfeit/job.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/up_axis.h"
@@ -22,9 +23,12 @@ struct CropBox {
 
 // What is done to the records of every input, in this order: channels are named, every n-th record
 // is taken, it is moved, cropped, given the channels that are kept, and thinned by a grid.
-struct ConvertOptions {
-  std::string channels{};  // channels to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md)
-  std::string part{};      // of files with several: the one to read; empty: the first with a cloud
+// `memory_bytes` bounds what a format takes that must hold what it writes until the end (OpenVDB),
+// and what thinning by a grid sorts in; all else takes some MiB, whatever the clouds' size. 0
+// stands for 2 GiB, or three quarters of what the job may hold where that is less. Temporary files
+// are of thinning by a grid. `filter` comes before all else but `channels`. `threads` and `strict`
+// change nothing.
+struct ConvertOptions : JobOptions, ReadOptions {
   // Takes records 0, every, 2 every, ... of each input; at least 1. Those stand for all: area and
   // power (of photons) are multiplied by it, radius, pscale and width by its root.
   std::uint64_t every = 1;
@@ -57,16 +61,6 @@ struct ConvertOptions {
   // attributes of a picture (.exr), the grid of a volume (.vdb), the camera of a .ptc, the header
   // of a .las. Empty: the input, where there is only one, which is not moved.
   std::string like{};
-  // Memory that a format may take that must hold what it writes until the end (OpenVDB), and that
-  // thinning by a grid sorts in; all else takes some MiB, whatever the clouds' size. 0: 2 GiB, or
-  // three quarters of what the job may hold where that is less.
-  std::uint64_t memory_bytes = 0;
-  std::string temporary_directory{};  // of thinning by a grid; empty: as of index
-  // Which records of the inputs are taken, "classification == 2" (docs/files.md, "Filters"), before
-  // all else but `channels`; empty: all but those that the format marks as not to be used.
-  std::string filter{};
-  // How colors are read whose numbers do not say what they mean.
-  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct ConvertStats {
@@ -86,8 +80,8 @@ struct ConvertStats {
 // name only when complete. Notes tell of what is absent, and what the formats cannot keep.
 // Errors: kInvalidArgument (options, a name of no format that is written, or rows that it cannot
 // hold), kCorruption naming file and record, kBudgetTooSmall, kIoError, kInterrupted.
-Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
-                                   const std::string& output, const ConvertOptions& options,
-                                   Progress& progress);
+SURFEIT_API Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
+                                               const std::string& output,
+                                               const ConvertOptions& options, Progress& progress);
 
 }  // namespace surfeit

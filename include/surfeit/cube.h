@@ -10,21 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "surfeit/gather.h"
+#include "surfeit/api.h"
+#include "surfeit/bake.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
-
-// The place that is looked from.
-struct CubeReceiver {
-  glm::dvec3 position{0};  // finite, scene units, as the cloud has them
-  // Finite, of any length; zero: the receiver gathers over the whole sphere.
-  glm::vec3 normal{0};
-  // With kGlossy, the direction that the receiver is looked along, of any length; zero: from
-  // GatherOptions::eye.
-  glm::vec3 view{0};
-};
 
 // What something was drawn as. Values are stable: pictures hold them.
 enum class CubeKind : std::uint8_t {
@@ -73,7 +64,7 @@ struct CubeFace {
 };
 
 struct CubeImage {
-  CubeReceiver receiver;        // with unit vectors, or zero ones
+  Receiver receiver;            // with unit vectors, or zero ones
   int resolution = 0;           // pixels along an edge of a face
   std::vector<CubeFace> faces;  // +x -x +y -y +z -z; or one, of a cone of up to 60 degrees
   // Pixel (face * resolution + row) * resolution + column.
@@ -97,15 +88,15 @@ struct CubeImage {
 // receiver and options alone, bit for bit.
 // Errors: kInvalidArgument (options, a receiver that is not finite, kGlossy without a normal or a
 // view), kBudgetTooSmall, kIoError, kCorruption, kInterrupted.
-Result<CubeImage> gatherCube(const std::string& scene_path, const CubeReceiver& receiver,
-                             const GatherOptions& options, Progress& progress);
+SURFEIT_API Result<CubeImage> gatherCube(const std::string& scene_path, const Receiver& receiver,
+                                         const GatherOptions& options, Progress& progress);
 
 // Row `number`, from 0, of a cloud of receivers as gatherCloud reads them; `channels`, `part` and
 // `filter` as in GatherOptions: rows that are left out do not count. Reads up to that row. Errors:
 // kInvalidArgument when there is no such row, kCorruption when it is no valid receiver, else as
 // indexClouds.
-Result<CubeReceiver> readCubeReceiver(const std::string& cloud_path, std::uint64_t number,
-                                      const std::string& channels, const std::string& part,
-                                      Progress& progress, const std::string& filter = {});
+SURFEIT_API Result<Receiver> readCubeReceiver(const std::string& cloud_path, std::uint64_t number,
+                                              const std::string& channels, const std::string& part,
+                                              Progress& progress, const std::string& filter = {});
 
 }  // namespace surfeit

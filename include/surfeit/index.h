@@ -8,7 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "surfeit/color_range.h"
+#include "surfeit/api.h"
+#include "surfeit/job.h"
 #include "surfeit/normal_estimation.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -23,33 +24,19 @@ enum class Repeats {
   kThin,  // one stays, the same for any order of the inputs; how many do not is told
 };
 
-struct IndexOptions {
-  // Budget, as in GatherOptions. 0: 1 GiB, or three quarters of what the job may hold where that is
-  // less.
-  std::uint64_t memory_bytes = 0;
-  int threads = 0;                    // 0: all that the job may use and the budget feeds
-  std::uint32_t leaf_capacity = 16;   // surfels per leaf (memo 3.2: "less than 16" or so)
-  float disk_overlap = 2;             // disk area over surfel area where one must be made up
-                                      // (--disk-overlap)
-  Repeats repeats = Repeats::kKeep;   // of overlapping clouds, such as tiles (--overlap)
-  bool full_precision = false;        // keep floats instead of quantized values
-  bool strict = false;                // refuse invalid records instead of skipping them
-  std::string temporary_directory{};  // empty: where the job wants them (SLURM_TMPDIR, TMPDIR),
-                                      // else beside the output
-  // Channels of the inputs to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
-  // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
-  std::string channels{}, part{};
+// `memory_bytes` 0 stands for 1 GiB, or three quarters of what the job may hold where that is less.
+struct IndexOptions : JobOptions, ReadOptions {
+  std::uint32_t leaf_capacity = 16;  // surfels per leaf (memo 3.2: "less than 16" or so)
+  float disk_overlap = 2;            // disk area over surfel area where one must be made up
+                                     // (--disk-overlap)
+  Repeats repeats = Repeats::kKeep;  // of overlapping clouds, such as tiles (--overlap)
+  bool full_precision = false;       // keep floats instead of quantized values
   // What places are counted from in the scene, in the cloud's coordinates: finite, at most 1e12.
   // Absent: 0 for clouds about 0, a corner of their root cube for others (docs/format.md). Scenes
   // of one sequence may share one.
   std::optional<glm::dvec3> origin{};
   // What is up. Absent: what the inputs say (surfeit/up_axis.h).
   std::optional<UpAxis> up{};
-  // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
-  // that the format marks as not to be used.
-  std::string filter{};
-  // How colors are read whose numbers do not say what they mean.
-  ColorRange color_range = ColorRange::kAuto;
   // Surfels without a normal get one from their neighbours, as those of surfeit/normals.h do; those
   // on no surface stay spheres or are seen from both sides. Absent: they are spheres.
   std::optional<NormalEstimation> normals{};
@@ -78,8 +65,9 @@ struct IndexStats {
 // input lacks is filled in by the rules of docs/format.md and told through progress.note().
 // Errors: kIoError, kCorruption (bad input, or no valid surfel at all), kInvalidArgument,
 // kBudgetTooSmall, kInterrupted.
-Result<IndexStats> indexClouds(const std::vector<std::string>& inputs, const std::string& output,
-                               const IndexOptions& options, Progress& progress);
+SURFEIT_API Result<IndexStats> indexClouds(const std::vector<std::string>& inputs,
+                                           const std::string& output, const IndexOptions& options,
+                                           Progress& progress);
 
 // What indexClouds will take, about.
 struct IndexForecast {
@@ -94,8 +82,8 @@ struct IndexForecast {
 // Indexes a sample from all over the inputs, in the folder of temporary files, and multiplies: a
 // sample is less dense, so the file will be somewhat smaller. Writes nothing else. Errors: as of
 // indexClouds.
-Result<IndexForecast> forecastIndex(const std::vector<std::string>& inputs,
-                                    const std::string& output, const IndexOptions& options,
-                                    Progress& progress);
+SURFEIT_API Result<IndexForecast> forecastIndex(const std::vector<std::string>& inputs,
+                                                const std::string& output,
+                                                const IndexOptions& options, Progress& progress);
 
 }  // namespace surfeit

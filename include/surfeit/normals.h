@@ -5,7 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "surfeit/color_range.h"
+#include "surfeit/api.h"
+#include "surfeit/job.h"
 #include "surfeit/normal_estimation.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -13,16 +14,11 @@
 
 namespace surfeit {
 
-struct NormalsOptions {
+// `memory_bytes` 0 stands for three quarters of what the job may hold, at most 1 GiB.
+struct NormalsOptions : JobOptions, ReadOptions {
   NormalEstimation estimation;
-  std::optional<UpAxis> up{};                // absent: what the cloud says (surfeit/up_axis.h)
-  bool with_sizes = false;                   // radius and area, too, as index would find them
-  std::string channels{}, part{}, filter{};  // of the input, as in IndexOptions
-  ColorRange color_range = ColorRange::kAuto;
-  std::uint64_t memory_bytes =
-      0;            // of the job; 0: three quarters of what it may hold, at most 1 GiB
-  int threads = 0;  // 0: all that the job may use
-  std::string temporary_directory{};  // empty: as of index
+  std::optional<UpAxis> up{};  // absent: what the cloud says (surfeit/up_axis.h)
+  bool with_sizes = false;     // radius and area, too, as index would find them
 };
 
 struct NormalsStats {
@@ -41,7 +37,8 @@ struct NormalsStats {
 // told. An octree of the places stands in a temporary file meanwhile. Neither memory nor time per
 // point depends on the size of the cloud or the order of its points. Errors: as of indexClouds and
 // of the formats.
-Result<NormalsStats> estimateNormals(const std::string& input, const std::string& output,
-                                     const NormalsOptions& options, Progress& progress);
+SURFEIT_API Result<NormalsStats> estimateNormals(const std::string& input,
+                                                 const std::string& output,
+                                                 const NormalsOptions& options, Progress& progress);
 
 }  // namespace surfeit

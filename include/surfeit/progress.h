@@ -5,10 +5,12 @@
 #include <string>
 #include <string_view>
 
+#include "surfeit/api.h"
+
 namespace surfeit {
 
 // Implement to show progress or to cancel. All calls may come from any thread.
-class Progress {
+class SURFEIT_API Progress {
  public:
   virtual ~Progress() = default;
 

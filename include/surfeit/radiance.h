@@ -8,13 +8,15 @@
 #include <utility>
 #include <vector>
 
-#include "surfeit/color_range.h"
+#include "surfeit/api.h"
+#include "surfeit/job.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
 
-struct RadianceOptions {
+// `memory_bytes`: at least 64 MiB.
+struct RadianceOptions : JobOptions, ReadOptions {
   // Photons per estimate, 1 to 10000: the photon itself and its nearest. More make less noise, and
   // blur (app note 6.3).
   std::uint32_t photons_per_estimate = 100;
@@ -24,19 +26,6 @@ struct RadianceOptions {
   // Disk area over surfel area, 1 to 16. Photons lie at random, so disks must overlap more than
   // those cut from a mesh to leave no gaps: e^-overlap of the surface stays uncovered.
   float disk_overlap = 7;
-  // As in GatherOptions; at least 64 MiB.
-  std::uint64_t memory_bytes = 0;
-  int threads = 0;                    // 0: all that the job may use
-  bool strict = false;                // refuse invalid photons instead of skipping them
-  std::string temporary_directory{};  // empty: beside the result
-  // Channels of the photons to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of files
-  // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
-  std::string channels{}, part{};
-  // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
-  // that the format marks as not to be used.
-  std::string filter{};
-  // How colors are read whose numbers do not say what they mean.
-  ColorRange color_range = ColorRange::kAuto;
 };
 
 struct RadianceStats {
@@ -61,8 +50,8 @@ struct RadianceStats {
 // result depends on the photons and the options above memory_bytes alone, bit for bit, and not on
 // the order of the photons. Errors: as indexClouds; kCorruption, before work starts, when an input
 // has no photons, no normals or no powers.
-Result<RadianceStats> radianceCloud(const std::vector<std::string>& photon_paths,
-                                    const std::string& result_path, const RadianceOptions& options,
-                                    Progress& progress);
+SURFEIT_API Result<RadianceStats> radianceCloud(const std::vector<std::string>& photon_paths,
+                                                const std::string& result_path,
+                                                const RadianceOptions& options, Progress& progress);
 
 }  // namespace surfeit

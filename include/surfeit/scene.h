@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/api.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
@@ -32,7 +33,7 @@ struct SceneInfo {
 
 // Reads header and directory, and of a scene with groups the first page. Errors: kIoError,
 // kCorruption.
-Result<SceneInfo> readSceneInfo(const std::string& path);
+SURFEIT_API Result<SceneInfo> readSceneInfo(const std::string& path);
 
 struct VerifyReport {
   std::uint64_t pages_checked = 0;
@@ -46,7 +47,7 @@ struct VerifyReport {
 // and the check goes on with the next page. `memory_bytes`: budget; 0: three quarters of what the
 // job may hold; more than some 100 MiB are left alone. Errors: kIoError, kBudgetTooSmall,
 // kInterrupted.
-Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress,
-                                 std::uint64_t memory_bytes = 0);
+SURFEIT_API Result<VerifyReport> verifyScene(const std::string& path, int threads,
+                                             Progress& progress, std::uint64_t memory_bytes = 0);
 
 }  // namespace surfeit

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "surfeit/gather.h"
+#include "surfeit/api.h"
+#include "surfeit/bake.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -80,12 +81,13 @@ struct TuneReport {
 inline constexpr double kTuneTimeMargin = 0.05;
 
 // Follows the look-ups of a sample of the receivers through the octree, gathers at some of them,
-// and predicts from that what a gather at all of `receivers_path` (PLY) would do in budgets of any
+// and predicts from that what a gather at all of `receivers_path` would do in budgets of any
 // size. Writes nothing but temporary files. With all receivers sampled, the predicted loads are
 // those of LRU caches on the very look-ups of a gather; with fewer they are estimates:
 // docs/algorithm.md, "Predicting misses from a sample". Times hold for the state of the system's
 // page cache as it is. Errors: as gatherCloud; kCorruption without valid receivers.
-Result<TuneReport> tuneGather(const std::string& scene_path, const std::string& receivers_path,
-                              const TuneOptions& options, Progress& progress);
+SURFEIT_API Result<TuneReport> tuneGather(const std::string& scene_path,
+                                          const std::string& receivers_path,
+                                          const TuneOptions& options, Progress& progress);
 
 }  // namespace surfeit

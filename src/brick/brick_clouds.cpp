@@ -7,17 +7,17 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
-#include <new>
 #include <optional>
 
 #include "brick/brick_input.h"
 #include "brick/brick_layout.h"
 #include "brick/brick_sweep.h"
 #include "brick/brick_writer.h"
+#include "core/guard.h"
 #include "core/job_limits.h"
-#include "io/output_target.h"
-#include "octree/parallel.h"
-#include "octree/record_sorter.h"
+#include "core/parallel.h"
+#include "storage/output_target.h"
+#include "storage/record_sorter.h"
 #include "surfeit/brick.h"
 
 namespace surfeit {
@@ -362,7 +362,7 @@ Result<BrickStats> brickClouds(const std::vector<std::string>& inputs, const std
   if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
   const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
-  try {
+  return guarded(output, [&]() -> Result<BrickStats> {
     std::optional<Result<BrickStats>> result;
     withThreads(threads, [&] { result = BrickBuild(inputs, output, options, progress).run(); });
     if (result->ok()) {
@@ -370,11 +370,7 @@ Result<BrickStats> brickClouds(const std::vector<std::string>& inputs, const std
       (*result)->memory_bytes = options.memory_bytes;
     }
     return std::move(*result);
-  } catch (const std::bad_alloc&) {
-    return Status::failed("out of memory while making a brick map");
-  } catch (const std::exception& error) {
-    return Status::failed(fmt::format("while making a brick map: {}", error.what()));
-  }
+  });
 }
 
 }  // namespace surfeit

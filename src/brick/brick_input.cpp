@@ -11,10 +11,10 @@
 #include <numbers>
 #include <string_view>
 
-#include "io/cloud_formats.h"
-#include "io/surfel_mapping.h"
-#include "io/surfel_names.h"
-#include "octree/scene_rows.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/surfel_names.h"
+#include "index/scene_rows.h"
+#include "surfels/surfel_mapping.h"
 
 namespace surfeit {
 namespace {
@@ -40,7 +40,7 @@ bool contains(std::span<const std::string_view> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-BrickChannel brickChannel(const PlyElement& element, const RowChannel& channel) {
+BrickChannel brickChannel(const RowLayout& element, const RowChannel& channel) {
   BrickChannel made{channel.name, {}};
   for (const std::size_t index : channel.properties) {
     made.properties.push_back(element.properties[index].name);
@@ -49,7 +49,7 @@ BrickChannel brickChannel(const PlyElement& element, const RowChannel& channel) 
 }
 
 // Channels of 1 or 3 numbers are grids as they are; others become one grid per number.
-void addChannels(const PlyElement& element, const RowChannel& channel,
+void addChannels(const RowLayout& element, const RowChannel& channel,
                  std::vector<BrickChannel>& channels) {
   if (channel.properties.size() == 1 || channel.properties.size() == 3) {
     channels.push_back(brickChannel(element, channel));
@@ -63,7 +63,7 @@ void addChannels(const PlyElement& element, const RowChannel& channel,
 
 }  // namespace
 
-Result<std::vector<BrickChannel>> chooseBrickChannels(const PlyElement& element,
+Result<std::vector<BrickChannel>> chooseBrickChannels(const RowLayout& element,
                                                       std::span<const std::string> names,
                                                       const std::string& path) {
   const std::vector<RowChannel> all = channelsOf(element);
@@ -108,13 +108,13 @@ Result<BrickInput> BrickInput::open(const std::string& path, std::span<const Bri
 }
 
 BrickInput::Field BrickInput::find(const char* name) const {
-  const PlyProperty* property = reader_->element().find(name);
+  const RowProperty* property = reader_->element().find(name);
   if (property == nullptr || property->is_list) return {};
   return {property->offset, property->type, true};
 }
 
 Status BrickInput::declare(std::span<const BrickChannel> channels) {
-  const PlyElement& element = reader_->element();
+  const RowLayout& element = reader_->element();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     position_[axis] = find(kPositionNames[axis]);
     normal_[axis] = find(kNormalNames[axis]);
@@ -135,7 +135,7 @@ Status BrickInput::declare(std::span<const BrickChannel> channels) {
   const std::vector<RowChannel> all = channelsOf(element);
   for (const BrickChannel& wanted : channels) {
     for (const std::string& name : wanted.properties) {
-      const PlyProperty* property = element.find(name);
+      const RowProperty* property = element.find(name);
       if (property == nullptr || property->is_list) {
         return Status::invalidArgument(
             fmt::format("{}: no property {} of channel {}; all clouds of a brick map need its "
@@ -147,7 +147,7 @@ Status BrickInput::declare(std::span<const BrickChannel> channels) {
         const auto at = std::find(channel.properties.begin(), channel.properties.end(), index);
         if (at == channel.properties.end()) continue;
         values_.push_back({channel, static_cast<std::size_t>(at - channel.properties.begin())});
-        const bool is_plain = property->type == PlyType::kFloat32;
+        const bool is_plain = property->type == ValueType::kFloat32;
         plain_.push_back({property->offset, property->type, is_plain});
         break;
       }

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "io/channels.h"
-#include "io/cloud_formats.h"
-#include "io/row_reader.h"
+#include "cloud/channels.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/row_reader.h"
 #include "surfeit/brick.h"
 #include "surfeit/color_range.h"
 #include "surfeit/progress.h"
@@ -32,7 +32,7 @@ struct BrickInputPoint {
 
 // Chooses the channels of a brick map by a cloud. kInvalidArgument lists those that it has when one
 // is missing, and for more numbers than kMaxBrickValues.
-Result<std::vector<BrickChannel>> chooseBrickChannels(const PlyElement& element,
+Result<std::vector<BrickChannel>> chooseBrickChannels(const RowLayout& element,
                                                       std::span<const std::string> names,
                                                       const std::string& path);
 
@@ -61,10 +61,10 @@ class BrickInput {
   };
   struct Field {
     std::size_t offset = 0;
-    PlyType type = PlyType::kFloat32;
+    ValueType type = ValueType::kFloat32;
     bool exists = false;
     bool empty() const { return !exists; }
-    double read(const std::byte* row) const { return plyValue(row + offset, type); }
+    double read(const std::byte* row) const { return rowValue(row + offset, type); }
   };
 
   BrickInput() = default;

@@ -10,7 +10,7 @@
 #include <glm/vec3.hpp>
 #include <string_view>
 
-#include "io/formats/vdb_file.h"
+#include "cloud/vdb/vdb_file.h"
 
 namespace surfeit {
 

@@ -190,8 +190,8 @@ std::uint64_t BrickMap::cachedBytes() const { return state_->pages->cachedBytes(
 std::uint64_t BrickMap::directoryBytes() const { return state_->pages->directoryBytes(); }
 
 Result<bool> BrickMap::lookup(const glm::dvec3& position, const glm::vec3& normal,
-                              double filter_width, std::span<float> values) const {
-  SURFEIT_CHECK(values.size() == valueCount());
+                              double filter_width, float* numbers) const {
+  const std::span<float> values(numbers, valueCount());
   try {
     std::fill(values.begin(), values.end(), 0.0f);
     const double octaves = filter_width > 0 ? std::log2(filter_width / voxelSize(0)) : 0;

@@ -10,7 +10,7 @@
 #include <optional>
 #include <sstream>
 
-#include "io/formats/vdb_coding.h"
+#include "cloud/vdb/vdb_coding.h"
 
 namespace surfeit {
 namespace {
@@ -68,7 +68,7 @@ Result<std::unique_ptr<BrickPages>> BrickPages::open(const std::string& path,
 
 Status BrickPages::corrupt(const VdbGrid& grid, const std::string& what) const {
   return Status::corruption(
-      fmt::format("{}: grid {}: {}", file_->input.path(), quotePlyText(grid.name), what));
+      fmt::format("{}: grid {}: {}", file_->input.path(), quoteText(grid.name), what));
 }
 
 // A channel as its grid tells of it.
@@ -77,10 +77,10 @@ Status BrickPages::addChannel(const VdbGrid& grid, const std::string& name) {
   std::istringstream words(grid.text(kBrickPropertiesName));
   for (std::string word; words >> word;) channel.properties.push_back(word);
   const std::optional<VdbValueType> type = vdbValueType(grid);
-  const bool fits = type.has_value() && type->type == PlyType::kFloat32 &&
+  const bool fits = type.has_value() && type->type == ValueType::kFloat32 &&
                     type->components == channel.properties.size() &&
                     std::all_of(channel.properties.begin(), channel.properties.end(),
-                                [](const std::string& word) { return isPlyName(word); });
+                                [](const std::string& word) { return isPropertyName(word); });
   value_count_ += channel.properties.size();
   if (!fits || name.empty() || value_count_ > kMaxBrickValues) {
     return corrupt(grid, "its properties do not fit its type");
@@ -96,7 +96,7 @@ Status BrickPages::arrangeGrids() {
     const std::optional<int> version = wholeNumber(grid.text(kBrickVersionName));
     if (version != kBrickVersion) {
       return corrupt(grid, fmt::format("found brick_version {}, expected {}: no brick map",
-                                       quotePlyText(grid.text(kBrickVersionName)), kBrickVersion));
+                                       quoteText(grid.text(kBrickVersionName)), kBrickVersion));
     }
     const std::optional<int> level = wholeNumber(grid.text(kBrickLevelName));
     const auto direction = std::find(kBrickDirectionNames.begin(), kBrickDirectionNames.end(),
@@ -147,10 +147,10 @@ Status BrickPages::checkGroups() const {
     for (std::size_t i = 0; i < group.grids.size(); ++i) {
       const std::optional<VdbValueType> type = vdbValueType(*group.grids[i]);
       const std::size_t components = i == 0 ? 1 : channels_[i - 1].properties.size();
-      if (!type.has_value() || type->type != PlyType::kFloat32 || type->components != components) {
-        return corrupt(*group.grids[i],
-                       fmt::format("type {}, expected {} floats",
-                                   quotePlyText(group.grids[i]->type), components));
+      if (!type.has_value() || type->type != ValueType::kFloat32 ||
+          type->components != components) {
+        return corrupt(*group.grids[i], fmt::format("type {}, expected {} floats",
+                                                    quoteText(group.grids[i]->type), components));
       }
     }
   }

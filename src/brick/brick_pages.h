@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "brick/brick_layout.h"
-#include "io/formats/vdb_file.h"
-#include "io/formats/vdb_tree.h"
+#include "cloud/vdb/vdb_file.h"
+#include "cloud/vdb/vdb_tree.h"
 #include "surfeit/brick.h"
 #include "surfeit/status.h"
 

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "io/formats/vdb_tree.h"
-#include "io/formats/vdb_writers.h"
+#include "cloud/vdb/vdb_tree.h"
+#include "cloud/vdb/vdb_writers.h"
 
 namespace surfeit {
 namespace {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "brick/brick_layout.h"
-#include "io/formats/vdb_output.h"
-#include "octree/record_sorter.h"
+#include "cloud/vdb/vdb_output.h"
+#include "storage/record_sorter.h"
 #include "surfeit/brick.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"

@@ -93,7 +93,7 @@ PageCache::PageCache(const Options& options, FramePool pool, Loader loader)
       loader_(std::move(loader)),
       pool_(std::move(pool)),
       has_barrier_(registerProcessBarrier()),
-      entries_(std::make_unique<Entry[]>(options.page_count)),
+      entries_(options.page_count),
       lists_(kEpochLists + 1) {
   setFrameLimit(options.frame_count);
 }
@@ -101,8 +101,8 @@ PageCache::PageCache(const Options& options, FramePool pool, Loader loader)
 PageCache::~PageCache() {
   resident_pins_.clear();
   SURFEIT_ASSERT(fronts_.empty());
-  for (PageNumber page = 0; page < options_.page_count; ++page) {
-    SURFEIT_ASSERT(!isPinned(entries_[page].word.load()));
+  for (const Frame& frame : frames_) {
+    SURFEIT_ASSERT(frame.page == kNone || !isPinned(entries_[frame.page].word.load()));
   }
 }
 
@@ -126,6 +126,28 @@ Status PageCache::keepResident(PageNumber count) {
   resident_pins_ = std::move(pins);
   resident_ = std::move(resident);
   return {};
+}
+
+void PageCache::forget(PageNumber first, PageNumber count) {
+  SURFEIT_CHECK(first >= resident_.size() && count <= options_.page_count - first);
+  const std::lock_guard lock(mutex_);
+  for (PageNumber page = first; page < first + count; ++page) {
+    Entry& entry = entries_[page];
+    const Word word = entry.word.load();
+    if (word == 0) continue;
+    const State state = stateOf(word);
+    SURFEIT_CHECK(!isPinned(word) && state != kLoading && state != kFailed);
+    if (state != kAbsent) {
+      const std::uint32_t frame = frameOf(word);
+      if (state == kLeaving && lists_.listOf(frame) == kLeavingList) --leaving_;
+      lists_.remove(frame);
+      setFree(frame);
+    }
+    entry.word.store(0);
+    entry.epoch.store(0, std::memory_order_relaxed);
+  }
+  shrink();
+  frame_released_.notify_all();
 }
 
 CacheCounters PageCache::counters() const {

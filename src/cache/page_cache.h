@@ -35,6 +35,7 @@
 #include "cache/frame_lists.h"
 #include "cache/frame_pool.h"
 #include "cache/page_number.h"
+#include "cache/zeroed_table.h"
 #include "core/assert.h"
 #include "surfeit/status.h"
 
@@ -48,7 +49,9 @@ class ReuseDistances;
 class PageCache {
  public:
   struct Options {
-    PageNumber page_count = 0;    // pages that exist: numbers 0 .. page_count - 1
+    // Pages that exist: numbers 0 .. page_count - 1. An entry of the table takes memory when its
+    // page, or a neighbour, is first looked up.
+    PageNumber page_count = 0;
     std::size_t frame_bytes = 0;  // most bytes of a decoded page
     std::size_t frame_count = 0;  // frames at first; see setFrameLimit
     // Told of the look-ups that fronts do not answer; may be null. Must outlive the cache.
@@ -127,6 +130,11 @@ class PageCache {
   // front, when they are let go of. Takes the time of a copy per page that moves. Safe from any
   // thread.
   void setFrameLimit(std::size_t frames);
+
+  // Forgets `count` pages from `first` on: their frames are free, and one that is loaded next under
+  // such a number was never there before. None of them may be pinned, in a front or being loaded.
+  // Safe from any thread.
+  void forget(PageNumber first, PageNumber count);
 
   // Safe from any thread. Counts of a moment: those of fronts may be a few look-ups old.
   CacheCounters counters() const;
@@ -286,7 +294,7 @@ class PageCache {
   const Loader loader_;
   FramePool pool_;
   const bool has_barrier_;  // processBarrier
-  std::unique_ptr<Entry[]> entries_;
+  ZeroedTable<Entry> entries_;
   std::vector<Pin> resident_pins_;
   std::vector<std::span<const std::byte>> resident_;  // pages that are always there
 

@@ -10,8 +10,8 @@
 #include <new>
 #include <utility>
 
-#include "io/file.h"
 #include "sample/polygon.h"
+#include "storage/file.h"
 
 namespace surfeit {
 namespace {

@@ -19,9 +19,9 @@
 #include <tiny_obj_loader.h>
 
 #include "core/spherical_harmonics.h"
-#include "io/file.h"
 #include "sample/mesh_builder.h"
 #include "sample/obj_lines.h"
+#include "storage/file.h"
 
 namespace surfeit {
 namespace {

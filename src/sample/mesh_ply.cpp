@@ -10,10 +10,10 @@
 #include <optional>
 #include <string_view>
 
+#include "cloud/cloud_formats.h"
+#include "cloud/ply/ply_reader.h"
+#include "cloud/srgb_curve.h"
 #include "core/resident_limit.h"
-#include "io/cloud_formats.h"
-#include "io/ply_reader.h"
-#include "io/srgb_curve.h"
 #include "sample/mesh_builder.h"
 
 namespace surfeit {
@@ -22,13 +22,13 @@ namespace {
 // Faces after which memory is looked at.
 constexpr std::uint64_t kCheckedFaces = 65536;
 
-using Triple = std::array<const PlyProperty*, 3>;
+using Triple = std::array<const RowProperty*, 3>;
 
 // Three scalar properties of the element, or nothing unless all are there.
-std::optional<Triple> findTriple(const PlyElement& element, std::string_view a, std::string_view b,
+std::optional<Triple> findTriple(const RowLayout& element, std::string_view a, std::string_view b,
                                  std::string_view c) {
   const Triple triple = {element.find(a), element.find(b), element.find(c)};
-  for (const PlyProperty* property : triple) {
+  for (const RowProperty* property : triple) {
     if (property == nullptr || property->is_list) return std::nullopt;
   }
   return triple;
@@ -37,8 +37,8 @@ std::optional<Triple> findTriple(const PlyElement& element, std::string_view a, 
 glm::dvec3 value(const std::byte* row, const Triple& triple) {
   glm::dvec3 result;
   for (int i = 0; i < 3; ++i) {
-    const PlyProperty& property = *triple[std::size_t(i)];
-    result[i] = plyValue(row + property.offset, property.type);
+    const RowProperty& property = *triple[std::size_t(i)];
+    result[i] = rowValue(row + property.offset, property.type);
   }
   return result;
 }
@@ -47,10 +47,10 @@ glm::dvec3 value(const std::byte* row, const Triple& triple) {
 glm::vec3 linearColor(const std::byte* row, const Triple& triple) {
   glm::vec3 color = glm::max(glm::vec3(value(row, triple)), glm::vec3(0));
   for (int i = 0; i < 3; ++i) {
-    const PlyType type = triple[std::size_t(i)]->type;
+    const ValueType type = triple[std::size_t(i)]->type;
     if (!codesSrgb(type)) continue;
-    color[i] = type == PlyType::kUint8 ? linearFromSrgb8(std::uint8_t(color[i]))
-                                       : linearFromSrgb(color[i] / 65535);
+    color[i] = type == ValueType::kUint8 ? linearFromSrgb8(std::uint8_t(color[i]))
+                                         : linearFromSrgb(color[i] / 65535);
   }
   return color;
 }
@@ -72,7 +72,7 @@ Result<std::unique_ptr<RowReader>> openVertices(const std::string& path, Progres
 
 // Returns whether vertices have colors.
 Result<bool> readVertices(RowReader& reader, MeshBuilder& builder) {
-  const PlyElement& element = reader.element();
+  const RowLayout& element = reader.element();
   const std::optional<Triple> position = findTriple(element, "x", "y", "z");
   if (!position) {
     return Status::corruption(
@@ -105,11 +105,11 @@ Result<bool> readVertices(RowReader& reader, MeshBuilder& builder) {
   }
 }
 
-Status readFaces(PlyReader& reader, const PlyElement& element, std::uint32_t material,
+Status readFaces(PlyReader& reader, const RowLayout& element, std::uint32_t material,
                  std::uint64_t vertex_begin, MeshBuilder& builder) {
   std::optional<std::size_t> list_property;
   for (std::size_t i = 0; i < element.properties.size(); ++i) {
-    const PlyProperty& property = element.properties[i];
+    const RowProperty& property = element.properties[i];
     if (property.is_list &&
         (property.name == "vertex_indices" || property.name == "vertex_index")) {
       list_property = i;

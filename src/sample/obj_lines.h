@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "io/byte_input.h"
+#include "storage/byte_input.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -21,15 +21,15 @@
 #include <string>
 #include <utility>
 
+#include "cloud/cloud_formats.h"
+#include "cloud/photon_names.h"
+#include "cloud/row_writer.h"
+#include "cloud/surfel_names.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
-#include "io/cloud_formats.h"
-#include "io/photon_names.h"
-#include "io/row_writer.h"
-#include "io/surfel_names.h"
-#include "io/up_comment.h"
+#include "core/up_comment.h"
 #include "sample/ray_scene.h"
 
 namespace surfeit {
@@ -62,17 +62,17 @@ struct FarPhoton {
 };
 static_assert(sizeof(FarPhoton) == 3 * sizeof(double) + 12 * sizeof(float));
 
-std::vector<PlyProperty> photonProperties(bool is_far) {
-  std::vector<PlyProperty> properties;
+std::vector<RowProperty> photonProperties(bool is_far) {
+  std::vector<RowProperty> properties;
   for (const auto& names :
        {kPositionNames, kNormalNames, kPowerNames, kIncidentNames, kAlbedoNames}) {
     for (int i = 0; i < 3; ++i) {
-      PlyProperty property;
+      RowProperty property;
       property.name = names[i];
       properties.push_back(property);
     }
   }
-  for (int i = 0; i < 3 && is_far; ++i) properties[std::size_t(i)].type = PlyType::kFloat64;
+  for (int i = 0; i < 3 && is_far; ++i) properties[std::size_t(i)].type = ValueType::kFloat64;
   return properties;
 }
 

@@ -18,10 +18,10 @@
 #include "core/long_side.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
-#include "io/surfel_writer.h"
-#include "io/up_comment.h"
+#include "core/up_comment.h"
 #include "sample/dice.h"
 #include "sample/ray_scene.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

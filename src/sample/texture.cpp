@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/assert.h"
-#include "io/file.h"
+#include "storage/file.h"
 
 namespace surfeit {
 namespace {

@@ -21,12 +21,12 @@ namespace {
 constexpr std::size_t kLookUpsAtOnce = 256;
 
 // The element of rows with floats behind what they have.
-PlyElement withProperties(PlyElement element, const BrickMap& brick) {
+RowLayout withProperties(RowLayout element, const BrickMap& brick) {
   for (const BrickChannel& channel : brick.channels()) {
     for (const std::string& name : channel.properties) {
       std::erase_if(element.properties,
-                    [&](const PlyProperty& property) { return property.name == name; });
-      PlyProperty property;
+                    [&](const RowProperty& property) { return property.name == name; });
+      RowProperty property;
       property.name = name;
       property.offset = element.row_bytes;
       element.properties.push_back(property);
@@ -47,7 +47,7 @@ class BrickRows final : public CloudRows {
         element_(withProperties(rows_->element(), brick_)) {}
 
   const std::string& path() const override { return rows_->path(); }
-  const PlyElement& element() const override { return element_; }
+  const RowLayout& element() const override { return element_; }
   UpAxis up() const override { return rows_->up(); }
   std::vector<std::string> notes() const override { return rows_->notes(); }
   Status rewind() override { return rows_->rewind(); }
@@ -86,7 +86,7 @@ class BrickRows final : public CloudRows {
     if (has_values) {
       const double width = filter_width_.value_or(2 * static_cast<double>(record.radius));
       SURFEIT_ASSIGN_OR_RETURN(has_values,
-                               brick_.lookup(record.position, record.normal, width, found));
+                               brick_.lookup(record.position, record.normal, width, &found[0]));
     }
     if (!has_values) std::fill(found.begin(), found.end(), std::numeric_limits<float>::quiet_NaN());
     std::memcpy(out, found.data(), found.size_bytes());
@@ -97,7 +97,7 @@ class BrickRows final : public CloudRows {
   BrickMap brick_;
   RecordDecoder decoder_;
   std::optional<double> filter_width_;
-  PlyElement element_;
+  RowLayout element_;
   std::vector<std::byte> bytes_;
 };
 

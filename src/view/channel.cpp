@@ -26,18 +26,18 @@ constexpr std::array<std::string_view, 3> kColorSuffixes = {"_r", "_g", "_b"};
 constexpr std::array<std::string_view, 3> kVectorSuffixes = {"_x", "_y", "_z"};
 
 // What turns an integer color into a display value; 0 for floats, which are linear already.
-float displayScale(PlyType type) {
+float displayScale(ValueType type) {
   switch (type) {
-    case PlyType::kUint8:
+    case ValueType::kUint8:
       return 1 / 255.f;
-    case PlyType::kUint16:
+    case ValueType::kUint16:
       return 1 / 65535.f;
     default:
       return 0;
   }
 }
 
-bool findFields(const PlyElement& element, const std::array<std::string, 3>& names,
+bool findFields(const RowLayout& element, const std::array<std::string, 3>& names,
                 std::array<RowField, 3>& fields) {
   for (std::size_t i = 0; i < 3; ++i) fields[i] = RowField::find(element, names[i]);
   return fields[0].exists() && fields[1].exists() && fields[2].exists();
@@ -52,7 +52,7 @@ glm::vec3 Channel::Triple::read(const std::byte* row) const {
   return display_scale > 0 ? linearFromSrgb(value * display_scale) : value;
 }
 
-Channel::Triple Channel::findTriple(const PlyElement& element, const std::string& name) {
+Channel::Triple Channel::findTriple(const RowLayout& element, const std::string& name) {
   Triple triple;
   for (const NamedTriple& named : kNamedTriples) {
     if (named.name != name) continue;
@@ -75,7 +75,7 @@ Channel::Triple Channel::findTriple(const PlyElement& element, const std::string
   return {};
 }
 
-Result<Channel> Channel::find(const PlyElement& element, const std::string& name,
+Result<Channel> Channel::find(const RowLayout& element, const std::string& name,
                               const std::string& path) {
   Channel channel;
   channel.name_ = name;
@@ -117,7 +117,7 @@ Result<Channel> Channel::find(const PlyElement& element, const std::string& name
   const RowField scalar = RowField::find(element, name);
   if (scalar.exists()) {
     channel.value_.fields = {scalar, scalar, scalar};
-    if (scalar.type == PlyType::kUint8) {
+    if (scalar.type == ValueType::kUint8) {
       channel.value_.display_scale = displayScale(scalar.type);
     } else if (name != "occlusion") {
       channel.kind_ = ValueKind::kScalar;
@@ -128,7 +128,7 @@ Result<Channel> Channel::find(const PlyElement& element, const std::string& name
                                              name, fmt::join(list(element), ", ")));
 }
 
-std::vector<std::string> Channel::list(const PlyElement& element) {
+std::vector<std::string> Channel::list(const RowLayout& element) {
   std::vector<std::string> names;
   const auto addOnce = [&](const std::string& name) {
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
@@ -140,7 +140,7 @@ std::vector<std::string> Channel::list(const PlyElement& element) {
   if (RowField::find(element, "occlusion").exists()) addOnce("ao");
 
   // A property is listed under its triple where it belongs to one
-  for (const PlyProperty& property : element.properties) {
+  for (const RowProperty& property : element.properties) {
     if (property.is_list) continue;
     std::string listed = property.name;
     for (const NamedTriple& named : kNamedTriples) {
@@ -157,7 +157,7 @@ std::vector<std::string> Channel::list(const PlyElement& element) {
   return names;
 }
 
-std::string Channel::choose(const PlyElement& element) {
+std::string Channel::choose(const RowLayout& element) {
   const auto has = [&](const char* name) { return findTriple(element, name).exists(); };
   if (has("irradiance") || has("environment")) return "lit";
   if (RowField::find(element, "occlusion").exists()) return "ao";

@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-#include "io/ply_format.h"
+#include "cloud/row_layout.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "view/row_field.h"
@@ -41,13 +41,13 @@ enum class ValueKind : std::uint8_t {
 class Channel {
  public:
   // The channel of that name. kInvalidArgument lists the channels of the cloud when it has none.
-  static Result<Channel> find(const PlyElement& element, const std::string& name,
+  static Result<Channel> find(const RowLayout& element, const std::string& name,
                               const std::string& path);
   // The names that find() knows for this cloud, derived ones first. Members of a triple are
   // channels as well, but not listed.
-  static std::vector<std::string> list(const PlyElement& element);
+  static std::vector<std::string> list(const RowLayout& element);
   // The most telling one: lit, ao, radiosity, color, albedo, normal, position.
-  static std::string choose(const PlyElement& element);
+  static std::string choose(const RowLayout& element);
 
   const std::string& name() const { return name_; }
   ValueKind kind() const { return kind_; }
@@ -65,7 +65,7 @@ class Channel {
     bool exists() const { return fields[0].exists(); }
     glm::vec3 read(const std::byte* row) const;
   };
-  static Triple findTriple(const PlyElement& element, const std::string& name);
+  static Triple findTriple(const RowLayout& element, const std::string& name);
 
   std::string name_;
   ValueKind kind_ = ValueKind::kLight;

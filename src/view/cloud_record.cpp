@@ -19,7 +19,7 @@ bool isInReach(double value) { return std::abs(value) <= kMaxLength; }
 
 }  // namespace
 
-Result<RecordDecoder> RecordDecoder::create(const PlyElement& element, const std::string& path) {
+Result<RecordDecoder> RecordDecoder::create(const RowLayout& element, const std::string& path) {
   constexpr const char* kPosition[3] = {"x", "y", "z"};
   constexpr const char* kNormal[3] = {"nx", "ny", "nz"};
   RecordDecoder decoder;

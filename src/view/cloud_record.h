@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 #include <string>
 
-#include "io/ply_format.h"
+#include "cloud/row_layout.h"
 #include "surfeit/status.h"
 #include "view/row_field.h"
 
@@ -23,7 +23,7 @@ struct CloudRecord {
 class RecordDecoder {
  public:
   // kCorruption when x, y or z is missing.
-  static Result<RecordDecoder> create(const PlyElement& element, const std::string& path);
+  static Result<RecordDecoder> create(const RowLayout& element, const std::string& path);
 
   bool hasNormal() const { return normal_[0].exists(); }
   bool hasRadius() const { return radius_.exists(); }

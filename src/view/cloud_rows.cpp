@@ -4,11 +4,11 @@
 
 #include <utility>
 
-#include "io/cloud_formats.h"
-#include "io/row_reader.h"
-#include "io/up_comment.h"
-#include "octree/scene_file.h"
-#include "octree/scene_rows.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/row_reader.h"
+#include "core/up_comment.h"
+#include "index/scene_rows.h"
+#include "octree/read/scene_file.h"
 
 namespace surfeit {
 namespace {
@@ -19,7 +19,7 @@ class FileRows final : public CloudRows {
   explicit FileRows(std::unique_ptr<RowReader> reader) : reader_(std::move(reader)) {}
 
   const std::string& path() const override { return reader_->path(); }
-  const PlyElement& element() const override { return reader_->element(); }
+  const RowLayout& element() const override { return reader_->element(); }
   UpAxis up() const override { return statedUpAxis(reader_->comments()).value_or(kDefaultUpAxis); }
   std::vector<std::string> notes() const override { return reader_->notes(); }
   Status rewind() override { return reader_->rewind(); }
@@ -38,7 +38,7 @@ class SceneRows final : public CloudRows {
       : header_(header), reader_(std::move(reader)) {}
 
   const std::string& path() const override { return reader_->path(); }
-  const PlyElement& element() const override { return reader_->element(); }
+  const RowLayout& element() const override { return reader_->element(); }
   UpAxis up() const override { return header_.up; }
   Status rewind() override { return reader_->rewind(); }
   Result<std::span<const std::byte>> next() override {
@@ -55,7 +55,7 @@ class SceneRows final : public CloudRows {
   AlignedBuffer buffer_;
 };
 
-bool hasPositions(const PlyElement& element) {
+bool hasPositions(const RowLayout& element) {
   return element.find("x") != nullptr && element.find("y") != nullptr &&
          element.find("z") != nullptr;
 }

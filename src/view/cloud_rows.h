@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "cloud/cloud_formats.h"
+#include "cloud/row_layout.h"
 #include "core/bounds.h"
-#include "io/cloud_formats.h"
-#include "io/ply_format.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "surfeit/up_axis.h"
@@ -29,7 +29,7 @@ class CloudRows {
 
   virtual const std::string& path() const = 0;
   // Names, types and offsets of a row's properties; row_bytes apart.
-  virtual const PlyElement& element() const = 0;
+  virtual const RowLayout& element() const = 0;
   // The axis that the file says is up.
   virtual UpAxis up() const = 0;
   // What is to be told of the file, one sentence each.
@@ -43,7 +43,7 @@ class CloudRows {
   virtual std::optional<Bounds3d> statedBounds() const { return std::nullopt; }
 };
 
-// Opens a file by its content: a scene, or any cloud that io/cloud_formats.h reads. kCorruption
+// Opens a file by its content: a scene, or any cloud that cloud/cloud_formats.h reads. kCorruption
 // when it is neither, or has no x, y and z.
 // `options`: what of a cloud is read, and under which names.
 Result<std::unique_ptr<CloudRows>> openCloudRows(const std::string& path,

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "cloud/cloud_formats.h"
+#include "cloud/exr/exr_reader.h"
 #include "core/job_limits.h"
-#include "io/cloud_formats.h"
-#include "io/formats/exr_reader.h"
 #include "view/channel.h"
 #include "view/non_finite.h"
 #include "view/picture.h"
@@ -54,7 +54,7 @@ class PixelRows {
     return rows;
   }
 
-  const PlyElement& element() const { return reader_->element(); }
+  const RowLayout& element() const { return reader_->element(); }
   const Imf::Header& header() const { return *exrHeaderOf(reader_.get()); }
 
   // The next row; nullptr at the end. Lasts until the next call.
@@ -97,7 +97,7 @@ class JoinedRows {
         return Status::invalidArgument(
             fmt::format("{}: another data window than {}, expected the same", path, paths.front()));
       }
-      for (PlyProperty property : added.element().properties) {
+      for (RowProperty property : added.element().properties) {
         if (joined.element_.find(property.name) != nullptr) continue;
         property.offset += joined.element_.row_bytes;
         joined.element_.properties.push_back(std::move(property));
@@ -112,7 +112,7 @@ class JoinedRows {
     return joined;
   }
 
-  const PlyElement& element() const { return element_; }
+  const RowLayout& element() const { return element_; }
   const Imf::Header& header() const { return inputs_.front().rows.header(); }
 
   // False at the end. row() and place() are those of the next pixel otherwise.
@@ -146,7 +146,7 @@ class JoinedRows {
   };
 
   std::vector<Input> inputs_;
-  PlyElement element_;
+  RowLayout element_;
   std::vector<std::byte> row_;
   Place place_;
 };

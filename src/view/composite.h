@@ -39,7 +39,7 @@ struct CompositeStats {
 };
 
 // Makes `picture`, .png or .exr by its name, of OpenEXR pictures that Surfeit reads as clouds
-// (io/formats/exr_reader.h). It has the display window of the first; pixels are those of the first,
+// (cloud/exr/exr_reader.h). It has the display window of the first; pixels are those of the first,
 // and the others add the channels that those before them lack. kInvalidArgument when an input is no
 // such picture, or the windows differ.
 Result<CompositeStats> compositePicture(std::span<const std::string> inputs,

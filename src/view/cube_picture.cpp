@@ -10,7 +10,7 @@
 #include <memory>
 #include <utility>
 
-#include "io/formats/exr_image_writer.h"
+#include "cloud/exr/exr_image_writer.h"
 #include "view/cube_layout.h"
 #include "view/srgb.h"
 

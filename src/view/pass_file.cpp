@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "io/formats/exr_image_writer.h"
-#include "io/formats/exr_reader.h"
+#include "cloud/exr/exr_image_writer.h"
+#include "cloud/exr/exr_reader.h"
 #include "view/channel.h"
 #include "view/framebuffer.h"
 #include "view/row_stream.h"

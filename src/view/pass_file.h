@@ -1,5 +1,5 @@
 // Render passes: what every pixel of a camera sees of a cloud, as an OpenEXR picture that the
-// gather takes as receivers (io/formats/exr_reader.h). The result of the gather is such a picture
+// gather takes as receivers (cloud/exr/exr_reader.h). The result of the gather is such a picture
 // again, and view/composite.h multiplies the light out.
 //
 // Channels, float, one sample in the middle of each pixel: P.X P.Y P.Z, where the ray through the

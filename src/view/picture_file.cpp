@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "io/file.h"
+#include "storage/file.h"
 
 namespace surfeit {
 

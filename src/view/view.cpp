@@ -9,10 +9,10 @@
 #include <memory>
 #include <new>
 
+#include "cloud/channels.h"
+#include "cloud/cloud_formats.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
-#include "io/channels.h"
-#include "io/cloud_formats.h"
 #include "view/brick_rows.h"
 #include "view/channel.h"
 #include "view/cloud_record.h"
@@ -195,7 +195,7 @@ Result<ViewStats> draw(const std::string& input, const std::string& picture_path
   }
   CameraOptions looking = options.camera;
   looking.up_axis = options.up.value_or(rows->up());
-  const PlyElement& element = rows->element();
+  const RowLayout& element = rows->element();
   SURFEIT_ASSIGN_OR_RETURN(const RecordDecoder decoder, RecordDecoder::create(element, input));
   const bool is_normal_map = options.mode == ViewMode::kNormals || !has_picture;
   stats.channel = is_normal_map             ? "normal"

@@ -86,7 +86,7 @@ class Brick : public DirectoryTest {
   static double at(const BrickMap& map, const glm::dvec3& position, const glm::vec3& normal,
                    double filter_width = 0) {
     std::vector<float> values(map.valueCount());
-    const Result<bool> found = map.lookup(position, normal, filter_width, values);
+    const Result<bool> found = map.lookup(position, normal, filter_width, &values[0]);
     EXPECT_TRUE(found.ok()) << found.status().message();
     return found.ok() && *found ? double(values[0]) : std::numeric_limits<double>::quiet_NaN();
   }
@@ -246,7 +246,7 @@ TEST_F(Brick, ManyThreadsLookUpTheSame) {
         const glm::dvec3 place(p.x, p.y, p.z);
         const glm::vec3 normal(p.nx, p.ny, p.nz);
         const bool same =
-            *map.lookup(place, normal, 0.01, a) && *one.lookup(place, normal, 0.01, b);
+            *map.lookup(place, normal, 0.01, &a[0]) && *one.lookup(place, normal, 0.01, &b[0]);
         wrong += same && a == b ? 0 : 1;
       }
     });
@@ -364,7 +364,7 @@ TEST_F(Brick, CloudsWithoutSizesAndNormalsWork) {
               testing::ElementsAre("result_r", "result_g", "result_b"));
   std::array<float, 3> values = {};
   for (const glm::vec3& normal : {glm::vec3(0), glm::vec3(0, 0, 1), glm::vec3(-1, 0, 0)}) {
-    ASSERT_TRUE(*map.lookup({0.3, 0.6, 0}, normal, 0, values));
+    ASSERT_TRUE(*map.lookup({0.3, 0.6, 0}, normal, 0, &values[0]));
     EXPECT_NEAR(values[0], 0.3f, 0.02f);
     EXPECT_NEAR(values[1], 0.6f, 0.02f);
     EXPECT_NEAR(values[2], 0.5f, 1e-6f);
@@ -383,7 +383,7 @@ TEST_F(Brick, DamagedFilesAreRefused) {
     if (!map.ok()) return map.status();
     std::vector<float> values(map->valueCount());
     for (const Point& p : points) {
-      const Result<bool> found = map->lookup({p.x, p.y, p.z}, {p.nx, p.ny, p.nz}, 0.1, values);
+      const Result<bool> found = map->lookup({p.x, p.y, p.z}, {p.nx, p.ny, p.nz}, 0.1, &values[0]);
       if (!found.ok()) return found.status();
       for (const float value : values) EXPECT_TRUE(std::isfinite(value));
     }

@@ -100,13 +100,13 @@ TEST_F(BrickOpenVdb, ValuesAreThoseOfItsGrids) {
   std::array<float, 4> values = {};
   for (auto voxel = occlusion->cbeginValueOn(); voxel; ++voxel, ++count) {
     const openvdb::Vec3d at = occlusion->indexToWorld(voxel.getCoord());
-    ASSERT_TRUE(*map->lookup({at.x(), at.y(), at.z()}, {0, 0, 1}, 0, values));
+    ASSERT_TRUE(*map->lookup({at.x(), at.y(), at.z()}, {0, 0, 1}, 0, &values[0]));
     EXPECT_NEAR(values[0], *voxel, 1e-6f);
     EXPECT_NEAR(values[0], 0.5 + 0.4 * at.x(), 0.01);
   }
   for (auto voxel = irradiance->cbeginValueOn(); voxel; ++voxel, ++count) {
     const openvdb::Vec3d at = irradiance->indexToWorld(voxel.getCoord());
-    ASSERT_TRUE(*map->lookup({at.x(), at.y(), at.z()}, {0, 0, -1}, 0, values));
+    ASSERT_TRUE(*map->lookup({at.x(), at.y(), at.z()}, {0, 0, -1}, 0, &values[0]));
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(values[std::size_t(c) + 1], (*voxel)[c], 1e-6f);
   }
   EXPECT_GT(count, 4000u);

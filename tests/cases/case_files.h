@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "surfeit/progress.h"
 

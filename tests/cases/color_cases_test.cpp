@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "cases/case_files.h"
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 #include "io/row_stream_test.h"
-#include "io/surfel_source.h"
 #include "io/test_directory.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/index.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "cases/case_files.h"
-#include "io/surfel_source.h"
 #include "io/test_directory.h"
 #include "sample/mesh.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "cases/case_files.h"
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 #include "io/row_stream_test.h"
-#include "io/surfel_source.h"
 #include "io/test_directory.h"
 #include "sample/sample.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 namespace {

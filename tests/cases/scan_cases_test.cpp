@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "cases/case_files.h"
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/index.h"
 
 namespace surfeit {
@@ -76,7 +76,7 @@ TEST_F(ScanCasesTest, ColorsOfSixteenBitsThatBeginDarkAreOfSixteen) {
   const auto reader = open("las/dark_first.las");
   ASSERT_NE(reader, nullptr);
   EXPECT_THAT(reader->notes(), Not(Contains(HasSubstr("8 bits"))));
-  EXPECT_EQ(reader->element().find("red")->type, PlyType::kUint16);
+  EXPECT_EQ(reader->element().find("red")->type, ValueType::kUint16);
 }
 
 TEST_F(ScanCasesTest, PcdOfAllKindsHasTheColorsOfItsText) {

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "cases/case_files.h"
+#include "cloud/cloud_formats.h"
+#include "core/up_comment.h"
 #include "gather/environment_pictures.h"
-#include "io/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
-#include "io/up_comment.h"
+#include "surfeit/bake.h"
 #include "surfeit/convert.h"
-#include "surfeit/gather.h"
 #include "surfeit/index.h"
 #include "surfeit/scene.h"
 

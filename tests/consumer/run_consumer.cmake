@@ -24,3 +24,40 @@ run(${CMAKE_COMMAND} -S ${PROJECT_DIR} -B ${WORK_DIR}/build -G ${GENERATOR}
   -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix)
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build --config ${BUILD_TYPE})
 run(${WORK_DIR}/build/consumer ${WORK_DIR}/scene)
+run(${WORK_DIR}/build/shared_consumer ${WORK_DIR}/scene)
+run(${WORK_DIR}/build/engine_consumer ${WORK_DIR}/scene/ceiling.sft)
+
+# The engine alone links no formats of files
+execute_process(COMMAND ldd ${WORK_DIR}/build/engine_consumer OUTPUT_VARIABLE libraries)
+if(libraries MATCHES "OpenEXR|blosc|Imath")
+  message(FATAL_ERROR "the engine links formats of files:\n${libraries}")
+endif()
+
+# From C, as a Makefile would build it
+file(GLOB_RECURSE pc ${WORK_DIR}/prefix/*/surfeit.pc)
+get_filename_component(pc_dir ${pc} DIRECTORY)
+get_filename_component(lib_dir ${pc_dir} DIRECTORY)
+set(ENV{PKG_CONFIG_PATH} ${pc_dir})
+execute_process(COMMAND pkg-config --cflags --libs surfeit OUTPUT_VARIABLE pkg_flags RESULT_VARIABLE result)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "pkg-config does not find surfeit in ${pc_dir}")
+endif()
+separate_arguments(pkg_flags UNIX_COMMAND ${pkg_flags})
+separate_arguments(c_flags UNIX_COMMAND "${flags}")
+run(gcc -std=c99 -pedantic -Wall -Wextra -Werror ${c_flags} ${PROJECT_DIR}/consumer.c ${pkg_flags} -lm
+  -Wl,-rpath,${lib_dir} -o ${WORK_DIR}/c_consumer)
+run(${WORK_DIR}/c_consumer ${WORK_DIR}/scene)
+
+# What the shared library shows to C: functions may come, none may go or be forgotten here
+execute_process(COMMAND nm -D --defined-only ${lib_dir}/libsurfeit.so OUTPUT_VARIABLE symbols)
+string(REGEX MATCHALL " T surfeit_[a-z_]+" functions "${symbols}")
+list(TRANSFORM functions REPLACE " T " "")
+list(SORT functions)
+file(STRINGS ${PROJECT_DIR}/c_functions.txt expected)
+if(NOT functions STREQUAL expected)
+  message(FATAL_ERROR "C functions of the shared library: ${functions}\nexpected (c_functions.txt): ${expected}")
+endif()
+# and nothing of what is inside
+if(symbols MATCHES "PacketGatherer|PageCache")
+  message(FATAL_ERROR "the shared library shows what is inside")
+endif()

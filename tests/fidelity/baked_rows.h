@@ -8,17 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "io/ply_reader.h"
+#include "cloud/ply/ply_reader.h"
 
 namespace surfeit {
 
 struct BakedRows {
-  PlyElement element;
+  RowLayout element;
   std::vector<std::byte> bytes;
 
   float value(std::size_t row, const std::string& property) const {
-    const PlyProperty* found = element.find(property);
-    return float(plyValue(&bytes[row * element.row_bytes + found->offset], found->type));
+    const RowProperty* found = element.find(property);
+    return float(rowValue(&bytes[row * element.row_bytes + found->offset], found->type));
   }
 };
 

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "io/ply_reader.h"
+#include "cloud/ply/ply_reader.h"
 #include "io/test_directory.h"
 #include "sample/reference.h"
 #include "sample/sample.h"
+#include "surfeit/bake.h"
 #include "surfeit/bounce.h"
-#include "surfeit/gather.h"
 #include "surfeit/index.h"
 
 namespace surfeit {
@@ -96,7 +96,7 @@ class BounceFidelity : public DirectoryTest {
     EXPECT_TRUE(stats.ok()) << stats.status().message();
     Result<PlyReader> reader = PlyReader::open(path("baked.ply"));
     EXPECT_TRUE(reader.ok());
-    const PlyElement& element = reader->header().elements[0];
+    const RowLayout& element = reader->header().elements[0];
     std::vector<std::byte> row(element.row_bytes);
     EXPECT_TRUE(reader->seekElement(0).ok());
     std::vector<Baked> baked;
@@ -107,8 +107,8 @@ class BounceFidelity : public DirectoryTest {
         glm::dvec3 value;
         int axis = 0;
         for (const char* name : {x, y, z}) {
-          const PlyProperty* property = element.find(name);
-          value[axis++] = plyValue(&row[property->offset], property->type);
+          const RowProperty* property = element.find(name);
+          value[axis++] = rowValue(&row[property->offset], property->type);
         }
         return value;
       };

@@ -15,7 +15,7 @@
 #include "io/test_directory.h"
 #include "sample/reference.h"
 #include "sample/sample.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/index.h"
 
 namespace surfeit {

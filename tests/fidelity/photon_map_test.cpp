@@ -18,7 +18,7 @@
 #include "sample/photon_tracer.h"
 #include "sample/reference.h"
 #include "sample/sample.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/index.h"
 #include "surfeit/radiance.h"
 

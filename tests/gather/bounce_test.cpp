@@ -20,9 +20,9 @@
 #include <vector>
 
 #include "gather/test_clouds.h"
-#include "io/surfel_writer.h"
-#include "octree/scene_file.h"
+#include "octree/read/scene_file.h"
 #include "surfeit/scene.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "gather/cache_split.h"
+#include "engine/cache_split.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "gather/contribution.h"
+#include "gather/rules/contribution.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "gather/coverage_rules.h"
-#include "octree/node_sums.h"
+#include "gather/rules/coverage_rules.h"
+#include "octree/node/node_sums.h"
 
 namespace surfeit {
 namespace {

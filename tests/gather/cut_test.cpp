@@ -1,4 +1,4 @@
-#include "gather/cut.h"
+#include "gather/cut/cut.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "gather/packet_cluster.h"
-#include "gather/packet_cost.h"
+#include "gather/cut/packet_cluster.h"
+#include "gather/cut/packet_cost.h"
 #include "gather/test_scene.h"
 
 namespace surfeit {
@@ -66,8 +66,8 @@ Node randomNode(std::mt19937& random) {
   return node;
 }
 
-std::vector<Receiver> randomPacket(std::mt19937& random, std::size_t count) {
-  std::vector<Receiver> receivers;
+std::vector<LocalReceiver> randomPacket(std::mt19937& random, std::size_t count) {
+  std::vector<LocalReceiver> receivers;
   const glm::vec3 axis = randomDirection(random);
   while (receivers.size() < count) {
     receivers.push_back(
@@ -82,7 +82,7 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
   for (int trial = 0; trial < 2000; ++trial) {
     std::vector<Node> siblings;
     for (int i = 0; i < 1 + trial % 8; ++i) siblings.push_back(randomNode(random));
-    const std::vector<Receiver> receivers = randomPacket(random, std::size_t(1 + trial % 5));
+    const std::vector<LocalReceiver> receivers = randomPacket(random, std::size_t(1 + trial % 5));
     const CutRules rules = {
         trial % 7 == 0 ? 0.f : .1f, trial % 3 == 0 ? 2.f : 1e30f,
         float(trial % 3 - 1),       trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups,
@@ -103,7 +103,7 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
       open += bit(found.open);
       mixed += bit(found.mixed);
       EXPECT_FALSE(!rules.sees(siblings[i].groups) && is_seen);
-      for (const Receiver& receiver : receivers) {
+      for (const LocalReceiver& receiver : receivers) {
         const float part = openPart(siblings[i], receiver, rules);
         EXPECT_FALSE(bit(found.far) && part > 1e-3f);
         EXPECT_FALSE(bit(found.open) && part < 1 - 1e-3f);
@@ -143,7 +143,7 @@ std::vector<Surfel> randomSurfels(std::mt19937& random, Node& node) {
 
 // Whether a receiver sees any place of a disk, tried at its middle and around its rim, that lies
 // higher above the horizon than what may be dropped.
-bool seesSome(const Surfel& surfel, const Receiver& receiver) {
+bool seesSome(const Surfel& surfel, const LocalReceiver& receiver) {
   const glm::vec3 aside = glm::normalize(glm::cross(surfel.normal, glm::vec3(.3f, .5f, .8f)));
   const glm::vec3 across = glm::cross(surfel.normal, aside);
   for (int i = 0; i <= 32; ++i) {
@@ -164,7 +164,7 @@ TEST(Cut, NothingThatIsSeenIsDropped) {
     Node node = randomNode(random);
     node.groups = 1;
     const std::vector<Surfel> surfels = randomSurfels(random, node);
-    const std::vector<Receiver> receivers = randomPacket(random, std::size_t(1 + trial % 16));
+    const std::vector<LocalReceiver> receivers = randomPacket(random, std::size_t(1 + trial % 16));
     const PacketView view = viewPacket(receivers);
     const CutRules both = {.1f, 1e30f, 0, kAllGroups, 1, .125f};
     CutRules fronts = both;
@@ -179,7 +179,7 @@ TEST(Cut, NothingThatIsSeenIsDropped) {
     }
     (isDropped(both) ? below : away) += 1;
     for (const Surfel& surfel : surfels) {
-      for (const Receiver& receiver : receivers) {
+      for (const LocalReceiver& receiver : receivers) {
         ASSERT_FALSE(seesSome(surfel, receiver)) << trial;
       }
     }
@@ -201,7 +201,7 @@ TEST(Cut, AStackOfSheetsIsAsHighAsItIs) {
   stack.flatness = 1;
   stack.flags = kNodeFlat;
   stack.groups = 1;
-  const Receiver receiver = {{0, 0, 0}, {0, 0, 1}};
+  const LocalReceiver receiver = {{0, 0, 0}, {0, 0, 1}};
   const CutRules rules = {.1f, 1e30f, 1, kAllGroups, 1, .125f};
   for (const SiblingClassifier classify : {&classifySiblings, fastestSiblingClassifier()}) {
     for (const float thickness : {12.f, 9.9f}) {
@@ -230,7 +230,7 @@ struct CountSurfels {
 };
 
 TEST(Cut, EveryReceiverSeesEverySurfelOfTheGroupsSeenOnce) {
-  Scene scene(boxWithSphere(20'000));
+  TestScene scene(boxWithSphere(20'000));
   for (const std::uint64_t groups : {kAllGroups, std::uint64_t{0b001}, std::uint64_t{0b110}}) {
     const auto seen =
         double(std::count_if(scene.cloud().begin(), scene.cloud().end(), [&](const Surfel& surfel) {
@@ -244,8 +244,8 @@ TEST(Cut, EveryReceiverSeesEverySurfelOfTheGroupsSeenOnce) {
     std::mt19937 random(9);
     int fading = 0;
     for (const float extent : {.01f, .1f, .5f, 2.f}) {
-      std::vector<Receiver> receivers(kPacketReceivers);
-      for (Receiver& receiver : receivers) {
+      std::vector<LocalReceiver> receivers(kPacketReceivers);
+      for (LocalReceiver& receiver : receivers) {
         receiver.position = glm::vec3(1, .5f, -1) + extent * randomDirection(random);
       }
       CountSurfels found;
@@ -274,7 +274,7 @@ struct SumOfHeights {
 
 // On a way of 4,000 places nodes come and go, by and by, and not at once (23).
 TEST(Cut, NodesFadeIntoWhatIsBelowThem) {
-  Scene scene(boxWithSphere(20'000));
+  TestScene scene(boxWithSphere(20'000));
   GatherQuality quality;
   quality.sides = GatherSides::kBoth;  // and no horizon: nothing is dropped
   const GatherRules rules(GatherMode::kBleeding, quality);
@@ -282,7 +282,7 @@ TEST(Cut, NodesFadeIntoWhatIsBelowThem) {
     CutWalk walk(rules, classify);
     double before = 0, largest = 0, least = 1e9, most = -1e9;
     for (int i = 0; i < 4000; ++i) {
-      const Receiver receiver = {{1 + .00005f * float(i), .3f, -1}, {0, 0, 0}};
+      const LocalReceiver receiver = {{1 + .00005f * float(i), .3f, -1}, {0, 0, 0}};
       SumOfHeights found;
       ASSERT_TRUE(
           walk.walk(viewPacket({&receiver, 1}), {&receiver, 1}, scene.reader(), found).ok());
@@ -299,12 +299,12 @@ TEST(Cut, NodesFadeIntoWhatIsBelowThem) {
 
 // However wide the packet is: what it takes for others does not count.
 TEST(Cut, EveryReceiverOfAPacketHasTheCutItHasAlone) {
-  Scene scene(boxWithSphere(20'000));
+  TestScene scene(boxWithSphere(20'000));
   GatherQuality quality;
   quality.sides = GatherSides::kBoth;  // and no normals below: nothing is dropped
   CutWalk walk(GatherRules(GatherMode::kBleeding, quality));
   for (const float width : {.003f, .05f, .4f}) {
-    std::vector<Receiver> receivers(kPacketReceivers);
+    std::vector<LocalReceiver> receivers(kPacketReceivers);
     for (std::size_t k = 0; k < kPacketReceivers; ++k) {
       receivers[k] = {glm::vec3(1 + width * float(k) / 16, .3f, -1), {0, 0, 0}};
     }
@@ -312,7 +312,7 @@ TEST(Cut, EveryReceiverOfAPacketHasTheCutItHasAlone) {
     ASSERT_TRUE(walk.walk(viewPacket(receivers), receivers, scene.reader(), together).ok());
     for (std::size_t k = 0; k < kPacketReceivers; ++k) {
       SumOfHeights alone;
-      const std::span<const Receiver> one(&receivers[k], 1);
+      const std::span<const LocalReceiver> one(&receivers[k], 1);
       ASSERT_TRUE(walk.walk(viewPacket(one), one, scene.reader(), alone).ok());
       EXPECT_NEAR(together.sum[k], alone.sum[0], .01) << width << ' ' << k;
     }
@@ -330,7 +330,7 @@ TEST(Cut, NodesOfWhichFewAreSeenAreOpenedAndTurnedAwayByProofAlone) {
   wall.flatness = .999f;
   wall.flags = kNodeFlat;
   wall.groups = 0b11;
-  const Receiver receiver = {{0, 0, 0}, {0, 0, 1}};
+  const LocalReceiver receiver = {{0, 0, 0}, {0, 0, 1}};
   const PacketView view = viewPacket({&receiver, 1});
   CutRules rules = {.1f, 1e30f, 1, kAllGroups, 1, .125f};
   EXPECT_EQ(openPart(wall, receiver, rules), 0);
@@ -348,12 +348,12 @@ TEST(Cut, NodesOfWhichFewAreSeenAreOpenedAndTurnedAwayByProofAlone) {
 
 TEST(PacketCluster, DividesByPlaceAndNormal) {
   std::mt19937 random(3);
-  std::vector<Receiver> receivers;
+  std::vector<LocalReceiver> receivers;
   for (int i = 0; i < 200; ++i) {  // two walls back to back, far from a third one
     const glm::vec3 at = .1f * randomDirection(random) * glm::vec3(1, 1, 0);
-    receivers.push_back(i % 3 == 0   ? Receiver{at, {0, 0, 1}}
-                        : i % 3 == 1 ? Receiver{at, {0, 0, -1}}
-                                     : Receiver{at + glm::vec3(5, 0, 0), {0, 0, 1}});
+    receivers.push_back(i % 3 == 0   ? LocalReceiver{at, {0, 0, 1}}
+                        : i % 3 == 1 ? LocalReceiver{at, {0, 0, -1}}
+                                     : LocalReceiver{at + glm::vec3(5, 0, 0), {0, 0, 1}});
   }
   const PacketCluster cluster(receivers);
   ASSERT_EQ(cluster.packetCount(), 13u);
@@ -376,7 +376,7 @@ TEST(PacketCluster, DividesByPlaceAndNormal) {
 TEST(PacketCluster, PacketsAcrossTwoPlacesAreToBeDivided) {
   for (const float apart : {0.f, 5.f}) {
     std::mt19937 random(3);
-    std::vector<Receiver> receivers;
+    std::vector<LocalReceiver> receivers;
     for (int i = 0; i < 200; ++i) {  // 104 here, 96 there: one packet reaches across
       const glm::vec3 at = .1f * randomDirection(random) * glm::vec3(1, 1, 0);
       receivers.push_back({at + (i < 104 ? glm::vec3(0) : glm::vec3(apart, 0, 0)), {0, 0, 1}});
@@ -392,7 +392,7 @@ TEST(PacketCluster, PacketsAcrossTwoPlacesAreToBeDivided) {
 
 // Of nothing to draw, whose cost would divide no packet.
 TEST(PacketCost, NoPartIsWiderThanAllowed) {
-  std::vector<Receiver> receivers(kPacketReceivers);
+  std::vector<LocalReceiver> receivers(kPacketReceivers);
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     receivers[i].position = {.01f * float(i) + (i < 3 ? 0.f : 5.f), 0, 0};
   }

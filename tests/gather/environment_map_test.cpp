@@ -1,4 +1,4 @@
-#include "gather/environment_map.h"
+#include "gather/light/environment_map.h"
 
 #include <OpenEXR/ImfEnvmap.h>
 #include <gmock/gmock.h>
@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "batch/environment_file.h"
 #include "core/spherical_harmonics.h"
 #include "gather/environment_pictures.h"
 
@@ -47,13 +48,13 @@ class EnvironmentMapTest : public DirectoryTest {
   }
   static EnvironmentMap load(const GatherEnvironment& options) {
     Progress progress;
-    Result<EnvironmentMap> map = EnvironmentMap::load(options, progress);
+    Result<EnvironmentMap> map = loadEnvironmentMap(options, progress);
     EXPECT_TRUE(map.ok()) << map.status().message();
     return std::move(*map);
   }
   Status failure(const GatherEnvironment& options) const {
     Progress progress;
-    return EnvironmentMap::load(options, progress).status();
+    return loadEnvironmentMap(options, progress).status();
   }
   Status failure(const std::string& name) const { return failure(environment(name)); }
 };
@@ -372,7 +373,7 @@ TEST_F(EnvironmentMapTest, PixelsThatAreNoLightAreNotedOnce) {
   picture.at(4, 2) = {1, std::nanf(""), INFINITY};
   writeExr(picture, path("map.exr"));
   Notes notes;
-  const Result<EnvironmentMap> map = EnvironmentMap::load(environment("map.exr"), notes);
+  const Result<EnvironmentMap> map = loadEnvironmentMap(environment("map.exr"), notes);
   ASSERT_TRUE(map.ok());
   EXPECT_THAT(notes.notes,
               testing::ElementsAre(AllOf(HasSubstr("map.exr"), HasSubstr("2 of 128"))));

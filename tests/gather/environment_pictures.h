@@ -37,7 +37,7 @@ struct TestPicture {
     return pixels[std::size_t(row * width + column)];
   }
   // The pixel of a lat-long picture turned by `rotation` in a direction with axes A, B, up
-  // (gather/environment_map.h).
+  // (gather/light/environment_map.h).
   const glm::vec3& lookup(const glm::dvec3& d, double rotation) const {
     constexpr double kTurnExact = 6.28318530717958647692;
     const double turns = .5 - (std::atan2(d.y, d.x) - rotation) / kTurnExact;

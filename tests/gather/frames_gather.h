@@ -7,12 +7,12 @@
 #include <span>
 #include <string>
 
-#include "gather/gather_crew.h"
-#include "gather/gather_input.h"
-#include "gather/receiver_sorter.h"
+#include "batch/gather_crew.h"
+#include "batch/gather_input.h"
+#include "batch/receiver_sorter.h"
 #include "io/fault_injector.h"
-#include "octree/scene_file.h"
-#include "surfeit/gather.h"
+#include "octree/read/scene_file.h"
+#include "surfeit/bake.h"
 #include "surfeit/progress.h"
 
 namespace surfeit {

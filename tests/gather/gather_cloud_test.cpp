@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "gather/test_clouds.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/progress.h"
 
 namespace surfeit {
@@ -161,9 +161,9 @@ TEST_F(GatherCloud, ShuffledReceiversGiveShuffledResults) {
 
 TEST_F(GatherCloud, OrderAndPropertiesAreKept) {
   Table receivers = receiversOf(500);
-  receivers.addProperty("red", PlyType::kUint8);
-  receivers.addProperty("time", PlyType::kFloat64);
-  receivers.addProperty("class", PlyType::kInt16);
+  receivers.addProperty("red", ValueType::kUint8);
+  receivers.addProperty("time", ValueType::kFloat64);
+  receivers.addProperty("class", ValueType::kInt16);
   receivers.addProperty("radius");  // zero: no concern of a receiver
   for (std::vector<double>& row : receivers.rows) {
     row.insert(row.end(), {double(row.size() % 256), 1e10 + row[6] / 3, -row[6], 0});
@@ -190,7 +190,7 @@ TEST_F(GatherCloud, OrderAndPropertiesAreKept) {
     for (std::size_t i = 0; i < receivers.properties.size(); ++i) {
       EXPECT_EQ(result.properties[i].type, receivers.properties[i].type);
     }
-    EXPECT_EQ(result.properties.back().type, PlyType::kFloat32);
+    EXPECT_EQ(result.properties.back().type, ValueType::kFloat32);
 
     const std::string bytes = readBytes(directory_.file("result.ply"));
     if (expected.empty()) expected = bytes;
@@ -200,10 +200,10 @@ TEST_F(GatherCloud, OrderAndPropertiesAreKept) {
 
 TEST_F(GatherCloud, EarlierResultsAreReplacedWhereTheyStand) {
   Table receivers;
-  receivers.addProperty("occlusion", PlyType::kUint8);
-  receivers.addProperty("irradiance_r", PlyType::kFloat64);
+  receivers.addProperty("occlusion", ValueType::kUint8);
+  receivers.addProperty("irradiance_r", ValueType::kFloat64);
   const Table plain = receiversOf(100);
-  for (const PlyProperty& property : plain.properties) {
+  for (const RowProperty& property : plain.properties) {
     receivers.addProperty(property.name, property.type);
   }
   for (const std::vector<double>& row : plain.rows) {
@@ -217,8 +217,8 @@ TEST_F(GatherCloud, EarlierResultsAreReplacedWhereTheyStand) {
   GatherOptions options = fastOptions();
   const Table occlusion = gatherTable("receivers.ply", options);
   EXPECT_EQ(occlusion.names(), receivers.names());
-  EXPECT_EQ(occlusion.properties[0].type, PlyType::kFloat32);
-  EXPECT_EQ(occlusion.properties[1].type, PlyType::kFloat64);
+  EXPECT_EQ(occlusion.properties[0].type, ValueType::kFloat32);
+  EXPECT_EQ(occlusion.properties[1].type, ValueType::kFloat64);
   EXPECT_EQ(occlusion.column("irradiance_r"), std::vector<double>(100, 88));
   EXPECT_EQ(occlusion.column("occlusion"), gatherTable("plain.ply", options).column("occlusion"));
 
@@ -227,7 +227,7 @@ TEST_F(GatherCloud, EarlierResultsAreReplacedWhereTheyStand) {
   std::vector<std::string> names = receivers.names();
   names.insert(names.end(), {"irradiance_g", "irradiance_b"});
   EXPECT_EQ(bleeding.names(), names);
-  EXPECT_EQ(bleeding.properties[1].type, PlyType::kFloat32);
+  EXPECT_EQ(bleeding.properties[1].type, ValueType::kFloat32);
   const Table expected = gatherTable("plain.ply", options);
   for (const char* name : {"irradiance_r", "irradiance_g", "irradiance_b", "id", "nz"}) {
     EXPECT_EQ(bleeding.column(name), expected.column(name)) << name;

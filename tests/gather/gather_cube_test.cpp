@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "batch/gather_options.h"
 #include "gather/environment_pictures.h"
-#include "gather/gather_options.h"
 #include "gather/test_clouds.h"
 #include "gather/test_scene.h"
 #include "surfeit/cube.h"
@@ -18,7 +18,7 @@ namespace surfeit {
 namespace {
 
 constexpr float kNowhere = std::numeric_limits<float>::infinity();
-const CubeReceiver kFloor = {{0, 0, 0}, {0, 0, 2}, {0, 0, 0}};
+const Receiver kFloor = {{0, 0, 0}, {0, 0, 2}, {0, 0, 0}};
 
 Surfel cubeSurfel(const glm::vec3& position, const glm::vec3& normal, float area) {
   Surfel surfel;
@@ -58,29 +58,29 @@ std::vector<Surfel> sphereAndCeiling() {
   return cloud;
 }
 
-CubeImage cubeOf(const Scene& scene, const CubeReceiver& receiver, const GatherOptions& options) {
+CubeImage cubeOf(const TestScene& scene, const Receiver& receiver, const GatherOptions& options) {
   Progress progress;
   Result<CubeImage> cube = gatherCube(scene.path(), receiver, options, progress);
   EXPECT_TRUE(cube.ok()) << cube.status().message();
   return cube.ok() ? std::move(*cube) : CubeImage{};
 }
 
-StatusCode refusalOf(const std::string& path, const CubeReceiver& receiver,
+StatusCode refusalOf(const std::string& path, const Receiver& receiver,
                      const GatherOptions& options) {
   Progress progress;
   return gatherCube(path, receiver, options, progress).status().code();
 }
 
 // The gather of the same receiver alone is the integral of the pixels, exactly.
-void expectIntegratesToTheGather(Scene& scene, const CubeReceiver& given,
+void expectIntegratesToTheGather(TestScene& scene, const Receiver& given,
                                  const GatherOptions& options) {
   Progress progress;
   const auto environment = loadEnvironment(options, kDefaultUpAxis, progress);
   ASSERT_TRUE(environment.ok()) << environment.status().message();
-  const GatherRules rules(withDefaults(options), environment->get());
+  const GatherRules rules = gatherRules(withDefaults(options), environment->get());
   const CubeImage cube = cubeOf(scene, given, options);
-  const Receiver receiver = {glm::vec3(cube.receiver.position), cube.receiver.normal,
-                             cube.receiver.view};
+  const LocalReceiver receiver = {glm::vec3(cube.receiver.position), cube.receiver.normal,
+                                  cube.receiver.view};
   const GatherResult gathered = scene.gather(receiver, rules);
   EXPECT_EQ(cube.occlusion, gathered.occlusion);
   EXPECT_EQ(cube.irradiance, gathered.irradiance);
@@ -105,10 +105,10 @@ void expectIntegratesToTheGather(Scene& scene, const CubeReceiver& given,
 }
 
 TEST(GatherCube, PixelsIntegrateToTheGather) {
-  Scene scene(sphereAndCeiling());
-  const std::vector<CubeReceiver> receivers = {
+  TestScene scene(sphereAndCeiling());
+  const std::vector<Receiver> receivers = {
       kFloor, {{1, -2, .5f}, {.3f, -.2f, .7f}}, {{-.4f, .1f, 3}, {0, 0, 0}}};
-  for (const CubeReceiver& receiver : receivers) {
+  for (const Receiver& receiver : receivers) {
     for (const float max_solid_angle : {0.f, .1f, .4f}) {
       GatherOptions options;
       options.mode = GatherMode::kBleeding;
@@ -126,7 +126,7 @@ TEST(GatherCube, PixelsIntegrateToTheGather) {
 }
 
 TEST(GatherCube, ConesAndReflectionsIntegrateToTheGather) {
-  Scene scene(sphereAndCeiling());
+  TestScene scene(sphereAndCeiling());
   GatherOptions options;
   options.mode = GatherMode::kBleeding;
   for (const float angle : {.3f, 1.3f}) {
@@ -143,7 +143,7 @@ TEST(GatherCube, ConesAndReflectionsIntegrateToTheGather) {
 }
 
 TEST(GatherCube, EnvironmentComesThroughWhatIsOpen) {
-  Scene scene(sphereAndCeiling());
+  TestScene scene(sphereAndCeiling());
   TestDirectory directory;
   GatherOptions options;
   options.environment.path = directory.file("sky.exr");
@@ -158,7 +158,7 @@ TEST(GatherCube, EnvironmentComesThroughWhatIsOpen) {
 }
 
 TEST(GatherCube, PixelsLieAroundTheDirectionsOfTheirFaces) {
-  Scene scene(sphereAndCeiling());
+  TestScene scene(sphereAndCeiling());
   for (const float angle : {0.f, .5f}) {
     GatherOptions options;
     options.weights.cone_angle = angle;
@@ -188,7 +188,7 @@ TEST(GatherCube, SphereAboveIsSeenWhereItIs) {
   const float radius = .8f, distance = glm::length(centre);
   std::vector<Surfel> cloud;
   addCubeSphere(cloud, 40000, centre, radius);
-  Scene scene(cloud);
+  TestScene scene(cloud);
   GatherOptions options;
   options.mode = GatherMode::kBleeding;
   options.quality.max_solid_angle = .01f;
@@ -224,7 +224,7 @@ TEST(GatherCube, SphereAboveIsSeenWhereItIs) {
 TEST(GatherCube, CeilingIsOneLayerAsFarAsItIs) {
   std::vector<Surfel> cloud;
   addCeiling(cloud, 200, 1, 8);
-  Scene scene(cloud);
+  TestScene scene(cloud);
   const CubeImage cube = cubeOf(scene, kFloor, {});
   float layers = 0;
   int pixels = 0;
@@ -240,7 +240,7 @@ TEST(GatherCube, CeilingIsOneLayerAsFarAsItIs) {
 }
 
 TEST(GatherCube, OutlineBeforeACeilingIsTwoLayers) {
-  Scene scene(sphereAndCeiling());
+  TestScene scene(sphereAndCeiling());
   const CubeImage cube = cubeOf(scene, kFloor, {});
   const auto most =
       std::max_element(cube.pixels.begin(), cube.pixels.end(),
@@ -251,7 +251,7 @@ TEST(GatherCube, OutlineBeforeACeilingIsTwoLayers) {
 TEST(GatherCube, KindsTellHowThingsWereDrawn) {
   std::vector<Surfel> cloud;
   addCubeSphere(cloud, 5000, {0, 0, 2}, .5f);
-  Scene scene(cloud);
+  TestScene scene(cloud);
   const auto kindsOf = [&](const GatherQuality& quality) {
     GatherOptions options;
     options.quality = quality;
@@ -285,7 +285,7 @@ TEST(GatherCube, KindsTellHowThingsWereDrawn) {
 }
 
 TEST(GatherCube, WhatCannotWorkIsRefused) {
-  Scene scene(sphereAndCeiling());
+  TestScene scene(sphereAndCeiling());
   const float nan = std::numeric_limits<float>::quiet_NaN();
   GatherOptions options;
   EXPECT_EQ(refusalOf(scene.path(), {{nan, 0, 0}, {0, 0, 1}}, options),
@@ -307,7 +307,7 @@ TEST(GatherCube, WhatCannotWorkIsRefused) {
 }
 
 TEST(GatherCube, SmallBudgetsGiveTheSamePixels) {
-  Scene scene(sphereAndCeiling());
+  TestScene scene(sphereAndCeiling());
   GatherOptions options;
   options.mode = GatherMode::kBleeding;
   const CubeImage all = cubeOf(scene, kFloor, options);

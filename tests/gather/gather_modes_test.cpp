@@ -6,10 +6,11 @@
 #include <functional>
 #include <string>
 
-#include "gather/environment_map.h"
+#include "batch/environment_file.h"
 #include "gather/environment_pictures.h"
-#include "gather/gather_outputs.h"
+#include "gather/light/environment_map.h"
 #include "gather/packet_clouds.h"
+#include "gather/rules/gather_outputs.h"
 
 namespace surfeit {
 namespace {
@@ -49,7 +50,7 @@ class GatherModes : public testing::Test {
     GatherEnvironment environment;
     environment.path = path;
     environment.up = UpAxis::kZ;
-    Result<EnvironmentMap> map = EnvironmentMap::load(environment, progress);
+    Result<EnvironmentMap> map = loadEnvironmentMap(environment, progress);
     EXPECT_TRUE(map.ok()) << map.status().message();
     EnvironmentCube cube(*map, RasterGeometry(GatherQuality().raster_resolution));
     environment_.reset(new LoadedEnvironment{std::move(*map), std::move(cube)});
@@ -144,14 +145,14 @@ float difference(const GatherResult& a, const GatherResult& b) {
 
 TEST_F(GatherModes, EqualReceiversGiveWhatTheScalarGatherGives) {
   const Cloud cloud = mixedCloud();
-  Scene scene(cloud);
+  TestScene scene(cloud);
   for (const Case& tried : cases()) {
     SCOPED_TRACE(tried.name);
     PacketGatherer gatherer(tried.rules);
     float worst = 0, sum = 0;
     for (std::size_t run = 0; run < kRuns; ++run) {
       const Surfel& at = cloud[run * cloud.size() / kRuns];
-      const std::vector<Receiver> receivers(kPacketReceivers, {at.position, at.normal});
+      const std::vector<LocalReceiver> receivers(kPacketReceivers, {at.position, at.normal});
       const GatherResult expected = scene.gather(receivers[0], tried.rules);
       for (const GatherResult& result : gatherPacket(gatherer, scene, receivers)) {
         worst = std::max(worst, difference(result, expected));
@@ -169,7 +170,7 @@ TEST_F(GatherModes, EqualReceiversGiveWhatTheScalarGatherGives) {
 
 TEST_F(GatherModes, InstructionSetsAgree) {
   const Cloud cloud = mixedCloud();
-  Scene scene(cloud);
+  TestScene scene(cloud);
   ASSERT_GE(packetKernels().size(), 2u);
   std::size_t count = 0, beyond_count = 0;
   for (const Case& tried : cases()) {
@@ -180,7 +181,7 @@ TEST_F(GatherModes, InstructionSetsAgree) {
       SCOPED_TRACE(tried.name + ", " + kernel.name);
       PacketGatherer gatherer(tried.rules, kernel);
       for (std::size_t run = 0; run < kRuns; ++run) {
-        const std::vector<Receiver> receivers = neighbours(cloud, run * cloud.size() / kRuns);
+        const std::vector<LocalReceiver> receivers = neighbours(cloud, run * cloud.size() / kRuns);
         const std::vector<GatherResult> expected = gatherPacket(definition, scene, receivers);
         const std::vector<GatherResult> results = gatherPacket(gatherer, scene, receivers);
         for (std::size_t i = 0; i < results.size(); ++i) {

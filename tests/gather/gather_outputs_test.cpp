@@ -61,18 +61,18 @@ GatherRules rulesOf(GatherMode mode, std::uint32_t outputs = 0) {
   return rules;
 }
 
-GatherResult gatherAt(Scene& scene, const Receiver& receiver, const GatherRules& rules) {
+GatherResult gatherAt(TestScene& scene, const LocalReceiver& receiver, const GatherRules& rules) {
   PacketGatherer gatherer(rules);
-  return gatherPacket(gatherer, scene, std::vector<Receiver>(kPacketReceivers, receiver))[0];
+  return gatherPacket(gatherer, scene, std::vector<LocalReceiver>(kPacketReceivers, receiver))[0];
 }
 
-constexpr Receiver kUpwards = {{0, 0, 0}, {0, 0, 1}};
-constexpr Receiver kSpherical = {{0, 0, 0}, {0, 0, 0}};
+constexpr LocalReceiver kUpwards = {{0, 0, 0}, {0, 0, 1}};
+constexpr LocalReceiver kSpherical = {{0, 0, 0}, {0, 0, 0}};
 
 // Part of the weight of a cone that a sphere in its middle covers.
 TEST(GatherWeightsTest, SphereAboveCoversItsPartOfConeAndDistribution) {
   for (const float angle : {.2f, .5f}) {
-    Scene scene(distantSphere({0, 0, 5}, angle, glm::vec3(1)));
+    TestScene scene(distantSphere({0, 0, 5}, angle, glm::vec3(1)));
     const auto sineSq = [](float x) { return std::sin(x) * std::sin(x); };
     const auto cap = [](float x) { return 1 - std::cos(x); };
     for (const float cone : {.3f, .8f, 1.2f, kHalfPi}) {
@@ -91,12 +91,12 @@ TEST(GatherWeightsTest, SphereAboveCoversItsPartOfConeAndDistribution) {
 }
 
 TEST(GatherWeightsTest, AClosedShellIsClosed) {
-  Scene scene(shell(2, -1, glm::vec3(1), 200000));
+  TestScene scene(shell(2, -1, glm::vec3(1), 200000));
   PacketGatherer gatherer(rulesOf(GatherMode::kOcclusion));
   constexpr std::size_t kPackets = 32;
   double open = 0, open_alone = 0;  // gathered as packets, and one by one
   for (std::size_t packet = 0; packet < kPackets; ++packet) {
-    std::vector<Receiver> receivers;
+    std::vector<LocalReceiver> receivers;
     for (std::size_t i = 0; i < kPacketReceivers; ++i) {
       // Spread evenly within, looking anywhere
       const auto turn = static_cast<float>(packet * kPacketReceivers + i);
@@ -119,7 +119,7 @@ TEST(GatherWeightsTest, AClosedShellIsClosed) {
 }
 
 TEST(GatherWeightsTest, OcclusionFadesWithDistance) {
-  Scene scene(shell(2, -1, glm::vec3(1)));
+  TestScene scene(shell(2, -1, glm::vec3(1)));
   GatherRules rules = rulesOf(GatherMode::kOcclusion);
   const float all = gatherAt(scene, kUpwards, rules).occlusion;
   EXPECT_NEAR(all, 1, kShellGap);
@@ -135,7 +135,7 @@ TEST(GatherWeightsTest, OcclusionFadesWithDistance) {
 
 TEST(GatherWeightsTest, OnlyTheChosenSidesCover) {
   for (const float facing : {-1.f, 1.f}) {
-    Scene scene(shell(2, facing, glm::vec3(1)));
+    TestScene scene(shell(2, facing, glm::vec3(1)));
     GatherRules rules = rulesOf(GatherMode::kBleeding);
     rules.quality.sides = GatherSides::kFront;
     EXPECT_NEAR(gatherAt(scene, kUpwards, rules).occlusion, facing < 0 ? 1 : 0, kShellGap);
@@ -150,7 +150,7 @@ TEST(GatherWeightsTest, OnlyTheChosenSidesCover) {
 // The quarter of a sphere that a wall leaves open has its mean direction, by cosine, along
 // (-2/3, 0, pi/3).
 TEST(GatherOutputsTest, BentNormalLeansAwayFromAWall) {
-  Scene scene(square({.01f, 0, 0}, {0, 0, 1}, {0, 1, 0}, 40, glm::vec3(1), 600));
+  TestScene scene(square({.01f, 0, 0}, {0, 0, 1}, {0, 1, 0}, 40, glm::vec3(1), 600));
   const GatherRules rules = rulesOf(GatherMode::kOcclusion, kOutputOcclusion | kOutputBentNormal);
   const GatherResult result = gatherAt(scene, kUpwards, rules);
   EXPECT_NEAR(result.occlusion, .5f, .01f);
@@ -159,7 +159,7 @@ TEST(GatherOutputsTest, BentNormalLeansAwayFromAWall) {
 }
 
 TEST(GatherOutputsTest, OpenSkyBendsNothingAndAClosedShellHasNoBentNormal) {
-  Scene far_away(distantSphere({0, 0, -5}, .1f, glm::vec3(1)));
+  TestScene far_away(distantSphere({0, 0, -5}, .1f, glm::vec3(1)));
   const GatherRules rules = rulesOf(GatherMode::kOcclusion, kOutputBentNormal);
   const glm::vec3 normal = glm::normalize(glm::vec3(1, 2, 3));
   EXPECT_GT(glm::dot(gatherAt(far_away, {{0, 0, 0}, normal}, rules).bent_normal, normal), .9999f);
@@ -167,7 +167,7 @@ TEST(GatherOutputsTest, OpenSkyBendsNothingAndAClosedShellHasNoBentNormal) {
 
 TEST(GatherOutputsTest, IlluminationComesFromTheLight) {
   const glm::vec3 direction = glm::normalize(glm::vec3(2, -1, 3));
-  Scene scene(distantSphere(4.f * direction, .05f, {3, 2, 1}));
+  TestScene scene(distantSphere(4.f * direction, .05f, {3, 2, 1}));
   const GatherRules rules =
       rulesOf(GatherMode::kBleeding, kOutputIlluminationDirection | kOutputIrradiance);
   const GatherResult result = gatherAt(scene, kUpwards, rules);
@@ -179,7 +179,7 @@ TEST(GatherOutputsTest, IlluminationComesFromTheLight) {
 
 TEST(GatherOutputsTest, VolumesReceiveFluenceAndHarmonics) {
   const glm::vec3 radiosity = {1, 2, 4};
-  Scene scene(shell(2, -1, radiosity));
+  TestScene scene(shell(2, -1, radiosity));
   const GatherRules rules =
       rulesOf(GatherMode::kBleeding, kOutputIrradiance | kOutputFluence | kOutputRadianceSh);
   const GatherResult result = gatherAt(scene, kSpherical, rules);
@@ -197,7 +197,7 @@ TEST(GatherOutputsTest, VolumesReceiveFluenceAndHarmonics) {
 
 TEST(GatherOutputsTest, HarmonicsOfASmallLightAreThoseOfItsDirection) {
   const glm::vec3 direction = glm::normalize(glm::vec3(-1, 2, -3));
-  Scene scene(distantSphere(4.f * direction, .1f, glm::vec3(5)));
+  TestScene scene(distantSphere(4.f * direction, .1f, glm::vec3(5)));
   const GatherRules rules = rulesOf(GatherMode::kBleeding, kOutputRadianceSh);
   const GatherResult result = gatherAt(scene, kSpherical, rules);
   const float power = 5 * 2 * kPi * (1 - std::cos(.1f));
@@ -222,7 +222,7 @@ TEST(AreaLight, RectangleGivesItsAnalyticIrradianceAndHalfOfItBehindAScreen) {
   const Cloud light = square({0, 0, 2}, {1, 0, 0}, {0, -1, 0}, 3, {6, 3, 1});
   const float factor = rectangleFactor(.75f, .75f);
   const GatherRules rules = rulesOf(GatherMode::kBleeding);
-  Scene open(light);
+  TestScene open(light);
   const GatherResult lit = gatherAt(open, kUpwards, rules);
   EXPECT_NEAR(lit.irradiance.r, 6 * factor, .015f * 6 * factor);
   EXPECT_NEAR(lit.irradiance.b, 1 * factor, .015f * factor);
@@ -231,7 +231,7 @@ TEST(AreaLight, RectangleGivesItsAnalyticIrradianceAndHalfOfItBehindAScreen) {
   Cloud half = light;
   const Cloud screen = square({2, 0, 1}, {1, 0, 0}, {0, -1, 0}, 4, glm::vec3(0));
   half.insert(half.end(), screen.begin(), screen.end());
-  Scene shaded(half);
+  TestScene shaded(half);
   EXPECT_NEAR(gatherAt(shaded, kUpwards, rules).irradiance.r, 3 * factor, .04f * 3 * factor);
   // Far behind its edge the shadow is full
   EXPECT_LT(gatherAt(shaded, {{2.5f, 0, 0}, {0, 0, 1}}, rules).irradiance.r, .02f * 6 * factor);
@@ -243,7 +243,7 @@ TEST(AreaLight, PenumbraFollowsTheVisiblePartOfTheLight) {
   Cloud cloud = square({0, 0, 2}, {1, 0, 0}, {0, -1, 0}, 1, glm::vec3(10));
   const Cloud screen = square({2, 0, 1}, {1, 0, 0}, {0, -1, 0}, 4, glm::vec3(0));
   cloud.insert(cloud.end(), screen.begin(), screen.end());
-  Scene scene(cloud);
+  TestScene scene(cloud);
   // Corner formula of the part of the light between x0 and x1, seen from x
   const auto corner = [](float a, float b) { return .25f * rectangleFactor(a, b); };
   for (const float x : {-.6f, -.3f, -.1f, .1f, .3f}) {
@@ -258,7 +258,7 @@ TEST(AreaLight, PenumbraFollowsTheVisiblePartOfTheLight) {
 // A floor that mirrors a light: it is seen where the mirrored view meets it.
 TEST(GatherGlossy, ReflectsWhatTheMirroredViewMeets) {
   Cloud cloud = square({3, 0, 4}, {1, 0, 0}, {0, -1, 0}, 1.7f, {7, 5, 3}, 300);
-  Scene scene(cloud);
+  TestScene scene(cloud);
   GatherRules rules = rulesOf(GatherMode::kGlossy);
   rules.weights.roughness = 1;
   for (const float cone : {.02f, .05f, .1f}) {
@@ -272,14 +272,14 @@ TEST(GatherGlossy, ReflectsWhatTheMirroredViewMeets) {
     const GatherResult missed = gatherAt(scene, kUpwards, rules);
     EXPECT_EQ(missed.occlusion, 0) << cone;
     // A view of its own goes before the camera's
-    const Receiver viewed = {{0, 0, 0}, {0, 0, 1}, glm::normalize(glm::vec3(3, 0, -4))};
+    const LocalReceiver viewed = {{0, 0, 0}, {0, 0, 1}, glm::normalize(glm::vec3(3, 0, -4))};
     EXPECT_NEAR(gatherAt(scene, viewed, rules).irradiance.r, 7, .07f) << cone;
   }
 }
 
 // The light covers the half of the cone on one side of its edge.
 TEST(GatherGlossy, NarrowConesResolveEdges) {
-  Scene scene(square({2.5f, 0, 4}, {1, 0, 0}, {0, -1, 0}, 5, glm::vec3(2), 1000));
+  TestScene scene(square({2.5f, 0, 4}, {1, 0, 0}, {0, -1, 0}, 5, glm::vec3(2), 1000));
   GatherRules rules = rulesOf(GatherMode::kGlossy);
   rules.weights.roughness = 1;
   rules.weights.cone_angle = .1f;
@@ -290,7 +290,7 @@ TEST(GatherGlossy, NarrowConesResolveEdges) {
 // The lobe's own integral: cos^n over a cap of angle a holds 1 - cos(a)^(n + 1) of it.
 TEST(GatherGlossy, LobesWeighDirectionsByTheirPower) {
   for (const float angle : {.05f, .1f, .2f}) {
-    Scene scene(distantSphere({0, 0, 5}, angle, glm::vec3(1)));
+    TestScene scene(distantSphere({0, 0, 5}, angle, glm::vec3(1)));
     GatherRules rules = rulesOf(GatherMode::kGlossy);
     rules.eye = {0, 0, 9};
     rules.weights = withConeAngle({.roughness = .15f}, GatherMode::kGlossy);
@@ -303,7 +303,7 @@ TEST(GatherGlossy, LobesWeighDirectionsByTheirPower) {
 
 // A wide lobe is drawn to the cube, one a little narrower to a raster of its own.
 TEST(GatherGlossy, RastersAgreeWhereTheyMeet) {
-  Scene scene(mixedCloud());
+  TestScene scene(mixedCloud());
   GatherRules rules = rulesOf(GatherMode::kGlossy);
   rules.eye = {3, -9, 4};
   rules.weights.roughness = 1;

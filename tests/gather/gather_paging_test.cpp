@@ -13,15 +13,15 @@
 #include <string>
 #include <vector>
 
+#include "batch/gather_crew.h"
+#include "batch/gather_input.h"
+#include "batch/gather_memory.h"
 #include "gather/frames_gather.h"
-#include "gather/gather_crew.h"
-#include "gather/gather_input.h"
-#include "gather/gather_memory.h"
 #include "gather/test_clouds.h"
 #include "io/fault_injector.h"
-#include "octree/paged_octree.h"
-#include "octree/scene_file.h"
-#include "surfeit/gather.h"
+#include "octree/read/paged_octree.h"
+#include "octree/read/scene_file.h"
+#include "surfeit/bake.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "gather/gather_point.h"
+#include "gather/scalar/gather_point.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/long_side.h"
-#include "gather/brute_force.h"
+#include "gather/scalar/brute_force.h"
 #include "gather/test_clouds.h"
 #include "gather/test_scene.h"
 
@@ -75,7 +75,7 @@ void addRectangle(Cloud& cloud, int side, const glm::vec3& corner, const glm::ve
 
 // Form factor of a polygon above the horizon: Lambert's formula, sum of edge angles dotted with the
 // normal, over 2 pi.
-double polygonFormFactor(std::span<const glm::vec3> corners, const Receiver& receiver) {
+double polygonFormFactor(std::span<const glm::vec3> corners, const LocalReceiver& receiver) {
   glm::dvec3 sum(0);
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const glm::dvec3 a = glm::normalize(glm::dvec3(corners[i] - receiver.position));
@@ -98,7 +98,7 @@ constexpr float kSolidAngles[] = {0, .01f, .05f, .2f};
 // What the cut may add to an error: large nodes drawn as rectangles leave gaps and overlap.
 double cutError(float max_solid_angle) { return .35 * double(max_solid_angle); }
 
-GatherResult bruteForce(const Cloud& cloud, const Receiver& receiver,
+GatherResult bruteForce(const Cloud& cloud, const LocalReceiver& receiver,
                         GatherMode mode = GatherMode::kBleeding) {
   return gatherBruteForce(receiver, cloud, {mode, {}});
 }
@@ -107,12 +107,12 @@ TEST(Gather, InsideUniformShellIrradianceEqualsRadiosity) {
   const glm::vec3 radiosity(4, 2, 1);
   Cloud cloud;
   addSphere(cloud, 60000, {1, 2, 3}, 2, true, radiosity);
-  Scene scene(cloud);
+  TestScene scene(cloud);
   for (const float max_solid_angle : kSolidAngles) {
-    for (const Receiver& receiver :
-         {Receiver{{1, 2, 3}, {0, 0, 1}}, Receiver{{1.8f, 1.5f, 3.7f}, {1, 0, 0}},
-          Receiver{{1, 2, 1.5f}, glm::normalize(glm::vec3(1, -2, -1))},
-          Receiver{{.5f, 2.5f, 3}, {0, 0, 0}}}) {
+    for (const LocalReceiver& receiver :
+         {LocalReceiver{{1, 2, 3}, {0, 0, 1}}, LocalReceiver{{1.8f, 1.5f, 3.7f}, {1, 0, 0}},
+          LocalReceiver{{1, 2, 1.5f}, glm::normalize(glm::vec3(1, -2, -1))},
+          LocalReceiver{{.5f, 2.5f, 3}, {0, 0, 0}}}) {
       const GatherResult result = scene.gather(receiver, qualityOf(max_solid_angle));
       EXPECT_NEAR(result.occlusion, 1, .02 + cutError(max_solid_angle)) << max_solid_angle;
       EXPECT_LE(result.occlusion, 1);
@@ -126,10 +126,10 @@ TEST(Gather, InsideUniformShellIrradianceEqualsRadiosity) {
 TEST(Gather, OnTheShellItselfIrradianceEqualsRadiosity) {
   Cloud cloud;
   addSphere(cloud, 60000, {0, 0, 0}, 2, true, glm::vec3(1));
-  Scene scene(cloud);
+  TestScene scene(cloud);
   for (const std::size_t i : {100u, 20000u, 41000u}) {
     for (const float max_solid_angle : kSolidAngles) {
-      const Receiver receiver{cloud[i].position, cloud[i].normal};
+      const LocalReceiver receiver{cloud[i].position, cloud[i].normal};
       EXPECT_NEAR(scene.gather(receiver, qualityOf(max_solid_angle)).irradiance.x, 1,
                   .02 + cutError(max_solid_angle))
           << max_solid_angle;
@@ -141,7 +141,7 @@ TEST(Gather, DiskAboveHasItsFormFactor) {
   for (const float height : {.3f, 1.f, 3.f}) {
     Cloud cloud;
     addDisk(cloud, 20000, {0, 0, height}, 1, -1, {2, 2, 2});
-    Scene scene(cloud);
+    TestScene scene(cloud);
     const float expected = 1 / (1 + height * height);
     for (const float max_solid_angle : kSolidAngles) {
       const GatherResult result = scene.gather({{0, 0, 0}, {0, 0, 1}}, qualityOf(max_solid_angle));
@@ -158,7 +158,7 @@ TEST(Gather, SphereHasItsFormFactor) {
     const glm::vec3 centre = distance * glm::vec3(std::sin(angle), 0, std::cos(angle));
     Cloud cloud;
     addSphere(cloud, 40000, centre, radius, false, {2, 2, 2});
-    Scene scene(cloud);
+    TestScene scene(cloud);
     const float expected = radius * radius / (distance * distance) * std::cos(angle);
     for (const float max_solid_angle : kSolidAngles) {
       const GatherResult result = scene.gather({{0, 0, 0}, {0, 0, 1}}, qualityOf(max_solid_angle));
@@ -173,11 +173,11 @@ TEST(Gather, PerpendicularRectangleHasItsFormFactor) {
   Cloud cloud;
   addRectangle(cloud, 150, corner, edge_v, edge_u, {1, 1, 1});
   ASSERT_LT(cloud[0].normal.x, 0);
-  Scene scene(cloud);
+  TestScene scene(cloud);
   const glm::vec3 corners[] = {corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v};
   for (const glm::vec3& position :
        {glm::vec3(0), glm::vec3(-.5f, .3f, 0), glm::vec3(.15f, .9f, 0)}) {
-    const Receiver receiver{position, {0, 0, 1}};
+    const LocalReceiver receiver{position, {0, 0, 1}};
     const double expected = polygonFormFactor(corners, receiver);
     for (const float max_solid_angle : kSolidAngles) {
       EXPECT_NEAR(scene.gather(receiver, qualityOf(max_solid_angle)).occlusion, expected, .018)
@@ -190,8 +190,8 @@ TEST(Gather, CornerOfTwoWallsApproachesHalf) {
   // A floor receiver at the foot of a wall that goes far: the wall fills half of its hemisphere
   Cloud cloud;
   addRectangle(cloud, 300, {0, -30, 0}, {0, 0, 30}, {0, 60, 0}, {1, 1, 1});
-  Scene scene(cloud);
-  const Receiver receiver{{-.4f, 0, 0}, {0, 0, 1}};
+  TestScene scene(cloud);
+  const LocalReceiver receiver{{-.4f, 0, 0}, {0, 0, 1}};
   EXPECT_NEAR(scene.gather(receiver, qualityOf(.05f)).occlusion, .5, .03);
 }
 
@@ -200,7 +200,7 @@ TEST(Gather, FlatPlaneDoesNotOccludeItself) {
     const glm::vec3 u = glm::normalize(glm::cross(normal, glm::vec3(1, 0, 0)));
     Cloud cloud;
     addRectangle(cloud, 120, {5, 6, 7}, u, glm::cross(normal, u), {1, 1, 1});
-    Scene scene(cloud);
+    TestScene scene(cloud);
     for (const float max_solid_angle : kSolidAngles) {
       const Surfel& own = cloud[120 * 60 + 60];
       const GatherResult result =
@@ -213,7 +213,7 @@ TEST(Gather, FlatPlaneDoesNotOccludeItself) {
 TEST(Gather, NothingAboveTheHorizonGathersNothing) {
   Cloud cloud;
   addSphere(cloud, 1000, {0, 0, -3}, 1, false, {1, 1, 1});
-  Scene scene(cloud);
+  TestScene scene(cloud);
   const GatherResult result = scene.gather({{0, 0, 0}, {0, 0, 1}}, qualityOf(.05f));
   EXPECT_EQ(result.occlusion, 0);
   EXPECT_EQ(result.irradiance, glm::vec3(0));
@@ -223,8 +223,8 @@ TEST(Gather, NothingAboveTheHorizonGathersNothing) {
 TEST(Gather, BackSidesCoverOnlyWhenAsked) {
   Cloud cloud;
   addDisk(cloud, 5000, {0, 0, 1}, 1, +1, {2, 2, 2});  // seen from behind
-  Scene scene(cloud);
-  const Receiver receiver{{0, 0, 0}, {0, 0, 1}};
+  TestScene scene(cloud);
+  const LocalReceiver receiver{{0, 0, 0}, {0, 0, 1}};
   for (const float max_solid_angle : kSolidAngles) {
     GatherQuality quality = qualityOf(max_solid_angle);
     EXPECT_EQ(scene.gather(receiver, quality).occlusion, 0);
@@ -252,7 +252,7 @@ TEST(Gather, PieceOfARibbonHasItsFormFactor) {
       ribbon.radius = .5f * std::hypot(.8f, .1f);
       ribbon.flags = kSurfelTwoSided;
       setLongSide(.8f * glm::vec3(std::cos(turn), std::sin(turn), 0), ribbon);
-      Scene scene({ribbon});
+      TestScene scene({ribbon});
       const GatherResult result = scene.gather({{0, 0, 0}, {0, 0, 1}}, GatherQuality{.bias = 0});
       // Integral of cos^2 / (pi d^2), at the middles of small squares
       double expected = 0;
@@ -298,7 +298,7 @@ TEST(Gather, ReceiverInsideASphereSurfelIsNotCoveredByIt) {
 TEST(Gather, SphericalReceiverSeesSolidAngleOverFourPi) {
   Cloud cloud;
   addDisk(cloud, 20000, {0, 0, 1}, 1, -1, {2, 2, 2});
-  Scene scene(cloud);
+  TestScene scene(cloud);
   const float expected = .5f * (1 - 1 / std::sqrt(2.f));
   const GatherResult result = scene.gather({{0, 0, 0}, {0, 0, 0}}, qualityOf(.05f));
   EXPECT_NEAR(result.occlusion, expected, .005);
@@ -309,7 +309,7 @@ TEST(Gather, NearSurfaceHidesTheOneBehind) {
   Cloud cloud;
   addDisk(cloud, 20000, {0, 0, 1}, 3, -1, {1, 0, 0});
   addDisk(cloud, 20000, {0, 0, 2}, 3, -1, {0, 1, 0});
-  Scene scene(cloud);
+  TestScene scene(cloud);
   for (const float max_solid_angle : kSolidAngles) {
     const GatherResult result = scene.gather({{0, 0, 0}, {0, 0, 1}}, qualityOf(max_solid_angle));
     const double tolerance = .01 + cutError(max_solid_angle) / 3;
@@ -321,8 +321,8 @@ TEST(Gather, NearSurfaceHidesTheOneBehind) {
 TEST(Gather, SurfelsBeyondMaxDistanceDoNotCount) {
   Cloud cloud;
   addDisk(cloud, 5000, {0, 0, 1}, .5f, -1, {1, 1, 1});
-  Scene scene(cloud);
-  const Receiver receiver{{0, 0, 0}, {0, 0, 1}};
+  TestScene scene(cloud);
+  const LocalReceiver receiver{{0, 0, 0}, {0, 0, 1}};
   GatherQuality quality = qualityOf(.05f);
   quality.max_distance = 1.2f;
   EXPECT_NEAR(scene.gather(receiver, quality).occlusion, .2, .015);
@@ -346,8 +346,8 @@ Cloud cloudOfEverything() {
   return cloud;
 }
 
-std::vector<Receiver> receiversOn(const Cloud& cloud, std::size_t step) {
-  std::vector<Receiver> receivers;
+std::vector<LocalReceiver> receiversOn(const Cloud& cloud, std::size_t step) {
+  std::vector<LocalReceiver> receivers;
   for (std::size_t i = step / 2; i < cloud.size(); i += step) {
     receivers.push_back({cloud[i].position, cloud[i].normal});
   }
@@ -362,9 +362,9 @@ void expectEqual(const GatherResult& a, const GatherResult& b) {
 
 TEST(Gather, ZeroMaxSolidAngleEqualsBruteForceBitForBit) {
   const Cloud cloud = cloudOfEverything();
-  Scene scene(cloud);
+  TestScene scene(cloud);
   for (const GatherMode mode : {GatherMode::kBleeding, GatherMode::kOcclusion}) {
-    for (const Receiver& receiver : receiversOn(cloud, 1500)) {
+    for (const LocalReceiver& receiver : receiversOn(cloud, 1500)) {
       expectEqual(scene.gather(receiver, qualityOf(0), mode),
                   bruteForce(scene.cloud(), receiver, mode));
     }
@@ -375,19 +375,19 @@ TEST(Gather, OrderOfSurfelsDoesNotChangeTheResult) {
   const Cloud cloud = cloudOfEverything();
   Cloud shuffled = cloud;
   std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(1));
-  for (const Receiver& receiver : receiversOn(cloud, 3000)) {
+  for (const LocalReceiver& receiver : receiversOn(cloud, 3000)) {
     expectEqual(bruteForce(cloud, receiver), bruteForce(shuffled, receiver));
   }
 }
 
 TEST(Gather, CutApproachesBruteForce) {
   const Cloud cloud = cloudOfEverything();
-  Scene scene(cloud);
+  TestScene scene(cloud);
   double before = 1;
   for (const float max_solid_angle : {.2f, .05f, .0125f}) {
     double error = 0;
-    const std::vector<Receiver> receivers = receiversOn(cloud, 400);
-    for (const Receiver& receiver : receivers) {
+    const std::vector<LocalReceiver> receivers = receiversOn(cloud, 400);
+    for (const LocalReceiver& receiver : receivers) {
       const double difference =
           double(scene.gather(receiver, qualityOf(max_solid_angle)).occlusion -
                  bruteForce(cloud, receiver).occlusion);
@@ -401,8 +401,8 @@ TEST(Gather, CutApproachesBruteForce) {
 
 TEST(Gather, OcclusionIsTheSameInBothModes) {
   const Cloud cloud = cloudOfEverything();
-  Scene scene(cloud);
-  for (const Receiver& receiver : receiversOn(cloud, 1500)) {
+  TestScene scene(cloud);
+  for (const LocalReceiver& receiver : receiversOn(cloud, 1500)) {
     EXPECT_EQ(scene.gather(receiver, qualityOf(.05f), GatherMode::kBleeding).occlusion,
               scene.gather(receiver, qualityOf(.05f), GatherMode::kOcclusion).occlusion);
   }
@@ -410,9 +410,9 @@ TEST(Gather, OcclusionIsTheSameInBothModes) {
 
 TEST(Gather, EarlierReceiversDoNotChangeTheResult) {
   const Cloud cloud = cloudOfEverything();
-  Scene scene(cloud);
+  TestScene scene(cloud);
   PointGatherer gatherer(GatherMode::kBleeding, qualityOf(.05f));
-  for (const Receiver& receiver : receiversOn(cloud, 1500)) {
+  for (const LocalReceiver& receiver : receiversOn(cloud, 1500)) {
     GatherResult result;
     ASSERT_TRUE(gatherer.gather(receiver, scene.reader(), result).ok());
     expectEqual(result, scene.gather(receiver, qualityOf(.05f)));
@@ -421,11 +421,11 @@ TEST(Gather, EarlierReceiversDoNotChangeTheResult) {
 
 TEST(Gather, EveryResolutionGivesFiniteResultsWithinBounds) {
   const Cloud cloud = cloudOfEverything();
-  Scene scene(cloud);
+  TestScene scene(cloud);
   for (int resolution = 2; resolution <= 64; resolution += 2) {
     GatherQuality quality = qualityOf(.3f);
     quality.raster_resolution = resolution;
-    for (const Receiver& receiver : receiversOn(cloud, 5000)) {
+    for (const LocalReceiver& receiver : receiversOn(cloud, 5000)) {
       const GatherResult result = scene.gather(receiver, quality);
       EXPECT_GE(result.occlusion, 0);
       EXPECT_LE(result.occlusion, 1);

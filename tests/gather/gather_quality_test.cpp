@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "gather/gather_options.h"
+#include "batch/gather_options.h"
 #include "gather/test_clouds.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 
 namespace surfeit {
 namespace {

@@ -4,13 +4,13 @@
 
 #include <array>
 
-#include "gather/gather_point.h"
-#include "io/page_codec.h"
+#include "gather/scalar/gather_point.h"
 #include "io/test_directory.h"
-#include "octree/node_sums.h"
-#include "octree/paged_octree.h"
-#include "octree/scene_writer.h"
-#include "octree/surfel_group.h"
+#include "octree/build/scene_writer.h"
+#include "octree/node/node_sums.h"
+#include "octree/page/surfel_group.h"
+#include "octree/read/paged_octree.h"
+#include "storage/page_codec.h"
 
 namespace surfeit {
 namespace {

@@ -11,14 +11,14 @@
 #include <string>
 #include <vector>
 
-#include "gather/gather_input.h"
-#include "gather/gather_memory.h"
-#include "gather/gather_outputs.h"
-#include "gather/interpolating_gatherer.h"
-#include "gather/local_fit.h"
+#include "batch/gather_input.h"
+#include "batch/gather_memory.h"
+#include "gather/packet/interpolating_gatherer.h"
+#include "gather/packet/local_fit.h"
+#include "gather/rules/gather_outputs.h"
 #include "gather/test_clouds.h"
-#include "octree/scene_file.h"
-#include "surfeit/gather.h"
+#include "octree/read/scene_file.h"
+#include "surfeit/bake.h"
 
 namespace surfeit {
 namespace {
@@ -274,7 +274,7 @@ TEST_F(Interpolation, ThreadsAndMemoryDoNotChangeResults) {
   // What it holds beside is charged
   options_.quality.max_variation = 0;
   const std::uint64_t without = leastGatherMemory(*scene, gatherWork(input->receivers(), options_));
-  EXPECT_GE(with - without, kGroupReceivers * (sizeof(Receiver) + sizeof(GatherResult)));
+  EXPECT_GE(with - without, kGroupReceivers * (sizeof(LocalReceiver) + sizeof(GatherResult)));
 }
 
 TEST_F(Interpolation, ReceiversWithoutNormalsAreInterpolatedInSpace) {

@@ -8,7 +8,7 @@
 
 #include "gather/environment_pictures.h"
 #include "gather/test_clouds.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/progress.h"
 
 namespace surfeit {

@@ -1,6 +1,6 @@
 // What the monitor and tune say about memory is true: a gather that follows it is not advised
 // again.
-#include "gather/memory_advice.h"
+#include "batch/memory_advice.h"
 
 #include <gtest/gtest.h>
 
@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "gather/gather_input.h"
-#include "gather/gather_memory.h"
+#include "batch/gather_input.h"
+#include "batch/gather_memory.h"
 #include "gather/test_clouds.h"
-#include "octree/scene_file.h"
-#include "surfeit/gather.h"
+#include "octree/read/scene_file.h"
+#include "surfeit/bake.h"
 #include "surfeit/tune.h"
 
 namespace surfeit {

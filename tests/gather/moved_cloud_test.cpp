@@ -8,15 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "cloud/cloud_formats.h"
 #include "gather/test_scene.h"
-#include "io/cloud_formats.h"
-#include "io/surfel_writer.h"
-#include "octree/scene_rows.h"
+#include "index/scene_rows.h"
 #include "octree/test_scenes.h"
+#include "surfeit/bake.h"
 #include "surfeit/bounce.h"
 #include "surfeit/cube.h"
-#include "surfeit/gather.h"
 #include "surfeit/radiance.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {
@@ -70,14 +70,14 @@ class MovedCloudTest : public DirectoryTest, public testing::WithParamInterface<
 
   // A property of all rows.
   static std::vector<double> values(RowReader& reader, const std::string& property) {
-    const PlyProperty* const field = reader.element().find(property);
+    const RowProperty* const field = reader.element().find(property);
     std::vector<double> values;
     AlignedBuffer buffer;
     for (;;) {
       const Result<Bytes> rows = reader.readRows(4096, buffer);
       if (field == nullptr || !rows.ok() || rows->empty()) return values;
       for (std::size_t at = 0; at < rows->size(); at += reader.element().row_bytes) {
-        values.push_back(plyValue(rows->data() + at + field->offset, field->type));
+        values.push_back(rowValue(rows->data() + at + field->offset, field->type));
       }
     }
   }

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "gather/packet_gatherer.h"
+#include "gather/packet/packet_gatherer.h"
 #include "gather/test_scene.h"
 
 namespace surfeit {
@@ -84,8 +84,8 @@ inline Cloud fineCloud() { return spheresOnGround(200, 2000); }
 inline constexpr std::size_t kRuns = 40;
 
 // Packets of neighbours on the surfaces of the cloud, where few surfels are anywhere else.
-inline std::vector<Receiver> neighbours(const Cloud& cloud, std::size_t first) {
-  std::vector<Receiver> receivers;
+inline std::vector<LocalReceiver> neighbours(const Cloud& cloud, std::size_t first) {
+  std::vector<LocalReceiver> receivers;
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
     const Surfel& surfel = cloud[std::min(first + i, cloud.size() - 1)];
     receivers.push_back({surfel.position, surfel.normal});
@@ -93,8 +93,8 @@ inline std::vector<Receiver> neighbours(const Cloud& cloud, std::size_t first) {
   return receivers;
 }
 
-inline std::vector<GatherResult> gatherPacket(PacketGatherer& gatherer, Scene& scene,
-                                              const std::vector<Receiver>& receivers) {
+inline std::vector<GatherResult> gatherPacket(PacketGatherer& gatherer, TestScene& scene,
+                                              const std::vector<LocalReceiver>& receivers) {
   std::vector<GatherResult> results(receivers.size());
   const Status status = gatherer.gather(receivers, scene.reader(), results);
   EXPECT_TRUE(status.ok()) << status.message();

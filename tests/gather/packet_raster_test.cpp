@@ -1,5 +1,5 @@
 // What the lanes of a packet see is what the raster of each receiver alone sees.
-#include "gather/packet_raster.h"
+#include "gather/packet/packet_raster.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
-#include "gather/gather_rules.h"
-#include "gather/receiver_raster.h"
+#include "gather/rules/gather_rules.h"
+#include "gather/scalar/receiver_raster.h"
 
 namespace surfeit {
 namespace {
@@ -34,8 +34,8 @@ Node bentNode() {
 }
 
 // From where the node faces them to where it turns away.
-std::vector<Receiver> receiversAlongTheRim() {
-  std::vector<Receiver> receivers;
+std::vector<LocalReceiver> receiversAlongTheRim() {
+  std::vector<LocalReceiver> receivers;
   for (int i = 0; i < int(kPacketReceivers); ++i) {
     receivers.push_back({{.2f * float(i) - 1.5f, 0, -3}, {0, 0, 1}});
   }
@@ -44,7 +44,7 @@ std::vector<Receiver> receiversAlongTheRim() {
 
 TEST(PacketRaster, EveryReceiverSeesItsOwnPartOfWhatIsBent) {
   const Node node = bentNode();
-  const std::vector<Receiver> receivers = receiversAlongTheRim();
+  const std::vector<LocalReceiver> receivers = receiversAlongTheRim();
   for (const GatherSides sides : {GatherSides::kFront, GatherSides::kBack}) {
     GatherQuality quality;
     quality.sides = sides;
@@ -76,7 +76,7 @@ TEST(PacketRaster, EveryReceiverSeesItsOwnPartOfWhatIsBent) {
 // Lanes without receivers are left out, whole vectors of them, and hold what was drawn before.
 TEST(PacketRaster, FewReceiversSeeTheSameAsInAFullPacket) {
   const Node node = bentNode();
-  std::vector<Receiver> receivers = receiversAlongTheRim();
+  std::vector<LocalReceiver> receivers = receiversAlongTheRim();
   std::reverse(receivers.begin(), receivers.end());
   const PacketView view = viewPacket(receivers);
   const GatherRules rules(GatherMode::kBleeding, {});
@@ -127,7 +127,7 @@ Surfel surfelAround(std::mt19937& random) {
 // What some receiver sees something of is drawn on every face it reaches; the rest is not kept.
 TEST(PacketRaster, SurfelsAreKeptForTheFacesThatSeeThem) {
   for (const bool has_normals : {true, false}) {
-    std::vector<Receiver> receivers;
+    std::vector<LocalReceiver> receivers;
     for (int i = 0; i < int(kPacketReceivers); ++i) {
       const float turn = .1f * float(i - 8);
       receivers.push_back({{.1f * turn, .02f * float(i % 4), 0}, glm::vec3(0)});
@@ -172,7 +172,7 @@ TEST(PacketRaster, ThinDisksMakeNoStepAtTheBorderOfTheNearField) {
   surfel.normal = glm::normalize(glm::vec3(1, 0, -.1f));
   const float border = nearFieldRadii(rules, false) * surfel.radius;
   constexpr std::size_t kPlaces = 64;  // from .8 to 1.1 times the border
-  std::vector<Receiver> receivers(kPlaces);
+  std::vector<LocalReceiver> receivers(kPlaces);
   for (std::size_t i = 0; i < kPlaces; ++i) {
     const float distance = border * (.8f + .3f * float(i) / float(kPlaces - 1));
     receivers[i] = {{-.5f / 8 * distance, -.5f / 8 * distance, -distance}, {0, 0, 1}};
@@ -181,7 +181,7 @@ TEST(PacketRaster, ThinDisksMakeNoStepAtTheBorderOfTheNearField) {
   PacketRaster packet(rules);
   std::vector<float> occlusion;
   for (std::size_t i = 0; i < kPlaces; i += kPacketReceivers) {
-    const std::span<const Receiver> lanes = std::span(receivers).subspan(i, kPacketReceivers);
+    const std::span<const LocalReceiver> lanes = std::span(receivers).subspan(i, kPacketReceivers);
     packet.begin(lanes, viewPacket(lanes));
     packet.addSurfels({&surfel, 1});
     packet.sort();

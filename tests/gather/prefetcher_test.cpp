@@ -1,5 +1,5 @@
 // Reading ahead, where reads are slow and caches are too small: it happens, and no result changes.
-#include "gather/prefetcher.h"
+#include "batch/prefetcher.h"
 
 #include <gtest/gtest.h>
 
@@ -14,13 +14,13 @@
 #include <utility>
 #include <vector>
 
+#include "batch/gather_crew.h"
+#include "batch/gather_input.h"
+#include "batch/gather_memory.h"
 #include "gather/frames_gather.h"
-#include "gather/gather_crew.h"
-#include "gather/gather_input.h"
-#include "gather/gather_memory.h"
 #include "gather/test_clouds.h"
 #include "io/fault_injector.h"
-#include "octree/scene_file.h"
+#include "octree/read/scene_file.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "gather/raster_cube.h"
+#include "gather/scalar/raster_cube.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/spherical_harmonics.h"
-#include "gather/coverage_rules.h"
+#include "gather/rules/coverage_rules.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "gather/receiver_queue.h"
+#include "batch/receiver_queue.h"
 
 #include <gtest/gtest.h>
 

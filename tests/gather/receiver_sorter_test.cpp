@@ -1,4 +1,4 @@
-#include "gather/receiver_sorter.h"
+#include "batch/receiver_sorter.h"
 
 #include <algorithm>
 #include <cstring>

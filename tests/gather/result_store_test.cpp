@@ -1,4 +1,4 @@
-#include "gather/result_store.h"
+#include "batch/result_store.h"
 
 #include <algorithm>
 #include <cmath>

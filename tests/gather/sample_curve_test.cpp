@@ -1,4 +1,4 @@
-#include "gather/sample_curve.h"
+#include "tune/sample_curve.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 namespace surfeit {
 namespace {
 
-// Receiver r of `count` looks up the pages around its place: neighbours share nearly all.
+// LocalReceiver r of `count` looks up the pages around its place: neighbours share nearly all.
 constexpr std::uint32_t kPages = 2000, kAround = 10;
 constexpr std::uint64_t kReceivers = 40000;
 

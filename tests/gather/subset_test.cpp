@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "gather/brute_force.h"
-#include "gather/packet_gatherer.h"
+#include "gather/packet/packet_gatherer.h"
+#include "gather/scalar/brute_force.h"
 #include "gather/test_clouds.h"
 #include "gather/test_scene.h"
 #include "surfeit/bounce.h"
@@ -82,8 +82,8 @@ GatherRules rulesFor(std::uint64_t groups, float max_solid_angle) {
 }
 
 // A receiver on one surfel of so many.
-std::vector<Receiver> receiversOn(const Cloud& cloud, std::size_t step) {
-  std::vector<Receiver> receivers;
+std::vector<LocalReceiver> receiversOn(const Cloud& cloud, std::size_t step) {
+  std::vector<LocalReceiver> receivers;
   for (std::size_t i = 0; i < cloud.size(); i += step) {
     receivers.push_back({cloud[i].position, cloud[i].normal});
   }
@@ -96,11 +96,11 @@ double difference(const GatherResult& a, const GatherResult& b) {
 }
 
 TEST(Subset, WithEveryNodeOpenItIsTheSubsetAloneToTheLastBit) {
-  Scene scene(groupedCloud());
+  TestScene scene(groupedCloud());
   for (const std::uint64_t groups : kSubsets) {
-    Scene alone(subsetOf(scene.cloud(), groups));
+    TestScene alone(subsetOf(scene.cloud(), groups));
     const GatherRules subset = rulesFor(groups, 0), all = rulesFor(kAllGroups, 0);
-    for (const Receiver& receiver : receiversOn(scene.cloud(), 1511)) {
+    for (const LocalReceiver& receiver : receiversOn(scene.cloud(), 1511)) {
       const GatherResult found = scene.gather(receiver, subset);
       EXPECT_EQ(difference(found, alone.gather(receiver, all)), 0);
       EXPECT_EQ(difference(found, gatherBruteForce(receiver, scene.cloud(), subset)), 0);
@@ -109,14 +109,14 @@ TEST(Subset, WithEveryNodeOpenItIsTheSubsetAloneToTheLastBit) {
 }
 
 TEST(Subset, ApproximatesTheSubsetAlone) {
-  Scene scene(groupedCloud());
+  TestScene scene(groupedCloud());
   for (const std::uint64_t groups : kSubsets) {
-    Scene alone(subsetOf(scene.cloud(), groups));
+    TestScene alone(subsetOf(scene.cloud(), groups));
     const GatherRules subset = rulesFor(groups, .08f), all = rulesFor(kAllGroups, .08f);
     const GatherRules exact = rulesFor(kAllGroups, 0);
     double square = 0, square_alone = 0, seen = 0;
-    const std::vector<Receiver> receivers = receiversOn(scene.cloud(), 97);
-    for (const Receiver& receiver : receivers) {
+    const std::vector<LocalReceiver> receivers = receiversOn(scene.cloud(), 97);
+    for (const LocalReceiver& receiver : receivers) {
       const GatherResult expected = alone.gather(receiver, exact);
       const double error = difference(scene.gather(receiver, subset), expected);
       const double error_alone = difference(alone.gather(receiver, all), expected);
@@ -134,13 +134,13 @@ TEST(Subset, ApproximatesTheSubsetAlone) {
 }
 
 TEST(Subset, PacketsGiveWhatTheScalarGatherGives) {
-  Scene scene(groupedCloud());
+  TestScene scene(groupedCloud());
   for (const std::uint64_t groups : kSubsets) {
     const GatherRules rules = rulesFor(groups, .08f);
     PacketGatherer gatherer(rules);
     double worst = 0;
-    for (const Receiver& receiver : receiversOn(scene.cloud(), 511)) {
-      const std::vector<Receiver> packet(kPacketReceivers, receiver);
+    for (const LocalReceiver& receiver : receiversOn(scene.cloud(), 511)) {
+      const std::vector<LocalReceiver> packet(kPacketReceivers, receiver);
       std::vector<GatherResult> results(packet.size());
       const Status status = gatherer.gather(packet, scene.reader(), results);
       ASSERT_TRUE(status.ok()) << status.message();
@@ -162,7 +162,7 @@ class SubsetOfSceneTest : public testing::Test {
                              "radiosity_g", "radiosity_b", "albedo_r", "albedo_g", "albedo_b"}) {
       table.addProperty(name);
     }
-    if (has_groups) table.addProperty("group", PlyType::kInt32);
+    if (has_groups) table.addProperty("group", ValueType::kInt32);
     for (const Surfel& s : cloud) {
       const glm::vec3 &p = s.position, &n = s.normal, &b = s.radiosity;
       table.rows.push_back(

@@ -20,8 +20,8 @@
 #include <utility>
 #include <vector>
 
-#include "io/ply_reader.h"
-#include "io/ply_writer.h"
+#include "cloud/ply/ply_reader.h"
+#include "cloud/ply/ply_writer.h"
 #include "surfeit/index.h"
 #include "surfeit/progress.h"
 
@@ -55,18 +55,18 @@ class TestDirectory {
 
 // A table of doubles with a type per column, as rows of a PLY file.
 struct Table {
-  std::vector<PlyProperty> properties;
+  std::vector<RowProperty> properties;
   std::vector<std::vector<double>> rows;
 
-  void addProperty(const std::string& name, PlyType type = PlyType::kFloat32) {
-    PlyProperty property;
+  void addProperty(const std::string& name, ValueType type = ValueType::kFloat32) {
+    RowProperty property;
     property.name = name;
     property.type = type;
     properties.push_back(property);
   }
   std::vector<std::string> names() const {
     std::vector<std::string> names;
-    for (const PlyProperty& property : properties) names.push_back(property.name);
+    for (const RowProperty& property : properties) names.push_back(property.name);
     return names;
   }
   // The values of a property; none when it is absent.
@@ -86,23 +86,23 @@ void storeAs(double value, std::byte* bytes) {
   std::memcpy(bytes, &typed, sizeof typed);
 }
 
-inline void storePlyValue(double value, PlyType type, std::byte* bytes) {
+inline void storePlyValue(double value, ValueType type, std::byte* bytes) {
   switch (type) {
-    case PlyType::kInt8:
+    case ValueType::kInt8:
       return storeAs<std::int8_t>(value, bytes);
-    case PlyType::kUint8:
+    case ValueType::kUint8:
       return storeAs<std::uint8_t>(value, bytes);
-    case PlyType::kInt16:
+    case ValueType::kInt16:
       return storeAs<std::int16_t>(value, bytes);
-    case PlyType::kUint16:
+    case ValueType::kUint16:
       return storeAs<std::uint16_t>(value, bytes);
-    case PlyType::kInt32:
+    case ValueType::kInt32:
       return storeAs<std::int32_t>(value, bytes);
-    case PlyType::kUint32:
+    case ValueType::kUint32:
       return storeAs<std::uint32_t>(value, bytes);
-    case PlyType::kFloat32:
+    case ValueType::kFloat32:
       return storeAs<float>(value, bytes);
-    case PlyType::kFloat64:
+    case ValueType::kFloat64:
       return storeAs<double>(value, bytes);
   }
 }
@@ -111,11 +111,11 @@ inline void writeTable(const Table& table, const std::string& path,
                        PlyEncoding encoding = PlyEncoding::kBinaryLittleEndian) {
   auto writer = PlyWriter::create(path, encoding, table.properties);
   ASSERT_TRUE(writer.ok()) << writer.status().message();
-  const PlyElement& element = writer->element();
+  const RowLayout& element = writer->element();
   std::vector<std::byte> row(element.row_bytes);
   for (const std::vector<double>& values : table.rows) {
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const PlyProperty& property = element.properties[i];
+      const RowProperty& property = element.properties[i];
       storePlyValue(values[i], property.type, row.data() + property.offset);
     }
     ASSERT_TRUE(writer->writeRows(row).ok());
@@ -129,7 +129,7 @@ inline Table readTable(const std::string& path) {
   auto reader = PlyReader::open(path);
   EXPECT_TRUE(reader.ok()) << reader.status().message();
   if (!reader.ok()) return table;
-  const PlyElement& element = reader->header().elements.at(0);
+  const RowLayout& element = reader->header().elements.at(0);
   EXPECT_TRUE(reader->seekElement(0).ok());
   table.properties = element.properties;
   std::vector<std::byte> row(element.row_bytes);
@@ -138,8 +138,8 @@ inline Table readTable(const std::string& path) {
     EXPECT_TRUE(count.ok()) << count.status().message();
     if (!count.ok() || *count == 0) return table;
     std::vector<double>& values = table.rows.emplace_back();
-    for (const PlyProperty& property : element.properties) {
-      values.push_back(plyValue(row.data() + property.offset, property.type));
+    for (const RowProperty& property : element.properties) {
+      values.push_back(rowValue(row.data() + property.offset, property.type));
     }
   }
 }
@@ -185,7 +185,7 @@ inline Table floorAndSphere(int side) {
 inline Table receiversOf(int count, unsigned seed = 1) {
   Table table;
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) table.addProperty(name);
-  table.addProperty("id", PlyType::kInt32);
+  table.addProperty("id", ValueType::kInt32);
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int i = 0; i < count; ++i) {

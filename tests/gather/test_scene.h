@@ -10,20 +10,20 @@
 #include <vector>
 
 #include "core/long_side.h"
-#include "gather/gather_point.h"
+#include "gather/scalar/gather_point.h"
 #include "gather/test_clouds.h"
-#include "io/surfel_source.h"
-#include "io/surfel_writer.h"
-#include "octree/paged_octree.h"
-#include "octree/scene_file.h"
+#include "octree/read/paged_octree.h"
+#include "octree/read/scene_file.h"
 #include "surfeit/index.h"
+#include "surfels/surfel_source.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 
 // A cloud as a paged octree, all in memory.
-class Scene {
+class TestScene {
  public:
-  explicit Scene(const std::vector<Surfel>& cloud) {
+  explicit TestScene(const std::vector<Surfel>& cloud) {
     CloudChannels channels;
     channels.normal = channels.radius = channels.area = channels.radiosity = true;
     channels.two_sided = true;
@@ -54,11 +54,11 @@ class Scene {
     reader_ = std::make_unique<PagedOctree::Reader>(*octree_);
   }
 
-  GatherResult gather(const Receiver& receiver, const GatherQuality& quality,
+  GatherResult gather(const LocalReceiver& receiver, const GatherQuality& quality,
                       GatherMode mode = GatherMode::kBleeding) {
     return gather(receiver, GatherRules(mode, quality));
   }
-  GatherResult gather(const Receiver& receiver, const GatherRules& rules) {
+  GatherResult gather(const LocalReceiver& receiver, const GatherRules& rules) {
     PointGatherer gatherer(rules);
     GatherResult result;
     expectOk(gatherer.gather(receiver, *reader_, result));

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "gather/test_clouds.h"
-#include "octree/paged_octree.h"
-#include "octree/scene_file.h"
-#include "surfeit/gather.h"
+#include "octree/read/paged_octree.h"
+#include "octree/read/scene_file.h"
+#include "surfeit/bake.h"
 
 namespace surfeit {
 namespace {

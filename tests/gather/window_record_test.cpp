@@ -1,4 +1,4 @@
-#include "gather/window_record.h"
+#include "engine/window_record.h"
 
 #include <gtest/gtest.h>
 

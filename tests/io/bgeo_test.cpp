@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cstring>
 
-#include "io/formats/bgeo_ascii_reader.h"
-#include "io/formats/bgeo_json_reader.h"
-#include "io/formats/bgeo_reader.h"
-#include "io/formats/bgeo_writer.h"
+#include "cloud/houdini/bgeo_ascii_reader.h"
+#include "cloud/houdini/bgeo_json_reader.h"
+#include "cloud/houdini/bgeo_reader.h"
+#include "cloud/houdini/bgeo_writer.h"
 #include "io/row_damage_test.h"
 #include "io/test_bytes.h"
 
@@ -105,7 +105,7 @@ TEST_F(BgeoTest, WrittenFilesAreReadBack) {
         "bar_b",       "velocity_x", "velocity_y", "velocity_z"}) {
     options.properties.push_back(rowProperty(name));
   }
-  options.properties.push_back(rowProperty("id", PlyType::kInt32));
+  options.properties.push_back(rowProperty("id", ValueType::kInt32));
   for (const char* file : {"b.bgeo", "b.bgeo.gz", "b.bgeo.zst"}) {
     Result<std::unique_ptr<RowWriter>> writer = createBgeo(path(file), options);
     ASSERT_TRUE(writer.ok()) << writer.status().message();
@@ -121,8 +121,9 @@ TEST_F(BgeoTest, WrittenFilesAreReadBack) {
 
 TEST_F(BgeoTest, PositionComesFirstWhereverRowsHaveIt) {
   RowWriterOptions options;
-  options.properties = {rowProperty("radius", PlyType::kFloat64), rowProperty("x"),
-                        rowProperty("y"), rowProperty("z"), rowProperty("count", PlyType::kUint8)};
+  options.properties = {rowProperty("radius", ValueType::kFloat64), rowProperty("x"),
+                        rowProperty("y"), rowProperty("z"),
+                        rowProperty("count", ValueType::kUint8)};
   Result<std::unique_ptr<RowWriter>> writer = createBgeo(path("b.bgeo"), options);
   ASSERT_TRUE(writer.ok()) << writer.status().message();
   EXPECT_EQ((*writer)->notes().size(), 1u);
@@ -134,8 +135,8 @@ TEST_F(BgeoTest, PositionComesFirstWhereverRowsHaveIt) {
   const std::vector<std::byte> read = readAllRows(*reader);
   for (std::size_t i = 0; i < 100; ++i) {
     const std::byte* row = &rows[i * (*writer)->element().row_bytes];
-    EXPECT_EQ(valueOf(*reader, read, i, "radius"), plyValue(row, PlyType::kFloat64));
-    EXPECT_EQ(valueOf(*reader, read, i, "count"), plyValue(row + 20, PlyType::kUint8));
+    EXPECT_EQ(valueOf(*reader, read, i, "radius"), rowValue(row, ValueType::kFloat64));
+    EXPECT_EQ(valueOf(*reader, read, i, "count"), rowValue(row + 20, ValueType::kUint8));
   }
 }
 

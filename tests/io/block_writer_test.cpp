@@ -1,4 +1,4 @@
-#include "io/block_writer.h"
+#include "storage/block_writer.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "io/byte_input.h"
+#include "storage/byte_input.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

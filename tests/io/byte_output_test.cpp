@@ -1,4 +1,4 @@
-#include "io/byte_output.h"
+#include "storage/byte_output.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "io/channels.h"
+#include "cloud/channels.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,20 +21,20 @@ std::vector<std::string> names(std::string_view name, std::size_t components, Ch
   return propertyNames(name, components, kind, *parsed);
 }
 
-PlyElement elementOf(const std::vector<std::pair<std::string, PlyType>>& properties) {
-  PlyElement element;
+RowLayout elementOf(const std::vector<std::pair<std::string, ValueType>>& properties) {
+  RowLayout element;
   element.name = "vertex";
   for (const auto& [name, type] : properties) {
-    PlyProperty property;
+    RowProperty property;
     property.name = name;
     property.type = type;
     element.properties.push_back(property);
   }
-  packPlyRow(element);
+  packRow(element);
   return element;
 }
 
-std::vector<std::string> channelNames(const PlyElement& element) {
+std::vector<std::string> channelNames(const RowLayout& element) {
   std::vector<std::string> found;
   for (const RowChannel& channel : channelsOf(element)) found.push_back(channel.name);
   return found;
@@ -78,7 +78,7 @@ TEST(Channels, UnknownNamesKeepTheirLetters) {
   EXPECT_THAT(names("none", 0, ChannelKind::kFloat), IsEmpty());
   // However long they are, they are names that PLY takes
   for (const std::string& name : names(std::string(200, 'q'), 16, ChannelKind::kMatrix)) {
-    EXPECT_TRUE(isPlyName(name));
+    EXPECT_TRUE(isPropertyName(name));
   }
   // A known name of another shape is no known channel
   EXPECT_THAT(names("P", 2, ChannelKind::kFloat), ElementsAre("P_0", "P_1"));
@@ -112,19 +112,19 @@ TEST(Channels, RenamesThatAreNoneAreRefused) {
 }
 
 TEST(Channels, AddedChannelsArePackedAndFoundAgain) {
-  PlyElement element;
-  const auto add = [&](const char* name, std::size_t components, ChannelKind kind, PlyType type) {
+  RowLayout element;
+  const auto add = [&](const char* name, std::size_t components, ChannelKind kind, ValueType type) {
     const Status status = addChannel(name, components, kind, type, {}, "a.ptc", element);
     EXPECT_TRUE(status.ok()) << status.message();
   };
-  add("P", 3, ChannelKind::kPoint, PlyType::kFloat64);
-  add("_area", 1, ChannelKind::kFloat, PlyType::kFloat32);
-  add("_radiosity", 3, ChannelKind::kColor, PlyType::kFloat32);
-  add("life", 2, ChannelKind::kFloat, PlyType::kUint16);
-  add("N", 3, ChannelKind::kNormal, PlyType::kFloat32);
-  add("m", 16, ChannelKind::kMatrix, PlyType::kFloat32);
-  add("Cd", 3, ChannelKind::kColor, PlyType::kFloat32);
-  add("spin", 3, ChannelKind::kVector, PlyType::kFloat32);
+  add("P", 3, ChannelKind::kPoint, ValueType::kFloat64);
+  add("_area", 1, ChannelKind::kFloat, ValueType::kFloat32);
+  add("_radiosity", 3, ChannelKind::kColor, ValueType::kFloat32);
+  add("life", 2, ChannelKind::kFloat, ValueType::kUint16);
+  add("N", 3, ChannelKind::kNormal, ValueType::kFloat32);
+  add("m", 16, ChannelKind::kMatrix, ValueType::kFloat32);
+  add("Cd", 3, ChannelKind::kColor, ValueType::kFloat32);
+  add("spin", 3, ChannelKind::kVector, ValueType::kFloat32);
   EXPECT_EQ(element.row_bytes, 24u + 4 + 12 + 4 + 12 + 64 + 12 + 12);
   EXPECT_EQ(element.find("life_1")->offset, 42u);
 
@@ -132,7 +132,7 @@ TEST(Channels, AddedChannelsArePackedAndFoundAgain) {
               ElementsAre("position", "area", "radiosity", "life", "normal", "m", "color", "spin"));
   const std::vector<RowChannel> channels = channelsOf(element);
   EXPECT_EQ(channels[0].kind, ChannelKind::kPoint);
-  EXPECT_EQ(channels[0].type, PlyType::kFloat64);
+  EXPECT_EQ(channels[0].type, ValueType::kFloat64);
   EXPECT_EQ(channels[2].kind, ChannelKind::kColor);
   EXPECT_EQ(channels[3].properties.size(), 2u);
   EXPECT_EQ(channels[4].kind, ChannelKind::kNormal);
@@ -140,43 +140,43 @@ TEST(Channels, AddedChannelsArePackedAndFoundAgain) {
   EXPECT_EQ(channels[7].kind, ChannelKind::kVector);
 
   const Status twin =
-      addChannel("position", 3, ChannelKind::kPoint, PlyType::kFloat32, {}, "a.ptc", element);
+      addChannel("position", 3, ChannelKind::kPoint, ValueType::kFloat32, {}, "a.ptc", element);
   EXPECT_EQ(twin.code(), StatusCode::kCorruption);
   EXPECT_THAT(twin.message(), HasSubstr("a.ptc: channel 'position': found a second property x"));
 }
 
 TEST(Channels, TriplesInAnyOrderBelongTogether) {
-  const PlyElement element = elementOf({{"nz", PlyType::kFloat32},
-                                        {"blue", PlyType::kUint8},
-                                        {"nx", PlyType::kFloat32},
-                                        {"red", PlyType::kUint16},
-                                        {"ny", PlyType::kFloat32},
-                                        {"green", PlyType::kUint8}});
+  const RowLayout element = elementOf({{"nz", ValueType::kFloat32},
+                                       {"blue", ValueType::kUint8},
+                                       {"nx", ValueType::kFloat32},
+                                       {"red", ValueType::kUint16},
+                                       {"ny", ValueType::kFloat32},
+                                       {"green", ValueType::kUint8}});
   EXPECT_THAT(channelNames(element), ElementsAre("normal", "color"));
   const std::vector<RowChannel> channels = channelsOf(element);
   EXPECT_THAT(channels[0].properties, ElementsAre(2, 4, 0));
   EXPECT_THAT(channels[1].properties, ElementsAre(3, 5, 1));
-  EXPECT_EQ(channels[1].type, PlyType::kUint16);
+  EXPECT_EQ(channels[1].type, ValueType::kUint16);
 }
 
 TEST(Channels, WhatIsNotCompleteIsSingle) {
-  PlyElement element = elementOf({{"x", PlyType::kFloat32},
-                                  {"y", PlyType::kFloat32},
-                                  {"tint_r", PlyType::kFloat32},
-                                  {"tint_g", PlyType::kFloat32},
-                                  {"a_0", PlyType::kFloat32},
-                                  {"b_1", PlyType::kFloat32},
-                                  {"_0", PlyType::kFloat32},
-                                  {"faces", PlyType::kInt32}});
+  RowLayout element = elementOf({{"x", ValueType::kFloat32},
+                                 {"y", ValueType::kFloat32},
+                                 {"tint_r", ValueType::kFloat32},
+                                 {"tint_g", ValueType::kFloat32},
+                                 {"a_0", ValueType::kFloat32},
+                                 {"b_1", ValueType::kFloat32},
+                                 {"_0", ValueType::kFloat32},
+                                 {"faces", ValueType::kInt32}});
   element.properties.back().is_list = true;
   EXPECT_THAT(channelNames(element), ElementsAre("x", "y", "tint_r", "tint_g", "a_0", "b_1", "_0"));
 }
 
 TEST(Channels, TypeHoldsTheValuesOfAllComponents) {
-  const auto type = [](PlyType a, PlyType b) {
+  const auto type = [](ValueType a, ValueType b) {
     return channelsOf(elementOf({{"v_0", a}, {"v_1", b}}))[0].type;
   };
-  using enum PlyType;
+  using enum ValueType;
   EXPECT_EQ(type(kUint8, kInt8), kInt16);
   EXPECT_EQ(type(kInt16, kUint8), kInt16);
   EXPECT_EQ(type(kInt8, kUint16), kInt32);
@@ -188,10 +188,10 @@ TEST(Channels, TypeHoldsTheValuesOfAllComponents) {
 }
 
 TEST(Channels, IntegersOfColorsAreTurnedLinear) {
-  const PlyElement element = elementOf({{"red", PlyType::kUint8},
-                                        {"green", PlyType::kUint16},
-                                        {"blue", PlyType::kFloat32},
-                                        {"count", PlyType::kUint8}});
+  const RowLayout element = elementOf({{"red", ValueType::kUint8},
+                                       {"green", ValueType::kUint16},
+                                       {"blue", ValueType::kFloat32},
+                                       {"count", ValueType::kUint8}});
   std::vector<std::byte> row(element.row_bytes);
   row[0] = std::byte{188};
   const std::uint16_t green = 65535;

@@ -1,4 +1,4 @@
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "io/byte_output.h"
 #include "io/compressed_files.h"
 #include "io/test_directory.h"
+#include "storage/byte_output.h"
 
 namespace surfeit {
 namespace {
@@ -63,7 +63,7 @@ std::vector<std::string> notesOfPoints(const std::string& path, double x) {
   for (const char* name : {"x", "y", "z"}) {
     options.properties.emplace_back();
     options.properties.back().name = name;
-    options.properties.back().type = PlyType::kFloat64;
+    options.properties.back().type = ValueType::kFloat64;
   }
   const auto writer = createRowWriter(path, options);
   EXPECT_TRUE(writer.ok()) << writer.status().message();
@@ -182,9 +182,9 @@ class PlyRowsTest : public DirectoryTest {
     return openRowReader(path("a.ply"), options).status().message();
   }
 
-  static std::vector<std::string> propertyNamesOf(const PlyElement& element) {
+  static std::vector<std::string> propertyNamesOf(const RowLayout& element) {
     std::vector<std::string> names;
-    for (const PlyProperty& property : element.properties) names.push_back(property.name);
+    for (const RowProperty& property : element.properties) names.push_back(property.name);
     return names;
   }
 

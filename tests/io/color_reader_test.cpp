@@ -1,4 +1,4 @@
-#include "io/color_reader.h"
+#include "cloud/color_reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 #include "io/row_damage_test.h"
-#include "io/surfel_source.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 namespace {
@@ -61,7 +61,8 @@ class ColorReaderTest : public RowFileTest {
     const auto reader = open(file, range, channels);
     if (reader == nullptr || reader->element().find(name) == nullptr) return {"none", {}, {}};
     const std::vector<std::byte> rows = readAllRows(*reader);
-    Found found{std::string(plyTypeName(reader->element().find(name)->type)), {}, reader->notes()};
+    Found found{
+        std::string(valueTypeName(reader->element().find(name)->type)), {}, reader->notes()};
     for (std::size_t i = 0; i < reader->element().count; ++i) {
       found.values.push_back(valueOf(*reader, rows, i, name));
     }
@@ -252,7 +253,7 @@ TEST_F(LongColorTest, CloudsMayBeginDark) {
   std::fill(reds.begin() + kRows * 9 / 10, reds.end(), 40'000);
   const auto reader = openOk(openRowReader, ply(reds));
   ASSERT_NE(reader, nullptr);
-  EXPECT_EQ(reader->element().find("red")->type, PlyType::kUint16);
+  EXPECT_EQ(reader->element().find("red")->type, ValueType::kUint16);
 }
 
 TEST_F(LongColorTest, ValuesThatTheSampleDoesNotKnowAreRefused) {
@@ -271,7 +272,7 @@ TEST_F(LongColorTest, ValuesThatTheSampleDoesNotKnowAreRefused) {
 TEST_F(LongColorTest, ReadersKeepTheirContract) {
   const auto reader = openOk(openRowReader, ply(std::vector<std::uint16_t>(10'000, 200)));
   ASSERT_NE(reader, nullptr);
-  EXPECT_EQ(reader->element().find("red")->type, PlyType::kUint8);
+  EXPECT_EQ(reader->element().find("red")->type, ValueType::kUint8);
   expectReaderKeepsContract(*reader);
 }
 

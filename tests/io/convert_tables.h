@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
 #include "surfeit/convert.h"
@@ -35,12 +35,12 @@ class TestProgress : public Progress {
 
 // A cloud in memory, all values as doubles.
 struct Table {
-  std::vector<PlyProperty> properties;
+  std::vector<RowProperty> properties;
   std::vector<std::vector<double>> rows;
 };
 
-inline void setValue(const PlyProperty& property, double value, std::byte* row) {
-  visitPlyType(property.type, [&]<typename T>(std::type_identity<T>) {
+inline void setValue(const RowProperty& property, double value, std::byte* row) {
+  visitValueType(property.type, [&]<typename T>(std::type_identity<T>) {
     const T typed = static_cast<T>(value);
     std::memcpy(row + property.offset, &typed, sizeof typed);
   });
@@ -54,7 +54,7 @@ class ConvertTest : public DirectoryTest {
     options.comments = {"made by a test"};
     const Result<std::unique_ptr<RowWriter>> writer = createRowWriter(path(name), options);
     ASSERT_TRUE(writer.ok()) << writer.status().message();
-    const PlyElement& element = (*writer)->element();
+    const RowLayout& element = (*writer)->element();
     std::vector<std::byte> row(element.row_bytes);
     for (const std::vector<double>& values : table.rows) {
       for (std::size_t i = 0; i < values.size(); ++i) {
@@ -69,13 +69,13 @@ class ConvertTest : public DirectoryTest {
     Result<std::unique_ptr<RowReader>> reader = openRowReader(path(name));
     EXPECT_TRUE(reader.ok()) << reader.status().message();
     if (!reader.ok()) return {};
-    const PlyElement& element = (*reader)->element();
+    const RowLayout& element = (*reader)->element();
     const std::vector<std::byte> bytes = readAllRows(**reader);
     Table table{element.properties, {}};
     for (std::size_t at = 0; at < bytes.size(); at += element.row_bytes) {
       std::vector<double> row;
-      for (const PlyProperty& property : element.properties) {
-        row.push_back(plyValue(&bytes[at + property.offset], property.type));
+      for (const RowProperty& property : element.properties) {
+        row.push_back(rowValue(&bytes[at + property.offset], property.type));
       }
       table.rows.push_back(row);
     }
@@ -105,18 +105,18 @@ class ConvertTest : public DirectoryTest {
   std::vector<std::string> notes_;
 };
 
-inline Table tableOf(const std::vector<std::pair<std::string, PlyType>>& properties) {
+inline Table tableOf(const std::vector<std::pair<std::string, ValueType>>& properties) {
   Table table;
   for (const auto& [name, type] : properties) table.properties.push_back(rowProperty(name, type));
   return table;
 }
 
-inline constexpr PlyType kFloat = PlyType::kFloat32;
-inline constexpr PlyType kDouble = PlyType::kFloat64;
-inline constexpr PlyType kByte = PlyType::kUint8;
+inline constexpr ValueType kFloat = ValueType::kFloat32;
+inline constexpr ValueType kDouble = ValueType::kFloat64;
+inline constexpr ValueType kByte = ValueType::kUint8;
 
 // Points x y z with some more properties.
-inline Table pointsOf(const std::vector<std::vector<double>>& rows, PlyType type = kFloat) {
+inline Table pointsOf(const std::vector<std::vector<double>>& rows, ValueType type = kFloat) {
   Table table = tableOf({{"x", type}, {"y", type}, {"z", type}});
   table.rows = rows;
   return table;
@@ -132,7 +132,7 @@ inline std::vector<double> column(const Table& table, const std::string& name) {
 }
 
 inline std::string typesOf(const Table& table) {
-  PlyElement element;
+  RowLayout element;
   element.properties = table.properties;
   return describeRow(element);
 }
@@ -165,9 +165,9 @@ inline Table fullTable() {
                          {"two_sided", kByte},
                          {"group", kByte},
                          {"weight", kDouble},
-                         {"id", PlyType::kInt32},
-                         {"pixel_x", PlyType::kInt32},
-                         {"pixel_y", PlyType::kInt32}});
+                         {"id", ValueType::kInt32},
+                         {"pixel_x", ValueType::kInt32},
+                         {"pixel_y", ValueType::kInt32}});
   std::mt19937 random(3);
   const auto uniform = [&random](double least, double most) {
     return double(float(std::uniform_real_distribution<double>(least, most)(random)));

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "cloud/row_union.h"
 #include "io/convert_tables.h"
-#include "io/row_union.h"
 
 namespace surfeit {
 namespace {
@@ -42,7 +42,7 @@ TEST_F(ConvertTest, MergedCloudsHaveThePropertiesOfAll) {
 }
 
 TEST_F(ConvertTest, MergedColorsKeepTheirShade) {
-  const auto colors = [](PlyType type) {
+  const auto colors = [](ValueType type) {
     return tableOf({{"x", kFloat},
                     {"y", kFloat},
                     {"z", kFloat},
@@ -50,7 +50,7 @@ TEST_F(ConvertTest, MergedColorsKeepTheirShade) {
                     {"green", type},
                     {"blue", type}});
   };
-  Table bytes = colors(kByte), words = colors(PlyType::kUint16), floats = colors(kFloat);
+  Table bytes = colors(kByte), words = colors(ValueType::kUint16), floats = colors(kFloat);
   bytes.rows = {{0, 0, 0, 255, 188, 0}};
   words.rows = {{0, 0, 0, 65535, 188 * 257, 1}};
   floats.rows = {{0, 0, 0, 2, 0.5, 0.25}};
@@ -76,9 +76,9 @@ TEST_F(ConvertTest, CodesOfLightStayThatLightInEveryFormat) {
                          {"radiosity_r", kByte},
                          {"radiosity_g", kByte},
                          {"radiosity_b", kByte},
-                         {"albedo_r", PlyType::kUint16},
-                         {"albedo_g", PlyType::kUint16},
-                         {"albedo_b", PlyType::kUint16}});
+                         {"albedo_r", ValueType::kUint16},
+                         {"albedo_g", ValueType::kUint16},
+                         {"albedo_b", ValueType::kUint16}});
   table.rows = {{1, 2, 3, 128, 255, 0, 188 * 257, 65535, 0}};
   writeTable("a.ply", table);
   for (const char* name :
@@ -88,7 +88,7 @@ TEST_F(ConvertTest, CodesOfLightStayThatLightInEveryFormat) {
     const auto reader = openRowReader(path(name));
     ASSERT_TRUE(reader.ok());
     const std::vector<std::byte> row = readAllRows(**reader);
-    const PlyElement& element = (*reader)->element();
+    const RowLayout& element = (*reader)->element();
     for (const RowChannel& channel : channelsOf(element)) {
       const bool is_radiosity = channel.name == "radiosity";
       if (!is_radiosity && channel.name != "albedo") continue;
@@ -117,16 +117,16 @@ TEST_F(ConvertTest, FormatsMixAndEmptyCloudsAddNothing) {
 TEST(RowUnion, WidestTypeHoldsTheValuesOfBoth) {
   for (int a = 0; a < 8; ++a) {
     for (int b = 0; b < 8; ++b) {
-      const PlyType wide = widestPlyType(PlyType(a), PlyType(b));
-      EXPECT_EQ(wide, widestPlyType(PlyType(b), PlyType(a)));
+      const ValueType wide = widestType(ValueType(a), ValueType(b));
+      EXPECT_EQ(wide, widestType(ValueType(b), ValueType(a)));
       for (const int narrow : {a, b}) {
-        visitPlyType(PlyType(narrow), [&]<typename T>(std::type_identity<T>) {
+        visitValueType(ValueType(narrow), [&]<typename T>(std::type_identity<T>) {
           for (const T value : {std::numeric_limits<T>::lowest(), std::numeric_limits<T>::max()}) {
             std::byte bytes[8];
-            PlyProperty property;
+            RowProperty property;
             property.type = wide;
             setValue(property, double(value), bytes);
-            EXPECT_EQ(plyValue(bytes, wide), double(value)) << a << " " << b;
+            EXPECT_EQ(rowValue(bytes, wide), double(value)) << a << " " << b;
           }
         });
       }
@@ -152,8 +152,8 @@ TEST_F(ConvertTest, LargeCoordinatesKeepTheirPrecision) {
 }
 
 TEST_F(ConvertTest, ChannelsMoveByWhatTheyAre) {
-  Table table = tableOf({{"x", PlyType::kInt16},
-                         {"y", PlyType::kInt32},
+  Table table = tableOf({{"x", ValueType::kInt16},
+                         {"y", ValueType::kInt32},
                          {"z", kFloat},
                          {"nx", kFloat},
                          {"ny", kFloat},

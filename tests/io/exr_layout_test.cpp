@@ -1,4 +1,4 @@
-#include "io/formats/exr_layout.h"
+#include "cloud/exr/exr_layout.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ std::vector<std::string> properties(const std::vector<std::string>& names,
   EXPECT_TRUE(layout.ok()) << layout.status().message();
   std::vector<std::string> found;
   if (!layout.ok()) return found;
-  for (const PlyProperty& property : layout->element.properties) found.push_back(property.name);
+  for (const RowProperty& property : layout->element.properties) found.push_back(property.name);
   return found;
 }
 
@@ -75,8 +75,8 @@ TEST(ExrLayout, GroupsColorsVectorsAndSingleValues) {
                           "depth", "albedo_r", "albedo_g", "albedo_b", "id", "motion_x", "motion_y",
                           "motion_z", "uv.U", "uv.V"));
   const Result<ExrLayout> layout = layOut({"P.X", "P.Y", "P.Z", "id"});
-  EXPECT_EQ(layout->element.find("id")->type, PlyType::kUint32);
-  EXPECT_EQ(layout->element.find("pixel_x")->type, PlyType::kInt32);
+  EXPECT_EQ(layout->element.find("id")->type, ValueType::kUint32);
+  EXPECT_EQ(layout->element.find("pixel_x")->type, ValueType::kInt32);
   EXPECT_EQ(layout->element.row_bytes, 24u);
 }
 

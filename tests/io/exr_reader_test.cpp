@@ -1,4 +1,4 @@
-#include "io/formats/exr_reader.h"
+#include "cloud/exr/exr_reader.h"
 
 #include <OpenEXR/ImfDeepFrameBuffer.h>
 #include <OpenEXR/ImfDeepScanLineOutputFile.h>
@@ -28,17 +28,17 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 // All rows of a file: a value as it would be asked for by name.
 struct Rows {
-  PlyElement element;
+  RowLayout element;
   std::vector<std::byte> bytes;
   std::vector<std::string> notes;
 
   std::size_t count() const { return bytes.size() / element.row_bytes; }
   double at(std::size_t row, const std::string& property) const {
-    const PlyProperty* const found = element.find(property);
+    const RowProperty* const found = element.find(property);
     EXPECT_NE(found, nullptr) << property;
     return found == nullptr
                ? -1
-               : plyValue(bytes.data() + row * element.row_bytes + found->offset, found->type);
+               : rowValue(bytes.data() + row * element.row_bytes + found->offset, found->type);
   }
 };
 

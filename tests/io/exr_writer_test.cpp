@@ -1,4 +1,4 @@
-#include "io/formats/exr_writer.h"
+#include "cloud/exr/exr_writer.h"
 
 #include <OpenEXR/ImfFloatAttribute.h>
 #include <OpenEXR/ImfStandardAttributes.h>
@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "cloud/exr/exr_image_writer.h"
+#include "cloud/exr/exr_reader.h"
 #include "io/exr_test_picture.h"
-#include "io/formats/exr_image_writer.h"
-#include "io/formats/exr_reader.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -59,7 +59,7 @@ class ExrWriterTest : public DirectoryTest {
     RowWriterOptions options;
     options.properties = reader.element().properties;
     for (const std::string& result : results) {
-      PlyProperty property;
+      RowProperty property;
       property.name = result;
       options.properties.push_back(property);
     }
@@ -156,13 +156,13 @@ TEST_F(ExrWriterTest, ResultsAreReadBackAsTheyWere) {
   const Bytes first = *reader->readRows(100, first_buffer);
   const Bytes second = *(*again)->readRows(100, second_buffer);
   for (std::uint64_t row = 0; row < reader->element().count; ++row) {
-    for (const PlyProperty& property : reader->element().properties) {
-      const PlyProperty* const found = (*again)->element().find(property.name);
+    for (const RowProperty& property : reader->element().properties) {
+      const RowProperty* const found = (*again)->element().find(property.name);
       ASSERT_NE(found, nullptr) << property.name;
       EXPECT_EQ(found->type, property.type);
       EXPECT_EQ(
-          plyValue(&first[row * reader->element().row_bytes + property.offset], property.type),
-          plyValue(&second[row * (*again)->element().row_bytes + found->offset], found->type))
+          rowValue(&first[row * reader->element().row_bytes + property.offset], property.type),
+          rowValue(&second[row * (*again)->element().row_bytes + found->offset], found->type))
           << property.name << " of row " << row;
     }
   }
@@ -216,9 +216,9 @@ TEST_F(ExrWriterTest, RowsOutOfOrderOrOutsideAreRefused) {
   const auto reader = openPasses();
   RowWriterOptions options;
   for (const char* name : {"pixel_x", "pixel_y"}) {
-    PlyProperty property;
+    RowProperty property;
     property.name = name;
-    property.type = PlyType::kInt32;
+    property.type = ValueType::kInt32;
     options.properties.push_back(property);
   }
   options.like = reader.get();

@@ -1,4 +1,4 @@
-// Ways in which system calls fail, for tests: each is a FaultInjector (io/system_calls.h), and
+// Ways in which system calls fail, for tests: each is a FaultInjector (storage/system_calls.h), and
 // several work together as Faults. Safe from any thread.
 #pragma once
 
@@ -23,7 +23,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/system_calls.h"
+#include "storage/system_calls.h"
 
 namespace surfeit {
 

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "io/fault_injector.h"
-#include "io/file.h"
-#include "io/page_file.h"
 #include "io/test_bytes.h"
 #include "io/test_directory.h"
+#include "storage/file.h"
+#include "storage/page_file.h"
 
 namespace surfeit {
 namespace {

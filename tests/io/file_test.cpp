@@ -1,4 +1,4 @@
-#include "io/file.h"
+#include "storage/file.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "io/block_writer.h"
 #include "io/fault_injector.h"
-#include "io/page_file.h"
 #include "io/test_bytes.h"
 #include "io/test_directory.h"
+#include "storage/block_writer.h"
+#include "storage/page_file.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "io/float_row_decoder.h"
+#include "surfels/float_row_decoder.h"
 
 #include <gtest/gtest.h>
 

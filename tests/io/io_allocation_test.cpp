@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "failing_allocations.h"
-#include "io/block_writer.h"
 #include "io/fault_injector.h"
-#include "io/file.h"
 #include "io/test_directory.h"
+#include "storage/block_writer.h"
+#include "storage/file.h"
 
 namespace surfeit {
 namespace {

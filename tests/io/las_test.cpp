@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "io/byte_output.h"
+#include "cloud/scans/las_reader.h"
 #include "io/compressed_files.h"
-#include "io/formats/las_reader.h"
 #include "io/las_test_file.h"
 #include "io/row_damage_test.h"
+#include "storage/byte_output.h"
 
 namespace surfeit {
 namespace {

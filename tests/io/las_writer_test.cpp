@@ -1,4 +1,4 @@
-#include "io/formats/las_writer.h"
+#include "cloud/scans/las_writer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -157,10 +157,10 @@ TEST_F(LasWriterTest, ResultsAreExtraBytesOfTheSamePoints) {
   const std::size_t bytes = (*like)->element().row_bytes;
   std::vector<std::byte> row((*writer)->element().row_bytes);
   for (std::size_t i = 0; i < 50; ++i) {
-    for (const PlyProperty& property : (*writer)->element().properties) {
-      const PlyProperty* const from = (*like)->element().find(property.name);
+    for (const RowProperty& property : (*writer)->element().properties) {
+      const RowProperty* const from = (*like)->element().find(property.name);
       setValue(property,
-               from != nullptr ? plyValue(&rows[i * bytes + from->offset], from->type)
+               from != nullptr ? rowValue(&rows[i * bytes + from->offset], from->type)
                                : double(i) + property.name.size() / 16.0,
                row.data());
     }
@@ -333,14 +333,14 @@ TEST_F(LasWriterTest, ValuesThatNoFieldHoldsAreExtraBytes) {
                          {"intensity", kFloat},
                          {"return_number", kByte},
                          {"user_data", kFloat},
-                         {"point_source_id", PlyType::kInt32},
+                         {"point_source_id", ValueType::kInt32},
                          {"scan_angle", kFloat}});
   table.rows = {{0, 0, 0, 0.25, 1, 7, 65535, -12.6}, {1, 0, 0, 300, 16, 255, 0, 0.0061}};
   writeTable("a.ply", table);
   convertOk({"a.ply"}, "b.las");
   EXPECT_EQ(
       describeRow([&] {
-        PlyElement element;
+        RowLayout element;
         element.properties = readTable("b.las").properties;
         return element;
       }())

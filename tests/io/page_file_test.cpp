@@ -1,4 +1,4 @@
-#include "io/page_file.h"
+#include "storage/page_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,9 @@
 
 #include "core/job_limits.h"
 #include "io/fault_injector.h"
-#include "io/page_codec.h"
 #include "io/page_file_damage.h"
 #include "io/test_directory.h"
+#include "storage/page_codec.h"
 #include "surfeit/version.h"
 
 namespace surfeit {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "io/formats/pcd_reader.h"
+#include "cloud/scans/pcd_reader.h"
 #include "io/row_damage_test.h"
 
 namespace surfeit {
@@ -89,7 +89,7 @@ TEST_F(PcdTest, AsciiAndBinaryGiveTheSameRows) {
   EXPECT_EQ(packed->formatName(), "PCD 0.7 binary");
   EXPECT_EQ(describeRow(packed->element()), row);
   const std::vector<std::byte> packed_rows = readAllRows(*packed);
-  for (const PlyProperty& property : packed->element().properties) {
+  for (const RowProperty& property : packed->element().properties) {
     const double a = valueOf(*ascii, rows, 1, property.name);
     const double b = valueOf(*packed, packed_rows, 1, property.name);
     EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << property.name;

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cstring>
 
-#include "io/formats/bgeo_reader.h"
-#include "io/formats/pdb_reader.h"
-#include "io/formats/pdb_writer.h"
-#include "io/formats/prt_reader.h"
+#include "cloud/houdini/bgeo_reader.h"
+#include "cloud/particles/pdb_reader.h"
+#include "cloud/particles/pdb_writer.h"
+#include "cloud/particles/prt_reader.h"
 #include "io/row_damage_test.h"
 
 namespace surfeit {
@@ -119,7 +119,7 @@ TEST_F(PdbTest, WrittenFilesAreReadBack) {
        {"x", "y", "z", "radius", "red", "green", "blue", "foo_r", "foo_g", "foo_b", "foo_x"}) {
     options.properties.push_back(rowProperty(name));
   }
-  options.properties.push_back(rowProperty("id", PlyType::kInt32));
+  options.properties.push_back(rowProperty("id", ValueType::kInt32));
   for (const char* file : {"b.pdb", "b.pdb.gz"}) {
     // More rows than a block of the temporary file has
     Result<std::unique_ptr<RowWriter>> writer = createPdb(path(file), options);

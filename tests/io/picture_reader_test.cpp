@@ -1,4 +1,4 @@
-#include "io/picture_reader.h"
+#include "cloud/pictures/picture_reader.h"
 
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <gmock/gmock.h>

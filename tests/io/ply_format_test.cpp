@@ -1,4 +1,4 @@
-#include "io/ply_format.h"
+#include "cloud/ply/ply_format.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -32,13 +32,13 @@ TEST(PlyHeader, ScalarsArePackedAndListsTakeNoBytes) {
   const Result<PlyHeader> header =
       parsePlyHeader(std::string("ply\nformat ascii") + kMeshHeader, "a.ply");
   ASSERT_TRUE(header.ok());
-  const PlyElement& vertex = header->elements[*header->findElement("vertex")];
+  const RowLayout& vertex = header->elements[*header->findElement("vertex")];
   EXPECT_EQ(vertex.row_bytes, 14u);
   EXPECT_EQ(vertex.find("y")->offset, 4u);
   EXPECT_EQ(vertex.find("z")->offset, 6u);
   EXPECT_EQ(vertex.find("w"), nullptr);
   EXPECT_FALSE(vertex.hasLists());
-  const PlyElement& face = header->elements[*header->findElement("face")];
+  const RowLayout& face = header->elements[*header->findElement("face")];
   EXPECT_EQ(face.row_bytes, 1u);
   EXPECT_TRUE(face.hasLists());
   EXPECT_FALSE(header->findElement("edge"));
@@ -52,12 +52,12 @@ TEST(PlyHeader, BothSpellingsOfTypesAndCrLfAreRead) {
       "a.ply");
   ASSERT_TRUE(header.ok()) << header.status().message();
   EXPECT_THAT(header->comments, ElementsAre("two  words"));
-  const std::vector<PlyProperty>& properties = header->elements[0].properties;
+  const std::vector<RowProperty>& properties = header->elements[0].properties;
   ASSERT_EQ(properties.size(), 4u);
-  EXPECT_EQ(properties[0].type, PlyType::kInt8);
-  EXPECT_EQ(properties[1].type, PlyType::kInt8);
-  EXPECT_EQ(properties[2].type, PlyType::kUint16);
-  EXPECT_EQ(properties[3].type, PlyType::kFloat64);
+  EXPECT_EQ(properties[0].type, ValueType::kInt8);
+  EXPECT_EQ(properties[1].type, ValueType::kInt8);
+  EXPECT_EQ(properties[2].type, ValueType::kUint16);
+  EXPECT_EQ(properties[3].type, ValueType::kFloat64);
 }
 
 TEST(PlyHeader, RefusalNamesTheLineFoundAndExpected) {

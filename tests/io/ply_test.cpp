@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/ply_reader.h"
+#include "cloud/ply/ply_reader.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -79,7 +79,7 @@ class PlyReaderTest : public DirectoryTest {
     SURFEIT_ASSIGN_OR_RETURN(PlyReader reader, open(text));
     std::vector<std::vector<double>> rows;
     for (std::size_t i = 0; i < reader.header().elements.size(); ++i) {
-      const PlyElement& element = reader.header().elements[i];
+      const RowLayout& element = reader.header().elements[i];
       SURFEIT_RETURN_IF_ERROR(reader.seekElement(i));
       if (element.row_bytes == 0) continue;
       std::vector<std::byte> row(element.row_bytes);
@@ -87,8 +87,8 @@ class PlyReaderTest : public DirectoryTest {
         SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, reader.readRows(row));
         if (count == 0) break;
         std::vector<double>& values = rows.emplace_back();
-        for (const PlyProperty& property : element.properties) {
-          if (!property.is_list) values.push_back(plyValue(&row[property.offset], property.type));
+        for (const RowProperty& property : element.properties) {
+          if (!property.is_list) values.push_back(rowValue(&row[property.offset], property.type));
         }
       }
     }
@@ -162,8 +162,8 @@ TEST_F(PlyReaderTest, SeekGoesForwardsAndBack) {
       ASSERT_EQ(
           *reader->readRows(std::span(row).first(reader->header().elements[element].row_bytes)),
           1u);
-      const PlyProperty& first = reader->header().elements[element].properties[0];
-      EXPECT_EQ(plyValue(row.data(), first.type), element == 0 ? 0.5 : element == 1 ? 7 : 4e9);
+      const RowProperty& first = reader->header().elements[element].properties[0];
+      EXPECT_EQ(rowValue(row.data(), first.type), element == 0 ? 0.5 : element == 1 ? 7 : 4e9);
     }
     EXPECT_EQ(reader->seekElement(3).code(), StatusCode::kInvalidArgument);
   }
@@ -190,7 +190,7 @@ TEST_F(PlyReaderTest, BatchesOfAnySizeGiveTheSameRows) {
         ASSERT_TRUE(count.ok());
         if (*count == 0) break;
         for (std::size_t i = 0; i < *count; ++i, ++next) {
-          ASSERT_EQ(plyValue(&rows[5 * i], PlyType::kUint32), next);
+          ASSERT_EQ(rowValue(&rows[5 * i], ValueType::kUint32), next);
           ASSERT_EQ(std::to_integer<std::uint8_t>(rows[5 * i + 4]), next & 255);
         }
       }
@@ -382,7 +382,7 @@ TEST_F(PlyReaderTest, SeekRowGoesToFixedRowsOnly) {
   Result<Bytes> view = reader->readRowView(5, buffer);
   ASSERT_TRUE(view.ok());
   ASSERT_EQ(view->size(), reader->header().elements[0].row_bytes);
-  EXPECT_EQ(plyValue(view->data(), PlyType::kFloat32), 2.5);
+  EXPECT_EQ(rowValue(view->data(), ValueType::kFloat32), 2.5);
   EXPECT_EQ(reader->seekRow(4).code(), StatusCode::kInvalidArgument);
   ASSERT_TRUE(reader->seekElement(1).ok());
   EXPECT_EQ(reader->seekRow(0).code(), StatusCode::kInvalidArgument);
@@ -393,7 +393,7 @@ TEST_F(PlyReaderTest, SeekRowGoesToFixedRowsOnly) {
   ASSERT_TRUE(reader->seekElement(2).ok());
   view = reader->readRowView(5, buffer);
   ASSERT_TRUE(view.ok());
-  EXPECT_EQ(plyValue(view->data(), PlyType::kUint32), 4000000000.0);
+  EXPECT_EQ(rowValue(view->data(), ValueType::kUint32), 4000000000.0);
 }
 
 TEST_F(PlyReaderTest, FailureLastsUntilTheNextSeek) {

@@ -1,4 +1,4 @@
-#include "io/ply_writer.h"
+#include "cloud/ply/ply_writer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/ply_reader.h"
+#include "cloud/ply/ply_reader.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -22,18 +22,18 @@ using testing::HasSubstr;
 
 using PlyWriterTest = DirectoryTest;
 
-PlyProperty scalar(const std::string& name, PlyType type) {
-  PlyProperty property;
+RowProperty scalar(const std::string& name, ValueType type) {
+  RowProperty property;
   property.name = name;
   property.type = type;
   return property;
 }
 
-std::vector<PlyProperty> oneOfEachType() {
-  return {scalar("a", PlyType::kInt8),    scalar("b", PlyType::kUint8),
-          scalar("c", PlyType::kInt16),   scalar("d", PlyType::kUint16),
-          scalar("e", PlyType::kInt32),   scalar("f", PlyType::kUint32),
-          scalar("g", PlyType::kFloat32), scalar("h", PlyType::kFloat64)};
+std::vector<RowProperty> oneOfEachType() {
+  return {scalar("a", ValueType::kInt8),    scalar("b", ValueType::kUint8),
+          scalar("c", ValueType::kInt16),   scalar("d", ValueType::kUint16),
+          scalar("e", ValueType::kInt32),   scalar("f", ValueType::kUint32),
+          scalar("g", ValueType::kFloat32), scalar("h", ValueType::kFloat64)};
 }
 
 TEST_F(PlyWriterTest, RandomRowsOfAllTypesRoundTripBitForBit) {
@@ -42,7 +42,7 @@ TEST_F(PlyWriterTest, RandomRowsOfAllTypesRoundTripBitForBit) {
        {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
     Result<PlyWriter> writer = PlyWriter::create(path("a.ply"), encoding, oneOfEachType(), {"hi"});
     ASSERT_TRUE(writer.ok()) << writer.status().message();
-    const PlyElement element = writer->element();
+    const RowLayout element = writer->element();
     ASSERT_EQ(element.row_bytes, 26u);
 
     // Random bits, but no NaN: ascii does not keep its payload
@@ -74,7 +74,7 @@ TEST_F(PlyWriterTest, RandomRowsOfAllTypesRoundTripBitForBit) {
 TEST_F(PlyWriterTest, FileAppearsOnlyWhenFinished) {
   {
     Result<PlyWriter> writer =
-        PlyWriter::create(path("a.ply"), PlyEncoding::kAscii, {scalar("x", PlyType::kUint8)});
+        PlyWriter::create(path("a.ply"), PlyEncoding::kAscii, {scalar("x", ValueType::kUint8)});
     ASSERT_TRUE(writer.ok());
     ASSERT_TRUE(writer->writeRows(std::vector<std::byte>(3)).ok());
     EXPECT_FALSE(std::filesystem::exists(path("a.ply")));
@@ -86,7 +86,7 @@ TEST_F(PlyWriterTest, HeaderOfAnyCountHasTheSameSize) {
   std::size_t sizes[2];
   for (const std::size_t rows : {0u, 12345u}) {
     Result<PlyWriter> writer = PlyWriter::create(path("a.ply"), PlyEncoding::kBinaryLittleEndian,
-                                                 {scalar("x", PlyType::kUint8)});
+                                                 {scalar("x", ValueType::kUint8)});
     ASSERT_TRUE(writer->writeRows(std::vector<std::byte>(rows)).ok());
     ASSERT_TRUE(writer->finish().ok());
     const std::string text = contents("a.ply");
@@ -99,7 +99,7 @@ TEST_F(PlyWriterTest, HeaderOfAnyCountHasTheSameSize) {
 
 TEST_F(PlyWriterTest, CommentsCannotEndTheHeader) {
   Result<PlyWriter> writer =
-      PlyWriter::create(path("a.ply"), PlyEncoding::kAscii, {scalar("x", PlyType::kUint8)},
+      PlyWriter::create(path("a.ply"), PlyEncoding::kAscii, {scalar("x", ValueType::kUint8)},
                         {"one\nend_header\ntwo", "element vertex 0"});
   ASSERT_TRUE(writer.ok());
   ASSERT_TRUE(writer->writeRows(std::vector<std::byte>(3)).ok());
@@ -111,19 +111,19 @@ TEST_F(PlyWriterTest, CommentsCannotEndTheHeader) {
 }
 
 TEST_F(PlyWriterTest, CallsThatCannotWorkAreInvalidArguments) {
-  const auto code = [this](const std::string& name, std::vector<PlyProperty> properties) {
+  const auto code = [this](const std::string& name, std::vector<RowProperty> properties) {
     return PlyWriter::create(path(name), PlyEncoding::kAscii, std::move(properties))
         .status()
         .code();
   };
-  const PlyProperty x = scalar("x", PlyType::kFloat32);
-  PlyProperty list = scalar("l", PlyType::kFloat32);
+  const RowProperty x = scalar("x", ValueType::kFloat32);
+  RowProperty list = scalar("l", ValueType::kFloat32);
   list.is_list = true;
   EXPECT_EQ(code("a.ply", {}), StatusCode::kInvalidArgument);
   EXPECT_EQ(code("a.ply", {x, x}), StatusCode::kInvalidArgument);
   EXPECT_EQ(code("a.ply", {x, list}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(code("a.ply", {scalar("two words", PlyType::kInt8)}), StatusCode::kInvalidArgument);
-  EXPECT_EQ(code("a.ply", {scalar("", PlyType::kInt8)}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(code("a.ply", {scalar("two words", ValueType::kInt8)}), StatusCode::kInvalidArgument);
+  EXPECT_EQ(code("a.ply", {scalar("", ValueType::kInt8)}), StatusCode::kInvalidArgument);
   EXPECT_EQ(code("no/such/a.ply", {x}), StatusCode::kIoError);
 
   Result<PlyWriter> writer = PlyWriter::create(path("a.ply"), PlyEncoding::kAscii, {x});

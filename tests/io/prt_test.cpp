@@ -3,10 +3,10 @@
 
 #include <cstring>
 
+#include "cloud/particles/prt2_reader.h"
+#include "cloud/particles/prt_reader.h"
+#include "cloud/particles/prt_writer.h"
 #include "io/compressed_files.h"
-#include "io/formats/prt2_reader.h"
-#include "io/formats/prt_reader.h"
-#include "io/formats/prt_writer.h"
 #include "io/row_damage_test.h"
 #include "io/test_bytes.h"
 
@@ -244,7 +244,7 @@ TEST_F(PrtTest, WrittenFilesAreReadBackWithAllTypes) {
     options.properties.push_back(rowProperty(name));
   }
   for (int type = 0; type < 8; ++type) {
-    options.properties.push_back(rowProperty("t" + std::to_string(type), PlyType(type)));
+    options.properties.push_back(rowProperty("t" + std::to_string(type), ValueType(type)));
   }
   Result<std::unique_ptr<RowWriter>> writer = createPrt(path("b.prt"), options);
   ASSERT_TRUE(writer.ok()) << writer.status().message();
@@ -264,7 +264,7 @@ TEST_F(PrtTest, CodedColorsAreWrittenLinear) {
   RowWriterOptions options;
   for (const char* name : {"x", "y", "z"}) options.properties.push_back(rowProperty(name));
   for (const char* name : {"red", "green", "blue"}) {
-    options.properties.push_back(rowProperty(name, PlyType::kUint8));
+    options.properties.push_back(rowProperty(name, ValueType::kUint8));
   }
   Result<std::unique_ptr<RowWriter>> writer = createPrt(path("b.prt"), options);
   ASSERT_TRUE(writer.ok()) << writer.status().message();

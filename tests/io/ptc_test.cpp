@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "io/byte_output.h"
-#include "io/formats/ptc_format.h"
-#include "io/formats/ptc_reader.h"
-#include "io/formats/ptc_writer.h"
+#include "cloud/particles/ptc_format.h"
+#include "cloud/particles/ptc_reader.h"
+#include "cloud/particles/ptc_writer.h"
 #include "io/row_damage_test.h"
+#include "storage/byte_output.h"
 
 namespace surfeit {
 namespace {
@@ -25,8 +25,8 @@ using testing::IsEmpty;
 // Of a version 0 file of two variables, float and color, as the tests below patch it
 constexpr std::size_t kCountAt = 8, kVariablesAt = 40 + 128 + 12;
 
-std::vector<PlyProperty> properties(std::initializer_list<const char*> names) {
-  std::vector<PlyProperty> all;
+std::vector<RowProperty> properties(std::initializer_list<const char*> names) {
+  std::vector<RowProperty> all;
   for (const char* name : names) all.push_back(rowProperty(name));
   return all;
 }
@@ -42,7 +42,7 @@ std::vector<std::byte> floatRows(std::size_t count, std::size_t floats) {
 
 class PtcFiles : public RowFileTest {
  protected:
-  void writePtc(const std::string& name, const std::vector<PlyProperty>& columns,
+  void writePtc(const std::string& name, const std::vector<RowProperty>& columns,
                 const std::vector<std::byte>& rows, int version = 0,
                 const RowReader* like = nullptr) {
     RowWriterOptions options;
@@ -201,12 +201,12 @@ TEST_F(PtcFiles, RadiusComesFromAreaOrWidthWhereThereIsNone) {
 }
 
 TEST_F(PtcFiles, OtherTypesBecomeFloatsWithANote) {
-  std::vector<PlyProperty> columns = {rowProperty("x", PlyType::kFloat64),
-                                      rowProperty("y", PlyType::kFloat64),
-                                      rowProperty("z", PlyType::kFloat64),
-                                      rowProperty("red", PlyType::kUint8),
-                                      rowProperty("green", PlyType::kUint8),
-                                      rowProperty("blue", PlyType::kUint8),
+  std::vector<RowProperty> columns = {rowProperty("x", ValueType::kFloat64),
+                                      rowProperty("y", ValueType::kFloat64),
+                                      rowProperty("z", ValueType::kFloat64),
+                                      rowProperty("red", ValueType::kUint8),
+                                      rowProperty("green", ValueType::kUint8),
+                                      rowProperty("blue", ValueType::kUint8),
                                       rowProperty("radius")};
   std::vector<std::byte> rows(31);
   const double position[3] = {0.5, 1e9, -3};

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "io/channels.h"
-#include "io/cloud_formats.h"
+#include "cloud/channels.h"
+#include "cloud/cloud_formats.h"
 #include "io/convert_tables.h"
 #include "io/exr_test_picture.h"
 
@@ -26,15 +26,15 @@ std::map<std::string, std::vector<double>> channelValues(const std::string& path
   Result<std::unique_ptr<RowReader>> reader = openRowReader(path);
   EXPECT_TRUE(reader.ok()) << reader.status().message();
   if (!reader.ok()) return values;
-  const PlyElement element = (*reader)->element();
+  const RowLayout element = (*reader)->element();
   const std::vector<std::byte> bytes = readAllRows(**reader);
-  const PlyProperty* const id = element.find("id");
+  const RowProperty* const id = element.find("id");
   EXPECT_NE(id, nullptr);
   if (id == nullptr) return values;
   std::vector<const std::byte*> rows;
   for (std::size_t at = 0; at < bytes.size(); at += element.row_bytes) rows.push_back(&bytes[at]);
   std::sort(rows.begin(), rows.end(), [&](const std::byte* a, const std::byte* b) {
-    return plyValue(a + id->offset, id->type) < plyValue(b + id->offset, id->type);
+    return rowValue(a + id->offset, id->type) < rowValue(b + id->offset, id->type);
   });
   for (const RowChannel& channel : channelsOf(element)) {
     std::vector<double>& column = values[channel.name];

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/row_writer.h"
 #include "io/row_stream_test.h"
-#include "io/row_writer.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -74,12 +74,12 @@ class RowFileTest : public DirectoryTest {
   }
 
   // Rows of random values, and the writer's answer to them, in uneven pieces.
-  static std::vector<std::byte> randomRows(const PlyElement& element, std::size_t count) {
+  static std::vector<std::byte> randomRows(const RowLayout& element, std::size_t count) {
     std::mt19937 random(5);
     std::vector<std::byte> rows(count * element.row_bytes);
     for (std::size_t i = 0; i < count; ++i) {
-      for (const PlyProperty& property : element.properties) {
-        visitPlyType(property.type, [&](auto type) {
+      for (const RowProperty& property : element.properties) {
+        visitValueType(property.type, [&](auto type) {
           using T = typename decltype(type)::type;
           const T value = static_cast<T>(static_cast<std::int32_t>(random() % 2000) / 16);
           std::memcpy(&rows[i * element.row_bytes + property.offset], &value, sizeof value);

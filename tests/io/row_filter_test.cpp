@@ -1,4 +1,4 @@
-#include "io/row_filter.h"
+#include "cloud/row_filter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "cloud/filtered_reader.h"
 #include "io/convert_tables.h"
-#include "io/filtered_reader.h"
 
 namespace surfeit {
 namespace {
@@ -25,14 +25,14 @@ using testing::IsEmpty;
 class RowFilterTest : public testing::Test {
  protected:
   RowFilterTest() {
-    element_.properties = {rowProperty("classification", PlyType::kUint8),
-                           rowProperty("return_number", PlyType::kUint8),
+    element_.properties = {rowProperty("classification", ValueType::kUint8),
+                           rowProperty("return_number", ValueType::kUint8),
                            rowProperty("radius"),
-                           rowProperty("gps_time", PlyType::kFloat64),
-                           rowProperty("odd(name)", PlyType::kInt16),
+                           rowProperty("gps_time", ValueType::kFloat64),
+                           rowProperty("odd(name)", ValueType::kInt16),
                            rowProperty("nx"),
-                           rowProperty("true_colour", PlyType::kUint8)};
-    packPlyRow(element_);
+                           rowProperty("true_colour", ValueType::kUint8)};
+    packRow(element_);
   }
 
   // Whether the condition holds for a row of these values.
@@ -58,7 +58,7 @@ class RowFilterTest : public testing::Test {
     return filter.status().message();
   }
 
-  PlyElement element_;
+  RowLayout element_;
 };
 
 TEST_F(RowFilterTest, ComparesAndCombines) {
@@ -148,7 +148,7 @@ class FilteredReaderTest : public ConvertTest {
     ConvertTest::SetUp();
     Table table;
     table.properties = {rowProperty("x"), rowProperty("y"), rowProperty("z"),
-                        rowProperty("id", PlyType::kInt32)};
+                        rowProperty("id", ValueType::kInt32)};
     for (std::size_t i = 0; i < kRows; ++i) table.rows.push_back({0, 1, 2, double(i)});
     writeTable("a.ply", table);
   }

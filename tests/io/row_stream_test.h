@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "io/row_reader.h"
-#include "io/row_writer.h"
+#include "cloud/row_reader.h"
+#include "cloud/row_writer.h"
 
 namespace surfeit {
 
@@ -40,31 +40,31 @@ inline std::vector<std::byte> readAllRows(RowReader& reader, std::size_t batch =
 
 inline double valueOf(const RowReader& reader, const std::vector<std::byte>& rows, std::size_t row,
                       const std::string& property) {
-  const PlyElement& element = reader.element();
-  const PlyProperty* const found = element.find(property);
+  const RowLayout& element = reader.element();
+  const RowProperty* const found = element.find(property);
   EXPECT_NE(found, nullptr) << property;
   if (!found || (row + 1) * element.row_bytes > rows.size()) return -12345;
-  return plyValue(&rows[row * element.row_bytes + found->offset], found->type);
+  return rowValue(&rows[row * element.row_bytes + found->offset], found->type);
 }
 
 // "float x, float y, uchar red"
-inline std::string describeRow(const PlyElement& element) {
+inline std::string describeRow(const RowLayout& element) {
   std::string text;
-  for (const PlyProperty& property : element.properties) {
-    text +=
-        (text.empty() ? "" : ", ") + std::string(plyTypeName(property.type)) + " " + property.name;
+  for (const RowProperty& property : element.properties) {
+    text += (text.empty() ? "" : ", ") + std::string(valueTypeName(property.type)) + " " +
+            property.name;
   }
   return text;
 }
 
-inline PlyProperty rowProperty(const std::string& name, PlyType type = PlyType::kFloat32) {
-  PlyProperty property;
+inline RowProperty rowProperty(const std::string& name, ValueType type = ValueType::kFloat32) {
+  RowProperty property;
   property.name = name;
   property.type = type;
   return property;
 }
 
-// What io/row_reader.h says of every reader: rows do not depend on the batch, rewind goes back,
+// What cloud/row_reader.h says of every reader: rows do not depend on the batch, rewind goes back,
 // seekRow goes anywhere or is refused.
 inline void expectReaderKeepsContract(RowReader& reader) {
   const std::size_t row_bytes = reader.element().row_bytes;

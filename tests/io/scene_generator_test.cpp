@@ -1,4 +1,4 @@
-#include "io/scene_generator.h"
+#include "surfels/generated/scene_generator.h"
 
 #include <gtest/gtest.h>
 #include <xxhash.h>
@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "core/bounds.h"
-#include "io/square_strata.h"
-#include "io/surfel_source.h"
-#include "io/surfel_writer.h"
+#include "core/square_strata.h"
 #include "io/test_bytes.h"
 #include "io/test_directory.h"
+#include "surfels/surfel_source.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "io/scene_recipe.h"
+#include "surfels/generated/scene_recipe.h"
 
 #include <gtest/gtest.h>
 

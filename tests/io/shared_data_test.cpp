@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
 
 namespace surfeit {
 namespace {
@@ -67,7 +67,7 @@ void expectCloud(const Sample& sample) {
   const std::string path = kData / sample.path;
   Result<std::unique_ptr<RowReader>> reader = openRowReader(path);
   ASSERT_TRUE(reader.ok()) << reader.status().message();
-  const PlyElement& element = (*reader)->element();
+  const RowLayout& element = (*reader)->element();
   std::uint64_t count = 0;
   AlignedBuffer buffer;
   for (;;) {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "io/formats/ply_rows.h"
-#include "io/formats/splat_reader.h"
+#include "cloud/ply/ply_rows.h"
+#include "cloud/ply/splat_reader.h"
 #include "io/row_damage_test.h"
 
 namespace surfeit {

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "io/surfel_source.h"
-#include "io/surfel_writer.h"
 #include "io/test_directory.h"
+#include "surfels/surfel_source.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 

@@ -1,4 +1,4 @@
-#include "io/surfel_mapping.h"
+#include "surfels/surfel_mapping.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,26 +19,26 @@ namespace surfeit {
 namespace {
 
 struct Declared {
-  PlyType type;
+  ValueType type;
   const char* name;
 };
 
-PlyElement elementOf(const std::vector<Declared>& properties, std::uint64_t count) {
-  PlyElement element;
+RowLayout elementOf(const std::vector<Declared>& properties, std::uint64_t count) {
+  RowLayout element;
   element.name = "vertex";
   element.count = count;
   for (const Declared& declared : properties) {
-    PlyProperty property;
+    RowProperty property;
     property.name = declared.name;
     property.type = declared.type;
     element.properties.push_back(property);
   }
-  packPlyRow(element);
+  packRow(element);
   return element;
 }
 
-constexpr PlyType kFloat = PlyType::kFloat32;
-constexpr PlyType kByte = PlyType::kUint8;
+constexpr ValueType kFloat = ValueType::kFloat32;
+constexpr ValueType kByte = ValueType::kUint8;
 
 // What our own writer writes: all channels.
 const std::vector<Declared> kFullCloud = {
@@ -55,7 +55,7 @@ const std::vector<std::vector<Declared>> kClouds = {
     {{kFloat, "nz"},
      {kByte, "two_sided"},
      {kFloat, "y"},
-     {PlyType::kFloat64, "time"},
+     {ValueType::kFloat64, "time"},
      {kFloat, "x"},
      {kByte, "class"},
      {kFloat, "z"},
@@ -76,7 +76,7 @@ const std::vector<std::vector<Declared>> kClouds = {
      {kFloat, "green"},
      {kFloat, "blue"},
      {kFloat, "pscale"},
-     {PlyType::kInt8, "two_sided"}},
+     {ValueType::kInt8, "two_sided"}},
     {{kByte, "red"},
      {kByte, "green"},
      {kByte, "blue"},
@@ -88,16 +88,20 @@ const std::vector<std::vector<Declared>> kClouds = {
      {kFloat, "z"}},
     // Groups of every size
     {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {kByte, "group"}, {kByte, "light_group"}},
-    {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kInt8, "light_group"}},
-    {{PlyType::kInt16, "group"}, {kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}},
-    {{kFloat, "x"}, {PlyType::kUint16, "group"}, {kFloat, "y"}, {kFloat, "z"}},
-    {{kByte, "two_sided"}, {PlyType::kInt32, "group"}, {kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}},
-    {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kUint32, "group"}},
+    {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {ValueType::kInt8, "light_group"}},
+    {{ValueType::kInt16, "group"}, {kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}},
+    {{kFloat, "x"}, {ValueType::kUint16, "group"}, {kFloat, "y"}, {kFloat, "z"}},
+    {{kByte, "two_sided"},
+     {ValueType::kInt32, "group"},
+     {kFloat, "x"},
+     {kFloat, "y"},
+     {kFloat, "z"}},
+    {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {ValueType::kUint32, "group"}},
     // Not fast
-    {{PlyType::kFloat64, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kInt32, "group"}},
-    {{PlyType::kFloat64, "x"},
-     {PlyType::kFloat64, "y"},
-     {PlyType::kFloat64, "z"},
+    {{ValueType::kFloat64, "x"}, {kFloat, "y"}, {kFloat, "z"}, {ValueType::kInt32, "group"}},
+    {{ValueType::kFloat64, "x"},
+     {ValueType::kFloat64, "y"},
+     {ValueType::kFloat64, "z"},
      {kFloat, "nx"},
      {kFloat, "ny"},
      {kFloat, "nz"},
@@ -105,13 +109,13 @@ const std::vector<std::vector<Declared>> kClouds = {
     {{kFloat, "x"},
      {kFloat, "y"},
      {kFloat, "z"},
-     {PlyType::kUint16, "red"},
-     {PlyType::kUint16, "green"},
-     {PlyType::kUint16, "blue"},
+     {ValueType::kUint16, "red"},
+     {ValueType::kUint16, "green"},
+     {ValueType::kUint16, "blue"},
      {kFloat, "two_sided"}},
 };
 
-SurfelMapping mappingOf(const PlyElement& element) {
+SurfelMapping mappingOf(const RowLayout& element) {
   Result<SurfelMapping> mapping = SurfelMapping::create(element, "a.ply");
   EXPECT_TRUE(mapping.ok()) << mapping.status().message();
   return std::move(*mapping);
@@ -136,28 +140,28 @@ std::vector<float> hostileFloats() {
 }
 
 // Rows of plausible values; of every `hostile_every` values one is hostile (0: none).
-std::vector<std::byte> randomRows(const PlyElement& element, unsigned hostile_every,
+std::vector<std::byte> randomRows(const RowLayout& element, unsigned hostile_every,
                                   std::mt19937& random) {
   static const std::vector<float> kHostile = hostileFloats();
   std::vector<std::byte> rows(element.count * element.row_bytes);
   for (std::size_t row = 0; row < rows.size(); row += element.row_bytes) {
-    for (const PlyProperty& property : element.properties) {
+    for (const RowProperty& property : element.properties) {
       std::byte* const to = &rows[row + property.offset];
       float value = float(random() % 1000 + 1) / 500;
       if (property.name[0] == 'n' && random() % 2 == 0) value = -value;
       if (hostile_every > 0 && random() % hostile_every == 0) {
         value = kHostile[random() % kHostile.size()];
       }
-      if (property.type == PlyType::kFloat32) {
+      if (property.type == ValueType::kFloat32) {
         std::memcpy(to, &value, sizeof value);
-      } else if (property.type == PlyType::kFloat64) {
+      } else if (property.type == ValueType::kFloat64) {
         const double wide = random() % 16 == 0 ? double(value) * 1e30 : double(value);
         std::memcpy(to, &wide, sizeof wide);
       } else {
-        for (std::size_t i = 0; i < plyTypeBytes(property.type); ++i) to[i] = std::byte(random());
+        for (std::size_t i = 0; i < valueTypeBytes(property.type); ++i) to[i] = std::byte(random());
         if (property.name == "two_sided" && random() % 2 == 0) *to = std::byte{0};
         if (property.name == "group" && random() % 8 != 0) {
-          std::memset(to, 0, plyTypeBytes(property.type));
+          std::memset(to, 0, valueTypeBytes(property.type));
           *to = std::byte(random() % kMaxGroups);
         }
       }
@@ -189,7 +193,7 @@ TEST(SurfelMapping, RowsDecodeAsOneByOneToTheLastBit) {
   for (const std::vector<Declared>& properties : kClouds) {
     for (const unsigned hostile_every : {0u, 2u, 5u, 20u, 500u}) {
       for (const std::uint64_t count : {1u, 63u, 64u, 65u, 3000u}) {
-        const PlyElement element = elementOf(properties, count);
+        const RowLayout element = elementOf(properties, count);
         const SurfelMapping mapping = mappingOf(element);
         const std::vector<std::byte> rows = randomRows(element, hostile_every, random);
         SurfelDefects expected_defects, defects;
@@ -206,12 +210,12 @@ TEST(SurfelMapping, RowsDecodeAsOneByOneToTheLastBit) {
 TEST(SurfelMapping, EveryHostileValueOfEveryPropertyDecodesAsOneByOne) {
   for (const std::vector<Declared>& properties : kClouds) {
     const std::vector<float> hostile = hostileFloats();
-    const PlyElement element = elementOf(properties, hostile.size());
+    const RowLayout element = elementOf(properties, hostile.size());
     const SurfelMapping mapping = mappingOf(element);
     std::mt19937 random(12);
     const std::vector<std::byte> good_rows = randomRows(element, 0, random);
-    for (const PlyProperty& property : element.properties) {
-      if (property.type != PlyType::kFloat32) continue;
+    for (const RowProperty& property : element.properties) {
+      if (property.type != ValueType::kFloat32) continue;
       std::vector<std::byte> rows = good_rows;
       for (std::size_t i = 0; i < hostile.size(); ++i) {
         std::memcpy(&rows[i * element.row_bytes + property.offset], &hostile[i], sizeof(float));
@@ -227,7 +231,7 @@ TEST(SurfelMapping, EveryHostileValueOfEveryPropertyDecodesAsOneByOne) {
 }
 
 TEST(SurfelMapping, NormalsOfAllLengthsDecodeAsOneByOne) {
-  const PlyElement element = elementOf(kFullCloud, 4096);
+  const RowLayout element = elementOf(kFullCloud, 4096);
   const SurfelMapping mapping = mappingOf(element);
   std::mt19937 random(13);
   std::vector<std::byte> rows = randomRows(element, 0, random);
@@ -252,14 +256,14 @@ TEST(SurfelMapping, NormalsOfAllLengthsDecodeAsOneByOne) {
 
 TEST(SurfelMapping, LongSidesAreVectorsAndNeedAnArea) {
   for (const char* size : {"area", "radius"}) {
-    const PlyElement element = elementOf({{kFloat, "x"},
-                                          {kFloat, "y"},
-                                          {kFloat, "z"},
-                                          {kFloat, size},
-                                          {kFloat, "long_side_x"},
-                                          {kFloat, "long_side_y"},
-                                          {kFloat, "long_side_z"}},
-                                         3);
+    const RowLayout element = elementOf({{kFloat, "x"},
+                                         {kFloat, "y"},
+                                         {kFloat, "z"},
+                                         {kFloat, size},
+                                         {kFloat, "long_side_x"},
+                                         {kFloat, "long_side_y"},
+                                         {kFloat, "long_side_z"}},
+                                        3);
     const SurfelMapping mapping = mappingOf(element);
     EXPECT_TRUE(mapping.channels().long_side);
     const float rows[3][7] = {{0, 0, 0, .5f, 0, -2, 0},
@@ -277,8 +281,8 @@ TEST(SurfelMapping, LongSidesAreVectorsAndNeedAnArea) {
 }
 
 TEST(SurfelMapping, GroupsAreIntegersFromZeroTo63) {
-  const PlyElement element =
-      elementOf({{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {PlyType::kInt32, "light_group"}}, 6);
+  const RowLayout element = elementOf(
+      {{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {ValueType::kInt32, "light_group"}}, 6);
   const SurfelMapping mapping = mappingOf(element);
   EXPECT_TRUE(mapping.channels().group);
   std::vector<std::byte> rows(element.count * element.row_bytes);
@@ -295,8 +299,8 @@ TEST(SurfelMapping, GroupsAreIntegersFromZeroTo63) {
 }
 
 TEST(SurfelMapping, GroupsMayBeWholeFloats) {
-  for (const PlyType type : {PlyType::kFloat32, PlyType::kFloat64}) {
-    const PlyElement element =
+  for (const ValueType type : {ValueType::kFloat32, ValueType::kFloat64}) {
+    const RowLayout element =
         elementOf({{kFloat, "x"}, {kFloat, "y"}, {kFloat, "z"}, {type, "group"}}, 6);
     const SurfelMapping mapping = mappingOf(element);
     std::vector<std::byte> rows(6 * element.row_bytes);
@@ -304,8 +308,8 @@ TEST(SurfelMapping, GroupsMayBeWholeFloats) {
     for (std::size_t i = 0; i < 6; ++i) {
       const float single = static_cast<float>(groups[i]);
       const void* const value =
-          type == PlyType::kFloat32 ? static_cast<const void*>(&single) : &groups[i];
-      std::memcpy(&rows[i * element.row_bytes + 12], value, plyTypeBytes(type));
+          type == ValueType::kFloat32 ? static_cast<const void*>(&single) : &groups[i];
+      std::memcpy(&rows[i * element.row_bytes + 12], value, valueTypeBytes(type));
     }
     std::vector<Surfel> surfels(6);
     SurfelDefects defects;
@@ -320,7 +324,7 @@ TEST(SurfelMapping, GroupsMayBeWholeFloats) {
 }
 
 TEST(SurfelMapping, DefectsOfPartsAddUpInAnyOrder) {
-  const PlyElement element = elementOf(kFullCloud, 2000);
+  const RowLayout element = elementOf(kFullCloud, 2000);
   const SurfelMapping mapping = mappingOf(element);
   std::mt19937 random(14);
   const std::vector<std::byte> rows = randomRows(element, 30, random);

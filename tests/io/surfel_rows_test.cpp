@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "io/surfel_cloud_test.h"
-#include "io/surfel_source.h"
-#include "io/surfel_writer.h"
 #include "io/test_bytes.h"
+#include "surfels/surfel_source.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

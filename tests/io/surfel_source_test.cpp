@@ -1,4 +1,4 @@
-#include "io/surfel_source.h"
+#include "surfels/surfel_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "io/surfel_cloud_test.h"
-#include "io/surfel_writer.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

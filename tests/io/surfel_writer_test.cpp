@@ -1,4 +1,4 @@
-#include "io/surfel_writer.h"
+#include "surfels/surfel_writer.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/positional_file.h"
+#include "storage/positional_file.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "io/cloud_formats.h"
-#include "io/formats/ptx_reader.h"
-#include "io/formats/xyz_reader.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/scans/ptx_reader.h"
+#include "cloud/text/xyz_reader.h"
 #include "io/row_damage_test.h"
 
 namespace surfeit {
@@ -43,7 +43,7 @@ class TextCloudTest : public RowFileTest {
     notes_ = reader->notes();
     const std::vector<std::byte> rows = readAllRows(*reader);
     std::string values;
-    for (const PlyProperty& property : reader->element().properties) {
+    for (const RowProperty& property : reader->element().properties) {
       const double value = valueOf(*reader, rows, static_cast<std::size_t>(row), property.name);
       char number[64];
       std::snprintf(number, sizeof number, "%s%s=%.7g", values.empty() ? "" : " ",
@@ -87,8 +87,8 @@ TEST_F(TextCloudTest, CommasBetweenOtherSeparatorsAreDecimal) {
 }
 
 TEST_F(TextCloudTest, UnitsOfPlacesAreTold) {
-  for (const char* head : {"X [ft],Y [ft],Z [ft]", "x (FT);y (FT);z (m)",
-                           "Easting(ft)\tNorthing(ft)\tElevation"}) {
+  for (const char* head :
+       {"X [ft],Y [ft],Z [ft]", "x (FT);y (FT);z (m)", "Easting(ft)\tNorthing(ft)\tElevation"}) {
     EXPECT_EQ(rowOf(std::string(head) + "\n1;2;3\n", 0), "x=1 y=2 z=3") << head;
     EXPECT_THAT(notes_, Contains(HasSubstr("places are in 'ft'"))) << head;
   }

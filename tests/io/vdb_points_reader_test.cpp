@@ -1,5 +1,5 @@
 // OpenVDB's own library writes the points that we read.
-#include "io/formats/vdb_points_reader.h"
+#include "cloud/vdb/vdb_points_reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -182,8 +182,8 @@ TEST_F(VdbPointsReaderTest, AttributesOfEveryTypeAndCodecAreRead) {
     expectColumn(table, "constant", std::vector<double>(20000, 0.75));
     EXPECT_THAT(table.notes, testing::Contains(testing::HasSubstr("label")));
     EXPECT_THAT(table.notes, testing::Contains(testing::HasSubstr("i64")));
-    EXPECT_EQ(table.element.find("i16")->type, PlyType::kInt16);
-    EXPECT_EQ(table.element.find("wide")->type, PlyType::kFloat64);
+    EXPECT_EQ(table.element.find("i16")->type, ValueType::kInt16);
+    EXPECT_EQ(table.element.find("wide")->type, ValueType::kFloat64);
   }
 }
 
@@ -192,7 +192,7 @@ TEST_F(VdbPointsReaderTest, PointsOfManyPagesAndFarFromTheOriginAreRead) {
   auto grid = pointGrid<vp::NullCodec>(points, 0.02);
   grid->transform().postTranslate(vdb::Vec3d(500000, 0, 0));
   const Table table = readTable(save({grid}, kCompressions[3]), 5000);
-  EXPECT_EQ(table.element.find("x")->type, PlyType::kFloat64);
+  EXPECT_EQ(table.element.find("x")->type, ValueType::kFloat64);
   expectPositions(table, positionsOf(*grid), 1e-9);
 }
 

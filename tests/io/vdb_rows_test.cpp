@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "io/formats/vdb_coding.h"
-#include "io/formats/vdb_reader.h"
-#include "io/formats/vdb_writer.h"
+#include "cloud/vdb/vdb_coding.h"
+#include "cloud/vdb/vdb_reader.h"
+#include "cloud/vdb/vdb_writer.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -40,7 +40,7 @@ class VdbRows : public DirectoryTest {
   RowWriterOptions someOptions() const {
     RowWriterOptions options;
     for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "radius"}) {
-      PlyProperty property;
+      RowProperty property;
       property.name = name;
       options.properties.push_back(property);
     }
@@ -203,14 +203,14 @@ TEST_F(VdbRows, TilesAndLeavesOfAVolumeAreRows) {
   write("v.vdb", volumeFile());
   Result<std::unique_ptr<RowReader>> reader = openVdb(path("v.vdb"), {});
   ASSERT_TRUE(reader.ok()) << reader.status().message();
-  const PlyElement& element = (*reader)->element();
+  const RowLayout& element = (*reader)->element();
   EXPECT_EQ(element.count, 8u + 128 * 128 * 128);
   AlignedBuffer buffer;
   const Result<Bytes> rows = (*reader)->readRows(9, buffer);
   ASSERT_TRUE(rows.ok());
   const auto value = [&](std::size_t row, const char* name) {
-    const PlyProperty* property = element.find(name);
-    return plyValue(rows->data() + row * element.row_bytes + property->offset, property->type);
+    const RowProperty* property = element.find(name);
+    return rowValue(rows->data() + row * element.row_bytes + property->offset, property->type);
   };
   EXPECT_EQ(value(7, "density"), 7);
   EXPECT_EQ(value(7, "voxel_k"), 7);
@@ -383,7 +383,7 @@ TEST_F(VdbRows, LeavesTakeAnyNumberOfPoints) {
   // 67 MB of an attribute for one voxel, pages 64 times as large as usual
   RowWriterOptions options = someOptions();
   for (int i = 0; i < 200; ++i) {
-    PlyProperty property;
+    RowProperty property;
     property.name = "weights_" + std::to_string(i);
     options.properties.push_back(property);
   }

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "io/formats/vdb_reader.h"
+#include "cloud/vdb/vdb_reader.h"
 #include "io/test_directory.h"
 
 namespace surfeit {
@@ -23,7 +23,7 @@ namespace vdb = openvdb;
 
 // All rows of a file, property by property.
 struct Table {
-  PlyElement element;
+  RowLayout element;
   std::vector<std::string> notes;
   std::map<std::string, std::vector<double>> columns;
   std::size_t size() const { return columns.empty() ? 0 : columns.begin()->second.size(); }
@@ -50,9 +50,9 @@ inline Table readTable(const std::string& path, std::size_t batch = 1000,
     EXPECT_TRUE(rows.ok()) << rows.status().message();
     if (!rows.ok() || rows->empty()) break;
     for (std::size_t at = 0; at < rows->size(); at += table.element.row_bytes) {
-      for (const PlyProperty& property : table.element.properties) {
+      for (const RowProperty& property : table.element.properties) {
         table.columns[property.name].push_back(
-            plyValue(rows->data() + at + property.offset, property.type));
+            rowValue(rows->data() + at + property.offset, property.type));
       }
     }
   }

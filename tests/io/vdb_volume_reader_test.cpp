@@ -1,5 +1,5 @@
 // OpenVDB's own library writes the volumes that we read.
-#include "io/formats/vdb_volume_reader.h"
+#include "cloud/vdb/vdb_volume_reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // OpenVDB's own library reads what we write.
-#include "io/formats/vdb_writer.h"
+#include "cloud/vdb/vdb_writer.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/points/PointCount.h>
@@ -25,12 +25,12 @@ class VdbWriterTest : public VdbTest {};
 
 // What the writer is given: a property and its values.
 struct Column {
-  PlyProperty property;
+  RowProperty property;
   std::vector<double> values;
 };
 
-Column column(const std::string& name, PlyType type, std::vector<double> values) {
-  PlyProperty property;
+Column column(const std::string& name, ValueType type, std::vector<double> values) {
+  RowProperty property;
   property.name = name;
   property.type = type;
   return {property, std::move(values)};
@@ -47,8 +47,8 @@ void writeVdb(const std::string& path, const std::vector<Column>& columns,
   std::vector<std::byte> row((*writer)->element().row_bytes);
   for (std::size_t i = 0; i < columns[0].values.size(); ++i) {
     for (std::size_t c = 0; c < columns.size(); ++c) {
-      const PlyProperty& property = (*writer)->element().properties[c];
-      visitPlyType(property.type, [&]<typename T>(std::type_identity<T>) {
+      const RowProperty& property = (*writer)->element().properties[c];
+      visitValueType(property.type, [&]<typename T>(std::type_identity<T>) {
         const T value = static_cast<T>(columns[c].values[i]);
         std::memcpy(row.data() + property.offset, &value, sizeof(T));
       });
@@ -66,7 +66,7 @@ std::vector<Column> someColumns(std::size_t count) {
     id.push_back(double(id.size()));
     n.push_back(std::sin(id.back()));
   }
-  using enum PlyType;
+  using enum ValueType;
   return {column("x", kFloat32, xyz[0]),      column("y", kFloat32, xyz[1]),
           column("z", kFloat32, xyz[2]),      column("nx", kFloat32, n),
           column("ny", kFloat32, n),          column("nz", kFloat32, n),
@@ -162,7 +162,7 @@ TEST_F(VdbWriterTest, OpenVdbReadsOurVolumesInTheSourcesPlace) {
   const Result<std::unique_ptr<RowReader>> like = openVdb(source, {});
   ASSERT_TRUE(like.ok());
 
-  using enum PlyType;
+  using enum ValueType;
   std::vector<Column> columns;
   for (const char* name : {"x", "y", "z", "density"}) {
     columns.push_back(column(name, kFloat32, table[name]));
@@ -198,7 +198,7 @@ TEST_F(VdbWriterTest, OpenVdbReadsOurVolumesInTheSourcesPlace) {
 }
 
 TEST_F(VdbWriterTest, OpenVdbReadsOurEmptyCloud) {
-  using enum PlyType;
+  using enum ValueType;
   writeVdb(path("empty.vdb"),
            {column("x", kFloat32, {}), column("y", kFloat32, {}), column("z", kFloat32, {})});
   const auto grid = load<vp::PointDataGrid>("empty.vdb", "points");

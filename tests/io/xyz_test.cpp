@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "io/formats/text_rows.h"
-#include "io/formats/xyz_reader.h"
-#include "io/formats/xyz_writer.h"
-#include "io/ply_number.h"
+#include "cloud/ply/ply_number.h"
+#include "cloud/text/text_rows.h"
+#include "cloud/text/xyz_reader.h"
+#include "cloud/text/xyz_writer.h"
 #include "io/row_damage_test.h"
 
 namespace surfeit {
@@ -35,7 +35,7 @@ class XyzTest : public RowFileTest {
 
   std::string refusalOf(const std::string& text) { return refusal(openXyz, text); }
 
-  void writeXyz(const std::string& name, const std::vector<PlyProperty>& columns,
+  void writeXyz(const std::string& name, const std::vector<RowProperty>& columns,
                 const std::vector<std::byte>& rows, const std::vector<std::string>& comments = {}) {
     RowWriterOptions options;
     options.properties = columns;
@@ -50,11 +50,11 @@ class XyzTest : public RowFileTest {
 // --- Numbers ---
 
 template <typename T>
-void expectParsed(const std::string& text, PlyType type) {
+void expectParsed(const std::string& text, ValueType type) {
   const TextColumn column{"v", type, 0, true};
   std::byte fast[8], slow[8];
   // Integers with zeros after a point are read in text, not in PLY
-  const bool is_pointed = type < PlyType::kFloat32 && text == "1.";
+  const bool is_pointed = type < ValueType::kFloat32 && text == "1.";
   ASSERT_EQ(parseTextRow(text, {&column, 1}, fast), parsePlyNumber(text, type, slow) || is_pointed)
       << text;
   if (!parsePlyNumber(text, type, slow)) return;
@@ -69,15 +69,15 @@ TEST(TextNumber, IsRoundedAsFromCharsDoes) {
     const int digits = int(random() % 18) + 1;
     const char* const forms[] = {"%.*g", "%.*e", "%.*f", "-%.*g"};
     std::snprintf(text, sizeof text, forms[random() % 4], digits, value);
-    expectParsed<float>(text, PlyType::kFloat32);
-    expectParsed<double>(text, PlyType::kFloat64);
+    expectParsed<float>(text, ValueType::kFloat32);
+    expectParsed<double>(text, ValueType::kFloat64);
   }
   // Floats and the points half way between them, written in full
   for (int i = 0; i < 100000; ++i) {
     const float value = std::ldexp(float(random() >> 40), -int(random() % 24));
     std::snprintf(text, sizeof text, "%.25g",
                   (double(value) + double(std::nextafter(value, 1e9f))) / 2);
-    expectParsed<float>(text, PlyType::kFloat32);
+    expectParsed<float>(text, ValueType::kFloat32);
   }
 }
 
@@ -124,10 +124,10 @@ TEST(TextNumber, OddSpellingsAreReadAsInPly) {
                            "000000000000000000000000001",
                            "1..2",
                            "1.2.3"}) {
-    expectParsed<float>(text, PlyType::kFloat32);
-    expectParsed<double>(text, PlyType::kFloat64);
-    expectParsed<std::int8_t>(text, PlyType::kInt8);
-    expectParsed<std::uint32_t>(text, PlyType::kUint32);
+    expectParsed<float>(text, ValueType::kFloat32);
+    expectParsed<double>(text, ValueType::kFloat64);
+    expectParsed<std::int8_t>(text, ValueType::kInt8);
+    expectParsed<std::uint32_t>(text, ValueType::kUint32);
   }
 }
 
@@ -263,34 +263,34 @@ TEST_F(XyzTest, RowsThatAreNotAsTheFirstAreRefused) {
 
 // --- Round trips ---
 
-std::vector<PlyProperty> mixedColumns() {
+std::vector<RowProperty> mixedColumns() {
   return {rowProperty("x"),
           rowProperty("y"),
           rowProperty("z"),
           rowProperty("nx"),
           rowProperty("ny"),
           rowProperty("nz"),
-          rowProperty("red", PlyType::kUint8),
-          rowProperty("green", PlyType::kUint8),
-          rowProperty("blue", PlyType::kUint8),
-          rowProperty("stamp", PlyType::kFloat64),
+          rowProperty("red", ValueType::kUint8),
+          rowProperty("green", ValueType::kUint8),
+          rowProperty("blue", ValueType::kUint8),
+          rowProperty("stamp", ValueType::kFloat64),
           rowProperty("radiosity_r"),
-          rowProperty("group", PlyType::kUint8)};
+          rowProperty("group", ValueType::kUint8)};
 }
 
 std::vector<std::byte> mixedRows(std::size_t count) {
-  PlyElement element;
+  RowLayout element;
   element.properties = mixedColumns();
-  packPlyRow(element);
+  packRow(element);
   std::mt19937_64 random(9);
   std::vector<std::byte> rows(count * element.row_bytes);
   for (std::size_t row = 0; row < count; ++row) {
-    for (const PlyProperty& property : element.properties) {
+    for (const RowProperty& property : element.properties) {
       std::byte* const at = &rows[row * element.row_bytes + property.offset];
-      if (property.type == PlyType::kFloat32) {
+      if (property.type == ValueType::kFloat32) {
         const float value = std::ldexp(float(std::int64_t(random()) >> 40), -int(random() % 60));
         std::memcpy(at, &value, sizeof value);
-      } else if (property.type == PlyType::kFloat64) {
+      } else if (property.type == ValueType::kFloat64) {
         const double value = std::ldexp(double(std::int64_t(random()) >> 11), -40);
         std::memcpy(at, &value, sizeof value);
       } else {

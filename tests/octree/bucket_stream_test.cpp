@@ -1,10 +1,10 @@
-#include "octree/bucket_stream.h"
+#include "octree/build/bucket_stream.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 
-#include "octree/index_plan.h"
+#include "index/index_plan.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {

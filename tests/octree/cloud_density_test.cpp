@@ -1,4 +1,4 @@
-#include "octree/cloud_density.h"
+#include "index/cloud_density.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "octree/scene_rows.h"
+#include "index/scene_rows.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {

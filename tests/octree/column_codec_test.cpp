@@ -1,4 +1,4 @@
-#include "octree/column_codec.h"
+#include "octree/page/column_codec.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "octree/curve_sort.h"
+#include "octree/build/curve_sort.h"
 
 #include <gtest/gtest.h>
 

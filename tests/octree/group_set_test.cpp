@@ -1,4 +1,4 @@
-#include "octree/group_set.h"
+#include "octree/read/group_set.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "io/byte_output.h"
 #include "octree/test_scenes.h"
+#include "storage/byte_output.h"
 #include "surfeit/index.h"
 
 namespace surfeit {

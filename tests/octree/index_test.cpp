@@ -9,7 +9,7 @@
 #include <random>
 
 #include "io/test_bytes.h"
-#include "octree/curve_sort.h"
+#include "octree/build/curve_sort.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {
@@ -20,8 +20,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 // Options with one thing changed.
-template <typename Value>
-IndexOptions optionsWith(Value IndexOptions::*field, const Value& value) {
+template <typename Options, typename Value>
+IndexOptions optionsWith(Value Options::*field, const Value& value) {
   IndexOptions options;
   options.*field = value;
   return options;

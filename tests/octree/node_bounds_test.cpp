@@ -1,5 +1,5 @@
 // Bounds hold for what a reader decodes: every surfel below every node, in both precisions.
-#include "octree/node_bounds.h"
+#include "octree/page/node_bounds.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
-#include "octree/node_group.h"
+#include "octree/page/node_group.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "core/curve_key.h"
-#include "octree/node_bounds.h"
-#include "octree/node_sums.h"
+#include "octree/node/node_sums.h"
+#include "octree/page/node_bounds.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {

@@ -1,4 +1,4 @@
-#include "octree/node_sums.h"
+#include "octree/node/node_sums.h"
 
 #include <gtest/gtest.h>
 

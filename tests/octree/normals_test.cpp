@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
+#include "index/scene_rows.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
-#include "octree/scene_rows.h"
 #include "surfeit/index.h"
 
 namespace surfeit {

@@ -1,6 +1,6 @@
 // The octree against its definition: a cell with more surfels than a leaf holds has its occupied
 // children below it, cells with one child are left out, and the root is the smallest of all.
-#include "octree/octree_builder.h"
+#include "octree/build/octree_builder.h"
 
 #include <gtest/gtest.h>
 

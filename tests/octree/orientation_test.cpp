@@ -1,6 +1,6 @@
 // Normals of bare positions that agree with their neighbours: closed surfaces face outward, open
 // ones up.
-#include "octree/orientation.h"
+#include "octree/neighbours/orientation.h"
 
 #include <gtest/gtest.h>
 
@@ -11,14 +11,14 @@
 #include <string>
 #include <vector>
 
-#include "io/cloud_formats.h"
+#include "cloud/cloud_formats.h"
+#include "index/scene_rows.h"
 #include "io/row_stream_test.h"
-#include "io/surfel_writer.h"
 #include "io/test_directory.h"
-#include "octree/scene_rows.h"
-#include "octree/side_forest.h"
+#include "octree/neighbours/side_forest.h"
 #include "surfeit/index.h"
 #include "surfeit/normals.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "octree/parallel.h"
+#include "core/parallel.h"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
-#include "octree/radiosity_rewriter.h"
+#include "octree/relight/radiosity_rewriter.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <functional>
 
-#include "io/page_codec.h"
-#include "octree/node_sums.h"
-#include "octree/parallel.h"
+#include "core/parallel.h"
+#include "octree/node/node_sums.h"
 #include "octree/test_scenes.h"
+#include "storage/page_codec.h"
 
 namespace surfeit {
 namespace {

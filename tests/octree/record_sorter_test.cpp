@@ -1,4 +1,4 @@
-#include "octree/record_sorter.h"
+#include "storage/record_sorter.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Clouds that overlap: surfels that repeat others are told, or left out.
-#include "octree/repeated_surfels.h"
+#include "octree/neighbours/repeated_surfels.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

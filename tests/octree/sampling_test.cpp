@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "io/surfel_writer.h"
 #include "io/test_directory.h"
 #include "octree/test_scenes.h"
 #include "surfeit/index.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {

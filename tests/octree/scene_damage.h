@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "io/page_codec.h"
-#include "io/page_file.h"
-#include "octree/node_group.h"
-#include "octree/scene_file.h"
-#include "octree/surfel_group.h"
+#include "octree/page/node_group.h"
+#include "octree/page/surfel_group.h"
+#include "octree/read/scene_file.h"
+#include "storage/page_codec.h"
+#include "storage/page_file.h"
 
 namespace surfeit {
 

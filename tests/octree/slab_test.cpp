@@ -1,10 +1,10 @@
-#include "octree/slab.h"
+#include "octree/build/slab.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 
-#include "octree/octree_builder.h"
+#include "octree/build/octree_builder.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {

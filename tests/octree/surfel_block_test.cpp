@@ -1,4 +1,4 @@
-#include "octree/surfel_block.h"
+#include "octree/build/surfel_block.h"
 
 #include <gtest/gtest.h>
 

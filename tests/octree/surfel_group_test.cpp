@@ -1,12 +1,12 @@
-#include "octree/surfel_group.h"
+#include "octree/page/surfel_group.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <utility>
 
-#include "io/page_codec.h"
 #include "octree/test_scenes.h"
+#include "storage/page_codec.h"
 
 namespace surfeit {
 namespace {

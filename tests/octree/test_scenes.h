@@ -14,12 +14,12 @@
 #include <string>
 #include <vector>
 
-#include "io/surfel_source.h"
-#include "io/surfel_writer.h"
 #include "io/test_directory.h"
-#include "octree/paged_octree.h"
+#include "octree/read/paged_octree.h"
 #include "surfeit/index.h"
 #include "surfeit/scene.h"
+#include "surfels/surfel_source.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 

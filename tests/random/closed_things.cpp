@@ -71,8 +71,8 @@ std::vector<Surfel> hiddenLamp() {
   return lamp;
 }
 
-std::vector<Receiver> receiversBehind() {
-  std::vector<Receiver> receivers;
+std::vector<LocalReceiver> receiversBehind() {
+  std::vector<LocalReceiver> receivers;
   for (int i = 0; i < 25; ++i) {
     const glm::vec3 at(.1f * float(i % 5 - 2), .1f * float(i / 5 - 2), 3);
     receivers.push_back({at, glm::normalize(glm::vec3(.02f * float(i % 3), .01f, -1))});

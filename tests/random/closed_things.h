@@ -5,7 +5,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "gather/receiver.h"
+#include "gather/rules/receiver.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
@@ -23,6 +23,6 @@ void addBox(std::vector<Surfel>& cloud, int count, const glm::vec3& centre, floa
 
 // What stands around the origin, a unit large, hides the lamp from all the receivers.
 std::vector<Surfel> hiddenLamp();
-std::vector<Receiver> receiversBehind();
+std::vector<LocalReceiver> receiversBehind();
 
 }  // namespace surfeit

@@ -19,8 +19,8 @@ namespace {
 constexpr int kSide = 48;  // receivers along a side of the wall
 
 // On a square of the plane z = 0 that looks up.
-std::vector<Receiver> wallOf(float size) {
-  std::vector<Receiver> wall;
+std::vector<LocalReceiver> wallOf(float size) {
+  std::vector<LocalReceiver> wall;
   for (int i = 0; i < kSide * kSide; ++i) {
     const float x = float(i % kSide) / (kSide - 1) - .5f, y = float(i / kSide) / (kSide - 1) - .5f;
     wall.push_back({{size * x, size * y, 0}, {0, 0, 1}});
@@ -42,7 +42,7 @@ struct WallErrors {
   double worst_step;  // and all
 };
 
-WallErrors errorsOf(std::span<const Surfel> cloud, std::span<const Receiver> wall,
+WallErrors errorsOf(std::span<const Surfel> cloud, std::span<const LocalReceiver> wall,
                     std::span<const double> truth) {
   const auto scene = IndexedScene::make(cloud);
   EXPECT_TRUE(scene.ok()) << scene.status().message();
@@ -85,7 +85,7 @@ std::vector<Surfel> fireOf(float radius) {
 // So thin that its flames do not hide each other: they add up.
 TEST(HotSpots, ThinFireLightsAWall) {
   const std::vector<Surfel> fire = fireOf(.0005f);
-  const std::vector<Receiver> wall = wallOf(3);
+  const std::vector<LocalReceiver> wall = wallOf(3);
   std::vector<double> truth(wall.size());
   for (std::size_t i = 0; i < wall.size(); ++i) {
     for (const Surfel& flame : fire) {
@@ -101,7 +101,7 @@ TEST(HotSpots, ThinFireLightsAWall) {
 // Flames that hide half of each other, against the exact cut with fine pixels.
 TEST(HotSpots, DenseFireLightsAWall) {
   const std::vector<Surfel> fire = fireOf(.03f);
-  const std::vector<Receiver> wall = wallOf(3);
+  const std::vector<LocalReceiver> wall = wallOf(3);
   const auto scene = IndexedScene::make(fire);
   ASSERT_TRUE(scene.ok());
   GatherQuality exact;
@@ -122,9 +122,9 @@ TEST(HotSpots, SmallBallLightsAFloor) {
     std::vector<Surfel> cloud;
     const glm::vec3 centre(.11f, .07f, .5f);
     addBall(cloud, 3000, centre, radius, 100);
-    const std::vector<Receiver> wall = wallOf(2);
+    const std::vector<LocalReceiver> wall = wallOf(2);
     std::vector<double> truth;
-    for (const Receiver& receiver : wall) {
+    for (const LocalReceiver& receiver : wall) {
       truth.push_back(irradianceOf(centre, radius, 100, receiver.position));
     }
     const WallErrors found = errorsOf(cloud, wall, truth);

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "core/curve_key.h"
-#include "gather/gather_point.h"
-#include "gather/packet_gatherer.h"
-#include "io/surfel_writer.h"
-#include "octree/scene_file.h"
+#include "gather/packet/packet_gatherer.h"
+#include "gather/scalar/gather_point.h"
+#include "octree/read/scene_file.h"
 #include "surfeit/index.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {
@@ -89,6 +89,12 @@ CloudChannels channelsOf(std::span<const Surfel> cloud) {
   return channels;
 }
 
+Status indexTo(const std::string& path, std::span<const Surfel> cloud,
+               const IndexedSceneOptions& options) {
+  const ScratchDirectory directory;
+  return indexCloud(cloud, options, directory, path);
+}
+
 Result<std::unique_ptr<IndexedScene>> IndexedScene::open(const std::string& path) {
   SURFEIT_ASSIGN_OR_RETURN(SceneFile file, SceneFile::open(path));
   SURFEIT_ASSIGN_OR_RETURN(
@@ -118,8 +124,8 @@ Result<std::unique_ptr<IndexedScene>> IndexedScene::makeBounced(std::span<const 
   return open(bounced);
 }
 
-Result<std::vector<GatherResult>> IndexedScene::gatherAlone(std::span<const Receiver> receivers,
-                                                            const GatherRules& rules) {
+Result<std::vector<GatherResult>> IndexedScene::gatherAlone(
+    std::span<const LocalReceiver> receivers, const GatherRules& rules) {
   PointGatherer gatherer(rules);
   std::vector<GatherResult> results(receivers.size());
   for (std::size_t i = 0; i < receivers.size(); ++i) {
@@ -129,7 +135,7 @@ Result<std::vector<GatherResult>> IndexedScene::gatherAlone(std::span<const Rece
 }
 
 Result<std::vector<GatherResult>> IndexedScene::gatherPacketsOfOne(
-    std::span<const Receiver> receivers, const GatherRules& rules) {
+    std::span<const LocalReceiver> receivers, const GatherRules& rules) {
   PacketGatherer gatherer(rules);
   std::vector<GatherResult> results(receivers.size());
   for (std::size_t i = 0; i < receivers.size(); ++i) {
@@ -139,15 +145,15 @@ Result<std::vector<GatherResult>> IndexedScene::gatherPacketsOfOne(
   return results;
 }
 
-Result<std::vector<GatherResult>> IndexedScene::gatherTogether(std::span<const Receiver> receivers,
-                                                               const GatherRules& rules) {
+Result<std::vector<GatherResult>> IndexedScene::gatherTogether(
+    std::span<const LocalReceiver> receivers, const GatherRules& rules) {
   // Along the curve, equal keys in the order of the input
   std::vector<std::pair<CurveKey, std::size_t>> order;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     order.emplace_back(curveKey(receivers[i].position, octree_->file().header().cube), i);
   }
   std::sort(order.begin(), order.end());
-  std::vector<Receiver> sorted;
+  std::vector<LocalReceiver> sorted;
   for (const auto& [key, index] : order) sorted.push_back(receivers[index]);
 
   PacketGatherer gatherer(rules);

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "gather/gather_rules.h"
-#include "gather/receiver.h"
-#include "octree/paged_octree.h"
+#include "gather/rules/gather_rules.h"
+#include "gather/rules/receiver.h"
+#include "octree/read/paged_octree.h"
 #include "surfeit/bounce.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
@@ -36,12 +36,12 @@ class IndexedScene {
 
   // Each by itself, by the scalar gather; and together as gatherCloud does, along the curve. In the
   // order of the receivers.
-  Result<std::vector<GatherResult>> gatherAlone(std::span<const Receiver> receivers,
+  Result<std::vector<GatherResult>> gatherAlone(std::span<const LocalReceiver> receivers,
                                                 const GatherRules& rules);
-  Result<std::vector<GatherResult>> gatherTogether(std::span<const Receiver> receivers,
+  Result<std::vector<GatherResult>> gatherTogether(std::span<const LocalReceiver> receivers,
                                                    const GatherRules& rules);
   // Each by itself, by the gather of packets.
-  Result<std::vector<GatherResult>> gatherPacketsOfOne(std::span<const Receiver> receivers,
+  Result<std::vector<GatherResult>> gatherPacketsOfOne(std::span<const LocalReceiver> receivers,
                                                        const GatherRules& rules);
 
   PagedOctree::Reader& reader() { return *reader_; }
@@ -53,6 +53,10 @@ class IndexedScene {
   std::unique_ptr<PagedOctree> octree_;
   std::unique_ptr<PagedOctree::Reader> reader_;
 };
+
+// Indexes a cloud to a file that stays.
+Status indexTo(const std::string& path, std::span<const Surfel> cloud,
+               const IndexedSceneOptions& options = {});
 
 // What a cloud of these surfels has.
 CloudChannels channelsOf(std::span<const Surfel> cloud);

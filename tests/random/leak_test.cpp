@@ -16,7 +16,7 @@
 namespace surfeit {
 namespace {
 
-double meanLight(std::span<const Surfel> cloud, std::span<const Receiver> receivers,
+double meanLight(std::span<const Surfel> cloud, std::span<const LocalReceiver> receivers,
                  const GatherQuality& quality) {
   const auto scene = IndexedScene::make(cloud);
   EXPECT_TRUE(scene.ok()) << scene.status().message();
@@ -38,7 +38,7 @@ struct LeakCase {
 class Leak : public ::testing::TestWithParam<LeakCase> {};
 
 TEST_P(Leak, LightBehindClosedThingsDoesNotArrive) {
-  const std::vector<Receiver> receivers = receiversBehind();
+  const std::vector<LocalReceiver> receivers = receiversBehind();
   const std::vector<Surfel> lamp = hiddenLamp();
   for (const int count : {5000, 50'000}) {
     std::vector<Surfel> hidden = lamp;
@@ -66,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 // Within its sphere nothing is open, however large the surfels are beside the pixels.
 TEST(ClosedShell, IsClosedAtAnyNumberOfPixels) {
-  std::vector<Receiver> receivers;
+  std::vector<LocalReceiver> receivers;
   for (int i = 0; i < 32; ++i) {
     const float angle = 2.4f * float(i), height = 1 - (2 * float(i) + 1) / 32;
     const float across = std::sqrt(1 - height * height);
@@ -102,7 +102,7 @@ TEST(SmallLight, SendsItsPowerFromAnyPlace) {
   lamp.area = kPi * lamp.radius * lamp.radius;
   lamp.radiosity = glm::vec3(100);
   cloud.push_back(lamp);
-  std::vector<Receiver> receivers;
+  std::vector<LocalReceiver> receivers;
   double truth = 0;
   for (int i = 0; i < 400; ++i) {
     const glm::vec3 at(.013f * float(i % 20), .017f * float(i / 20), 0);
@@ -120,7 +120,7 @@ TEST(OwnSurface, HidesNothingOfEitherSideOfATwoSidedSheet) {
   std::vector<Surfel> sheet;
   addSheet(sheet, 4000, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
   for (Surfel& surfel : sheet) surfel.flags |= kSurfelTwoSided;
-  std::vector<Receiver> receivers;
+  std::vector<LocalReceiver> receivers;
   for (const float side : {-1.f, 1.f}) {
     for (int i = 0; i < 64; ++i) {
       receivers.push_back({sheet[std::size_t(1000 + 31 * i)].position, {0, 0, side}});

@@ -1,4 +1,4 @@
-// Numbers by chance, the same on every machine: a counter through the hash of io/square_strata.h.
+// Numbers by chance, the same on every machine: a counter through the hash of core/square_strata.h.
 #pragma once
 
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "io/square_strata.h"
+#include "core/square_strata.h"
 
 namespace surfeit {
 

@@ -369,8 +369,8 @@ RandomScene RandomScene::only(std::uint64_t kept) const {
   return scene;
 }
 
-std::vector<Receiver> RandomScene::plainReceivers() const {
-  std::vector<Receiver> plain;
+std::vector<LocalReceiver> RandomScene::plainReceivers() const {
+  std::vector<LocalReceiver> plain;
   for (const RandomReceiver& one : receivers) plain.push_back(one.receiver);
   return plain;
 }

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "gather/receiver.h"
+#include "gather/rules/receiver.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
@@ -28,7 +28,7 @@ struct RandomSphere {
 };
 
 struct RandomReceiver {
-  Receiver receiver;
+  LocalReceiver receiver;
   const char* place = "";  // "on a surface", "at an edge", "in a cavity", "in the open", ...
   int ingredient = -1;     // that it is on; -1: on none
   float ray_offset = 0;    // how far above it rays on the true geometry begin, scene units
@@ -56,7 +56,7 @@ struct RandomScene {
   // Surfels and true geometry of the ingredients in `kept`, a set; receivers stay where they are.
   // Numbers of ingredients stay as well.
   RandomScene only(std::uint64_t kept) const;
-  std::vector<Receiver> plainReceivers() const;
+  std::vector<LocalReceiver> plainReceivers() const;
 };
 
 inline constexpr int kMostIngredients = 8;

@@ -10,19 +10,19 @@
 #include <system_error>
 #include <vector>
 
-#include "io/ply_writer.h"
-#include "io/surfel_writer.h"
+#include "cloud/ply/ply_writer.h"
 #include "random/indexed_scene.h"
+#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {
 
 Status writeReceivers(const RandomScene& scene, const std::string& path) {
-  std::vector<PlyProperty> properties;
+  std::vector<RowProperty> properties;
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) {
-    PlyProperty& property = properties.emplace_back();
+    RowProperty& property = properties.emplace_back();
     property.name = name;
-    property.type = PlyType::kFloat32;
+    property.type = ValueType::kFloat32;
   }
   SURFEIT_ASSIGN_OR_RETURN(PlyWriter writer,
                            PlyWriter::create(path, PlyEncoding::kBinaryLittleEndian, properties));

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "random/random_scene.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -19,8 +19,8 @@
 #include "random/random_scene.h"
 #include "random/random_test_parts.h"
 #include "random/result_differences.h"
+#include "surfeit/bake.h"
 #include "surfeit/bounce.h"
-#include "surfeit/gather.h"
 
 namespace surfeit {
 namespace {
@@ -125,11 +125,9 @@ TEST_P(RandomScenes, OcclusionIsTheSameWithoutLight) {
     const auto cloud = indexed(scene.surfels);
     ASSERT_NE(cloud, nullptr);
     GatherOptions options = bleeding();
-    const auto lit =
-        valueOf(cloud->gatherTogether(scene.plainReceivers(), GatherRules(options, nullptr)));
+    const auto lit = valueOf(cloud->gatherTogether(scene.plainReceivers(), GatherRules(options)));
     options.mode = GatherMode::kOcclusion;
-    const auto unlit =
-        valueOf(cloud->gatherTogether(scene.plainReceivers(), GatherRules(options, nullptr)));
+    const auto unlit = valueOf(cloud->gatherTogether(scene.plainReceivers(), GatherRules(options)));
     EXPECT_LT(differencesOf(unlit, lit).worst, 1e-4) << scene.describe();
   }
 }
@@ -140,8 +138,7 @@ TEST_P(RandomScenes, CompanyChangesLittle) {
     const RandomScene scene = makeRandomScene(seed);
     const auto cloud = indexed(scene.surfels);
     ASSERT_NE(cloud, nullptr);
-    const GatherRules rules(bleeding(seed % 3 == 0 ? GatherSides::kBoth : GatherSides::kFront),
-                            nullptr);
+    const GatherRules rules(bleeding(seed % 3 == 0 ? GatherSides::kBoth : GatherSides::kFront));
     const auto together = valueOf(cloud->gatherTogether(scene.plainReceivers(), rules));
     const auto alone = valueOf(cloud->gatherPacketsOfOne(scene.plainReceivers(), rules));
     ASSERT_EQ(together.size(), alone.size());
@@ -203,9 +200,9 @@ TEST_P(RandomScenes, PlaceTurnAndScaleHardlyMatter) {
   for (const std::uint64_t seed : smallScenes(first(), kFew)) {
     const RandomScene scene = makeRandomScene(seed);
     GatherOptions options = bleeding();
-    const GatherRules fast(options, nullptr);
+    const GatherRules fast(options);
     options.quality.max_solid_angle = 0;
-    const GatherRules exact(options, nullptr);
+    const GatherRules exact(options);
     const IndexedSceneOptions floats = {.full_precision = true};
     const auto cloud = indexed(scene.surfels, floats);
     ASSERT_NE(cloud, nullptr);
@@ -243,7 +240,7 @@ TEST_P(RandomScenes, OrderFilesThreadsAndMemoryDoNotMatter) {
     for (std::size_t i = shuffled.size(); i > 1; --i) {
       std::swap(shuffled[i - 1], shuffled[std::size_t(random.below(int(i)))]);
     }
-    const GatherRules rules(bleeding(), nullptr);
+    const GatherRules rules(bleeding());
     const auto gather = [&](const std::vector<Surfel>& surfels,
                             const IndexedSceneOptions& options) {
       const auto cloud = indexed(surfels, options);
@@ -271,7 +268,7 @@ TEST_P(RandomScenes, BouncesComeCloseToExact) {
     bounce.threads = 1;
     GatherOptions options = bleeding();
     options.quality.max_solid_angle = 0;
-    const GatherRules rules(options, nullptr);
+    const GatherRules rules(options);
     const auto fast = IndexedScene::makeBounced(scene.surfels, {}, bounce);
     bounce.quality.max_solid_angle = 0;
     const auto exact = IndexedScene::makeBounced(scene.surfels, {}, bounce);

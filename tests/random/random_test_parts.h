@@ -18,7 +18,7 @@
 #include "random/random_scene.h"
 #include "random/random_scene_files.h"
 #include "random/result_differences.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 
 namespace surfeit {
 
@@ -32,10 +32,10 @@ inline ResultDifferences fastAgainstExact(const RandomScene& scene, GatherOption
   const auto indexed = IndexedScene::make(scene.surfels);
   EXPECT_TRUE(indexed.ok()) << indexed.status().message();
   if (!indexed.ok()) return {};
-  const std::vector<Receiver> receivers = scene.plainReceivers();
-  const auto fast = (*indexed)->gatherTogether(receivers, GatherRules(options, nullptr));
+  const std::vector<LocalReceiver> receivers = scene.plainReceivers();
+  const auto fast = (*indexed)->gatherTogether(receivers, GatherRules(options));
   options.quality.max_solid_angle = 0;
-  const auto exact = (*indexed)->gatherAlone(receivers, GatherRules(options, nullptr));
+  const auto exact = (*indexed)->gatherAlone(receivers, GatherRules(options));
   EXPECT_TRUE(fast.ok() && exact.ok());
   return fast.ok() && exact.ok() ? differencesOf(*fast, *exact) : ResultDifferences{};
 }
@@ -87,7 +87,7 @@ inline std::vector<std::uint64_t> allScenes(std::uint64_t first, std::size_t cou
 inline void dropTurnedAway(RandomScene& scene, const GatherOptions& options) {
   if (options.mode != GatherMode::kGlossy || std::isnan(options.eye.x)) return;
   std::erase_if(scene.receivers, [&](const RandomReceiver& one) {
-    const Receiver& receiver = one.receiver;
+    const LocalReceiver& receiver = one.receiver;
     return !(glm::dot(glm::vec3(options.eye) - receiver.position, receiver.normal) > 0);
   });
 }

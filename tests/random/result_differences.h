@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "gather/receiver.h"
+#include "gather/rules/receiver.h"
 
 namespace surfeit {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "gather/test_clouds.h"
-#include "surfeit/gather.h"
+#include "surfeit/bake.h"
 #include "surfeit/index.h"
 
 namespace surfeit {

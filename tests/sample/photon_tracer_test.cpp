@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "cloud/ply/ply_reader.h"
 #include "core/spherical_harmonics.h"
-#include "io/ply_reader.h"
 #include "sample/reference.h"
 #include "sample/scene_files.h"
 
@@ -36,7 +36,7 @@ class PhotonTracing : public SceneFiles {
   std::vector<StoredPhoton> readPhotons() const {
     Result<PlyReader> reader = PlyReader::open(path("photons.ply"));
     EXPECT_TRUE(reader.ok()) << reader.status().message();
-    const PlyElement& element = reader->header().elements[0];
+    const RowLayout& element = reader->header().elements[0];
     EXPECT_EQ(element.row_bytes, sizeof(StoredPhoton));
     const char* const kNames[] = {"x", "nx", "power_r", "incident_x", "albedo_r"};
     for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(element.properties[3 * i].name, kNames[i]);

@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "io/surfel_source.h"
 #include "surfeit/progress.h"
+#include "surfels/surfel_source.h"
 
 namespace surfeit {
 

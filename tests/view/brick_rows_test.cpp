@@ -55,7 +55,7 @@ TEST_F(BrickRows, ValuesOfTheMapTakeThePlaceOfTheClouds) {
   ASSERT_TRUE(opened.ok());
   Result<std::unique_ptr<CloudRows>> rows = addBrickValues(std::move(*opened), map(), {});
   ASSERT_TRUE(rows.ok()) << rows.status().message();
-  const PlyElement& element = (*rows)->element();
+  const RowLayout& element = (*rows)->element();
   const Result<Channel> occlusion = Channel::find(element, "occlusion", file);
   const Result<Channel> irradiance = Channel::find(element, "irradiance", file);
   const RowField albedo = RowField::find(element, "albedo_r");

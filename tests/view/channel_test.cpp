@@ -15,11 +15,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 // An element of float properties, and a row where property i has the value i + 1.
-PlyElement floats(const std::vector<std::string>& names) {
-  PlyElement element;
+RowLayout floats(const std::vector<std::string>& names) {
+  RowLayout element;
   element.name = "vertex";
   for (const std::string& name : names) {
-    PlyProperty property;
+    RowProperty property;
     property.name = name;
     property.offset = element.row_bytes;
     element.row_bytes += sizeof(float);
@@ -28,7 +28,7 @@ PlyElement floats(const std::vector<std::string>& names) {
   return element;
 }
 
-glm::vec3 valueOf(const PlyElement& element, const std::string& name,
+glm::vec3 valueOf(const RowLayout& element, const std::string& name,
                   const std::vector<float>& row) {
   const Result<Channel> channel = Channel::find(element, name, "cloud.ply");
   EXPECT_TRUE(channel.ok()) << channel.status().message();
@@ -55,8 +55,7 @@ TEST(Channel, AoIsOneMinusOcclusion) {
 }
 
 TEST(Channel, LitWithoutAlbedoShowsTheIrradiance) {
-  const PlyElement element =
-      floats({"x", "y", "z", "irradiance_r", "irradiance_g", "irradiance_b"});
+  const RowLayout element = floats({"x", "y", "z", "irradiance_r", "irradiance_g", "irradiance_b"});
   EXPECT_EQ(valueOf(element, "lit", {0, 0, 0, 1, 2, 3}), glm::vec3(1, 2, 3));
 }
 
@@ -69,13 +68,13 @@ TEST(Channel, LitAddsTheLightOfTheEnvironment) {
   EXPECT_EQ(valueOf(floats(names), "indirect", row), glm::vec3(2, 1, 4));
 
   // Without color bleeding there is still the environment
-  const PlyElement alone = floats({names.begin(), names.begin() + 9});
+  const RowLayout alone = floats({names.begin(), names.begin() + 9});
   EXPECT_EQ(valueOf(alone, "lit", row), glm::vec3(0.5f, 0.5f, 3));
   EXPECT_EQ(Channel::choose(alone), "lit");
 }
 
 TEST(Channel, TriplesOfAGatherAreChannels) {
-  const PlyElement element =
+  const RowLayout element =
       floats({"x", "y", "z", "reflection_r", "reflection_g", "reflection_b", "fluence_r",
               "fluence_g", "fluence_b", "bent_normal_x", "bent_normal_y", "bent_normal_z"});
   const std::vector<float> row = {0, 0, 0, 1, 2, 3, 4, 5, 6, 0, -1, 0};
@@ -86,11 +85,11 @@ TEST(Channel, TriplesOfAGatherAreChannels) {
 }
 
 TEST(Channel, EightBitColorsAreSrgb) {
-  PlyElement element = floats({"x", "y", "z"});
+  RowLayout element = floats({"x", "y", "z"});
   for (const char* name : {"red", "green", "blue"}) {
-    PlyProperty property;
+    RowProperty property;
     property.name = name;
-    property.type = PlyType::kUint8;
+    property.type = ValueType::kUint8;
     property.offset = element.row_bytes++;
     element.properties.push_back(property);
   }

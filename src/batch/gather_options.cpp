@@ -1,0 +1,75 @@
+#include "batch/gather_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "batch/environment_file.h"
+#include "core/job_limits.h"
+#include "core/up_comment.h"
+#include "gather/rules/check_settings.h"
+#include "gather/rules/gather_outputs.h"
+#include "gather/rules/gather_rules.h"
+#include "gather/scalar/raster_cube.h"
+
+namespace surfeit {
+namespace {
+
+constexpr int kMostThreads = 4096;
+
+Status refuse(const char* what, auto found, const std::string& expected) {
+  return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
+}
+
+Status checkEnvironment(const GatherEnvironment& environment) {
+  if (!(environment.intensity >= 0 && std::isfinite(environment.intensity))) {
+    return refuse("intensity of the environment", environment.intensity, "0 or more");
+  }
+  if (!std::isfinite(environment.rotation)) {
+    return refuse("rotation of the environment", environment.rotation, "radians");
+  }
+  return {};
+}
+
+}  // namespace
+
+Status checkGatherOptions(const GatherOptions& options) {
+  SURFEIT_RETURN_IF_ERROR(checkGatherSettings(options, !options.environment.path.empty()));
+  SURFEIT_RETURN_IF_ERROR(checkEnvironment(options.environment));
+  if (options.threads < 0 || options.threads > kMostThreads) {
+    return refuse("thread count", options.threads, fmt::format("0 to {}", kMostThreads));
+  }
+  if (!(options.cache_split <= 1)) {
+    return refuse("cache split", options.cache_split, "0 to 1, or a negative number to measure");
+  }
+  return {};
+}
+
+Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
+                                                                 UpAxis scene_up,
+                                                                 Progress& progress) {
+  GatherEnvironment environment = options.environment;
+  if (environment.path.empty()) return std::unique_ptr<const LoadedEnvironment>();
+  if (!environment.up) {
+    environment.up = scene_up;
+    progress.inform(fmt::format("{}: {} is up, as in the scene (--up)", environment.path,
+                                upAxisName(scene_up)));
+  }
+  SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, loadEnvironmentMap(environment, progress));
+  EnvironmentCube cube(map, RasterGeometry(options.quality.raster_resolution));
+  return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
+}
+
+GatherOptions withDefaults(GatherOptions options) {
+  if (options.outputs == 0) {
+    options.outputs = usualOutputs(options.mode);
+    if (!options.environment.path.empty()) options.outputs |= kOutputEnvironment;
+  }
+  if (options.threads == 0) options.threads = defaultThreadCount();
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes();
+  return options;
+}
+
+}  // namespace surfeit

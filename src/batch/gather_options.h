@@ -1,0 +1,32 @@
+// Checks of what a caller asks for.
+#pragma once
+
+#include <memory>
+
+#include "gather/light/environment_map.h"
+#include "gather/rules/gather_rules.h"
+#include "storage/positional_file.h"
+#include "surfeit/bake.h"
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// kInvalidArgument, naming the option, what was found and what is expected.
+Status checkGatherOptions(const GatherOptions& options);
+
+// With threads and memory that were left open filled in, from what the job may use.
+GatherOptions withDefaults(GatherOptions options);
+
+// The environment that is asked for, ready for a raster of that resolution; null when there is
+// none. Errors: as loadEnvironmentMap.
+Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOptions& options,
+                                                                 UpAxis scene_up,
+                                                                 Progress& progress);
+
+// How the pages of the scene are read.
+inline Access sceneAccess(const GatherOptions& options) {
+  return options.direct_io ? Access::kDirect : Access::kCached;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,319 @@
+// A bounce reads the scene twice: once to gather at its surfels, in the order of its pages, and
+// once to write it again with what was found.
+//
+//   scene with B_0 ---------------+----------------------+
+//                                 |                      |
+//   scene with B_{k-1} --gather (all threads)--> B_k --rewrite--> scene with B_k
+//
+// Bounces before the last are files without a name.
+#include "surfeit/bounce.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "batch/gather_memory.h"
+#include "batch/gather_options.h"
+#include "batch/paging_controller.h"
+#include "bounce/bounce_crew.h"
+#include "bounce/bounce_radiosity.h"
+#include "core/guard.h"
+#include "core/parallel.h"
+#include "core/seconds_since.h"
+#include "octree/read/group_set.h"
+#include "octree/read/scene_file.h"
+#include "octree/read/scene_light.h"
+#include "octree/relight/radiosity_rewriter.h"
+#include "storage/block_writer.h"
+#include "storage/file.h"
+#include "storage/output_target.h"
+
+namespace surfeit {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kMostBounces = 100;
+constexpr int kMostSurfelsPerReceiver = 64;
+// What a bounced scene's provenance holds its bounces under.
+constexpr const char* kProvenanceKey = "bounce";
+
+GatherOptions gatherOptions(const BounceOptions& options) {
+  GatherOptions gather;
+  gather.mode = GatherMode::kBleeding;
+  gather.quality = options.quality;
+  gather.groups = options.groups;
+  gather.memory_bytes = options.memory_bytes;
+  gather.threads = options.threads;
+  gather.cache_split = options.cache_split;
+  gather.direct_io = options.direct_io;
+  gather.prefetch = false;
+  return gather;
+}
+
+Status checkOptions(const BounceOptions& options) {
+  const auto refuse = [](const char* what, int found, int most) {
+    return Status::invalidArgument(fmt::format("{} is {}, expected 1 to {}", what, found, most));
+  };
+  if (options.bounces < 1 || options.bounces > kMostBounces) {
+    return refuse("number of bounces", options.bounces, kMostBounces);
+  }
+  if (options.surfels_per_receiver < 1 || options.surfels_per_receiver > kMostSurfelsPerReceiver) {
+    return refuse("surfels per receiver", options.surfels_per_receiver, kMostSurfelsPerReceiver);
+  }
+  if (options.quality.sides != GatherSides::kFront && options.quality.sides != GatherSides::kBoth) {
+    return Status::invalidArgument("sides: found those that send no light, expected front or both");
+  }
+  return checkGatherOptions(gatherOptions(options));
+}
+
+class Bouncer {
+ public:
+  Bouncer(const std::string& scene_path, const std::string& result_path,
+          const BounceOptions& options, Progress& progress)
+      : scene_path_(scene_path),
+        result_path_(result_path),
+        options_(options),
+        gather_options_(withDefaults(gatherOptions(options))),
+        progress_(progress),
+        temporary_directory_(temporaryDirectory(options.temporary_directory, result_path)) {}
+
+  Result<BounceStats> run();
+
+ private:
+  Status checkScene() const;
+  Status checkMemory() const;
+  std::uint64_t bytesBesideGather() const;
+  std::uint64_t laterGrowthBytes() const;
+  GatherWork gatherWork() const;
+  Status gather(int bounce, SceneFile before, BounceRadiosity& radiosity, BouncePass& pass);
+  Result<SceneFile> write(int bounce, BounceRadiosity& radiosity, BouncePass& pass);
+  std::string phase(const char* what, int bounce) const;
+  int surfelsPerReceiver(int bounce) const {
+    return bounce < options_.bounces ? options_.surfels_per_receiver : 1;
+  }
+  std::string provenance() const;
+
+  const std::string& scene_path_;
+  const std::string& result_path_;
+  const BounceOptions& options_;
+  const GatherOptions gather_options_;
+  Progress& progress_;
+  const std::string temporary_directory_;
+  std::optional<SceneFile> scene_;
+  BounceStats stats_;
+};
+
+Result<BounceStats> Bouncer::run() {
+  if (result_path_ == scene_path_) {
+    return Status::invalidArgument(
+        fmt::format("{}: the result would replace the scene", scene_path_));
+  }
+  SURFEIT_ASSIGN_OR_RETURN(scene_, SceneFile::open(scene_path_, sceneAccess(gather_options_)));
+  SURFEIT_RETURN_IF_ERROR(checkScene());
+  SURFEIT_RETURN_IF_ERROR(checkMemory());
+  SURFEIT_RETURN_IF_ERROR(noteDarkness(*scene_, progress_));
+  {
+    // A result that cannot be written should not take hours to be refused
+    SURFEIT_ASSIGN_OR_RETURN(const AtomicFile probe, AtomicFile::create(result_path_));
+  }
+  stats_.surfels = scene_->header().surfel_count;
+  stats_.threads = gather_options_.threads;
+  stats_.memory_bytes = gather_options_.memory_bytes;
+
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile before,
+                           SceneFile::open(scene_path_, sceneAccess(gather_options_)));
+  for (int bounce = 1; bounce <= options_.bounces; ++bounce) {
+    BouncePass pass;
+    const std::uint64_t before_bytes = bounce > 1 ? before.fileBytes() : 0;
+    SURFEIT_ASSIGN_OR_RETURN(
+        BounceRadiosity radiosity,
+        BounceRadiosity::create(temporary_directory_, scene_->surfelPageCount()));
+    SURFEIT_RETURN_IF_ERROR(gather(bounce, std::move(before), radiosity, pass));
+    SURFEIT_RETURN_IF_ERROR(radiosity.finish());
+    SURFEIT_ASSIGN_OR_RETURN(before, write(bounce, radiosity, pass));
+    const std::uint64_t written = bounce < options_.bounces ? before.fileBytes() : 0;
+    stats_.temporary_bytes =
+        std::max(stats_.temporary_bytes, radiosity.fileBytes() + std::max(before_bytes, written));
+    stats_.passes.push_back(pass);
+  }
+  if (stats_.passes.front().largest_change == 0) {
+    progress_.note(fmt::format(
+        "warning: {}: no surfel receives light that it reflects; the result is as bright as the "
+        "scene",
+        result_path_));
+  }
+  return stats_;
+}
+
+// What a scene lacks shows before any work.
+Status Bouncer::checkScene() const {
+  const CloudChannels& channels = scene_->header().channels;
+  if (!channels.albedo) {
+    return Status::corruption(
+        fmt::format("{}: found no albedo, expected one for every surfel, to reflect light by: "
+                    "index clouds with albedo_r albedo_g albedo_b, as surfeit sample writes them",
+                    scene_path_));
+  }
+  if (!channels.radiosity) {
+    return Status::corruption(
+        fmt::format("{}: found no radiosity, expected the emission and direct light that bounces: "
+                    "index clouds with radiosity_r radiosity_g radiosity_b",
+                    scene_path_));
+  }
+  const nlohmann::json json = nlohmann::json::parse(scene_->provenance(), nullptr, false);
+  if (json.is_object() && json.contains(kProvenanceKey)) {
+    return Status::invalidArgument(
+        fmt::format("{}: holds bounces already, which would count again: expected the scene that "
+                    "it was made from",
+                    scene_path_));
+  }
+  return checkGroups(*scene_, options_.groups);
+}
+
+GatherWork Bouncer::gatherWork() const {
+  return {.rules = GatherRules(gather_options_),
+          .threads = gather_options_.threads,
+          .cache_split = options_.cache_split};
+}
+
+// What gathering and rewriting take beside what a gather of no receivers takes.
+std::uint64_t Bouncer::bytesBesideGather() const {
+  const auto threads = static_cast<std::uint64_t>(gather_options_.threads);
+  const std::uint64_t directory = scene_->pages().pageCount() * sizeof(PageEntry);
+  return 2 * directory + BounceRadiosity::memoryBytes(scene_->surfelPageCount()) +
+         threads * BounceCrew::threadBytes(*scene_, options_.surfels_per_receiver) +
+         BlockWriter::kDefaultBlocks * BlockWriter::kBlockBytes +
+         rewriteRadiosityBytes(*scene_, gather_options_.threads);
+}
+
+// What a gather of a later bounce may take more than one of the scene: pages may be a little
+// larger, stored and decompressed, by colors where there were none, of surfels or of nodes and
+// their facets.
+std::uint64_t Bouncer::laterGrowthBytes() const {
+  if (options_.bounces == 1) return 0;
+  const SceneHeader& header = scene_->header();
+  const std::uint64_t most_colors = std::max<std::uint64_t>(
+      header.surfel_group_capacity, std::uint64_t{header.node_group_capacity} * (1 + kMostFacets));
+  return static_cast<std::uint64_t>(gather_options_.threads) * 2 * most_colors * sizeof(glm::vec3);
+}
+
+Status Bouncer::checkMemory() const {
+  const std::uint64_t least =
+      leastGatherMemory(*scene_, gatherWork()) + bytesBesideGather() + laterGrowthBytes();
+  if (gather_options_.memory_bytes >= least) return {};
+  return Status::budgetTooSmall(fmt::format(
+      "a memory budget of {:.1f} MiB is too small for {} with {} {}: {} is the least that works",
+      double(gather_options_.memory_bytes) / (1 << 20), scene_path_, gather_options_.threads,
+      gather_options_.threads == 1 ? "thread" : "threads", formatMebibytes(least)));
+}
+
+std::string Bouncer::phase(const char* what, int bounce) const {
+  return fmt::format("{} {}/{}", what, bounce, options_.bounces);
+}
+
+Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity, BouncePass& pass) {
+  SURFEIT_ASSIGN_OR_RETURN(
+      const GatherMemory memory,
+      planGatherMemory(before, gather_options_.memory_bytes - bytesBesideGather(), gatherWork()));
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
+                           PagedOctree::create(std::move(before), memory.caches));
+  progress_.beginPhase(phase("bounce", bounce), stats_.surfels, "surfels");
+  const Clock::time_point begin = Clock::now();
+  PagingController controller(*octree,
+                              {.threads = gather_options_.threads,
+                               .adapts_split = options_.cache_split < 0,
+                               .prefetches = false,
+                               .memory_bytes = gather_options_.memory_bytes - bytesBesideGather(),
+                               .work = memory.work,
+                               .beside_bytes = bytesBesideGather(),
+                               .receivers = stats_.surfels,
+                               .least_node_frames = memory.caches.least_node_frames,
+                               .least_surfel_frames = memory.caches.least_surfel_frames},
+                              progress_);
+  BounceCrew crew({.scene = *scene_,
+                   .octree = *octree,
+                   .rules = GatherRules(gather_options_),
+                   .surfels_per_receiver = surfelsPerReceiver(bounce),
+                   .threads = gather_options_.threads,
+                   .radiosity = radiosity,
+                   .controller = controller,
+                   .progress = progress_});
+  SURFEIT_RETURN_IF_ERROR(crew.run());
+  controller.finish();
+  pass.receivers = crew.receivers();
+  pass.largest_change = crew.largestChange();
+  pass.gather_seconds = secondsSince(begin);
+  pass.node_cache = controller.nodeStats();
+  pass.surfel_cache = controller.surfelStats();
+  return {};
+}
+
+// The scene with this bounce: a file without a name, which is returned; at last the result, and
+// what is returned is the scene itself.
+Result<SceneFile> Bouncer::write(int bounce, BounceRadiosity& radiosity, BouncePass& pass) {
+  progress_.beginPhase(phase("write", bounce), stats_.surfels, "surfels");
+  const Clock::time_point begin = Clock::now();
+  const std::string text = provenance();
+  const std::uint64_t parts[] = {scene_->pages().identity(), radiosity.content(),
+                                 XXH3_64bits(text.data(), text.size())};
+  const std::uint64_t identity = XXH3_64bits(parts, sizeof parts);
+  const bool is_last = bounce == options_.bounces;
+  SURFEIT_ASSIGN_OR_RETURN(
+      PageFileWriter writer,
+      PageFileWriter::create(is_last ? result_path_ : temporary_directory_ + "/surfeit-bounce.sft",
+                             identity, scene_->header().format_version));
+  Result<glm::dvec3> mean = Status::failed("bounce: not written");
+  withThreads(gather_options_.threads, [&] {
+    mean = rewriteRadiosity(*scene_, radiosity, writer, gather_options_.threads, progress_);
+  });
+  SURFEIT_RETURN_IF_ERROR(mean.status());
+  pass.mean_radiosity = *mean;
+  const std::vector<std::byte> fields = rewrittenSceneFields(*scene_);
+  if (is_last) {
+    SURFEIT_RETURN_IF_ERROR(writer.finish(fields, text));
+    stats_.file_bytes = writer.fileBytes();
+    pass.write_seconds = secondsSince(begin);
+    return SceneFile();
+  }
+  SURFEIT_ASSIGN_OR_RETURN(PageFile pages, writer.finishUnnamed(fields, text));
+  pass.write_seconds = secondsSince(begin);
+  return SceneFile::open(std::move(pages));
+}
+
+// What the scene's says, and what decides about the bounces.
+std::string Bouncer::provenance() const {
+  nlohmann::json json = nlohmann::json::parse(scene_->provenance(), nullptr, false);
+  if (!json.is_object()) json = nlohmann::json::object();
+  const GatherQuality& quality = options_.quality;
+  json[kProvenanceKey] = {{"bounces", options_.bounces},
+                          {"surfels_per_receiver", options_.surfels_per_receiver},
+                          {"max_solid_angle", quality.max_solid_angle},
+                          {"raster_resolution", quality.raster_resolution},
+                          {"near_field_radii", quality.near_field_radii},
+                          {"bias", quality.bias},
+                          {"max_distance", quality.max_distance},
+                          {"both_sides", quality.sides == GatherSides::kBoth}};
+  if (options_.groups != kAllGroups) {
+    json[kProvenanceKey]["groups"] = describeGroups(options_.groups);
+  }
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+Result<BounceStats> bounceScene(const std::string& scene_path, const std::string& result_path,
+                                const BounceOptions& options, Progress& progress) {
+  return guarded(result_path, [&]() -> Result<BounceStats> {
+    SURFEIT_RETURN_IF_ERROR(checkOptions(options));
+    return Bouncer(scene_path, result_path, options, progress).run();
+  });
+}
+
+}  // namespace surfeit

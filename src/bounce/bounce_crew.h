@@ -1,0 +1,65 @@
+// The gather of one bounce: threads take the surfel pages of the scene in order, a stretch at a
+// time, gather at their surfels, and hand in the new radiosities.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "batch/paging_controller.h"
+#include "bounce/bounce_radiosity.h"
+#include "bounce/bounce_receivers.h"
+#include "core/first_failure.h"
+#include "gather/packet/packet_gatherer.h"
+#include "gather/rules/gather_rules.h"
+#include "octree/read/paged_octree.h"
+#include "octree/read/scene_file.h"
+#include "surfeit/gather.h"
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+class BounceCrew {
+ public:
+  // All that is referred to must outlive the crew.
+  struct Setup {
+    const SceneFile& scene;  // with B_0
+    PagedOctree& octree;     // the same scene with B_{k-1}
+    GatherRules rules;
+    int surfels_per_receiver = 1;
+    int threads = 1;
+    BounceRadiosity& radiosity;  // gets B_k
+    PagingController& controller;
+    Progress& progress;
+  };
+  explicit BounceCrew(const Setup& setup) : setup_(setup) {}
+
+  // Gathers at all pages. Returns the first failure; kInterrupted when the progress is cancelled.
+  // Once.
+  Status run();
+
+  // After run().
+  std::uint64_t receivers() const { return receivers_; }
+  double largestChange() const { return double(largest_change_.load()); }
+
+  // Bytes of a thread beside gatherer, reader and caches.
+  static std::uint64_t threadBytes(const SceneFile& scene, int surfels_per_receiver);
+
+ private:
+  struct Stretch;
+
+  Status gatherStretches();
+  Status load(std::uint32_t first_page, PagedOctree::Reader& reader, Stretch& stretch) const;
+  Status gather(PacketGatherer& gatherer, PagedOctree::Reader& reader, Stretch& stretch) const;
+  Status handIn(std::uint32_t first_page, Stretch& stretch);
+  void noteChange(float change);
+
+  const Setup setup_;
+  FirstFailure failure_;
+  std::atomic<std::uint32_t> next_page_{0};
+  std::atomic<std::uint64_t> receivers_{0};
+  std::atomic<float> largest_change_{0};
+};
+
+}  // namespace surfeit

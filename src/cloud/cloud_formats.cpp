@@ -1,0 +1,244 @@
+#include "cloud/cloud_formats.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "cloud/color_reader.h"
+#include "cloud/exr/exr_reader.h"
+#include "cloud/exr/exr_writer.h"
+#include "cloud/houdini/bgeo_ascii_reader.h"
+#include "cloud/houdini/bgeo_json_reader.h"
+#include "cloud/houdini/bgeo_reader.h"
+#include "cloud/houdini/bgeo_writer.h"
+#include "cloud/moved_positions.h"
+#include "cloud/particles/pdb_reader.h"
+#include "cloud/particles/pdb_writer.h"
+#include "cloud/particles/prt2_reader.h"
+#include "cloud/particles/prt_reader.h"
+#include "cloud/particles/prt_writer.h"
+#include "cloud/particles/ptc_reader.h"
+#include "cloud/particles/ptc_writer.h"
+#include "cloud/ply/ply_rows.h"
+#include "cloud/scans/las_reader.h"
+#include "cloud/scans/las_writer.h"
+#include "cloud/scans/pcd_reader.h"
+#include "cloud/scans/ptx_reader.h"
+#include "cloud/text/xyz_reader.h"
+#include "cloud/text/xyz_writer.h"
+#include "cloud/vdb/vdb_output.h"
+#include "cloud/vdb/vdb_reader.h"
+#include "cloud/vdb/vdb_writer.h"
+#include "core/up_comment.h"
+#include "storage/byte_output.h"
+
+namespace surfeit {
+namespace {
+
+// Formats with a magic first; text, which is recognised by looking at more, last.
+constexpr CloudFormat kFormats[] = {
+    {"PLY", ".ply", recognisesPly, openPlyRows, createPlyRows, CloudFormat::kStatesUp},
+    {"OpenEXR", ".exr", recognisesExr, openExr, createExr,
+     CloudFormat::kReadInPlaces | CloudFormat::kFloatPositions},
+    {"PTC", ".ptc", recognisesPtc, openPtc, createPtc, CloudFormat::kFloatPositions},
+    {"OpenVDB", ".vdb", recognisesVdb, openVdb, createVdb,
+     CloudFormat::kReadInPlaces | CloudFormat::kStatesUp},
+    {"LAS", ".las", recognisesLas, openLas, createLas, CloudFormat::kHasUpZ},
+    {"PCD", "", recognisesPcd, openPcd, nullptr},
+    {"PRT", ".prt", recognisesPrt, openPrt, createPrt},
+    {"PRT 2", "", recognisesPrt2, openPrt2, nullptr},
+    {"BGEO", ".bgeo", recognisesBgeo, openBgeo, createBgeo, CloudFormat::kFloatPositions},
+    {"BGEO", "", recognisesBgeoJson, openBgeoJson, nullptr},
+    {"GEO", "", recognisesBgeoAscii, openBgeoAscii, nullptr},
+    {"PDB", ".pdb", recognisesPdb, openPdb, createPdb, CloudFormat::kFloatPositions},
+    // Text stands last
+    {"PTX", "", recognisesPtx, openPtx, nullptr},
+    {"xyz text", ".xyz .txt .asc .csv", recognisesXyz, openXyz, createXyz, CloudFormat::kStatesUp},
+};
+
+// Known formats that are not read, and what to do instead.
+struct OtherFormat {
+  std::string_view magic, name, advice;
+};
+using namespace std::string_view_literals;
+constexpr std::string_view kSceneMagic = "\x89SFT";
+constexpr std::string_view kPictureAdvice =
+    "pictures are textures of `sample` and environments of `gather`; passes are .exr";
+constexpr OtherFormat kOtherFormats[] = {
+    {kSceneMagic, "a Surfeit scene (.sft)", "give the cloud that it was indexed from"},
+    {"surfeit-recipe"sv, "a recipe of `surfeit generate`", "give it to `surfeit index`"},
+    {"ASTM-E57"sv, "E57",
+     "convert it to LAS or PLY first: `pdal translate IN.e57 OUT.las`, CloudCompare 2.12 or later, "
+     "or Python (`pip install pye57`)"},
+    {"ICECACHE"sv, "a particle cache of Softimage ICE",
+     "save it as .bgeo, .prt or .pdb (partconv)"},
+    {"scf1"sv, "compressed geometry of Houdini (.bgeo.sc)",
+     "save it as .bgeo or .bgeo.gz (gconvert)"},
+    {"[\"fileversion"sv, "Houdini's geometry as text (.geo)", "save it as .bgeo (gconvert)"},
+    {"[\n\t\"fileversion"sv, "Houdini's geometry as text (.geo)", "save it as .bgeo (gconvert)"},
+    {"NGSP"sv, "SPZ", "convert it to the PLY of Gaussian splats first"},
+    {"Ogawa"sv, "Alembic", "save the points as PLY, .bgeo or .vdb"},
+    {"\x89HDF"sv, "HDF5 (Alembic)", "save the points as PLY, .bgeo or .vdb"},
+    {"PXR-USDC"sv, "USD", "save the points as PLY, .bgeo or .vdb"},
+    {"#usda"sv, "USD", "save the points as PLY, .bgeo or .vdb"},
+    {"HAIR"sv, "HAIR", "convert its strands to points or meshes first"},
+    {"#?RADIANCE"sv, "a Radiance picture", kPictureAdvice},
+    {"#?RGBE"sv, "a Radiance picture", kPictureAdvice},
+    {"\xFF\xD8\xFF"sv, "a JPEG picture", kPictureAdvice},
+    {"\x89PNG"sv, "a PNG picture", kPictureAdvice},
+    {"\xFF\xFE"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
+    {"\xFE\xFF"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
+    {"PK\x03\x04"sv, "a ZIP archive", "unpack it first"},
+    {"BZh"sv, "bzip2", "unpack it first; gzip and zstd are read as they are"},
+    {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},
+};
+
+// "PLY, PTC and PRT"
+std::string namesOfRead() {
+  std::vector<std::string_view> names;
+  for (const CloudFormat& format : kFormats) {
+    const bool is_new = std::find(names.begin(), names.end(), format.name) == names.end();
+    if (format.open != nullptr && is_new) names.push_back(format.name);
+  }
+  const std::string_view last = names.back();
+  names.pop_back();
+  return names.empty() ? std::string(last) : fmt::format("{} and {}", fmt::join(names, ", "), last);
+}
+
+std::string extensionsWritten() {
+  std::string text;
+  for (const CloudFormat& format : kFormats) {
+    if (format.create == nullptr) continue;
+    text += (text.empty() ? "" : " ") + std::string(format.extensions);
+  }
+  return text;
+}
+
+Status unknownFormat(const std::string& path, std::string_view first_bytes) {
+  for (const OtherFormat& other : kOtherFormats) {
+    if (first_bytes.starts_with(other.magic)) {
+      return Status::corruption(fmt::format("{}: found {}, which is not read as a cloud: {}", path,
+                                            other.name, other.advice));
+    }
+  }
+  return Status::corruption(fmt::format(
+      "{}: found {} at 0, expected a cloud ({}); `surfeit sample` makes one of a mesh (.obj)", path,
+      quoteText(first_bytes.substr(0, 4)), namesOfRead()));
+}
+
+// Whether a list of extensions, separated by blanks, has one that `path` ends with.
+bool hasExtension(std::string_view path, std::string_view extensions) {
+  while (!extensions.empty()) {
+    const std::size_t end = std::min(extensions.find(' '), extensions.size());
+    const std::string_view extension = extensions.substr(0, end);
+    if (!extension.empty() && path.size() > extension.size() && path.ends_with(extension)) {
+      return true;
+    }
+    extensions.remove_prefix(std::min(end + 1, extensions.size()));
+  }
+  return false;
+}
+
+// Tells apart what a filter takes of files.
+std::string selectionKey(const std::string& path, const RowReaderOptions& options) {
+  std::string key = path + '\n' + options.part + '\n' + options.filter;
+  for (const ChannelRename& rename : options.channels) {
+    key += '\n' + rename.from + '=' + rename.to;
+  }
+  return key;
+}
+
+}  // namespace
+
+std::span<const CloudFormat> cloudFormats() { return kFormats; }
+
+bool isSceneFile(std::string_view first_bytes) { return first_bytes.starts_with(kSceneMagic); }
+
+Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
+                                                 const RowReaderOptions& options) {
+  std::string first_bytes(kMagicBytes, '\0');
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                           input.readSome(0, std::as_writable_bytes(std::span(first_bytes))));
+  first_bytes.resize(size);
+  for (const CloudFormat& format : kFormats) {
+    if (format.open == nullptr || !format.recognises(first_bytes)) continue;
+    if (input.isCompressed() && format.has(CloudFormat::kReadInPlaces)) {
+      return Status::corruption(
+          fmt::format("{}: found {} compressed as a whole, expected it as it is: unpack it first "
+                      "(gunzip, unzstd)",
+                      path, format.name));
+    }
+    SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, format.open(path, options));
+    SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(reader->element(), path));
+    SURFEIT_ASSIGN_OR_RETURN(
+        reader, filterRows(std::move(reader), options.filter, selectionKey(path, options),
+                           options.selections.get()));
+    if (options.color_range) return readColors(std::move(reader), *options.color_range);
+    return reader;
+  }
+  return unknownFormat(path, first_bytes);
+}
+
+Result<std::optional<ColorRange>> colorRangeFor(std::span<const std::string> inputs,
+                                                const std::string& output, ColorRange asked) {
+  const std::optional<ColorRange> as_asked = asked;
+  if (asked != ColorRange::kAuto || !hasExtension(withoutCompression(output), ".las")) {
+    return as_asked;
+  }
+  for (const std::string& path : inputs) {
+    std::string first_bytes(8, '\0');
+    SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                             input.readSome(0, std::as_writable_bytes(std::span(first_bytes))));
+    if (!recognisesLas(std::string_view(first_bytes).substr(0, size))) return as_asked;
+  }
+  return std::optional<ColorRange>();
+}
+
+std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes) {
+  return hasExtension(path, ".vdb") ? count * (row_bytes + sizeof(VdbEntry)) : 0;
+}
+
+namespace {
+
+// Tells when what is up in the rows will not be known from the file. Pictures stay what they are.
+void noteLostUpAxis(const std::string& path, const CloudFormat& format,
+                    const RowWriterOptions& options) {
+  const UpAxis up = statedUpAxis(options.comments).value_or(kDefaultUpAxis);
+  const UpAxis own = format.has(CloudFormat::kHasUpZ) ? UpAxis::kZ : kDefaultUpAxis;
+  const bool is_csv = hasExtension(withoutCompression(path), ".csv");
+  const bool states_up = format.has(CloudFormat::kStatesUp) && !is_csv;
+  if (states_up || own == up || options.progress == nullptr) return;
+  if (format.create == createExr) return;
+  options.progress->note(
+      fmt::format("{}: {} has no place for the up axis, {}: give --up {} where it is read", path,
+                  is_csv ? "CSV" : format.name, upAxisName(up), upAxisName(up)));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
+                                                   const RowWriterOptions& options) {
+  // Standard output has no name: it is PLY, or what follows the dash (-.csv)
+  const std::string_view name = path == "-" ? std::string_view("-.ply") : withoutCompression(path);
+  RowWriterOptions writing = options;
+  if (writing.like != nullptr) writing.like = &writing.like->file();
+  for (const CloudFormat& format : kFormats) {
+    if (format.create != nullptr && hasExtension(name, format.extensions)) {
+      noteLostUpAxis(path, format, writing);
+      SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> writer, format.create(path, writing));
+      return format.has(CloudFormat::kFloatPositions) ? watchPositions(std::move(writer))
+                                                      : std::move(writer);
+    }
+  }
+  return Status::invalidArgument(fmt::format(
+      "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it; - "
+      "is PLY to standard output, -.csv CSV",
+      path, extensionsWritten()));
+}
+
+}  // namespace surfeit

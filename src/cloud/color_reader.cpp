@@ -1,0 +1,424 @@
+#include "cloud/color_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "cloud/channels.h"
+#include "cloud/color_sample.h"
+#include "cloud/srgb_curve.h"
+
+namespace surfeit {
+namespace {
+
+// Linear light rarely has a mean so far above white, and codes of 8 bits mostly do.
+constexpr double kSuspectMean = 16;
+// One number for a color: [ alpha : 8 | red : 8 | green : 8 | blue : 8 ].
+constexpr std::string_view kPackedNames[] = {"rgb", "rgba"};
+
+bool isPackedName(std::string_view name) {
+  return std::find(std::begin(kPackedNames), std::end(kPackedNames), name) !=
+         std::end(kPackedNames);
+}
+
+// Of the three codes.
+std::vector<std::string> unpackedNames(const std::string& packed) {
+  return propertyNames(isPackedName(packed) ? "color" : packed, 3, ChannelKind::kColor, {});
+}
+
+// What is done to the numbers of a property. They become others at the same place of a row.
+struct Change {
+  enum class Kind {
+    kCode8,         // a whole number up to 255 becomes uchar
+    kCode16,        // up to 65535: ushort
+    kLight8,        // a code becomes scene-linear, of 8 bits
+    kLight16,       // of 16 bits
+    kPackedNumber,  // three codes in a whole number
+    kPackedBits     // or in the bits of an integer or float
+  };
+  Kind kind = Kind::kCode8;
+  RowProperty property;       // as the file has it
+  bool takes_larger = false;  // as the largest code, instead of refusing them
+
+  double most() const { return kind == Kind::kCode16 || kind == Kind::kLight16 ? 65535 : 255; }
+};
+
+template <typename T>
+T load(const std::byte* bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+template <typename T>
+void store(std::byte* bytes, T value) {
+  std::memcpy(bytes, &value, sizeof value);
+}
+
+// The code, or -1 when the value is none. Signed integers of 8 and 16 bits stand for their bits.
+template <typename T>
+double codeOf(T value, const Change& change) {
+  double code;
+  if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
+    code = static_cast<double>(static_cast<std::make_unsigned_t<T>>(value));
+  } else {
+    code = static_cast<double>(value);
+  }
+  if (!(code >= 0 && code == std::floor(code))) return -1;
+  if (code > change.most()) return change.takes_larger ? change.most() : -1;
+  return code;
+}
+
+// Each returns the number of rows done: less than `count` when the next one's value is none.
+template <typename T>
+std::size_t toCodes(const Change& change, std::byte* row, std::size_t count,
+                    std::size_t row_bytes) {
+  std::byte* at = row + change.property.offset;
+  for (std::size_t i = 0; i < count; ++i, at += row_bytes) {
+    const double code = codeOf(load<T>(at), change);
+    if (code < 0) return i;
+    if (change.kind == Change::Kind::kCode16) {
+      store(at, static_cast<std::uint16_t>(code));
+    } else {
+      store(at, static_cast<std::uint8_t>(code));
+    }
+  }
+  return count;
+}
+
+// What is no code, below 0 or not finite, stays: the mapping to surfels tells.
+template <typename T>
+std::size_t toLight(const Change& change, std::byte* row, std::size_t count,
+                    std::size_t row_bytes) {
+  std::byte* at = row + change.property.offset;
+  for (std::size_t i = 0; i < count; ++i, at += row_bytes) {
+    const double value = static_cast<double>(load<T>(at));
+    if (value >= 0) store(at, static_cast<T>(linearFromSrgbCode(value / change.most())));
+  }
+  return count;
+}
+
+template <typename T>
+std::size_t unpack(const Change& change, std::byte* row, std::size_t count, std::size_t row_bytes) {
+  std::byte* at = row + change.property.offset;
+  for (std::size_t i = 0; i < count; ++i, at += row_bytes) {
+    const T value = load<T>(at);
+    std::uint32_t bits;
+    if constexpr (std::is_integral_v<T>) {
+      bits = static_cast<std::uint32_t>(value);
+    } else if (change.kind == Change::Kind::kPackedNumber) {
+      if (!(value >= 0 && value <= 4294967295.0 && value == std::floor(value))) return i;
+      bits = static_cast<std::uint32_t>(value);
+    } else {
+      bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+    }
+    const std::uint8_t codes[4] = {
+        static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
+        static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 24)};
+    std::memcpy(at, codes, sizeof codes);
+  }
+  return count;
+}
+
+std::size_t apply(const Change& change, std::byte* rows, std::size_t count, std::size_t row_bytes) {
+  return visitValueType(change.property.type, [&]<typename T>(std::type_identity<T>) {
+    switch (change.kind) {
+      case Change::Kind::kCode8:
+      case Change::Kind::kCode16:
+        if constexpr (sizeof(T) >= 2) return toCodes<T>(change, rows, count, row_bytes);
+        return count;  // bytes are codes, signed or not
+      case Change::Kind::kLight8:
+      case Change::Kind::kLight16:
+        if constexpr (std::is_floating_point_v<T>) {
+          return toLight<T>(change, rows, count, row_bytes);
+        }
+        return count;
+      default:
+        if constexpr (sizeof(T) >= 4) return unpack<T>(change, rows, count, row_bytes);
+        return count;
+    }
+  });
+}
+
+class ColorReader final : public RowReader {
+ public:
+  ColorReader(std::unique_ptr<RowReader> reader, RowLayout element, std::vector<Change> changes,
+              std::vector<std::string> notes)
+      : reader_(std::move(reader)),
+        element_(std::move(element)),
+        changes_(std::move(changes)),
+        notes_(std::move(notes)) {}
+
+  const std::string& path() const override { return reader_->path(); }
+  std::string formatName() const override { return reader_->formatName(); }
+  const RowLayout& element() const override { return element_; }
+  std::vector<std::string> comments() const override { return reader_->comments(); }
+  const RowReader& file() const override { return reader_->file(); }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = reader_->notes();
+    notes.insert(notes.end(), notes_.begin(), notes_.end());
+    return notes;
+  }
+
+  Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
+    SURFEIT_RETURN_IF_ERROR(failure_);
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes view, reader_->readRows(max_rows, buffer));
+    if (view.empty()) return view;
+    const std::size_t row_bytes = element_.row_bytes, count = view.size() / row_bytes;
+    std::byte* const rows = buffer.data() + (view.data() - buffer.data());
+    for (const Change& change : changes_) {
+      const std::size_t done = apply(change, rows, count, row_bytes);
+      if (done == count) continue;
+      failure_ = misfit(change, rows + done * row_bytes, row_ + done);
+      return failure_;
+    }
+    row_ += count;
+    return view;
+  }
+
+  Status rewind() override {
+    row_ = 0;
+    failure_ = {};
+    return reader_->rewind();
+  }
+  bool isSeekable() const override { return reader_->isSeekable(); }
+  Status seekRow(std::uint64_t row) override {
+    SURFEIT_RETURN_IF_ERROR(reader_->seekRow(row));
+    row_ = row;
+    failure_ = {};
+    return {};
+  }
+
+ private:
+  Status misfit(const Change& change, const std::byte* row, std::uint64_t record) const {
+    const RowProperty& property = change.property;
+    return Status::corruption(fmt::format(
+        "{}: record {}: found {} as {}, expected a whole number up to {}, as a sample of the cloud "
+        "has: --color-range 8, 16 or unit says what colors are",
+        path(), record, rowValue(row + property.offset, property.type), property.name,
+        change.kind == Change::Kind::kPackedNumber ? 4294967295.0 : change.most()));
+  }
+
+  std::unique_ptr<RowReader> reader_;
+  RowLayout element_;
+  std::vector<Change> changes_;
+  std::vector<std::string> notes_;
+  std::uint64_t row_ = 0;  // that comes next
+  Status failure_;
+};
+
+// "floats", "ushort"
+std::string_view typeText(ValueType type) {
+  if (type == ValueType::kFloat32) return "floats";
+  if (type == ValueType::kFloat64) return "doubles";
+  return valueTypeName(type);
+}
+
+// Decides what the numbers of the colors of one reader become.
+class ColorPlan {
+ public:
+  ColorPlan(const RowReader& reader, ColorRange range)
+      : reader_(reader), range_(range), element_(reader.element()) {}
+
+  // What needs a sample; none: all colors are plain.
+  std::vector<ColorSample> findColors() const {
+    std::vector<ColorSample> samples;
+    const RowLayout& element = reader_.element();
+    bool has_color = false;
+    for (const RowChannel& channel : channelsOf(element)) {
+      has_color = has_color || channel.name == "color";
+      const bool is_color = channel.properties.size() == 3 &&
+                            (channel.name == "color" || channel.name == "albedo" ||
+                             (channel.name == "radiosity" && !isFloatType(channel.type)));
+      if (!is_color || channel.type == ValueType::kUint8) continue;
+      ColorSample sample{channel.name, channel.properties, channel.type};
+      const bool is_real = isFloatType(channel.type);
+      sample.is_decided = is_real ? range_ == ColorRange::kUnit : isCodeGiven();
+      if (is_real && sample.is_decided) continue;
+      samples.push_back(std::move(sample));
+    }
+    for (std::size_t i = 0; i < element.properties.size(); ++i) {
+      if (!isPacked(element.properties[i], has_color)) continue;
+      ColorSample sample{element.properties[i].name, {i}, element.properties[i].type};
+      sample.is_decided = !isFloatType(sample.type);
+      samples.push_back(std::move(sample));
+      has_color = true;
+    }
+    return samples;
+  }
+
+  Status decide(const ColorSample& sample, bool is_whole) {
+    sampled_ = is_whole ? "the largest is" : "the largest of a sample is";
+    if (sample.isPacked()) {
+      addPacked(sample);
+      return {};
+    }
+    if (isFloatType(sample.type)) {
+      decideReals(sample);
+      return {};
+    }
+    return decideIntegers(sample);
+  }
+
+  bool changes() const { return !changes_.empty() || !notes_.empty(); }
+
+  std::unique_ptr<RowReader> apply(std::unique_ptr<RowReader> reader) {
+    return std::make_unique<ColorReader>(std::move(reader), std::move(element_),
+                                         std::move(changes_), std::move(notes_));
+  }
+
+ private:
+  using Kind = Change::Kind;
+
+  bool isCodeGiven() const { return range_ == ColorRange::k8 || range_ == ColorRange::k16; }
+
+  // Three values in one: rgb and rgba, where there is no other color; integers also as what the
+  // user calls albedo or radiosity.
+  bool isPacked(const RowProperty& property, bool has_color) const {
+    if (property.is_list || valueTypeBytes(property.type) < 4) return false;
+    const bool is_packed = isPackedName(property.name)
+                               ? !has_color
+                               : !isFloatType(property.type) &&
+                                     (property.name == "albedo" || property.name == "radiosity");
+    if (!is_packed) return false;
+    const std::vector<std::string> names = unpackedNames(property.name);
+    return std::none_of(names.begin(), names.end(), [&](const std::string& name) {
+      return reader_.element().find(name) != nullptr;
+    });
+  }
+
+  void add(const ColorSample& sample, Kind kind, bool takes_larger = false) {
+    for (const std::size_t i : sample.properties) {
+      RowProperty& property = element_.properties[i];
+      if (property.type == ValueType::kUint8) continue;  // of a triple of several types
+      changes_.push_back({kind, property, takes_larger});
+      if (kind == Kind::kCode8 || valueTypeBytes(property.type) == 1)
+        property.type = ValueType::kUint8;
+      else if (kind == Kind::kCode16)
+        property.type = ValueType::kUint16;
+    }
+  }
+
+  // "colors are 0-255 in floats (the largest of a sample is 255): " and what follows.
+  void note(const ColorSample& sample, std::string_view range, std::string_view what) {
+    if (!sample.hasLight()) return;  // black either way
+    const std::string name = sample.channel == "color" ? "colors" : sample.channel + " colors";
+    notes_.push_back(fmt::format("{} are {} in {} ({} {}): {}", name, range, typeText(sample.type),
+                                 sampled_, sample.largest, what));
+  }
+
+  void decideReals(const ColorSample& sample) {
+    if (isCodeGiven()) {
+      const bool is_8 = range_ == ColorRange::k8;
+      add(sample, is_8 ? Kind::kLight8 : Kind::kLight16);
+      notes_.push_back(
+          fmt::format("{} in {} become scene-linear from sRGB of {} bits, as "
+                      "--color-range says",
+                      sample.channel, typeText(sample.type), is_8 ? 8 : 16));
+    } else if (sample.largest > 1 && sample.areBytes()) {
+      add(sample, sample.has_non_finite ? Kind::kLight8 : Kind::kCode8);
+      note(sample, "0-255", "read as sRGB of 8 bits; --color-range unit reads them as linear");
+    } else if (sample.largest > 255 && sample.are_wholes && sample.least >= 0) {
+      note(sample, "whole numbers",
+           "read as linear light; --color-range 16 reads them as sRGB of 16 bits");
+    } else if (sample.largest <= 255.5 && sample.meanOfPositive() > kSuspectMean) {
+      note(sample, fmt::format("{:.0f} on average", sample.meanOfPositive()),
+           "read as linear light; --color-range 8 reads them as sRGB of 8 bits");
+    }
+  }
+
+  Status decideIntegers(const ColorSample& sample) {
+    const std::size_t bytes = valueTypeBytes(sample.type);
+    const bool is_signed = sample.type == ValueType::kInt8 || sample.type == ValueType::kInt16;
+    if (isCodeGiven()) {
+      const bool is_8 = range_ == ColorRange::k8;
+      if (!is_8 && sample.type == ValueType::kUint16) return {};
+      add(sample, is_8 ? Kind::kCode8 : Kind::kCode16, true);
+      notes_.push_back(fmt::format(
+          "{} in {}: sRGB of {} bits, as --color-range says; what is above {} counts as that",
+          sample.channel, valueTypeName(sample.type), is_8 ? 8 : 16, is_8 ? 255 : 65535));
+    } else if (sample.type == ValueType::kInt8) {
+      add(sample, Kind::kCode8);
+      note(sample, "char", "read as sRGB of 8 bits, without a sign");
+    } else if (sample.type == ValueType::kUint16 && sample.largest <= 0) {
+      return {};  // black either way
+    } else if (sample.least >= 0 && sample.largest <= 255) {
+      add(sample, Kind::kCode8);
+      note(sample, "0-255", "read as sRGB of 8 bits; --color-range 16 reads them as 16 bits");
+    } else if (sample.type == ValueType::kUint16) {
+      return {};
+    } else if (bytes == 2 || (sample.least >= 0 && sample.largest <= 65535)) {
+      add(sample, Kind::kCode16);
+      note(sample, "above 255",
+           is_signed ? "read as sRGB of 16 bits, without a sign" : "read as sRGB of 16 bits");
+    } else if (sample.positive > 0 || sample.least < 0) {
+      const RowProperty& property = element_.properties[sample.properties[0]];
+      return Status::corruption(fmt::format(
+          "{}: found {} to {} in property {} of type {}, expected colors of 0 to 255 or 65535 "
+          "(--channels {}=- reads no colors)",
+          reader_.path(), sample.least, sample.largest, property.name, valueTypeName(property.type),
+          sample.channel));
+    }
+    return {};
+  }
+
+  // The properties of the color, in place of the one.
+  void addPacked(const ColorSample& sample) {
+    const std::size_t index = sample.properties[0];
+    const RowProperty packed = element_.properties[index];
+    const bool is_number = isFloatType(packed.type) && !sample.has_non_finite && sample.are_wholes;
+    changes_.push_back({is_number ? Kind::kPackedNumber : Kind::kPackedBits, packed});
+    std::vector<std::string> names = unpackedNames(packed.name);
+    if (packed.name == kPackedNames[1] && element_.find("alpha") == nullptr) {
+      names.emplace_back("alpha");
+    }
+    std::vector<RowProperty> codes;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      codes.push_back({names[i], ValueType::kUint8, false, ValueType::kUint8, packed.offset + i});
+    }
+    const auto at = element_.properties.begin() + static_cast<std::ptrdiff_t>(index);
+    element_.properties.insert(element_.properties.erase(at), codes.begin(), codes.end());
+    notes_.push_back(fmt::format(
+        "{} is a color packed into {} of type {}: read as{}", packed.name,
+        is_number || !isFloatType(packed.type) ? "whole numbers" : "the bits of numbers",
+        valueTypeName(packed.type), fmt::format(" {}", fmt::join(names, " "))));
+  }
+
+  const RowReader& reader_;
+  const ColorRange range_;
+  RowLayout element_;
+  std::vector<Change> changes_;
+  std::vector<std::string> notes_;
+  std::string_view sampled_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<RowReader>> readColors(std::unique_ptr<RowReader> reader, ColorRange range) {
+  ColorPlan plan(*reader, range);
+  std::vector<ColorSample> samples = plan.findColors();
+  if (samples.empty()) return reader;
+  bool is_whole = false;
+  if (std::any_of(samples.begin(), samples.end(),
+                  [](const ColorSample& sample) { return !sample.is_decided; })) {
+    SURFEIT_ASSIGN_OR_RETURN(is_whole, sampleColors(*reader, samples));
+  }
+  // Packed ones last, and from the back: each puts more properties in its place
+  std::stable_sort(samples.begin(), samples.end(), [](const ColorSample& a, const ColorSample& b) {
+    if (a.isPacked() != b.isPacked()) return b.isPacked();
+    return a.isPacked() && a.properties[0] > b.properties[0];
+  });
+  for (const ColorSample& sample : samples) SURFEIT_RETURN_IF_ERROR(plan.decide(sample, is_whole));
+  if (!plan.changes()) return reader;
+  return plan.apply(std::move(reader));
+}
+
+}  // namespace surfeit

@@ -1,0 +1,42 @@
+// What the numbers of a color are like, by a sample of the whole cloud.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cloud/row_layout.h"
+#include "cloud/row_reader.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// The properties of a color, and what was seen of their values.
+struct ColorSample {
+  std::string channel;                  // color, radiosity, albedo; of one property: packed
+  std::vector<std::size_t> properties;  // indices into the element's
+  ValueType type = ValueType::kUint8;   // the widest of them
+  bool is_decided = false;              // whatever its values are
+
+  double least = std::numeric_limits<double>::infinity();
+  double largest = -std::numeric_limits<double>::infinity();
+  double sum_of_positive = 0;
+  std::uint64_t positive = 0;
+  bool are_wholes = true;
+  bool has_non_finite = false;
+
+  bool isPacked() const { return properties.size() == 1; }
+  bool hasLight() const { return positive > 0 || least < 0; }
+  double meanOfPositive() const { return positive > 0 ? sum_of_positive / double(positive) : 0; }
+  bool areBytes() const { return are_wholes && least >= 0 && largest <= 255; }
+};
+
+// Looks at the rows and goes back to the first. Returns whether all rows were seen: of long clouds
+// a sample of many places is enough, and reading ends when nothing is left to find out (reals that
+// are no whole numbers, integers that need all their bits). What cannot be read counts as the end:
+// whoever reads the rows is told.
+Result<bool> sampleColors(RowReader& reader, std::vector<ColorSample>& samples);
+
+}  // namespace surfeit

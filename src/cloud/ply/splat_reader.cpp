@@ -1,0 +1,202 @@
+#include "cloud/ply/splat_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "cloud/srgb_curve.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kBlockRows = 4096;
+constexpr double kLeastCoverage = 1e-6;
+
+constexpr const char* kNeeded[] = {"x",      "y",       "z",       "f_dc_0",  "f_dc_1",
+                                   "f_dc_2", "opacity", "scale_0", "scale_1", "rot_0",
+                                   "rot_1",  "rot_2",   "rot_3"};
+constexpr const char* kThirdScale = "scale_2";
+
+// What disks have instead; files bring normals that mean nothing.
+constexpr const char* kFloats[] = {"nx",    "ny",   "nz",      "radius",  "red",
+                                   "green", "blue", "opacity", "coverage"};
+constexpr const char* kTwoSided = "two_sided";
+
+bool isReplaced(std::string_view name) {
+  const auto has = [&](std::span<const char* const> names) {
+    return std::any_of(names.begin(), names.end(),
+                       [&](const char* other) { return name == other; });
+  };
+  return has(std::span(kNeeded).subspan(3)) || has(kFloats) || name == kThirdScale ||
+         name == kTwoSided || name.starts_with("f_rest_");
+}
+
+// A value of a splat, in its row.
+struct Field {
+  std::size_t offset = 0;
+  ValueType type = ValueType::kFloat32;
+
+  double of(const std::byte* row) const {
+    if (type != ValueType::kFloat32) return rowValue(row + offset, type);
+    float value;
+    std::memcpy(&value, row + offset, sizeof value);
+    return double{value};
+  }
+};
+
+class SplatReader final : public RowReader {
+ public:
+  explicit SplatReader(std::unique_ptr<RowReader> splats) : splats_(std::move(splats)) {
+    const RowLayout& from = splats_->element();
+    element_.name = from.name;
+    element_.count = from.count;
+    for (const RowProperty& property : from.properties) {
+      if (property.is_list || isReplaced(property.name)) {
+        rest_count_ += property.name.starts_with("f_rest_") ? 1 : 0;
+        continue;
+      }
+      copies_.push_back(property.offset);
+      element_.properties.push_back(property);
+    }
+    for (const char* name : kFloats) element_.properties.push_back({name, ValueType::kFloat32});
+    element_.properties.push_back({kTwoSided, ValueType::kUint8});
+    packRow(element_);
+    for (std::size_t i = 0; i < std::size(kNeeded); ++i) fields_[i] = fieldOf(kNeeded[i]);
+    has_third_scale_ = from.find(kThirdScale) != nullptr;
+    if (has_third_scale_) third_scale_ = fieldOf(kThirdScale);
+  }
+
+  const std::string& path() const override { return splats_->path(); }
+  std::string formatName() const override { return splats_->formatName() + " of Gaussian splats"; }
+  const RowLayout& element() const override { return element_; }
+  std::vector<std::string> comments() const override { return splats_->comments(); }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = splats_->notes();
+    notes.push_back("Gaussian splats are read as disks of radius sqrt(2 s1 s2), two-sided");
+    notes.push_back("their opacity becomes the part of its area that a disk covers");
+    notes.push_back("splats of an opacity below 1/255 keep their rows");
+    if (rest_count_ > 0) {
+      notes.push_back(
+          fmt::format("colors by direction, f_rest_0 to f_rest_{}, are not kept", rest_count_ - 1));
+    }
+    return notes;
+  }
+
+  Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
+    std::size_t count = 0;
+    const auto most =
+        static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, element_.count - next_row_));
+    buffer.reserve(std::max<std::size_t>(1, most) * element_.row_bytes);
+    while (true) {
+      // At the end too, where the reader looks at what follows
+      SURFEIT_ASSIGN_OR_RETURN(
+          const Bytes rows,
+          splats_->readRows(std::clamp<std::size_t>(most - count, 1, kBlockRows), splat_rows_));
+      const std::size_t row_bytes = splats_->element().row_bytes;
+      const std::size_t got = rows.size() / row_bytes;
+      for (std::size_t i = 0; i < got; ++i) {
+        decode(rows.data() + i * row_bytes, buffer.data() + (count + i) * element_.row_bytes);
+      }
+      count += got;
+      next_row_ += got;
+      if (got == 0 || count == most) break;
+    }
+    return Bytes(buffer.data(), count * element_.row_bytes);
+  }
+
+  Status rewind() override {
+    next_row_ = 0;
+    return splats_->rewind();
+  }
+  bool isSeekable() const override { return splats_->isSeekable(); }
+  Status seekRow(std::uint64_t row) override {
+    SURFEIT_RETURN_IF_ERROR(splats_->seekRow(row));
+    next_row_ = row;
+    return {};
+  }
+
+ private:
+  Field fieldOf(const char* name) const {
+    const RowProperty& property = *splats_->element().find(name);
+    return {property.offset, property.type};
+  }
+
+  // By the names of kNeeded.
+  double valueOf(const std::byte* row, std::size_t needed) const { return fields_[needed].of(row); }
+
+  void decode(const std::byte* splat, std::byte* disk) const {
+    for (std::size_t i = 0; i < copies_.size(); ++i) {
+      const RowProperty& property = element_.properties[i];
+      std::memcpy(disk + property.offset, splat + copies_[i], valueTypeBytes(property.type));
+    }
+    std::array<float, std::size(kFloats)> values;
+    decodeShape(splat, values.data());
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double code = std::max(0.0, 0.5 + kSplatColorFactor * valueOf(splat, 3 + c));
+      values[4 + c] = static_cast<float>(linearFromSrgbCode(code));
+    }
+    const double opacity = 1 / (1 + std::exp(-valueOf(splat, 6)));
+    values[7] = static_cast<float>(opacity);
+    values[8] = static_cast<float>(std::max(opacity, kLeastCoverage));
+    std::byte* const floats = disk + element_.properties[copies_.size()].offset;
+    std::memcpy(floats, values.data(), sizeof values);
+    floats[sizeof values] = std::byte{1};  // two_sided
+  }
+
+  // Normal and radius.
+  void decodeShape(const std::byte* splat, float* values) const {
+    // The axis of the smallest scale; a splat of two scales is flat
+    const double scales[3] = {valueOf(splat, 7), valueOf(splat, 8),
+                              has_third_scale_ ? third_scale_.of(splat) : -INFINITY};
+    const std::size_t smallest =
+        static_cast<std::size_t>(std::min_element(scales, scales + 3) - scales);
+    const double log_product = scales[(smallest + 1) % 3] + scales[(smallest + 2) % 3];
+
+    // That column of the rotation's matrix
+    double w = valueOf(splat, 9), x = valueOf(splat, 10), y = valueOf(splat, 11),
+           z = valueOf(splat, 12);
+    const double length = std::sqrt(w * w + x * x + y * y + z * z);
+    w /= length, x /= length, y /= length, z /= length;
+    const double columns[3][3] = {
+        {1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)},
+        {2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)},
+        {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)}};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      values[axis] = static_cast<float>(columns[smallest][axis]);
+    }
+    values[3] = static_cast<float>(std::numbers::sqrt2 * std::exp(log_product / 2));
+  }
+
+  std::unique_ptr<RowReader> splats_;
+  RowLayout element_;
+  std::vector<std::size_t> copies_;  // where the first properties of element_ stand in a splat
+  std::array<Field, std::size(kNeeded)> fields_;
+  Field third_scale_;
+  bool has_third_scale_ = false;
+  std::size_t rest_count_ = 0;
+  std::uint64_t next_row_ = 0;
+  AlignedBuffer splat_rows_;
+};
+
+}  // namespace
+
+bool areSplats(const RowLayout& element) {
+  return std::all_of(std::begin(kNeeded), std::end(kNeeded), [&](const char* name) {
+    const RowProperty* property = element.find(name);
+    return property != nullptr && !property->is_list;
+  });
+}
+
+std::unique_ptr<RowReader> readSplatsAsDisks(std::unique_ptr<RowReader> splats) {
+  return std::make_unique<SplatReader>(std::move(splats));
+}
+
+}  // namespace surfeit

@@ -1,0 +1,282 @@
+#include "cloud/text/xyz_header.h"
+
+#include <algorithm>
+#include <cctype>
+#include <iterator>
+
+#include "cloud/parts/property_renames.h"
+#include "cloud/text/text_rows.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kMaxNameChars = 56;
+
+// What files call columns that we know, in lower case. Of several names of one, the first counts.
+struct Alias {
+  std::string_view alias, name;
+};
+constexpr Alias kAliases[] = {
+    {"x", "x"},
+    {"y", "y"},
+    {"z", "z"},
+    {"points:0", "x"},
+    {"points:1", "y"},
+    {"points:2", "z"},
+    {"points_0", "x"},
+    {"points_1", "y"},
+    {"points_2", "z"},
+    {"position_x", "x"},
+    {"position_y", "y"},
+    {"position_z", "z"},
+    {"pos_x", "x"},
+    {"pos_y", "y"},
+    {"pos_z", "z"},
+    {"x coordinate", "x"},
+    {"y coordinate", "y"},
+    {"z coordinate", "z"},
+    {"x_coordinate", "x"},
+    {"y_coordinate", "y"},
+    {"z_coordinate", "z"},
+    {"x_coord", "x"},
+    {"y_coord", "y"},
+    {"z_coord", "z"},
+    {"coord_x", "x"},
+    {"coord_y", "y"},
+    {"coord_z", "z"},
+    {"xcoord", "x"},
+    {"ycoord", "y"},
+    {"zcoord", "z"},
+    {"easting", "x"},
+    {"northing", "y"},
+    {"eastings", "x"},
+    {"northings", "y"},
+    {"east", "x"},
+    {"north", "y"},
+    {"e", "x"},
+    {"n", "y"},
+    {"elevation", "z"},
+    {"elev", "z"},
+    {"height", "z"},
+    {"altitude", "z"},
+    {"alt", "z"},
+    {"h", "z"},
+    {"red", "red"},
+    {"green", "green"},
+    {"blue", "blue"},
+    {"r", "red"},
+    {"g", "green"},
+    {"b", "blue"},
+    {"rf", "red"},
+    {"gf", "green"},
+    {"bf", "blue"},
+    {"rgb:0", "red"},
+    {"rgb:1", "green"},
+    {"rgb:2", "blue"},
+    {"rgba:0", "red"},
+    {"rgba:1", "green"},
+    {"rgba:2", "blue"},
+    {"colors:0", "red"},
+    {"colors:1", "green"},
+    {"colors:2", "blue"},
+    {"color:0", "red"},
+    {"color:1", "green"},
+    {"color:2", "blue"},
+    {"alpha", "alpha"},
+    {"a", "alpha"},
+    {"af", "alpha"},
+    {"rgba:3", "alpha"},
+    {"colors:3", "alpha"},
+    {"color:3", "alpha"},
+    {"nx", "nx"},
+    {"ny", "ny"},
+    {"nz", "nz"},
+    {"normal_x", "nx"},
+    {"normal_y", "ny"},
+    {"normal_z", "nz"},
+    {"normal x", "nx"},
+    {"normal y", "ny"},
+    {"normal z", "nz"},
+    {"normalx", "nx"},
+    {"normaly", "ny"},
+    {"normalz", "nz"},
+    {"normals:0", "nx"},
+    {"normals:1", "ny"},
+    {"normals:2", "nz"},
+    {"normals_0", "nx"},
+    {"normals_1", "ny"},
+    {"normals_2", "nz"},
+    {"normal:0", "nx"},
+    {"normal:1", "ny"},
+    {"normal:2", "nz"},
+    {"intensity", "intensity"},
+    {"i", "intensity"},
+    {"radius", "radius"},
+    {"area", "area"},
+    {"width", "width"},
+    {"pscale", "pscale"},
+    {"group", "group"},
+};
+// A letter alone means what we think only beside its fellows.
+constexpr std::string_view kFellows[] = {"r g b", "e n"};
+
+constexpr std::string_view kLatitudes[] = {"lat", "latitude", "lat_deg", "phi"};
+constexpr std::string_view kLongitudes[] = {"lon", "long", "lng", "longitude", "lon_deg", "lambda"};
+
+using Words = std::vector<std::string>;
+
+bool contains(const Words& words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+template <std::size_t kCount>
+bool containsAny(const Words& words, const std::string_view (&names)[kCount]) {
+  return std::any_of(std::begin(names), std::end(names),
+                     [&](std::string_view name) { return contains(words, name); });
+}
+
+// The words between separators outside quotes; a blank stands for any number of blanks with at most
+// one comma among them.
+Words split(std::string_view line, char separator) {
+  Words words;
+  std::string word;
+  bool is_quoted = false, had_quotes = false;
+  const auto end_word = [&](bool is_kept) {
+    const std::string_view text = had_quotes ? std::string_view(word) : trimmedLine(word);
+    if (is_kept || !text.empty() || had_quotes) words.emplace_back(text);
+    word.clear();
+    had_quotes = false;
+  };
+  for (const char c : line) {
+    if (c == '"') {
+      is_quoted = !is_quoted;
+      had_quotes = true;
+      if (is_quoted) word.clear();
+    } else if (!is_quoted &&
+               (separator == ' ' ? isTextBlank(c) || isTextComma(c) : c == separator)) {
+      end_word(separator != ' ');
+    } else if (!had_quotes || is_quoted) {
+      word += c;
+    }
+    if (words.size() > kMaxXyzColumns) return {};
+  }
+  end_word(false);  // a separator may end the line
+  return words;
+}
+
+// Where a unit in brackets begins behind a name; its size when there is none.
+std::size_t beginOfUnit(std::string_view name) {
+  const std::size_t bracket = name.find_first_of("([");
+  const bool has_unit =
+      bracket != name.npos && bracket > 0 && (name.back() == ')' || name.back() == ']');
+  return has_unit ? bracket : name.size();
+}
+
+std::string inLowerCase(std::string_view word) {
+  std::string text(word);
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+// In lower case, without a unit in brackets.
+std::string plainName(std::string_view word) {
+  return inLowerCase(trimmedLine(word.substr(0, beginOfUnit(word))));
+}
+
+// "ft" of "X [ft]"; metres, and no unit, are nothing.
+std::string unitOf(std::string_view word) {
+  const std::size_t begin = beginOfUnit(word);
+  if (begin + 2 > word.size()) return {};
+  const std::string unit =
+      inLowerCase(trimmedLine(word.substr(begin + 1, word.size() - begin - 2)));
+  const bool is_metres =
+      unit == "m" || unit == "metre" || unit == "metres" || unit == "meter" || unit == "meters";
+  return is_metres ? std::string() : unit;
+}
+
+// The letters of the file made fit for a property.
+std::string fitName(std::string_view word) {
+  std::string name(word.substr(0, kMaxNameChars));
+  std::replace_if(
+      name.begin(), name.end(),
+      [](char c) { return !(c > ' ' && c < '\x7f') || c == ':' || isTextComma(c); }, '_');
+  return name.empty() ? "_" : name;
+}
+
+bool hasFellows(std::string_view letter, const Words& plain) {
+  for (const std::string_view fellows : kFellows) {
+    if (letter.size() != 1 || fellows.find(letter) == fellows.npos) continue;
+    const Words needed = split(fellows, ' ');
+    return std::all_of(needed.begin(), needed.end(),
+                       [&](const std::string& word) { return contains(plain, word); });
+  }
+  return true;
+}
+
+XyzHeader headerOf(Words words) {
+  Words plain;
+  for (const std::string& word : words) plain.push_back(plainName(word));
+
+  // Names that we know
+  Words names(words.size());
+  for (const Alias& row : kAliases) {
+    const auto found = std::find(plain.begin(), plain.end(), row.alias);
+    if (found == plain.end() || contains(names, row.name)) continue;
+    if (row.alias == "a" && !contains(names, "red")) continue;
+    std::string& name = names[static_cast<std::size_t>(found - plain.begin())];
+    if (name.empty() && hasFellows(row.alias, plain)) name = row.name;
+  }
+  XyzHeader header;
+  for (const std::string_view place : {"x", "y", "z"}) {
+    if (std::count(plain.begin(), plain.end(), place) > 1) return {};
+    if (contains(names, place)) continue;
+    // Without x or y: angles, if they are named
+    if (containsAny(plain, kLatitudes) && containsAny(plain, kLongitudes)) {
+      header.refusal =
+          "found latitude and longitude, which are angles, expected lengths: project the points "
+          "first, to UTM for example";
+      header.file_names = std::move(words);
+    }
+    return header;
+  }
+
+  // All others
+  DistinctNames distinct;
+  for (const std::string& name : names) {
+    if (!name.empty()) distinct.add(name);
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i].empty()) names[i] = distinct.add(fitName(words[i]));
+  }
+  for (const std::string_view place : {"x", "y", "z"}) {
+    const auto found = std::find(names.begin(), names.end(), place);
+    if (!header.unit.empty() || found == names.end()) continue;
+    header.unit = unitOf(words[static_cast<std::size_t>(found - names.begin())]);
+  }
+  header.names = std::move(names);
+  header.file_names = std::move(words);
+  return header;
+}
+
+}  // namespace
+
+XyzHeader parseXyzHeader(std::string_view line, std::size_t column_count) {
+  line = trimmedLine(line);
+  while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
+  line = trimmedLine(line);
+  XyzHeader best;
+  for (const char separator : {';', '\t', ',', ' '}) {
+    if (separator != ' ' && line.find(separator) == line.npos) continue;
+    Words words = split(line, separator);
+    if (words.size() > kMaxXyzColumns) continue;
+    XyzHeader header = headerOf(std::move(words));
+    if (header.file_names.empty()) continue;
+    const bool fits = column_count == 0 || header.file_names.size() == column_count;
+    if (fits || best.file_names.empty()) best = std::move(header);
+    if (fits) break;
+  }
+  return best;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,34 @@
+// Lines that name the columns of a text of points: "x y z nx ny nz", "//X,Y,Z,Scalar field",
+// "Easting;Northing;Elevation", "Points:0","Points:1","Points:2".
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace surfeit {
+
+inline constexpr std::size_t kMaxXyzColumns = 256;
+
+struct XyzHeader {
+  // Of the columns, as rows have them; empty when the line does not name a position.
+  std::vector<std::string> names;
+  // As the file has them, without quotes.
+  std::vector<std::string> file_names;
+  // Of x, y and z, as names have them behind: "ft"; where they differ that of the first that is no
+  // m. Empty: m, or nothing is said.
+  std::string unit;
+  // Why a line that names columns cannot be used; empty when it can.
+  std::string refusal;
+};
+
+// Names of the columns when the line, a comment or not, names a position: x y z, easting northing
+// elevation (e n h), points:0 points:1 points:2. Names are parted by semicolons, tabs or commas,
+// and may have blanks then; else by blanks. Of several ways the one that gives `column_count` names
+// is taken, if any. Quotes around names and units behind them ("x (m)") are taken off; names that
+// we know are ours in any case (r g b are red green blue); a name that comes again gets a number.
+// Latitude and longitude are refused: they are angles.
+XyzHeader parseXyzHeader(std::string_view line, std::size_t column_count = 0);
+
+}  // namespace surfeit

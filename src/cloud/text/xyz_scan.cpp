@@ -1,0 +1,183 @@
+// The pass over all rows of a text that tells what its columns are.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "cloud/text/xyz_layout.h"
+
+namespace surfeit {
+namespace {
+
+constexpr int kFloatDigits = 6;  // so many are given back by every float
+
+// 10 to the power of -n, for the usual numbers of decimals without a call.
+double tenth(double decimals) {
+  constexpr double kTenths[] = {1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
+  if (decimals >= 0 && decimals <= 10) return kTenths[static_cast<std::size_t>(decimals)];
+  return std::pow(10.0, -decimals);
+}
+
+// Whether the float next to a number gives it back, written with as many decimals. So do floats
+// that a program wrote with more decimals than they have.
+bool isFloat(std::string_view word, double value) {
+  std::byte single[4];
+  const char* const end = word.data() + word.size();
+  if (!std::isfinite(value)) return true;
+  if (parseTextNumber(word.data(), end, ValueType::kFloat32, single) == nullptr) return true;
+  const std::size_t exponent_at = std::min(word.find_first_of("eE"), word.size());
+  const std::size_t point_at = std::min(word.find('.'), exponent_at);
+  double decimals = point_at < exponent_at ? double(exponent_at - point_at - 1) : 0;
+  std::byte exponent[8];
+  const std::string_view exponent_text = word.substr(std::min(exponent_at + 1, word.size()));
+  if (!exponent_text.empty() &&
+      parseTextNumber(exponent_text.data(), end, ValueType::kFloat64, exponent) == end) {
+    decimals -= rowValue(exponent, ValueType::kFloat64);
+  }
+  // A little more than half a unit: floats are often exactly half way, and both sides are rounded
+  const double half_unit = (0.5 + 1e-6) * tenth(decimals);
+  return std::abs(rowValue(single, ValueType::kFloat32) - value) <= half_unit;
+}
+
+bool isShortNumber(std::string_view word) {
+  int digits = 0;
+  for (const char c : word) {
+    if (c == 'e' || c == 'E') return false;
+    digits += c >= '0' && c <= '9' ? 1 : 0;
+  }
+  return digits <= kFloatDigits;
+}
+
+class XyzScanner {
+ public:
+  XyzScanner(std::span<const TextColumn> columns, std::uint64_t pts_count)
+      : columns_(columns), values_(columns.size()), counted_(pts_count) {
+    table_.columns.resize(columns.size());
+    table_.are_unit_vectors.assign(columns.size(), true);
+    has_any_vector_.assign(columns.size(), false);
+    table_.scan_count = pts_count > 0 ? 1 : 0;
+  }
+
+  // Takes the values of a line; false when it is not as the columns say.
+  bool takeRow(std::string_view line) {
+    const char* at = line.data();
+    const char* const end = at + line.size();
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      while (at < end && isTextBlank(*at)) ++at;
+      const bool has_comma = i > 0 && at < end && isTextComma(*at);
+      if (has_comma) ++at;
+      while (at < end && isTextBlank(*at)) ++at;
+      const char* word_end = at;
+      while (word_end < end && !isTextBlank(*word_end) && !isTextComma(*word_end)) ++word_end;
+      if (word_end == at && !(has_comma && !columns_[i].is_kept)) return false;
+      if (columns_[i].is_kept) {
+        std::byte bytes[8];
+        if (parseTextNumber(at, word_end, ValueType::kFloat64, bytes) != word_end) return false;
+        std::memcpy(&values_[i], bytes, sizeof bytes);
+        takeValue({at, static_cast<std::size_t>(word_end - at)}, values_[i], table_.columns[i]);
+      }
+      at = word_end;
+    }
+    while (at < end && (isTextBlank(*at) || isTextComma(*at))) ++at;
+    if (at < end) return false;
+    takeVectors();
+    ++table_.row_count;
+    ++rows_of_scan_;
+    return true;
+  }
+
+  void takeCount(std::uint64_t count) {
+    checkCount();
+    ++table_.scan_count;
+    counted_ = count;
+    rows_of_scan_ = 0;
+  }
+
+  XyzTable finish() {
+    checkCount();
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      const bool is_triple = i + 3 <= columns_.size() && columns_[i].is_kept &&
+                             columns_[i + 1].is_kept && columns_[i + 2].is_kept;
+      table_.are_unit_vectors[i] = is_triple && has_any_vector_[i] && table_.are_unit_vectors[i];
+      table_.columns[i].are_numbers = columns_[i].is_kept;
+    }
+    return std::move(table_);
+  }
+
+  std::uint64_t rowCount() const { return table_.row_count; }
+  XyzTable& table() { return table_; }
+
+ private:
+  static void takeValue(std::string_view word, double value, XyzColumn& column) {
+    column.least = std::min(column.least, value);
+    column.largest = std::max(column.largest, value);
+    if (column.are_wholes) column.are_wholes = value == std::floor(value) && std::isfinite(value);
+    if (column.are_floats && !isShortNumber(word)) column.are_floats = isFloat(word, value);
+  }
+
+  void takeVectors() {
+    for (std::size_t i = 3; i + 3 <= columns_.size(); ++i) {
+      if (!table_.are_unit_vectors[i]) continue;
+      const double square = values_[i] * values_[i] + values_[i + 1] * values_[i + 1] +
+                            values_[i + 2] * values_[i + 2];
+      if (square == 0) continue;
+      has_any_vector_[i] = true;
+      table_.are_unit_vectors[i] = std::abs(std::sqrt(square) - 1) <= 0.01;
+    }
+  }
+
+  void checkCount() {
+    if (table_.scan_count == 0 || counted_ == rows_of_scan_ || !table_.count_note.empty()) return;
+    table_.count_note = fmt::format("scan {} counts {} points, {} follow: all that follow are read",
+                                    table_.scan_count, counted_, rows_of_scan_);
+  }
+
+  std::span<const TextColumn> columns_;
+  std::vector<double> values_;
+  std::vector<bool> has_any_vector_;
+  std::uint64_t counted_ = 0, rows_of_scan_ = 0;
+  XyzTable table_;
+};
+
+std::uint64_t countOf(std::string_view word) {
+  std::uint64_t count = 0;
+  for (const char c : trimmedLine(word)) count = count * 10 + static_cast<std::uint64_t>(c - '0');
+  return count;
+}
+
+}  // namespace
+
+Result<XyzTable> scanXyz(LineSource& source, std::span<const TextColumn> columns, TextExtras extras,
+                         std::uint64_t pts_count) {
+  XyzScanner scanner(columns, pts_count);
+  for (;;) {
+    SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source.lines());
+    if (lines.empty()) return scanner.finish();
+    const char* at = lines.data();
+    const char* const end = at + lines.size();
+    std::uint64_t line_count = 0;
+    while (at < end) {
+      const void* const found = std::memchr(at, '\n', static_cast<std::size_t>(end - at));
+      const char* const line_end = found ? static_cast<const char*>(found) : end;
+      const std::string_view line(at, static_cast<std::size_t>(line_end - at));
+      // Lines that hold no row are few, so they are looked at last
+      const bool is_count = extras.has_counts && isTextCount(trimmedLine(line));
+      if (is_count) {
+        scanner.takeCount(countOf(line));
+      } else if (!scanner.takeRow(line) && !isTextExtra(line, extras)) {
+        XyzTable table = scanner.finish();
+        table.has_comma_in_refused = line.find(',') != line.npos;
+        table.refusal = Status::corruption(
+            fmt::format("{}: row {} at line {}: {}", source.input().path(), table.row_count,
+                        source.lineNumber() + line_count, describeTextRow(line, columns)));
+        return table;
+      }
+      at = line_end + (found ? 1 : 0);
+      ++line_count;
+    }
+    source.consume(lines.size(), line_count);
+  }
+}
+
+}  // namespace surfeit

@@ -1,0 +1,25 @@
+#include "engine/gatherer_memory.h"
+
+#include <algorithm>
+
+#include "gather/packet/interpolating_gatherer.h"
+#include "gather/packet/packet_gatherer.h"
+
+namespace surfeit {
+
+std::uint64_t gathererBytes(const GatherRules& rules, std::uint64_t surfels) {
+  constexpr std::uint64_t kThreadBytes = std::uint64_t{128} << 10;  // stack and allocator
+  constexpr double kLayers = 8;
+  // Rough nodes open to a quarter of the solid angle
+  constexpr double kPatches = 4;
+  constexpr double kBytes = 2 * (sizeof(Patch) + 2 * sizeof(std::uint64_t));  // vectors double
+  const double cut = kPatches * 4 * double(kPi) / double(maxSolidAngle(rules)) * kLayers;
+  const double most = std::min(double(surfels), cut);
+  const double more = std::max(0.0, most - double(PacketRaster::kReservedPatches));
+  const bool interpolates = rules.quality.max_variation > 0;
+  return (interpolates ? InterpolatingGatherer::memoryBytes(rules)
+                       : PacketGatherer::memoryBytes(rules)) +
+         kThreadBytes + static_cast<std::uint64_t>(more * kBytes);
+}
+
+}  // namespace surfeit

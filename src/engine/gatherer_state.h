@@ -1,0 +1,45 @@
+// What is behind a Gatherer.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/world.h"
+#include "gather/packet/interpolating_gatherer.h"
+#include "gather/packet/packet_gatherer.h"
+#include "gather/packet/world_walk.h"
+#include "surfeit/engine.h"
+
+namespace surfeit {
+
+struct Gatherer::State {
+  // The engine has given the bytes of a gatherer.
+  explicit State(std::shared_ptr<const World> of);
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+  ~State();
+
+  // False for one that is not valid.
+  bool toLocal(const Receiver& receiver, LocalReceiver& result) const;
+  Status gatherGroup(std::span<const Receiver> receivers, std::span<GatherResult> results);
+
+  const std::shared_ptr<const World> world;
+  PagedOctree::Reader reader;
+  WorldReader view;
+  const GatherResult no_result;
+  std::unique_ptr<PacketGatherer> packets;  // or
+  std::unique_ptr<InterpolatingGatherer> interpolating;
+  std::size_t group_size = 0;  // receivers that are gathered together at most
+
+  // Of a group
+  std::vector<LocalReceiver> local;
+  std::vector<std::uint32_t> places;
+  std::vector<GatherResult> found;
+
+  std::uint64_t done_receivers = 0, invalid_receivers = 0;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,482 @@
+// Draws patches to the rasters of a packet; for one instruction set (see packet_kernel-inl.h).
+#if defined(SURFEIT_PACKET_BRUSH_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_BRUSH_INL_H_
+#undef SURFEIT_PACKET_BRUSH_INL_H_
+#else
+#define SURFEIT_PACKET_BRUSH_INL_H_
+#endif
+
+#include <hwy/highway.h>
+// Needs the instruction set that the former chose
+#include <hwy/contrib/math/math-inl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <type_traits>
+
+#include "gather/packet/packet_cover-inl.h"
+#include "gather/packet/packet_footprint-inl.h"
+#include "gather/packet/packet_kernel.h"
+#include "gather/packet/packet_lanes-inl.h"
+#include "gather/packet/packet_rays-inl.h"
+#include "gather/rules/coverage_rules.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+// What begins closer than this part of its distance, measured across the face, is taken to reach
+// behind the receiver.
+constexpr float kLeastInFront = 1e-3f;
+
+template <typename Kind>
+class Brush {
+ public:
+  Brush(const PacketCanvas& canvas, std::size_t lane)
+      : canvas_(canvas),
+        lane_(lane),
+        resolution_(canvas.geometry->resolution()),
+        scale_(canvas.geometry->pixelsPerSlope()),
+        ribbon_nested_(ribbonNested(scale_)),
+        receivers_(*canvas.lanes, lane),
+        frames_(*canvas.lanes, lane) {}
+
+  // What follows draws to this face alone.
+  void BeginFace(int face) {
+    face_ = face;
+    seen_ = &canvas_.seen->faces[std::size_t(face)];
+    pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
+    hull_ = Hull(pixels_, *seen_, resolution_);
+    open_.Begin(*seen_);
+    if constexpr (!Kind::kFrame) weights_ = FaceWeights(canvas_, receivers_, face);
+    ClearFace();
+  }
+  // Nothing more is drawn to it.
+  void EndFace() { hull_.CloseAll(); }
+
+  HWY_INLINE void DrawPatch(const Patch& patch) {
+    Sight sight = See(canvas_, patch, receivers_);
+    M seen = SeenAsPatch(patch, receivers_, sight);
+    if (patch.parts != 0) {
+      const M counts = hn::Gt(LoadLanes(canvas_.parts[patch.parts].of, lane_), hn::Zero(D()));
+      seen = hn::And(seen, counts);
+      sight.traced = hn::And(sight.traced, counts);
+    }
+    if (!hn::AllFalse(D(), sight.traced)) Trace(patch, sight);
+    if (!hn::AllFalse(D(), seen)) SplatPatch(patch, sight, seen);
+  }
+
+ private:
+  using Hull = FaceHull<Kind::kChannels>;
+  static constexpr std::size_t kChannels = Hull::kAll;
+  // Of a patch, in the frame of the raster.
+  using Normal = std::conditional_t<Kind::kFrame, V3, glm::vec3>;
+  Normal InRaster(const glm::vec3& normal) const {
+    if constexpr (Kind::kFrame) {
+      return frames_.ToLocal(normal);
+    } else {
+      return normal;
+    }
+  }
+  V3 InRaster(const V3& v) const {
+    if constexpr (Kind::kFrame) {
+      return frames_.ToLocal(v);
+    } else {
+      return v;
+    }
+  }
+
+  // Entries of a shape in the frame of the raster, w towards the face that is drawn.
+  struct FaceShape {
+    V uu, vv, ww, uv, uw, vw;
+  };
+  FaceShape InRaster(const SymmetricMatrix& m) const {
+    const int w_axis = face_ / 2, u_axis = (w_axis + 1) % 3, v_axis = (w_axis + 2) % 3;
+    if constexpr (Kind::kFrame) {
+      const V3 mx = frames_.Times(m, 0), my = frames_.Times(m, 1), mz = frames_.Times(m, 2);
+      // The raster of a cone has the face +x alone
+      return {Dot(frames_.y, my), Dot(frames_.z, mz), Dot(frames_.x, mx),
+              Dot(frames_.y, mz), Dot(frames_.x, my), Dot(frames_.x, mz)};
+    } else {
+      const float sign = face_ % 2 == 0 ? 1.f : -1.f;
+      return {Splat(m(u_axis, u_axis)),        Splat(m(v_axis, v_axis)),
+              Splat(m(w_axis, w_axis)),        Splat(m(u_axis, v_axis)),
+              Splat(sign * m(u_axis, w_axis)), Splat(sign * m(v_axis, w_axis))};
+    }
+  }
+
+  // What a receiver does not look at is not open. No layer has ended anywhere.
+  void ClearFace() {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    const D d;
+    const V zero = hn::Zero(d), one = Splat(1);
+    const V3 up = InRaster(receivers_.normal);
+    const RasterGeometry::Pixel* const pixels =
+        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
+    seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
+      float* const at = pixels_.at(pixel);
+      for (std::size_t i = 0; i < kChannels; ++i) hn::Store(zero, d, at + i * kStep);
+      const M above = hn::Gt(Dot(up, pixels[pixel].direction), zero);
+      const V open = hn::IfThenElseZero(hn::Or(receivers_.spherical, above), one);
+      for (const std::size_t i :
+           {PacketCanvas::kRoom, PacketCanvas::kOpen, PacketCanvas::kRest, Hull::kRestBefore}) {
+        hn::Store(open, d, at + i * kStep);
+      }
+      hn::Store(Splat(-kInfinity), d, at + Hull::kEnd * kStep);
+    });
+  }
+
+  // Of this part of it.
+  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part,
+                  V inverse_touch) const {
+    const V reach = Splat(patch.reach);
+    Cover cover;
+    cover.depth_begin = hn::Sub(distance, reach);
+    cover.depth_end = hn::Add(distance, reach);
+    cover.inverse_gap = inverseLayerGap(patch.reach);
+    cover.inverse_touch = inverse_touch;
+    cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
+    cover.overlap = patch.overlap;
+    cover.has_hull = patch.thicket == 0;
+    cover.is_solid = patch.is_solid;
+    cover.nested = patch.nested(ribbon_nested_);
+    cover.opacity = hn::Mul(part, Opacity(patch));
+    cover.own = 0.5f * (1 - patch.thicket);
+    cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
+    cover.radiosity = patch.radiosity;
+    if constexpr (Kind::kFade) cover.fade = FadeAt(distance);
+    return cover;
+  }
+
+  // Each receiver has its own while a node fades into what is below it.
+  V Opacity(const Patch& patch) const {
+    if (patch.parts == 0) return Splat(patch.opacity);
+    return hn::Mul(Splat(patch.opacity), LoadLanes(canvas_.parts[patch.parts].of, lane_));
+  }
+
+  // As fadeAt.
+  V FadeAt(V distance) const {
+    const D d;
+    const GatherWeights& weights = canvas_.rules->weights;
+    if (weights.falloff_mode == GatherWeights::FalloffMode::kExponential) {
+      return hn::Exp(d, hn::Mul(Splat(-weights.falloff), distance));
+    }
+    const float inverse = 1 / canvas_.rules->quality.max_distance;
+    const V rest = hn::NegMulAdd(distance, Splat(inverse), Splat(1));
+    const V power = hn::Mul(Splat(weights.falloff), hn::Log(d, hn::Max(rest, Splat(1e-30f))));
+    return hn::IfThenElseZero(hn::Gt(rest, Splat(1e-30f)), hn::Exp(d, power));
+  }
+
+  // As RasterCube::splat, onto face_.
+  HWY_INLINE void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
+    const V3 offset = InRaster(sight.offset);
+    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(offset, face_ / 2));
+    // Numbers of lanes that see nothing must be numbers, too
+    const V distance_sq = hn::IfThenElse(seen, sight.distance_sq, Splat(1));
+    const V distance = hn::Mul(distance_sq, InverseSqrt(distance_sq));
+    seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kLeastAxis), distance)));
+    if (hn::AllFalse(D(), seen)) return;
+
+    // The visible area, times the distance
+    V cosine = hn::Abs(sight.facing);
+    if (patch.range > 0) {
+      const V range = hn::Mul(Splat(patch.range), distance);
+      cosine = patch.showsBoth() ? RimOfBoth(cosine, range) : RimCosine(sight.facing, range);
+    }
+    const V area = hn::Min(
+        hn::MulAdd(Splat(patch.disk_area), cosine, hn::Mul(Splat(patch.round_area), distance)),
+        hn::Mul(Splat(patch.most_area), distance));
+    const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
+    const Parallelogram shape = OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w);
+    const Cover cover =
+        MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape));
+    CoverParallelogram(shape, seen, cover);
+    if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
+  }
+
+  // As touchPart.
+  static V InverseTouch(const Parallelogram& shape) {
+    const V area = hn::Mul(Splat(4), hn::Mul(shape.half_x, shape.half_y));
+    const V counts = hn::Min(Splat(1), hn::Max(Splat(kLeastTouched), area));
+    return Reciprocal(hn::Mul(Splat(kTouch), counts));
+  }
+
+  // As facingAreas of a facet; all times the distance.
+  static V RimCosine(V facing, V range) {
+    const V sum = hn::Max(hn::Zero(D()), hn::Sub(range, facing));
+    const V rim = hn::Div(hn::Mul(sum, sum), hn::Mul(Splat(4), range));
+    return hn::IfThenElse(hn::Lt(hn::Neg(facing), range), rim, hn::Neg(facing));
+  }
+
+  // Fronts and backs together.
+  static V RimOfBoth(V cosine, V range) {
+    const V rim = hn::Div(hn::MulAdd(cosine, cosine, hn::Mul(range, range)), hn::Add(range, range));
+    return hn::IfThenElse(hn::Lt(cosine, range), rim, cosine);
+  }
+
+  // As RasterCube::onFace; `area` is the visible area times the distance.
+  HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse) const {
+    const V one = Splat(1), least = Splat(kLeastSpread);
+    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    const Normal normal = InRaster(patch.normal);
+    const V u = hn::Mul(Axis(offset, u_axis), inverse);
+    const V v = hn::Mul(Axis(offset, v_axis), inverse);
+    const V n_axis = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(normal, axis));
+    const V g_u = hn::NegMulAdd(u, n_axis, Axis(normal, u_axis));
+    const V g_v = hn::NegMulAdd(v, n_axis, Axis(normal, v_axis));
+
+    // The spread on the face, and what is left of a row's when it is sheared
+    const FaceShape m = InRaster(patch.shape);
+    const V wu = hn::NegMulAdd(u, m.ww, m.uw), wv = hn::NegMulAdd(v, m.ww, m.vw);
+    const V a = hn::Max(least, hn::NegMulAdd(u, hn::Add(m.uw, wu), m.uu));
+    const V c = hn::Max(least, hn::NegMulAdd(v, hn::Add(m.vw, wv), m.vv));
+    const V b = hn::NegMulAdd(v, wu, hn::NegMulAdd(u, m.vw, m.uv));
+    const V inverse_c = Reciprocal(c);
+    const V shear = hn::Mul(b, inverse_c);
+    const V row_a = hn::Max(hn::Mul(least, a), hn::NegMulAdd(b, shear, a));
+    const V ratio_sq = hn::Mul(row_a, inverse_c);
+    const V ratio = hn::Mul(ratio_sq, InverseSqrt(ratio_sq));
+
+    // Area on the face: du dv = area / distance^2 * (distance / w)^3, and more for large ones
+    const V inverse_sq = hn::Mul(inverse, inverse);
+    const V extent = hn::Min(Splat(kMostExtent), hn::Mul(Splat(patch.area), inverse_sq));
+    const V depth = hn::NegMulAdd(n_axis, n_axis, one);
+    const V bulge = hn::MulAdd(extent, hn::Mul(Splat(0.5f), depth), one);
+    const V half_area =
+        hn::Mul(hn::Mul(Splat(0.25f), area), hn::Mul(hn::Mul(inverse, inverse_sq), bulge));
+    const V half_u_sq = hn::Max(hn::Mul(half_area, ratio), Splat(1e-30f));
+    const V inverse_half_u = InverseSqrt(half_u_sq);
+    const V shift = hn::Mul(extent, Splat(1.f / 3));
+    const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
+    const V middle_u = hn::MulAdd(shift, hn::MulAdd(n_axis, g_u, u), u);
+    const V middle_v = hn::MulAdd(shift, hn::MulAdd(n_axis, g_v, v), v);
+    return {hn::MulAdd(middle_u, scale, middle), hn::MulAdd(middle_v, scale, middle),
+            hn::Mul(hn::Mul(half_u_sq, inverse_half_u), scale),
+            hn::Mul(hn::Mul(half_area, inverse_half_u), scale), shear};
+  }
+
+  // Covers pixels by the part of them that lies in the shape, row by row.
+  HWY_INLINE void CoverParallelogram(const Parallelogram& shape, M seen, const Cover& cover) {
+    const D d;
+    const V zero = hn::Zero(d), size = Splat(float(resolution_));
+    const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, shape.half_x);
+    const V x0 = hn::Max(zero, hn::Sub(shape.x, reach));
+    const V x1 = hn::Min(size, hn::Add(shape.x, reach));
+    const V y0 = hn::Max(zero, hn::Sub(shape.y, shape.half_y));
+    const V y1 = hn::Min(size, hn::Add(shape.y, shape.half_y));
+    seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)));
+    if (hn::AllFalse(d, seen)) return;
+    const PixelRange range = RangeOf(seen, x0, x1, y0, y1, resolution_, *seen_);
+    if (range.isEmpty()) return;
+
+    const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
+    const Rows rows = {y0, y1, half_x, range};
+    cover.overlap > 0 ? CoverRows<true>(shape, rows, cover) : CoverRows<false>(shape, rows, cover);
+  }
+
+  struct Rows {
+    V begin, end, half_x;
+    PixelRange range;
+  };
+  template <bool kOverlaps>
+  HWY_INLINE void CoverRows(const Parallelogram& shape, const Rows& rows, const Cover& cover) {
+    const V zero = hn::Zero(D());
+    for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
+      const V bottom = hn::Max(rows.begin, Splat(float(row)));
+      const V top = hn::Min(rows.end, Splat(float(row + 1)));
+      const V height = hn::Mul(cover.opacity, hn::Max(zero, hn::Sub(top, bottom)));
+      const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
+      const V x = hn::NegMulAdd(shape.shear, along, shape.x);
+      const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
+      const FaceWeights::Row weights(weights_, row, hn::Mul(Splat(0.5f), hn::Add(top, bottom)));
+      open_.DrawRow(rows.range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
+        const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
+                                              hn::Max(left, Splat(float(column)))));
+        V weight = Splat(1);
+        if constexpr (!Kind::kFrame) {
+          const V across = hn::Add(hn::Min(right, Splat(float(column + 1))),
+                                   hn::Max(left, Splat(float(column))));
+          weight = weights.At(column, hn::Mul(Splat(0.5f), across));
+        }
+        return CoverPixel<Kind, kOverlaps>(pixels_.at(pixel), pixel, hn::Mul(width, height), weight,
+                                           cover, hull_);
+      });
+    }
+  }
+
+  // As RasterCube::traceDisk, traceSphere and traceRibbon.
+  void Trace(const Patch& patch, const Sight& sight) {
+    const V3 to_centre = RayStartTo(sight, receivers_);
+    Sight from_ray = sight;
+    from_ray.facing = Dot(to_centre, patch.normal);
+    TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
+             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part,
+                       Splat(1 / (kTouch * kLeastTouched))));
+  }
+
+  void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
+                const Cover& cover) {
+    const D d;
+    const int axis = face_ / 2;
+    const V centre_sq = Dot(centre, centre);
+    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(centre, axis));
+    const V half_w = HalfSide(patch, normal, axis);
+    traced = hn::And(traced, hn::Gt(hn::Add(w, half_w), hn::Zero(d)));
+    if (hn::AllFalse(d, traced)) return;
+    V x0, x1, y0, y1;
+    Outline(patch, centre, normal, (axis + 1) % 3, w, half_w, x0, x1);
+    Outline(patch, centre, normal, (axis + 2) % 3, w, half_w, y0, y1);
+    const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_, *seen_);
+    if (range.isEmpty()) return;
+
+    if (patch.isRound()) {
+      return TracePixels(traced, range, cover, [&](const glm::vec3& ray) HWY_ATTR {
+        return SphereAmount(patch, ray, centre, centre_sq);
+      });
+    }
+    if (patch.isRibbon()) {
+      const Ribbon ribbon =
+          Ribbon::ofShape(patch.shape, patch.normal, patch.area, patch.ribbonWidth());
+      const RibbonRays<Normal> rays(centre, c_n, normal, InRaster(ribbon.along),
+                                    InRaster(ribbon.across), ribbon, 0.5f / scale_);
+      return TracePixels(traced, range, cover,
+                         [&](const glm::vec3& ray) HWY_ATTR { return rays.Amount(ray); });
+    }
+    TraceDisk(patch, centre, normal, traced, c_n, centre_sq, range, cover);
+  }
+
+  // Pixels along an axis of the face whose middles the disk may reach: of the lines across that
+  // axis, at u on the face, those touch the outline that are as far from the centre as the disk
+  // extends across them, (c_u - u c_w)^2 = s_uu - 2 u s_uw + u^2 s_ww with s = radius^2 (I - n
+  // n^T). Of disks that reach behind the receiver those of the box around them.
+  void Outline(const Patch& patch, const V3& centre, const Normal& normal, int u_axis, V w,
+               V half_w, V& begin, V& end) const {
+    const V zero = hn::Zero(D()), one = Splat(1), size = Splat(float(resolution_));
+    const V u = Axis(centre, u_axis), half_u = HalfSide(patch, normal, u_axis);
+    V across = zero;
+    if (!patch.isRound()) {
+      const float scale = (face_ % 2 == 0 ? -1.f : 1.f) * patch.radius * patch.radius;
+      across = hn::Mul(Splat(scale), hn::Mul(Axis(normal, u_axis), Axis(normal, face_ / 2)));
+    }
+    const V near = hn::Sub(w, half_w), far = hn::Add(w, half_w);
+    const M in_front = hn::Gt(near, hn::Mul(Splat(kLeastInFront), far));
+    const V a = hn::IfThenElse(in_front, hn::Mul(near, far), one);
+    const V b = hn::MulSub(u, w, across);
+    const V c = hn::NegMulAdd(half_u, half_u, hn::Mul(u, u));
+    const V root = hn::Sqrt(hn::Max(zero, hn::MulSub(b, b, hn::Mul(a, c))));
+    const V inverse = Reciprocal(a);
+    V low = hn::Mul(hn::Sub(b, root), inverse), high = hn::Mul(hn::Add(b, root), inverse);
+    if (!hn::AllTrue(D(), in_front)) {
+      const V inverse_far = Reciprocal(hn::Max(far, Splat(1e-30f)));
+      const V inverse_near = hn::Mul(inverse_far, Splat(1 / kLeastInFront));
+      const V left = hn::Sub(u, half_u), right = hn::Add(u, half_u);
+      const V box_low =
+          hn::Mul(left, hn::IfThenElse(hn::Lt(left, zero), inverse_near, inverse_far));
+      const V box_high =
+          hn::Mul(right, hn::IfThenElse(hn::Lt(right, zero), inverse_far, inverse_near));
+      low = hn::IfThenElse(in_front, low, box_low);
+      high = hn::IfThenElse(in_front, high, box_high);
+    }
+    // What lies there is seen from the middle of a pixel, of ribbons the parts of all; and some to
+    // spare
+    constexpr float kSpare = 0.02f;
+    const float inset = (patch.isRibbon() ? -0.5f : 0.5f) - kSpare;
+    const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
+    begin = hn::Add(hn::MulAdd(low, scale, middle), Splat(inset));
+    end = hn::Sub(hn::MulAdd(high, scale, middle), Splat(inset));
+    begin = hn::Min(size, hn::Max(zero, begin));
+    end = hn::Min(size, hn::Max(zero, end));
+  }
+
+  bool CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
+    amount = hn::Mul(cover.opacity, amount);
+    const bool is_open =
+        CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, Splat(1), cover, hull_);
+    if (!is_open || !cover.has_hull) return is_open;
+    const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(kTracedHull)));
+    hull_.Add(pixel, hn::IfThenElseZero(is_hull, SplatU(kHullSamples)),
+              SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.depth_begin, cover.depth_end);
+    return true;
+  }
+
+  // Covers pixels by what amountOf(ray) says.
+  template <typename AmountOf>
+  void TracePixels(M traced, const PixelRange& range, const Cover& cover,
+                   const AmountOf& amountOf) {
+    const RasterGeometry::Pixel* const pixels =
+        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
+    for (int row = range.row_begin; row < range.row_end; ++row) {
+      open_.DrawRow(range, row, resolution_, [&](std::size_t pixel, int) HWY_ATTR {
+        const V amount = amountOf(pixels[pixel].direction);
+        return CoverTraced(pixel, hn::IfThenElseZero(traced, amount), cover);
+      });
+    }
+  }
+
+  // Most rays of the box miss the disk. With q = (u, v, 1) on the face, the ray meets the disk's
+  // plane at t q with t = c.n / q.n, within the disk where |t q - c|^2 < radius^2, that is where
+  //
+  //   (c.n)^2 q.q - 2 c.n (q.n) (q.c) + (c.c - radius^2) (q.n)^2 < 0,
+  //
+  // along a row a polynomial of second degree.
+  void TraceDisk(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
+                 V centre_sq, const PixelRange& range, const Cover& cover) {
+    const D d;
+    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
+    const V sign = Splat(face_ % 2 == 0 ? 1.f : -1.f), minus_2 = Splat(-2);
+    const V n_u = Axis(normal, u_axis), n_v = Axis(normal, v_axis);
+    const V n_w = hn::Mul(sign, Axis(normal, axis));
+    const V c_u = Axis(centre, u_axis), c_v = Axis(centre, v_axis);
+    const V c_w = hn::Mul(sign, Axis(centre, axis));
+    const V power = hn::Sub(centre_sq, Splat(patch.radius * patch.radius));
+    const V plane_sq = hn::Mul(c_n, c_n);
+    // Of (q.n) (power q.n - 2 c.n q.c), factor by factor
+    const V m_u = hn::MulAdd(power, n_u, hn::Mul(minus_2, hn::Mul(c_n, c_u)));
+    const V m_v = hn::MulAdd(power, n_v, hn::Mul(minus_2, hn::Mul(c_n, c_v)));
+    const V m_w = hn::MulAdd(power, n_w, hn::Mul(minus_2, hn::Mul(c_n, c_w)));
+    const V square = hn::MulAdd(n_u, m_u, plane_sq);
+    const RasterGeometry::Pixel* const pixels =
+        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
+    const float slope = 1 / scale_, first = 0.5f * (1 - float(resolution_));
+    for (int row = range.row_begin; row < range.row_end; ++row) {
+      const V v = Splat(slope * (float(row) + first));
+      const V n_row = hn::MulAdd(n_v, v, n_w), m_row = hn::MulAdd(m_v, v, m_w);
+      const V linear = hn::MulAdd(n_u, m_row, hn::Mul(m_u, n_row));
+      const V constant = hn::MulAdd(n_row, m_row, hn::Mul(plane_sq, hn::MulAdd(v, v, Splat(1))));
+      open_.DrawRow(range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
+        const V u = Splat(slope * (float(column) + first));
+        const V outside = hn::MulAdd(hn::MulAdd(square, u, linear), u, constant);
+        const M hit = hn::And(traced, hn::Lt(outside, hn::Zero(d)));
+        if (hn::AllFalse(d, hit)) return true;
+        const glm::vec3& ray = pixels[pixel].direction;
+        const V amount = DiskAmount(patch, normal, ray, centre, c_n, centre_sq);
+        return CoverTraced(pixel, hn::IfThenElseZero(hit, amount), cover);
+      });
+    }
+  }
+
+  const PacketCanvas& canvas_;
+  const std::size_t lane_;
+  const int resolution_;
+  const float scale_;  // pixels for a slope of 1
+  const float ribbon_nested_;
+  const Receivers receivers_;
+  const Frames frames_;
+  int face_ = 0;
+  const SeenPixels::Face* seen_ = nullptr;
+  FaceLanes pixels_;  // of the face
+  OpenPixels open_;
+  FaceWeights weights_;
+  Hull hull_;
+};
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target guard

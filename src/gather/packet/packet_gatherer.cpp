@@ -1,0 +1,79 @@
+#include "gather/packet/packet_gatherer.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+
+namespace surfeit {
+namespace {
+
+// Hands the cut to the raster.
+struct DrawCut {
+  PacketRaster& raster;
+  void setFrame(const InstanceFrame* frame) { raster.setFrame(frame); }
+  void node(const Node& node, const LaneParts* parts) { raster.addNode(node, parts); }
+  void leaf(const Node&) {}
+  void surfels(std::span<const Surfel> run, const LaneParts* parts) {
+    raster.addSurfels(run, parts);
+  }
+};
+
+}  // namespace
+
+PacketGatherer::PacketGatherer(const GatherRules& rules, const PacketKernel& kernel)
+    : rules_(rules), raster_(rules, kernel), walk_(rules), cost_(rules) {}
+
+// Adds the time since the last call.
+void PacketGatherer::endPhase(double& seconds) {
+  if (!measures_phases_) return;
+  const double now =
+      std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  seconds += now - phase_begin_;
+  phase_begin_ = now;
+}
+
+Status PacketGatherer::gatherPacket(std::span<const LocalReceiver> receivers,
+                                    std::span<const std::uint16_t> places, WorldReader& world,
+                                    std::span<GatherResult> results) {
+  const PacketView view = viewPacket(receivers, rules_);
+  raster_.begin(receivers, view);
+  SURFEIT_RETURN_IF_ERROR(walk_.walk(view, receivers, world, DrawCut{raster_}));
+  work_.nodes_visited += walk_.nodesVisited();
+  work_.surfels_visited += walk_.surfelsVisited();
+  work_.patches += raster_.patchCount();
+  ++work_.packets;
+  endPhase(work_.walk_seconds);
+  raster_.sort();
+  endPhase(work_.sort_seconds);
+  raster_.draw();
+  endPhase(work_.draw_seconds);
+
+  std::array<GatherResult, kPacketReceivers> packet_results;
+  raster_.integrate(std::span(packet_results).first(receivers.size()));
+  for (std::size_t k = 0; k < receivers.size(); ++k) results[places[k]] = packet_results[k];
+  endPhase(work_.integrate_seconds);
+  return {};
+}
+
+Status PacketGatherer::gather(std::span<const LocalReceiver> receivers, WorldReader& world,
+                              std::span<GatherResult> results) {
+  double ignored = 0;
+  endPhase(ignored);
+  const PacketCluster cluster(receivers);
+  cost_.begin(cluster.receivers(0)[0].position);
+  const std::span<const LocalReceiver> first = cluster.receivers(0).first(1);
+  SURFEIT_RETURN_IF_ERROR(walk_.walk(viewPacket(first, rules_), first, world, cost_));
+  for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
+    const std::span<const LocalReceiver> packet = cluster.receivers(i);
+    const std::span<const std::uint16_t> places = cluster.places(i);
+    SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(
+        packet, cluster.mostPacketRadius(), [&](std::size_t begin, std::size_t count) {
+          return gatherPacket(packet.subspan(begin, count), places.subspan(begin, count), world,
+                              results);
+        }));
+  }
+  return {};
+}
+
+}  // namespace surfeit

@@ -1,0 +1,74 @@
+// The gather of neighbouring receivers from a paged octree: for every packet of 16 one traversal,
+// one cut, one order front to back, and a raster cube per receiver in the lanes of vectors (memo,
+// section 3).
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "gather/cut/cut.h"
+#include "gather/cut/packet_cluster.h"
+#include "gather/cut/packet_cost.h"
+#include "gather/packet/packet_raster.h"
+#include "gather/packet/world_walk.h"
+#include "gather/rules/receiver.h"
+#include "octree/read/paged_octree.h"
+#include "surfeit/gather.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// One thread at a time; make one per thread. For its memory see PacketRaster.
+class PacketGatherer {
+ public:
+  // `rules` must be valid, as for PointGatherer.
+  explicit PacketGatherer(const GatherRules& rules,
+                          const PacketKernel& kernel = fastestPacketKernel());
+  PacketGatherer(GatherMode mode, const GatherQuality& quality,
+                 const PacketKernel& kernel = fastestPacketKernel())
+      : PacketGatherer(GatherRules(mode, quality), kernel) {}
+
+  // Gathers at 1 to kClusterReceivers receivers, whose values must be finite; results are as many.
+  // On an error (a page that cannot be read or decoded) results are incomplete. They depend on the
+  // scene, the receivers given together, rules and instruction set alone, bit for bit.
+  Status gather(std::span<const LocalReceiver> receivers, WorldReader& world,
+                std::span<GatherResult> results);
+  // Of one octree, in its own coordinates.
+  Status gather(std::span<const LocalReceiver> receivers, PagedOctree::Reader& octree,
+                std::span<GatherResult> results) {
+    WorldReader world(octree);
+    return gather(receivers, world, results);
+  }
+
+  // What all gathers so far took, for benches and tests.
+  struct Work {
+    std::size_t packets = 0;  // drawn, of whatever size
+    std::size_t nodes_visited = 0, surfels_visited = 0;
+    std::size_t patches = 0;  // drawn
+    // Time by phase; measured only when asked for with measurePhases().
+    double walk_seconds = 0, sort_seconds = 0, draw_seconds = 0, integrate_seconds = 0;
+  };
+  const Work& work() const { return work_; }
+  void measurePhases(bool measures) { measures_phases_ = measures; }
+
+  // Bytes that a gatherer holds from the start.
+  static std::size_t memoryBytes(const GatherRules& rules) {
+    return sizeof(PacketGatherer) + PacketCost::memoryBytes() + PacketRaster::memoryBytes(rules);
+  }
+
+ private:
+  Status gatherPacket(std::span<const LocalReceiver> receivers,
+                      std::span<const std::uint16_t> places, WorldReader& world,
+                      std::span<GatherResult> results);
+  void endPhase(double& seconds);
+
+  const GatherRules rules_;
+  PacketRaster raster_;
+  WorldWalk walk_;
+  PacketCost cost_;
+  Work work_;
+  bool measures_phases_ = false;
+  double phase_begin_ = 0;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,61 @@
+#include "gather/packet/packet_kernel.h"
+
+// Compiled once for every instruction set (Highway, "foreach_target").
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "gather/packet/packet_kernel.cpp"
+#include <hwy/foreach_target.h>
+// Highway's own headers come after
+#include <hwy/highway.h>
+
+#include "gather/packet/packet_kernel-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+
+PacketKernel Kernel() {
+  return {.name = hwy::TargetName(HWY_TARGET),
+          .findSeenPixels = FindSeenPixels,
+          .isAbove = IsAbove,
+          .facesThatSee = FacesThatSee,
+          .seeRoughNode = SeeRoughNode,
+          .draw = Draw,
+          .integrate = Integrate};
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include <vector>
+
+namespace surfeit {
+namespace {
+
+HWY_EXPORT(Kernel);
+
+std::vector<PacketKernel> allKernels() {
+  std::vector<PacketKernel> kernels;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    kernels.push_back(HWY_DYNAMIC_DISPATCH(Kernel)());
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  return kernels;
+}
+
+}  // namespace
+
+const PacketKernel& fastestPacketKernel() {
+  static const PacketKernel kernel = HWY_DYNAMIC_DISPATCH(Kernel)();
+  return kernel;
+}
+
+std::span<const PacketKernel> packetKernels() {
+  static const std::vector<PacketKernel> kernels = allKernels();
+  return kernels;
+}
+
+}  // namespace surfeit
+#endif

@@ -1,0 +1,176 @@
+// The inner loops of the packet raster, in vectors of whatever width this machine has (Highway).
+// Results of different instruction sets agree within 1e-4 of occlusion and relative irradiance, and
+// within 3e-3 for two of 1000 receivers: sums are rounded differently, and rounding decides whether
+// things that hardly meet are of one layer. Of one instruction set they are the same bit for bit.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <span>
+
+#include "core/symmetric_matrix.h"
+#include "gather/cut/cut.h"
+#include "gather/rules/contribution.h"
+#include "gather/rules/coverage_rules.h"
+#include "gather/rules/gather_rules.h"
+#include "gather/rules/raster_geometry.h"
+#include "gather/rules/receiver.h"
+#include "octree/node/node.h"
+#include "surfeit/gather.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// A node or surfel of the cut, ready for the lanes. Two lines of a cache: they are drawn in another
+// order than they are made in.
+struct alignas(64) Patch {
+  glm::vec3 position{0};
+  float radius = 0;
+  glm::vec3 normal{0};      // of a node: times its flatness; zero: looks round
+  SymmetricMatrix shape{};  // how it spreads; RasterCube::Patch
+  float area = 0;           // all of it, whatever shows
+  // The area that it shows: disk_area times the cosine, plus round_area, which everyone sees
+  float disk_area = 0, round_area = 0;
+  float most_area = 0;  // and no more than this
+  // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
+  float range = 0;
+  float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
+  bool is_solid = true;                         // likewise
+  std::uint32_t parts = 0;  // place in PacketCanvas::parts of what counts of the opacity; 0: all
+  glm::vec3 radiosity{0};
+  // It is seen where offset . normal, from the receiver, is below this: kFrontOnly; kBothSides, of
+  // a two-sided disk or facet; kDarkBack, when it is seen from both sides and sends light from its
+  // front; or kAllAround, when something else says what it shows
+  float facing_limit = 0;
+  float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
+  float reach = 0;          // how far before and behind its middle it meets others of its layer
+  // Of the ray traced disk, see softDiskPeak; or less than 0, of a ribbon: its width times -1
+  float soft_peak = 0;
+
+  static constexpr float kFrontOnly = 0;
+  static constexpr float kBothSides = std::numeric_limits<float>::infinity();
+  static constexpr float kDarkBack = std::numeric_limits<float>::max();
+  static constexpr float kAllAround = kDarkBack / 2;
+  bool isRound() const { return disk_area == 0; }
+  bool showsBoth() const { return facing_limit >= kDarkBack; }
+  bool isRibbon() const { return soft_peak < 0; }
+  float ribbonWidth() const { return -soft_peak; }
+  float nested(float ribbon_nested) const {
+    if (isRibbon() && thicket > 0) return ribbon_nested;
+    return nestedPart(is_solid && facing_limit != kBothSides, thicket);
+  }
+};
+static_assert(sizeof(Patch) == 128);
+
+// How much of a patch counts for each receiver.
+struct alignas(64) PacketParts {
+  LaneParts of;
+};
+
+// The receivers as columns, one per lane; lanes without a receiver repeat the last one.
+struct alignas(64) PacketLanes {
+  std::array<float, kPacketReceivers> x, y, z, normal_x, normal_y, normal_z;
+  std::array<float, kPacketReceivers> spherical;  // 1: no normal, sees the whole sphere; else 0
+  // Axes of the frames of cones (ConeFrame), x y z of each; of a cube, the first is the lobe's.
+  std::array<std::array<float, kPacketReceivers>, 9> frame;
+};
+
+// The pixels that count: those that some receiver has above its horizon. Nothing else is drawn, or
+// looked at.
+struct SeenPixels {
+  struct Columns {
+    std::uint8_t begin = 0, end = 0;
+  };
+  struct Face {
+    int row_begin = 0, row_end = 0;
+    std::array<Columns, RasterGeometry::kMaxResolution> rows;
+    bool isEmpty() const { return row_begin == row_end; }
+    // Calls visit(pixel) with their places on a face of this resolution.
+    template <typename Visit>
+    void forEachPixel(std::size_t resolution, const Visit& visit) const {
+      for (auto row = std::size_t(row_begin); row < std::size_t(row_end); ++row) {
+        const auto [begin, end] = rows[row];
+        for (std::size_t column = begin; column < end; ++column) visit(row * resolution + column);
+      }
+    }
+  };
+  std::array<Face, RasterGeometry::kFaces> faces;
+};
+
+// Where a packet is drawn: 16 rasters, interleaved by pixel as many at a time as a vector holds
+// (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage), what is open of
+// it and of its weight; with color red, green and blue; the faded coverage, when occlusion fades;
+// then the hull (FaceHull), and what was left and seen before the last layer.
+struct PacketCanvas {
+  static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3, kRest = 4;  // places
+  static constexpr std::size_t kCoverageChannels = 5, kHullChannels = 4;
+  static std::size_t channels(const GatherRules& rules) {
+    return kCoverageChannels + kHullChannels + 2 * rules.channels();
+  }
+
+  const PacketLanes* lanes;
+  std::size_t receiver_count;  // vectors of lanes without any are left out
+  const GatherRules* rules;
+  const RasterGeometry* geometry;
+  const DirectionWeights* weights;
+  float bias;             // of rays, in radii of the surfel
+  float turned;           // -1 when one-sided surfels were turned to show their backs, else 1
+  float max_distance_sq;  // may be infinite
+  glm::vec3 centre;       // of the packet
+  float packet_radius;
+  float* pixels;  // aligned to 64 bytes
+  // Faces that were drawn to; the pixels of others hold nothing of this packet.
+  std::array<bool, RasterGeometry::kFaces>* is_face_used;
+  const SeenPixels* seen;
+  const PacketParts* parts;  // of the patches
+};
+
+struct RoughSight {
+  FacingAreas facing;
+  glm::vec3 radiosity;
+};
+
+// An entry of the order: one patch on one face of the cube, [ face : 3 | distance : 29 | index of
+// the patch : 32 ]. Faces are drawn one after the other, because the pixels of one face of 16
+// receivers fit a near cache. `distance` is the upper part of the squared distance's bits,
+// which sort like the distance.
+namespace draw_order {
+inline std::uint64_t key(int face, float distance_sq, std::uint32_t index) {
+  const std::uint64_t distance = std::bit_cast<std::uint32_t>(distance_sq) >> 2;
+  return static_cast<std::uint64_t>(face) << 61 | distance << 32 | index;
+}
+inline int face(std::uint64_t key) { return static_cast<int>(key >> 61); }
+inline std::uint32_t index(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
+}  // namespace draw_order
+
+// How far from its middle a patch may be drawn, in halves of its side: at the edge of a face, where
+// it matters, everything shows larger by the root of 2, and sides need not be equal.
+inline constexpr float kSplatReach = 1.8f;
+
+struct PacketKernel {
+  const char* name;  // of the instruction set
+  void (*findSeenPixels)(const PacketCanvas& canvas, SeenPixels& seen);
+  // Whether any receiver has this place above its horizon.
+  bool (*isAbove)(const PacketLanes& lanes, std::size_t receiver_count, const glm::vec3& position);
+  // The faces on which some receiver may see something of the patch, which stands for a surfel, as
+  // bits; of a cone's raster the first.
+  std::uint32_t (*facesThatSee)(const PacketCanvas& canvas, const Patch& patch);
+  // What the receivers see of a rough node in unit direction `direction` from them; as facingAreas
+  // and seenRadiosity.
+  void (*seeRoughNode)(const Node& node, const glm::vec3& direction, RoughSight& sight);
+  // Draws patches in this order, all of one face after those of another.
+  void (*draw)(const PacketCanvas& canvas, const Patch* patches,
+               std::span<const std::uint64_t> order);
+  void (*integrate)(const PacketCanvas& canvas, std::span<GatherResult> results);
+};
+
+// For the fastest instruction set of this machine.
+const PacketKernel& fastestPacketKernel();
+// For all that this machine has and the build knows, for tests and benches.
+std::span<const PacketKernel> packetKernels();
+
+}  // namespace surfeit

@@ -1,0 +1,238 @@
+// The receivers of a packet in lanes, and how they see a patch; for one instruction set (see
+// packet_kernel-inl.h).
+#if defined(SURFEIT_PACKET_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_LANES_INL_H_
+#undef SURFEIT_PACKET_LANES_INL_H_
+#else
+#define SURFEIT_PACKET_LANES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/vec3.hpp>
+
+#include "gather/cut/vectors_of_3-inl.h"
+#include "gather/packet/packet_kernel.h"
+#include "gather/rules/coverage_rules.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace surfeit {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::CappedTag<float, kPacketReceivers>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+constexpr std::size_t kStep = hn::MaxLanes(D());
+
+inline V Splat(float value) { return hn::Set(D(), value); }
+inline V LoadLanes(const std::array<float, kPacketReceivers>& column, std::size_t lane) {
+  return hn::Load(D(), column.data() + lane);
+}
+
+// Values of the pixels of a face, for the kStep receivers from `lane` on, which lie together: all
+// pixels of these, then all of the next. What one vector draws fits a near cache so, as far as
+// it is seen. `channels`: values of a pixel and receiver.
+class FaceLanes {
+ public:
+  FaceLanes() = default;
+  FaceLanes(float* values, const PacketCanvas& canvas, std::size_t face, std::size_t lane,
+            std::size_t channels)
+      : values_(values == nullptr ? nullptr
+                                  : values + (face * kPacketReceivers + lane) * channels *
+                                                 canvas.geometry->facePixels()),
+        pixel_floats_(channels * kStep) {}
+  explicit operator bool() const { return values_ != nullptr; }
+  // Of a pixel of the face; kStep of a channel, then of the next.
+  float* at(std::size_t pixel) const { return values_ + pixel * pixel_floats_; }
+
+ private:
+  float* values_ = nullptr;
+  std::size_t pixel_floats_ = 0;
+};
+
+// One step of Newton's method on the machine's estimate: 22 bits or more everywhere.
+inline V Reciprocal(V x) {
+  const V estimate = hn::ApproximateReciprocal(x);
+  return hn::Mul(estimate, hn::NegMulAdd(x, estimate, Splat(2)));
+}
+inline V InverseSqrt(V x) {
+  const V estimate = hn::ApproximateReciprocalSqrt(x);
+  const V half = hn::Mul(Splat(0.5f), x);
+  return hn::Mul(estimate, hn::NegMulAdd(hn::Mul(half, estimate), estimate, Splat(1.5f)));
+}
+
+// As openBehind, of coverage_rules.h.
+inline V OpenBehind(V room, V layer, V nested) {
+  const V rest = hn::Sub(Splat(1), layer), apart = hn::Mul(room, rest);
+  return hn::MulAdd(nested, hn::Sub(hn::Min(room, rest), apart), apart);
+}
+
+// As takenWeight, of coverage_rules.h; zero where nothing is open.
+inline V TakenWeight(V covered, V open, V rest, V weight) {
+  const V zero = hn::Zero(D()), one = Splat(1);
+  const V part = hn::Div(covered, hn::Max(open, Splat(1e-30f)));
+  const V own = hn::Mul(hn::Mul(covered, hn::Sub(one, part)), weight);
+  const V taken = hn::MulAdd(hn::Mul(part, part), rest, own);
+  return hn::IfThenElseZero(hn::Gt(covered, zero), hn::Min(rest, hn::Max(zero, taken)));
+}
+
+using V3 = VectorsOf3<V>;
+inline V Axis(const V3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+inline V Axis(const glm::vec3& v, int axis) { return Splat(v[axis]); }
+
+// Frames of the lanes' cones.
+struct Frames {
+  V3 x, y, z;
+  Frames(const PacketLanes& lanes, std::size_t lane)
+      : x{LoadLanes(lanes.frame[0], lane), LoadLanes(lanes.frame[1], lane),
+          LoadLanes(lanes.frame[2], lane)},
+        y{LoadLanes(lanes.frame[3], lane), LoadLanes(lanes.frame[4], lane),
+          LoadLanes(lanes.frame[5], lane)},
+        z{LoadLanes(lanes.frame[6], lane), LoadLanes(lanes.frame[7], lane),
+          LoadLanes(lanes.frame[8], lane)} {}
+  template <typename Vector>
+  V3 ToLocal(const Vector& v) const {
+    return {Dot(x, v), Dot(y, v), Dot(z, v)};
+  }
+  // A matrix times one of the axes.
+  V3 Times(const SymmetricMatrix& m, int axis) const {
+    const V3& v = axis == 0 ? x : axis == 1 ? y : z;
+    const glm::vec3 rows[3] = {
+        {m(0, 0), m(0, 1), m(0, 2)}, {m(1, 0), m(1, 1), m(1, 2)}, {m(2, 0), m(2, 1), m(2, 2)}};
+    return {Dot(v, rows[0]), Dot(v, rows[1]), Dot(v, rows[2])};
+  }
+  // A component of v = (x, y, z) in the frame, of the world.
+  V ToWorld(const glm::vec3& v, int axis) const {
+    return hn::MulAdd(Axis(x, axis), Splat(v.x),
+                      hn::MulAdd(Axis(y, axis), Splat(v.y), hn::Mul(Axis(z, axis), Splat(v.z))));
+  }
+};
+
+// Some of the receivers.
+struct Receivers {
+  V3 position, normal;
+  M spherical;
+
+  Receivers(const PacketLanes& lanes, std::size_t lane)
+      : position{LoadLanes(lanes.x, lane), LoadLanes(lanes.y, lane), LoadLanes(lanes.z, lane)},
+        normal{LoadLanes(lanes.normal_x, lane), LoadLanes(lanes.normal_y, lane),
+               LoadLanes(lanes.normal_z, lane)},
+        spherical(hn::Gt(LoadLanes(lanes.spherical, lane), hn::Zero(D()))) {}
+
+  V3 To(const glm::vec3& place) const {
+    return {hn::Sub(Splat(place.x), position.x), hn::Sub(Splat(place.y), position.y),
+            hn::Sub(Splat(place.z), position.z)};
+  }
+  // Those that see what is this high above their horizons.
+  M SeeAt(V height) const { return hn::Or(spherical, hn::Gt(height, hn::Zero(D()))); }
+};
+
+// A patch as some of the receivers see it.
+struct Sight {
+  V3 offset;  // from the receivers
+  V distance_sq, height;
+  V facing;     // offset . normal: negative in front
+  M in_reach;   // not too far away, and for spheres around spherical receivers, not too close
+  V near_part;  // of what is seen, as nearPart
+  V bias;       // of rays: see ReceiverRaster::rayBias
+  M traced;     // near in part, and seen by the rays
+};
+
+// As nearPart.
+inline V NearPart(const Patch& patch, const Sight& sight) {
+  const float inverse = 1 / nearBorderSq(patch.near_distance);
+  const V rest = hn::NegMulAdd(sight.distance_sq, Splat(inverse), Splat(1));
+  const V part = hn::Mul(rest, Splat(1 / (1 - kWholeNear * kWholeNear)));
+  return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
+}
+
+HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers& receivers) {
+  const D d;
+  const V zero = hn::Zero(d), one = Splat(1);
+  Sight sight;
+  sight.offset = receivers.To(patch.position);
+  sight.distance_sq = Dot(sight.offset, sight.offset);
+  sight.height = Dot(sight.offset, receivers.normal);
+  sight.facing = Dot(sight.offset, patch.normal);
+  sight.in_reach = hn::Le(sight.distance_sq, Splat(canvas.max_distance_sq));
+  sight.traced = hn::Gt(zero, zero);
+  sight.near_part = zero;
+  sight.bias = zero;
+  if (!(patch.near_distance > 0)) return sight;
+
+  if (patch.isRound()) {
+    const float clearance = kSphereClearance * patch.radius;
+    const M too_close =
+        hn::And(receivers.spherical, hn::Lt(sight.distance_sq, Splat(clearance * clearance)));
+    sight.in_reach = hn::AndNot(too_close, sight.in_reach);
+  }
+  sight.near_part = hn::IfThenElseZero(sight.in_reach, NearPart(patch, sight));
+  const M is_near = hn::Gt(sight.near_part, zero);
+  if (hn::AllFalse(d, is_near)) return sight;
+
+  // As ReceiverRaster::addSurfel: the disk must rise above the horizon of the rays
+  const V cosine = Dot(receivers.normal, patch.normal);
+  const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
+  const float size = patch.isRibbon() ? patch.ribbonWidth() : patch.radius;
+  const float bias = canvas.bias * size * (patch.isRibbon() ? kRibbonBias : 1);
+  V part = hn::MulAdd(Splat(turned), cosine, one);
+  if (patch.facing_limit == Patch::kBothSides) {
+    part = hn::Max(zero, hn::NegMulAdd(sight.height, Splat(1 / (kBiasHeight * size)), one));
+  }
+  sight.bias = hn::Mul(Splat(bias), hn::Min(one, part));
+  const V rise =
+      hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
+  const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));
+  sight.traced = hn::And(is_near, rises);
+
+  // ... and show its front, or the sphere its outside, to where the rays begin
+  if (patch.facing_limit == Patch::kFrontOnly) {
+    sight.traced =
+        hn::And(sight.traced, hn::Lt(hn::NegMulAdd(sight.bias, cosine, sight.facing), zero));
+  } else if (patch.isRound()) {
+    const V along =
+        hn::MulAdd(sight.bias, sight.bias,
+                   hn::NegMulAdd(hn::Mul(Splat(2), sight.bias), sight.height, sight.distance_sq));
+    sight.traced = hn::And(sight.traced, hn::Gt(along, Splat(patch.radius * patch.radius)));
+  }
+  return sight;
+}
+
+// Lanes to which the patch is a patch of solid angle: the mid or the far field.
+HWY_INLINE M SeenAsPatch(const Patch& patch, const Receivers& receivers, const Sight& sight) {
+  const M faces = hn::Lt(sight.facing, Splat(patch.facing_limit));
+  return hn::And(hn::And(hn::Lt(sight.near_part, Splat(1)), sight.in_reach),
+                 hn::And(receivers.SeeAt(sight.height), faces));
+}
+
+// From where the rays begin.
+HWY_INLINE V3 RayStartTo(const Sight& sight, const Receivers& receivers) {
+  return {hn::NegMulAdd(sight.bias, receivers.normal.x, sight.offset.x),
+          hn::NegMulAdd(sight.bias, receivers.normal.y, sight.offset.y),
+          hn::NegMulAdd(sight.bias, receivers.normal.z, sight.offset.z)};
+}
+
+// Half of the side along an axis of the box around the disk.
+inline V HalfSide(const Patch& patch, const V3& normal, int axis) {
+  if (patch.isRound()) return Splat(patch.radius);
+  const V n = Axis(normal, axis);
+  return hn::Mul(Splat(patch.radius),
+                 hn::Sqrt(hn::Max(hn::Zero(D()), hn::NegMulAdd(n, n, Splat(1)))));
+}
+inline V HalfSide(const Patch& patch, const glm::vec3& normal, int axis) {
+  if (patch.isRound()) return Splat(patch.radius);
+  return Splat(patch.radius * std::sqrt(std::max(0.f, 1 - normal[axis] * normal[axis])));
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace surfeit
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target guard

@@ -1,0 +1,103 @@
+// The rasters of a packet of receivers side by side: 16 raster cubes interleaved by pixel, so that
+// a footprint of a few pixels is a few vector operations for all receivers at once. Collects what
+// the packet's cut gives, sorts it by distance from the packet's centre, draws it front to back and
+// integrates (memo 3.4 and 3.5).
+//
+// Each lane is the raster of one receiver by the rules of ReceiverRaster, which is the definition;
+// what the lanes share is the cut and the order. A rough node is seen from the packet's centre.
+#pragma once
+
+#include <hwy/aligned_allocator.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "gather/cut/cut.h"
+#include "gather/cut/instance_tree.h"
+#include "gather/packet/packet_kernel.h"
+#include "gather/rules/contribution.h"
+#include "gather/rules/raster_geometry.h"
+#include "gather/rules/receiver.h"
+#include "octree/node/node.h"
+#include "surfeit/gather.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// One thread at a time. Has room for kReservedPatches from the start; for what grows beyond, see
+// ReceiverRaster.
+class PacketRaster {
+ public:
+  static constexpr std::size_t kReservedPatches = 4096;
+  static constexpr std::size_t kReservedParts = 1024;    // of what fades
+  static constexpr std::size_t kReservedEntries = 8192;  // of the order
+
+  // `rules` must be valid, as for PointGatherer.
+  explicit PacketRaster(const GatherRules& rules,
+                        const PacketKernel& kernel = fastestPacketKernel());
+  PacketRaster(const PacketRaster&) = delete;
+  PacketRaster& operator=(const PacketRaster&) = delete;
+
+  // Starts over for 1 to kPacketReceivers receivers.
+  void begin(std::span<const LocalReceiver> receivers, const PacketView& view);
+  // What is added next is in the frame of an instance; null, as at first: in that of the receivers.
+  void setFrame(const InstanceFrame* frame);
+  // Adds a node as a whole. All receivers must lie outside its radius.
+  // `parts`: how much it counts for each receiver; null: wholly.
+  void addNode(const Node& node, const LaneParts* parts = nullptr);
+  // Adds those of the surfels that some receiver may see.
+  void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr);
+
+  // Sorts what was added, and draws it.
+  void sort();
+  void draw();
+
+  // One result per receiver.
+  void integrate(std::span<GatherResult> results);
+
+  std::size_t patchCount() const { return patches_.size(); }
+
+  // Bytes that a raster of this quality holds from the start.
+  static std::size_t memoryBytes(const GatherRules& rules);
+
+ private:
+  bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
+  std::uint32_t keepParts(const LaneParts* parts);
+  void addFacet(const Facet& facet, std::uint32_t parts);
+  void addRoughNode(const Node& node, std::uint32_t parts);
+  std::uint32_t facesThatSee(const Patch& patch) const;
+  std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
+  glm::vec3 toWorld(const glm::vec3& place) const {
+    return frame_ != nullptr ? frame_->toWorld(place) : place;
+  }
+  void bringToWorld(Patch& patch) const;
+  void orderLastPatch(std::uint32_t faces);
+  PacketCanvas canvas() const;
+
+  const PacketKernel& kernel_;
+  const GatherRules rules_;
+  const float near_disk_radii_, near_sphere_radii_;
+  float max_distance_sq_;
+  RasterGeometry geometry_;
+  DirectionWeights weights_;
+  hwy::AlignedFreeUniquePtr<float[]> pixels_;
+  mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
+
+  PacketLanes lanes_;
+  std::size_t receiver_count_ = 0;
+  SeenPixels seen_;
+  std::uint32_t seen_faces_ = 0;  // set of those with pixels that count
+  PacketView view_;
+  const InstanceFrame* frame_ = nullptr;
+  glm::vec3 local_centre_{0};  // of the view, in the frame of what is added
+  float local_radius_ = 0;
+  std::vector<Patch> patches_;
+  std::vector<PacketParts> parts_;
+  std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling
+  std::size_t order_count_ = 0;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,197 @@
+// All that decides what a gather finds at a receiver, but the scene: what it looks for, how well,
+// and by which weights.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+#include "gather/rules/raster_geometry.h"
+#include "gather/rules/receiver.h"
+#include "surfeit/gather.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+class EnvironmentCube;
+class EnvironmentMap;
+
+// Cones up to this half angle (radians) get a raster of their own, of one face around their axis;
+// wider ones are parts of the cube. At 60 degrees the outermost pixels are as narrow as a third.
+inline constexpr float kWidestConeRaster = 1.05f;
+
+// Half angle of the cone that is all above a receiver, and where a glossy lobe ends: at directions
+// that weigh this little.
+inline constexpr float kHemisphere = kPi / 2;
+inline constexpr float kLobeEnd = 0.01f;
+
+// Of the cosine, as Blinn-Phong lobes of a Beckmann roughness have it.
+inline float lobeExponent(float roughness) { return 2 / (roughness * roughness) - 2; }
+
+// The weights with the cone angle filled in if it was left open.
+inline GatherWeights withConeAngle(GatherWeights weights, GatherMode mode) {
+  if (weights.cone_angle > 0) {
+    weights.cone_angle = std::min(weights.cone_angle, kHemisphere);
+    return weights;
+  }
+  const float exponent = mode == GatherMode::kGlossy ? lobeExponent(weights.roughness) : 0;
+  weights.cone_angle = exponent > 0 ? std::acos(std::pow(kLobeEnd, 1 / exponent)) : kHemisphere;
+  return weights;
+}
+
+// What a mode usually gives.
+constexpr std::uint32_t usualOutputs(GatherMode mode) {
+  return mode == GatherMode::kOcclusion ? kOutputOcclusion : kOutputOcclusion | kOutputIrradiance;
+}
+
+struct GatherRules {
+  GatherRules(GatherMode gather_mode, const GatherQuality& gather_quality)
+      : mode(gather_mode),
+        outputs(usualOutputs(gather_mode)),
+        quality(gather_quality),
+        weights(withConeAngle({}, gather_mode)) {}
+
+  // `settings` must be checked (checkGatherSettings). With an environment see gatherRules in
+  // gather/light/environment_map.h.
+  explicit GatherRules(const GatherSettings& settings)
+      : mode(settings.mode),
+        outputs(settings.outputs != 0 ? settings.outputs : usualOutputs(settings.mode)),
+        quality(settings.quality),
+        weights(withConeAngle(settings.weights, settings.mode)),
+        groups(settings.groups),
+        eye(glm::vec3(settings.eye)) {}
+
+  GatherMode mode;
+  std::uint32_t outputs;  // set of GatherOutput
+  // Both null, or of one map.
+  const EnvironmentMap* environment = nullptr;
+  const EnvironmentCube* environment_cube = nullptr;  // of the raster's resolution
+  GatherQuality quality;
+  GatherWeights weights;              // with the cone angle filled in
+  std::uint64_t groups = kAllGroups;  // set of the groups of surfels that are seen
+  glm::vec3 eye{0};                   // with kGlossy: receivers are looked at from here
+
+  bool has(std::uint32_t some) const { return (outputs & some) != 0; }
+  // Whether the radiosity of surfels matters, and whether distance does.
+  bool hasLight() const {
+    return has(kOutputIrradiance | kOutputIlluminationDirection | kOutputFluence |
+               kOutputRadianceSh);
+  }
+  bool fades() const { return weights.falloff > 0 && has(kOutputOcclusion); }
+  bool isGlossy() const { return mode == GatherMode::kGlossy; }
+  // Whether only a cone is looked at, and drawn to a raster of its own.
+  bool hasCone() const { return weights.cone_angle < kHemisphere; }
+  bool hasConeRaster() const { return weights.cone_angle <= kWidestConeRaster; }
+  std::uint32_t channels() const { return (hasLight() ? 3u : 0u) + (fades() ? 1u : 0u); }
+};
+
+// The raster that is drawn to.
+inline RasterGeometry rasterGeometry(const GatherRules& rules) {
+  const int resolution = rules.quality.raster_resolution;
+  return rules.hasConeRaster() ? RasterGeometry::cone(resolution, rules.weights.cone_angle)
+                               : RasterGeometry(resolution);
+}
+
+inline float pixelsPerSlope(const GatherRules& rules) {
+  const float slope = rules.hasConeRaster() ? std::tan(rules.weights.cone_angle) : 1;
+  return 0.5f * float(rules.quality.raster_resolution) / slope;
+}
+
+// The max solid angle of a cone is this many times its share of the hemisphere: 4 by 4 of its
+// pixels at standard quality. (light_bench, glossy .2: error .030 with 4, .034 with 10, at 1.3 and
+// 0.7 times the time of bleeding.)
+inline constexpr float kConeShare = 10;
+
+// No node is drawn as a patch of more pixels: what it does not know of its own shape would be seen.
+// So finer pixels converge, whatever the max solid angle. (Covered of a closed shell of 20,000
+// disks at 32 and 64 pixels: .998 and .995; with .1 sr .991 and .982. bench/leaks)
+inline constexpr float kMostNodePixels = 6.5f;
+
+// A raster that looks closer needs smaller clusters, and disks where others have patches. Shares of
+// the hemisphere keep their number of clusters.
+inline float maxSolidAngle(const GatherRules& rules) {
+  const float share = std::min(1.f, kConeShare * (1 - std::cos(rules.weights.cone_angle)));
+  const float pixel = 1 / pixelsPerSlope(rules);
+  return std::min(rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1),
+                  kMostNodePixels * pixel * pixel);
+}
+// Where directions weigh by the cosine of their angle to the normal, what is low may look this many
+// times as large, and no larger than a limit: of what exceeds it, a footprint on the raster is no
+// image.
+inline constexpr float kMostCoarser = 4, kMostLowSolidAngle = 0.4f;
+inline float mostCoarser(const GatherRules& rules) {
+  const bool weighs_by_cosine = !rules.isGlossy() && !rules.hasCone() &&
+                                rules.weights.distribution == GatherWeights::Distribution::kCosine;
+  const float whole = std::max(maxSolidAngle(rules), kMostLowSolidAngle / kMostCoarser);
+  return weighs_by_cosine ? std::max(1.f, kMostLowSolidAngle / whole) : 1;
+}
+// In radii of a surfel. Disks more than two pixels wide are ray traced in any case, unless nothing
+// is: between such patches the widest hull leaves gaps. Spheres stand alone, and rays through the
+// middles of pixels are no measure of how large they are.
+inline float nearFieldRadii(const GatherRules& rules, bool is_sphere) {
+  const float slope = rules.hasConeRaster() ? std::tan(rules.weights.cone_angle) : 1;
+  const float radii = rules.quality.near_field_radii / std::sqrt(std::min(1.f, slope));
+  return radii > 0 && !is_sphere ? std::max(radii, pixelsPerSlope(rules)) : radii;
+}
+
+// The axis that directions weigh about: the normal, or the view mirrored at it. Unit; without a
+// normal something.
+inline glm::vec3 lobeAxis(const LocalReceiver& receiver, const GatherRules& rules) {
+  if (receiver.isSpherical()) return {1, 0, 0};
+  if (!rules.isGlossy()) return receiver.normal;
+  const glm::vec3 view =
+      receiver.view != glm::vec3(0) ? receiver.view : receiver.position - rules.eye;
+  const float length = glm::length(view);
+  if (!(length > 0)) return receiver.normal;
+  const glm::vec3 mirrored =
+      view / length - 2 * glm::dot(view / length, receiver.normal) * receiver.normal;
+  return mirrored / glm::length(mirrored);
+}
+
+// How occlusion at a distance counts.
+inline float fadeAt(float distance, const GatherRules& rules) {
+  const GatherWeights& weights = rules.weights;
+  if (weights.falloff_mode == GatherWeights::FalloffMode::kExponential) {
+    return std::exp(-weights.falloff * distance);
+  }
+  return std::pow(std::max(0.f, 1 - distance / rules.quality.max_distance), weights.falloff);
+}
+
+// How directions weigh by the cosine of their angle to an axis, the normal or the reflection.
+class DirectionWeights {
+ public:
+  // `pixel`: angle of a pixel of the raster; the edge of a cone fades over as much.
+  DirectionWeights(const GatherRules& rules, float pixel) {
+    exponent_ = rules.isGlossy() ? lobeExponent(rules.weights.roughness) : 0;
+    is_cosine_ =
+        !rules.isGlossy() && rules.weights.distribution == GatherWeights::Distribution::kCosine;
+    if (rules.hasCone()) {
+      edge_cosine_ = std::cos(rules.weights.cone_angle);
+      edge_slope_ = 1 / (pixel * std::sin(rules.weights.cone_angle));
+    }
+  }
+
+  float operator()(float cosine) const {
+    if (!(cosine > 0)) return 0;
+    float weight = is_cosine_ ? cosine : 1;
+    if (exponent_ > 0) weight *= std::pow(cosine, exponent_);
+    if (edge_slope_ > 0) {
+      weight *= std::clamp(0.5f + (cosine - edge_cosine_) * edge_slope_, 0.f, 1.f);
+    }
+    return weight;
+  }
+
+  bool isPlainCosine() const { return is_cosine_ && edge_slope_ == 0; }
+  bool isCosine() const { return is_cosine_; }
+  float exponent() const { return exponent_; }
+  float edgeCosine() const { return edge_cosine_; }
+  float edgeSlope() const { return edge_slope_; }  // 0: no cone
+
+ private:
+  bool is_cosine_ = true;
+  float exponent_ = 0, edge_cosine_ = 0, edge_slope_ = 0;
+};
+
+}  // namespace surfeit

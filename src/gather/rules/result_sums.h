@@ -1,0 +1,79 @@
+// Results as sums over the pixels of a raster.
+#pragma once
+
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+#include "core/spherical_harmonics.h"
+#include "gather/rules/gather_rules.h"
+#include "gather/rules/receiver.h"
+
+namespace surfeit {
+
+// What Rec. 709 primaries of equal strength look like; weighs the colors of light by brightness.
+inline constexpr glm::vec3 kLuminance = {0.2126f, 0.7152f, 0.0722f};
+
+// The result of sums over the pixels, each times the direction's weight and the solid angle; those
+// of fluence and harmonics times the solid angle alone. Dividing by the sum of the weights rather
+// than by pi makes a wholly covered hemisphere exactly 1, whatever the resolution.
+inline GatherResult resultOf(const GatherResult& sums, float weight, const GatherRules& rules,
+                             bool is_spherical) {
+  const auto unit = [](const glm::vec3& v) {
+    const float length = glm::length(v);
+    return length > 0 ? v / length : glm::vec3(0);
+  };
+  const float inverse = weight > 0 ? 1 / weight : 0;
+  GatherResult result;
+  if (rules.has(kOutputOcclusion)) result.occlusion = sums.occlusion * inverse;
+  if (rules.has(kOutputIrradiance)) result.irradiance = sums.irradiance * inverse;
+  if (rules.has(kOutputBentNormal)) result.bent_normal = unit(sums.bent_normal);
+  if (rules.has(kOutputIlluminationDirection)) {
+    result.illumination_direction = unit(sums.illumination_direction);
+  }
+  if (rules.has(kOutputEnvironment)) result.environment = sums.environment * inverse;
+  // Radiosity is pi times radiance
+  if (rules.has(kOutputFluence)) result.fluence = sums.fluence * ((is_spherical ? 1 : 2) / kPi);
+  if (rules.has(kOutputRadianceSh)) result.radiance_sh = sums.radiance_sh;
+  return result;
+}
+
+// Adds up in the order of the calls.
+class ResultSums {
+ public:
+  struct Pixel {
+    glm::vec3 direction;  // unit, of the world
+    float solid_angle;
+    float weight;  // of the direction, without the solid angle
+    float coverage, occlusion;
+    glm::vec3 radiosity;    // of surfels, times the coverage
+    glm::vec3 environment;  // of the whole pixel
+  };
+  void add(const Pixel& pixel) {
+    const float weight = pixel.weight * pixel.solid_angle, open = 1 - pixel.coverage;
+    const glm::vec3 environment = open * pixel.environment;
+    const glm::vec3 light = pixel.radiosity + environment;
+    weight_ += weight;
+    sums_.occlusion += weight * pixel.occlusion;
+    sums_.irradiance += weight * pixel.radiosity;
+    sums_.bent_normal += weight * open * pixel.direction;
+    sums_.illumination_direction += weight * glm::dot(light, kLuminance) * pixel.direction;
+    sums_.environment += weight * environment;
+    if (!(pixel.weight > 0)) return;
+    sums_.fluence += pixel.solid_angle * light;
+    const ShCoefficients basis = shBasis(pixel.direction);
+    for (std::size_t i = 0; i < basis.size(); ++i) {
+      sums_.radiance_sh[i] += pixel.solid_angle * basis[i] * light;
+    }
+  }
+
+  GatherResult result(const GatherRules& rules, bool is_spherical) const {
+    return resultOf(sums_, weight_, rules, is_spherical);
+  }
+
+ private:
+  float weight_ = 0;
+  GatherResult sums_;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,249 @@
+#include "index/cloud_reader.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <mutex>
+#include <optional>
+
+#include "core/first_failure.h"
+#include "core/parallel.h"
+#include "core/thread_scratch.h"
+#include "core/up_comment.h"
+#include "index/row_fetcher.h"
+#include "index/scene_rows.h"
+
+namespace surfeit {
+namespace {
+
+// Places that a sample is taken from; few records at each, because neighbours say the same.
+constexpr std::uint64_t kLeastPlaces = 2048, kMostPlaces = 16384;
+
+// What the decoding threads of one input share.
+class InputPass {
+ public:
+  InputPass(const SurfelSource& source, const CloudReader::Consumer& consume,
+            std::uint64_t sample_step, Progress& progress)
+      : source_(source), consume_(consume), sample_step_(sample_step), progress_(progress) {}
+
+  void decode(const RowFetcher::Rows& rows);
+
+  // The first of the file, by record.
+  FirstFailure& failure() { return failure_; }
+  CloudTotals& totals() { return totals_; }
+  const SurfelDefects& defects() const { return defects_; }
+
+ private:
+  Status decodePart(Bytes rows, std::uint64_t first_record, CloudTotals& totals,
+                    SurfelDefects& defects);
+
+  const SurfelSource& source_;
+  const CloudReader::Consumer& consume_;
+  const std::uint64_t sample_step_;
+  Progress& progress_;
+  FirstFailure failure_;
+  std::mutex mutex_;  // guards what is below
+  CloudTotals totals_;
+  SurfelDefects defects_;
+};
+
+Status InputPass::decodePart(Bytes rows, std::uint64_t first_record, CloudTotals& totals,
+                             SurfelDefects& defects) {
+  std::vector<Surfel>& surfels = threadScratch<std::vector<Surfel>>([] {});
+  surfels.resize(kReadBatch);
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                           source_.decodeRows(rows, first_record, surfels, defects));
+  const std::span<Surfel> batch = std::span(surfels).first(count);
+  totals.add(batch);
+  const std::uint64_t phase = first_record % sample_step_;
+  for (std::size_t i = phase == 0 ? 0 : sample_step_ - phase; i < count; i += sample_step_) {
+    totals.sample.push_back(batch[i]);
+  }
+  return consume_(batch, totals.bounds);
+}
+
+void InputPass::decode(const RowFetcher::Rows& rows) {
+  const std::size_t row_bytes = source_.rowBytes();
+  const std::size_t row_count = rows.bytes.size() / row_bytes;
+  CloudTotals totals;
+  SurfelDefects defects;
+  // What comes before a failure goes on: it may hold the first one
+  for (std::size_t begin = 0; begin < row_count && rows.first_record + begin < failure_.place();
+       begin += kReadBatch) {
+    const std::size_t count = std::min(kReadBatch, row_count - begin);
+    const Bytes part = rows.bytes.subspan(begin * row_bytes, count * row_bytes);
+    const std::uint64_t first_record = rows.first_record + begin;
+    failure_.note(decodePart(part, first_record, totals, defects), first_record);
+  }
+  const std::lock_guard lock(mutex_);
+  totals_.add(totals);
+  defects_.add(defects);
+  progress_.advance(row_count);
+  progress_.advanceBytes(rows.bytes.size());
+}
+
+CloudChannels unionOf(const CloudChannels& a, const CloudChannels& b) {
+  return {a.normal || b.normal,       a.radius || b.radius,      a.area || b.area,
+          a.radiosity || b.radiosity, a.albedo || b.albedo,      a.two_sided || b.two_sided,
+          a.group || b.group,         a.long_side || b.long_side};
+}
+
+}  // namespace
+
+void CloudTotals::add(std::span<const Surfel> added) {
+  for (const Surfel& surfel : added) {
+    missing_both += surfel.radius <= 0 && surfel.area <= 0 ? 1 : 0;
+    missing_area += surfel.radius > 0 && surfel.area == 0 ? 1 : 0;
+    covering += surfel.radius > 0 && surfel.area < 0 ? 1 : 0;
+    missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
+    spheres += surfel.isSphere() ? 1 : 0;
+    bounds.add(surfel.position);
+    content += XXH3_64bits(&surfel, sizeof surfel);
+  }
+  surfels += added.size();
+}
+
+void CloudTotals::add(const CloudTotals& other) {
+  if (!other.bounds.isEmpty()) bounds.add(other.bounds);
+  surfels += other.surfels;
+  skipped += other.skipped;
+  content += other.content;
+  channels = unionOf(channels, other.channels);
+  missing_both += other.missing_both;
+  missing_area += other.missing_area;
+  covering += other.covering;
+  missing_radius += other.missing_radius;
+  spheres += other.spheres;
+  sample.insert(sample.end(), other.sample.begin(), other.sample.end());
+}
+
+Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bool strict,
+                                      std::size_t read_bytes, const RowReaderOptions& reading,
+                                      const SourceOpener& opener) {
+  CloudReader reader;
+  reader.inputs_ = inputs;
+  reader.reading_ = reading;
+  reader.reading_.access = Access::kDirect;
+  reader.opener_ = opener ? opener : SourceOpener(openCloudSource);
+  reader.strict_ = strict;
+  reader.read_bytes_ = read_bytes;
+  for (const std::string& path : inputs) {
+    SURFEIT_ASSIGN_OR_RETURN(const auto source, reader.opener_(path, strict, reading));
+    reader.records_.push_back(source->recordCount());
+    if (source->hasFloatPositions()) reader.float_inputs_.push_back(path);
+    reader.record_count_ += source->recordCount();
+    reader.is_seekable_ = reader.is_seekable_ && source->isSeekable();
+    for (const std::string& note : source->notes()) {
+      reader.notes_.push_back(fmt::format("{}: {}", path, note));
+    }
+    const UpAxis up = source->up();
+    if (reader.up_.value_or(up) != up) {
+      reader.notes_.push_back(fmt::format("{}: {} is up, but {} in {}: the scene has that (--up)",
+                                          path, upAxisName(up), upAxisName(*reader.up_),
+                                          inputs[0]));
+    }
+    if (!reader.up_) reader.up_ = up;
+    const CloudChannels channels = source->channels();
+    reader.lacks_sizes_ =
+        reader.lacks_sizes_ || (!channels.radius && !channels.area) || source->hasCoverage();
+    if (opener) {
+      reader.file_bytes_ += source->recordCount() * source->rowBytes();
+      continue;
+    }
+    SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+    reader.file_bytes_ += file.size();
+  }
+  return reader;
+}
+
+Result<std::vector<Surfel>> CloudReader::sample(std::uint64_t buckets) const {
+  const std::uint64_t places = std::clamp(8 * buckets, kLeastPlaces, kMostPlaces);
+  const std::size_t run_size = static_cast<std::size_t>(kSampleSurfels / places);
+  const std::uint64_t step = std::max<std::uint64_t>(run_size, record_count_ / places);
+  std::vector<Surfel> all, run(run_size);
+  AlignedBuffer buffer;
+  std::uint64_t record = step / 2;  // counted on from input to input
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    if (record >= records_[i]) {
+      record -= records_[i];
+      continue;
+    }
+    // Bad records are refused, if they are to be, when all are read: then the first one is named
+    SURFEIT_ASSIGN_OR_RETURN(const auto source, opener_(inputs_[i], /* strict= */ false, reading_));
+    source->setOrigin(origin_);
+    for (; record < records_[i]; record += step) {
+      SURFEIT_RETURN_IF_ERROR(source->seekRow(record));
+      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, source->readRows(run_size, buffer));
+      SurfelDefects defects;
+      SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                               source->decodeRows(rows, record, run, defects));
+      all.insert(all.end(), run.begin(), run.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+    record -= records_[i];
+  }
+  return all;
+}
+
+Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& progress) const {
+  CloudTotals totals;
+  const std::uint64_t sample_step = std::max<std::uint64_t>(1, record_count_ / kSampleSurfels);
+  for (const std::string& path : inputs_) {
+    SURFEIT_ASSIGN_OR_RETURN(const auto source, opener_(path, strict_, reading_));
+    source->setOrigin(origin_);
+    InputPass pass(*source, consume, sample_step, progress);
+    // Small inputs are read in parts too, so that all threads have some
+    const std::uint64_t part_rows = source->recordCount() / (4 * RowFetcher::kSlots) + kReadBatch;
+    RowFetcher fetcher(*source, static_cast<std::size_t>(std::min<std::uint64_t>(
+                                    read_bytes_, part_rows * source->rowBytes())));
+    std::array<RowFetcher::Rows, RowFetcher::kSlots> fetched;  // by slot
+    const auto fetch = [&]() -> std::optional<std::size_t> {
+      if (progress.isCancelled()) pass.failure().note(Status::interrupted());
+      if (pass.failure().happened()) return std::nullopt;
+      const RowFetcher::Rows rows = fetcher.next();
+      if (rows.bytes.empty()) return std::nullopt;
+      fetched[rows.slot] = rows;
+      return rows.slot;
+    };
+    const PipelineStage decode = {PipelineStage::Mode::kParallel, [&](std::size_t slot) {
+                                    const RowFetcher::Rows rows = fetched[slot];
+                                    pass.decode(rows);
+                                    fetcher.giveBack(rows);
+                                  }};
+    runPipeline(RowFetcher::kSlots, fetch, {&decode, 1});
+    SURFEIT_RETURN_IF_ERROR(pass.failure().status());
+    SURFEIT_RETURN_IF_ERROR(fetcher.status());
+    pass.totals().channels = source->channels();
+    pass.totals().skipped = pass.defects().total();
+    if (const std::string defects = pass.defects().describe(); !defects.empty()) {
+      progress.note(fmt::format("{}: skipped {}", path, defects));
+    }
+    totals.add(pass.totals());
+  }
+  return totals;
+}
+
+std::uint64_t CloudReader::memoryBytes(std::size_t read_bytes, int threads) {
+  // A batch, grouped by bucket with its words, and a packed block
+  constexpr std::uint64_t kThreadBytes = kReadBatch * (2 * sizeof(Surfel) + 16) + (512 << 10);
+  return RowFetcher::kSlots * std::uint64_t{read_bytes} +
+         static_cast<std::uint64_t>(threads) * kThreadBytes + 3 * kSampleSurfels * sizeof(Surfel);
+}
+
+std::vector<std::string> CloudReader::notesOfFloats(const CloudTotals& totals) const {
+  std::vector<std::string> notes;
+  const double step = floatStep(movedBounds(totals.bounds, origin_));
+  const double spacing = double(totals.bounds.longestSide()) / std::sqrt(double(totals.surfels));
+  if (step <= 1e-3 * spacing) return notes;  // no more than quantizing moves
+  for (const std::string& path : float_inputs_) {
+    notes.push_back(fmt::format(
+        "{}: positions are floats, which stand {:.2g} apart so far from 0, beside a spacing of "
+        "about {:.2g}: write the cloud with doubles, or near 0",
+        path, step, spacing));
+  }
+  return notes;
+}
+
+}  // namespace surfeit

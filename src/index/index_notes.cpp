@@ -1,0 +1,65 @@
+#include "index/index_notes.h"
+
+#include <fmt/format.h>
+
+#include <string>
+
+namespace surfeit {
+
+void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
+                    const IndexOptions& options, Progress& progress) {
+  for (const std::string& note : reader.notesOfFloats(totals)) progress.note(note);
+  if (totals.missing_both > 0) {
+    progress.note(
+        fmt::format("{} surfels have neither radius nor area: both follow from the "
+                    "cells among their neighbours",
+                    totals.missing_both));
+  }
+  if (totals.covering > 0) {
+    progress.note(fmt::format(
+        "{} surfels have a coverage: it is multiplied by the area of the disk, or of the "
+        "cell among their neighbours, whichever is smaller",
+        totals.covering));
+  }
+  if (totals.missing_area > 0) {
+    progress.note(fmt::format("{} surfels have no area: pi r^2 / {} is used", totals.missing_area,
+                              options.disk_overlap));
+  }
+  if (totals.missing_radius > 0) {
+    progress.note(fmt::format("{} surfels have no radius: a disk of {} times the area is used",
+                              totals.missing_radius, options.disk_overlap));
+  }
+  if (totals.spheres == 0) return;
+  if (options.normals) {
+    progress.note(
+        fmt::format("{} surfels have no normal: it follows from their neighbours", totals.spheres));
+  } else {
+    progress.note(
+        fmt::format("warning: {} surfels have no normal: they are spheres, which look "
+                    "the same from everywhere (--normals estimate finds some)",
+                    totals.spheres));
+  }
+}
+
+void noteRepeats(const IndexStats& stats, const IndexOptions& options, Progress& progress) {
+  if (stats.repeated_surfels == 0) return;
+  if (options.repeats == Repeats::kThin) {
+    progress.inform(fmt::format("{} surfels repeat another at its place: they are left out",
+                                stats.repeated_surfels));
+  } else {
+    progress.note(
+        fmt::format("{} surfels repeat another at its place, and their areas count twice "
+                    "(--overlap thin keeps one at a place, as tiles that overlap need)",
+                    stats.repeated_surfels));
+  }
+}
+
+void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress) {
+  if (stats.thin_surfels == 0) return;
+  progress.inform(
+      fmt::format("{} of {} surfels without a normal lie on no surface: they are {}",
+                  stats.thin_surfels, stats.thin_surfels + stats.normals_found,
+                  options.normals->thin_is_two_sided ? "seen from both sides" : "spheres"));
+}
+
+}  // namespace surfeit

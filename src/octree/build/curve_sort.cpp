@@ -1,0 +1,131 @@
+#include "octree/build/curve_sort.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
+
+namespace surfeit {
+namespace {
+
+constexpr int kDigitBits = 8;
+constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
+// Tickets and scratch of this many fit half a second-level cache of 2 MiB.
+constexpr std::size_t kCacheTickets = 32768;
+// Below this a comparison sort beats counting digits.
+constexpr std::size_t kFewTickets = 192;
+// Pieces in which the threads count and move tickets.
+constexpr std::size_t kPieceTickets = 65536;
+
+using Histogram = std::array<std::size_t, kDigits>;
+
+// The digit of a key at a shift.
+std::size_t digitOf(CurveKey key, int shift) { return key >> shift & (kDigits - 1); }
+
+// Bits in which the keys differ.
+CurveKey differingBits(std::span<const Ticket> tickets) {
+  CurveKey bits = 0;
+  for (const Ticket& ticket : tickets) bits |= ticket.key ^ tickets.front().key;
+  return bits;
+}
+
+void sortFew(std::span<Ticket> tickets) {
+  std::stable_sort(tickets.begin(), tickets.end(),
+                   [](const Ticket& a, const Ticket& b) { return a.key < b.key; });
+}
+
+// Passes from the bottom over the digits that differ; the result ends in `tickets`.
+void sortInCache(std::span<Ticket> tickets, std::span<Ticket> scratch) {
+  const CurveKey bits = differingBits(tickets);
+  std::span<Ticket> from = tickets, to = scratch;
+  for (int shift = 0; shift < 64 && bits >> shift != 0; shift += kDigitBits) {
+    if ((bits >> shift & (kDigits - 1)) == 0) continue;
+    std::array<std::uint32_t, kDigits> next{};
+    for (const Ticket& ticket : from) ++next[digitOf(ticket.key, shift)];
+    std::uint32_t sum = 0;
+    for (std::uint32_t& n : next) sum += std::exchange(n, sum);
+    for (const Ticket& ticket : from) to[next[digitOf(ticket.key, shift)]++] = ticket;
+    std::swap(from, to);
+  }
+  if (from.data() != tickets.data()) std::copy(from.begin(), from.end(), tickets.begin());
+}
+
+void sortPart(std::span<Ticket> tickets, std::span<Ticket> scratch);
+
+// One pass from the top, then every digit by itself. Threads count their pieces first, so that each
+// knows where its tickets go: the order within a digit is that of the input.
+void splitAndSort(std::span<Ticket> tickets, std::span<Ticket> scratch) {
+  const CurveKey bits = differingBits(tickets);
+  if (bits == 0) return;
+  const int shift = std::max(0, static_cast<int>(std::bit_width(bits)) - kDigitBits);
+  const std::size_t pieces = (tickets.size() + kPieceTickets - 1) / kPieceTickets;
+  const auto piece = [&](std::size_t p) {
+    const std::size_t begin = p * kPieceTickets;
+    return tickets.subspan(begin, std::min(kPieceTickets, tickets.size() - begin));
+  };
+  std::vector<Histogram> next(pieces);
+  parallelFor(pieces, [&](std::size_t p) {
+    next[p].fill(0);
+    for (const Ticket& ticket : piece(p)) ++next[p][digitOf(ticket.key, shift)];
+  });
+  std::array<std::size_t, kDigits + 1> begin{};
+  std::size_t sum = 0;
+  for (std::size_t digit = 0; digit < kDigits; ++digit) {
+    begin[digit] = sum;
+    for (Histogram& histogram : next) sum += std::exchange(histogram[digit], sum);
+  }
+  begin[kDigits] = sum;
+  parallelFor(pieces, [&](std::size_t p) {
+    for (const Ticket& ticket : piece(p)) scratch[next[p][digitOf(ticket.key, shift)]++] = ticket;
+  });
+  parallelFor(kDigits, [&](std::size_t digit) {
+    const std::size_t size = begin[digit + 1] - begin[digit];
+    if (size == 0) return;
+    // What was moved to scratch is sorted there and comes back
+    const std::span<Ticket> moved = scratch.subspan(begin[digit], size);
+    const std::span<Ticket> home = tickets.subspan(begin[digit], size);
+    if (shift > 0) sortPart(moved, home);
+    std::copy(moved.begin(), moved.end(), home.begin());
+  });
+}
+
+void sortPart(std::span<Ticket> tickets, std::span<Ticket> scratch) {
+  if (tickets.size() <= kFewTickets) {
+    sortFew(tickets);
+  } else if (tickets.size() <= kCacheTickets) {
+    sortInCache(tickets, scratch);
+  } else {
+    splitAndSort(tickets, scratch);
+  }
+}
+
+}  // namespace
+
+bool contentLess(const Surfel& a, const Surfel& b) {
+  return std::memcmp(&a, &b, sizeof(Surfel)) < 0;
+}
+
+void sortByKey(std::span<Ticket> tickets, std::span<Ticket> scratch) { sortPart(tickets, scratch); }
+
+void sortAlongCurve(std::span<Ticket> tickets, std::span<Ticket> scratch,
+                    std::span<const Surfel> surfels) {
+  sortByKey(tickets, scratch);
+  // Equal keys are rare: two surfels within 2^-20 of the scene
+  const auto less = [surfels](const Ticket& a, const Ticket& b) {
+    return contentLess(surfels[a.index], surfels[b.index]);
+  };
+  for (std::size_t i = 1; i < tickets.size(); ++i) {
+    if (tickets[i].key != tickets[i - 1].key) continue;
+    const std::size_t first = i - 1;
+    while (i < tickets.size() && tickets[i].key == tickets[first].key) ++i;
+    // Small ranges are sorted here by this thread
+    parallelSort(tickets.begin() + static_cast<std::ptrdiff_t>(first),
+                 tickets.begin() + static_cast<std::ptrdiff_t>(i), less);
+  }
+}
+
+}  // namespace surfeit

@@ -1,0 +1,41 @@
+// Surfels in curve order, as the octree is built from them.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "storage/file.h"
+#include "octree/build/curve_sort.h"
+#include "surfeit/status.h"
+#include "surfeit/surfel.h"
+
+namespace surfeit {
+
+// A run of surfels along the curve: tickets in order, surfels in any. Immutable when handed out, so
+// threads may share it.
+struct SortedBatch {
+  std::vector<Ticket> tickets;
+  std::span<Surfel> surfels;  // what the tickets' indices point into
+
+  // Room for `count` surfels, each in one cache line; what was there is lost.
+  void resize(std::size_t count) {
+    tickets.resize(count);
+    memory_.reserve(count * sizeof(Surfel));
+    surfels = {reinterpret_cast<Surfel*>(memory_.data()), count};
+  }
+
+ private:
+  AlignedBuffer memory_;
+};
+
+// Where sorted surfels come from, batch after batch. Surfels of one key come in an order that follows
+// from their content. One thread at a time; a stream may use all threads of the current arena.
+class SortedSurfelStream {
+ public:
+  virtual ~SortedSurfelStream() = default;
+  // The next batch, never empty; nullptr at the end.
+  virtual Result<std::shared_ptr<const SortedBatch>> next() = 0;
+};
+
+}  // namespace surfeit

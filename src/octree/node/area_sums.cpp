@@ -1,0 +1,75 @@
+#include "octree/node/area_sums.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/spherical_harmonics.h"
+
+namespace surfeit {
+namespace {
+
+// The mean of x x^T over a disk of area A around the origin is A / (4 pi) (I - n n^T); over the
+// disk that a sphere looks like, the same without a normal.
+double diskSpread(const Surfel& surfel) {
+  const double radius = double(surfel.radius);
+  return std::min(double(surfel.area) / (4 * double(kPi)), radius * radius / 4);
+}
+
+}  // namespace
+
+AreaSums::AreaSums(const Surfel& surfel, const double (&origin)[3]) {
+  const double a = double(surfel.area), spread = diskSpread(surfel);
+  area = a;
+  double x[3], n[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    x[axis] = double(surfel.position[axis]) - origin[axis];
+    n[axis] = surfel.isSphere() ? 0 : double(surfel.normal[axis]);
+    position[axis] = a * x[axis];
+    radiosity[axis] = a * double(surfel.radiosity[axis]);
+    // Both sides of a two-sided disk face everywhere: it gives a node no direction
+    if (!surfel.isTwoSided()) normal[axis] = a * n[axis];
+  }
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
+    const double identity = row == column ? 1 : 0;
+    second_moment[i] = a * (x[row] * x[column] + spread * (identity - n[row] * n[column]));
+  }
+}
+
+// (x + d)(x + d)^T.
+void AreaSums::move(const double (&shift)[3]) {
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
+    second_moment[i] += shift[row] * position[column] + position[row] * shift[column] +
+                        area * shift[row] * shift[column];
+  }
+  for (int axis = 0; axis < 3; ++axis) position[axis] += area * shift[axis];
+}
+
+void AreaSums::add(const AreaSums& other) {
+  area += other.area;
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    second_moment[i] += other.second_moment[i];
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    position[axis] += other.position[axis];
+    normal[axis] += other.normal[axis];
+    radiosity[axis] += other.radiosity[axis];
+  }
+}
+
+double AreaSums::normalLength() const {
+  return std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+}
+
+SymmetricMatrix AreaSums::covariance() const {
+  SymmetricMatrix covariance;
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
+    covariance.entries[i] =
+        float(second_moment[i] / area - position[row] / area * (position[column] / area));
+  }
+  return covariance;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,120 @@
+#include "octree/node/facet_sums.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace surfeit {
+namespace {
+
+double dotOfNormals(const AreaSums& a, const AreaSums& b) {
+  return a.normal[0] * b.normal[0] + a.normal[1] * b.normal[1] + a.normal[2] * b.normal[2];
+}
+
+// Whether two-sided groups lie in about one plane, and only their normals are turned: not so the
+// opposite walls of a house.
+bool areTurned(const FacetGroup& a, const FacetGroup& b) {
+  constexpr double kFarthest = 0.1;  // from each other's plane, over the root of the area
+  if (!a.is_two_sided || !(dotOfNormals(a, b) < 0)) return false;
+  const FacetGroup& larger = a.area > b.area ? a : b;
+  const glm::dvec3 between = a.middle() - b.middle();
+  double distance = 0;
+  for (int axis = 0; axis < 3; ++axis) distance += between[axis] * larger.normal[axis];
+  return std::abs(distance) <= kFarthest * std::sqrt(larger.area) * larger.normalLength();
+}
+
+// Of the normals, as they are when those are turned back.
+double facingDot(const FacetGroup& a, const FacetGroup& b) {
+  const double dot = dotOfNormals(a, b);
+  return areTurned(a, b) ? -dot : dot;
+}
+
+// Within 10 degrees.
+bool faceAlike(const FacetGroup& a, const FacetGroup& b) {
+  constexpr double kCosineSq = 0.97;
+  if (a.is_two_sided != b.is_two_sided) return false;
+  const double dot = facingDot(a, b);
+  return dot > 0 && dot * dot > kCosineSq * dotOfNormals(a, a) * dotOfNormals(b, b);
+}
+
+}  // namespace
+
+FacetGroup::FacetGroup(const AreaSums& sums, const Surfel& surfel)
+    : AreaSums(sums), is_two_sided(surfel.isTwoSided()) {
+  for (int axis = 0; axis < 3; ++axis) normal[axis] = sums.area * double(surfel.normal[axis]);
+}
+
+void FacetGroup::add(const FacetGroup& other) {
+  if (!areTurned(*this, other)) return AreaSums::add(other);
+  AreaSums turned = other;
+  for (double& n : turned.normal) n = -n;
+  AreaSums::add(turned);
+}
+
+void FacetSums::add(const FacetGroup& facet) {
+  if (has_given_up_) return;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (faceAlike(groups_[i], facet)) return groups_[i].add(facet);
+  }
+  groups_[count_++] = facet;
+  if (count_ > kMostFacets) merge(*closest());  // of seven groups, four are of one kind
+}
+
+void FacetSums::add(const FacetSums& child, const double (&shift)[3]) {
+  if (child.has_given_up_) giveUp();
+  for (FacetGroup group : child.groups()) {
+    group.move(shift);
+    add(group);
+  }
+}
+
+void FacetSums::giveUp() {
+  has_given_up_ = true;
+  count_ = 0;
+}
+
+std::optional<FacetSums::Pair> FacetSums::closest() const {
+  std::array<double, kMostFacets + 1> lengths;
+  for (std::size_t i = 0; i < count_; ++i) lengths[i] = groups_[i].normalLength();
+  std::optional<Pair> closest;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count_; ++i) {
+    for (std::size_t j = i + 1; j < count_; ++j) {
+      if (groups_[i].is_two_sided != groups_[j].is_two_sided) continue;
+      const double both_sq =
+          lengths[i] * lengths[i] + lengths[j] * lengths[j] + 2 * facingDot(groups_[i], groups_[j]);
+      const double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
+      if (!closest || loss < least) {
+        least = loss;
+        closest = Pair{i, j};
+      }
+    }
+  }
+  return closest;
+}
+
+void FacetSums::merge(const Pair& pair) {
+  groups_[pair.first].add(groups_[pair.second]);
+  --count_;
+  groups_[pair.second] = groups_[count_];
+}
+
+FacetSums FacetSums::fewest(float flatness) const {
+  FacetSums fewest;
+  FacetSums fewer = *this;
+  while (fewer.count_ > 0) {
+    double area = 0, facing = 0;
+    for (const FacetGroup& group : fewer.groups()) {
+      area += group.area;
+      facing += group.normalLength();
+    }
+    if (!(facing > double(flatness) * area)) break;
+    fewest = fewer;
+    const std::optional<Pair> closest = fewer.closest();
+    if (!closest) break;
+    fewer.merge(*closest);
+  }
+  return fewest;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,54 @@
+// The facets of a node while it is summed up.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "octree/node/area_sums.h"
+#include "octree/node/node_facet.h"
+
+namespace surfeit {
+
+// Surfels that face about one way; two-sided ones of a plane may face the other way as well.
+struct FacetGroup : AreaSums {
+  bool is_two_sided = false;  // `normal` is the sum of those turned to one side, within a plane
+
+  FacetGroup() = default;
+  // One surfel; it has a normal. `sums` are its own.
+  FacetGroup(const AreaSums& sums, const Surfel& surfel);
+  void add(const FacetGroup& other);
+};
+
+// Groups of surfels that face about one way. What is added joins the group that it resembles, and
+// when there are too many, the two groups become one that lose least by it: the loss is the area
+// that faces one way less, |N_a| + |N_b| - |N_a + N_b| with N = sum A n. The order of adding
+// decides what is grouped with what. One-sided and two-sided surfels stay apart. Plain data.
+class FacetSums {
+ public:
+  void add(const FacetGroup& facet);
+  // Those of a child, `shift` farther from our origin.
+  void add(const FacetSums& child, const double (&shift)[3]);
+  // There are no facets and will be none: some surfels have no normal.
+  void giveUp();
+
+  // As few groups as hold together more than `flatness` of the area, as sum |N| over sum A; none
+  // when all do not.
+  FacetSums fewest(float flatness) const;
+  std::span<const FacetGroup> groups() const { return std::span(groups_).first(count_); }
+
+ private:
+  struct Pair {
+    std::size_t first, second;
+  };
+  // None where all are different kinds.
+  std::optional<Pair> closest() const;
+  void merge(const Pair& pair);
+
+  std::array<FacetGroup, kMostFacets + 1> groups_;
+  std::size_t count_ = 0;
+  bool has_given_up_ = false;
+};
+
+}  // namespace surfeit

@@ -1,0 +1,128 @@
+#include "octree/page/facet_columns.h"
+
+#include <array>
+#include <cstddef>
+
+#include "core/thread_scratch.h"
+#include "octree/page/column_codec.h"
+
+namespace surfeit {
+namespace {
+
+// Entries of a facet: its area and normal in 16 bits, its offset and covariance in bytes.
+constexpr std::size_t kWide = 4, kBytes = 3 + SymmetricMatrix::kEntries;
+
+// Entry `k` of all facets lies side by side.
+struct Codes {
+  std::size_t count;
+  std::vector<std::int16_t>& wide = threadScratch<std::vector<std::int16_t>>([] {});
+  std::vector<std::uint8_t>& bytes = threadScratch<std::vector<std::uint8_t>>([] {});
+
+  explicit Codes(std::size_t facets) : count(facets) {
+    wide.resize(kWide * facets);
+    bytes.resize(kBytes * facets);
+  }
+  bool get(PayloadReader& reader) {
+    return getSmallIntegers(reader, wide) && getBytes8(reader, bytes);
+  }
+
+  void set(std::size_t i, const NodeFacet& facet) {
+    wide[i] = static_cast<std::int16_t>(facet.area);
+    for (std::size_t k = 0; k < 3; ++k) wide[(1 + k) * count + i] = facet.normal[k];
+    for (std::size_t k = 0; k < 3; ++k) bytes[k * count + i] = facet.offset[k];
+    for (std::size_t k = 0; k < facet.covariance.size(); ++k) {
+      bytes[(3 + k) * count + i] = facet.covariance[k];
+    }
+  }
+  NodeFacet at(std::size_t i) const {
+    NodeFacet facet{};
+    facet.area = static_cast<std::uint16_t>(wide[i]);
+    for (std::size_t k = 0; k < 3; ++k) facet.normal[k] = wide[(1 + k) * count + i];
+    for (std::size_t k = 0; k < 3; ++k) facet.offset[k] = bytes[k * count + i];
+    for (std::size_t k = 0; k < facet.covariance.size(); ++k) {
+      facet.covariance[k] = bytes[(3 + k) * count + i];
+    }
+    return facet;
+  }
+};
+
+// Radiosities of all facets as columns.
+MutableAxes colorColumns(std::size_t count) {
+  std::vector<float>& values = threadScratch<std::vector<float>>([] {});
+  values.resize(3 * count);
+  const std::span<float> all(values);
+  return {all.first(count), all.subspan(count, count), all.subspan(2 * count)};
+}
+
+std::size_t countFacets(std::span<const Node> nodes) {
+  std::size_t count = 0;
+  for (const Node& node : nodes) count += node.facet_count;
+  return count;
+}
+
+}  // namespace
+
+FacetColumns::FacetColumns()
+    : counts_(threadScratch<std::vector<std::uint8_t>>([] {})),
+      facets_(threadScratch<std::vector<NodeFacet>>([] {})) {
+  counts_.clear();
+  facets_.clear();
+}
+
+void FacetColumns::add(const Node& node) {
+  counts_.push_back(node.facet_count);
+  facets_.insert(facets_.end(), node.facets.begin(), node.facets.begin() + node.facet_count);
+}
+
+void FacetColumns::put(PayloadWriter& writer) const {
+  putBytes8(writer, counts_);
+  Codes codes(facets_.size());
+  for (std::size_t i = 0; i < facets_.size(); ++i) codes.set(i, facets_[i]);
+  putSmallIntegers(writer, codes.wide);
+  putBytes8(writer, codes.bytes);
+}
+
+void FacetColumns::putRadiosity(PayloadWriter& writer, bool full_precision) const {
+  const MutableAxes columns = colorColumns(facets_.size());
+  for (std::size_t i = 0; i < facets_.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) columns[c][i] = facets_[i].radiosity[static_cast<int>(c)];
+  }
+  putColors(writer, constAxes(columns), full_precision);
+}
+
+bool FacetColumns::pass(PayloadReader& reader) const {
+  return getBytes8(reader, counts_) && Codes(facets_.size()).get(reader);
+}
+
+bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes) {
+  std::vector<std::uint8_t>& counts = threadScratch<std::vector<std::uint8_t>>([] {});
+  counts.resize(nodes.size());
+  if (!getBytes8(reader, counts)) return false;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (counts[i] > (nodes[i].isFlat() ? 0 : kMostFacets)) return false;
+    nodes[i].facet_count = counts[i];
+  }
+  Codes codes(countFacets(nodes));
+  if (!codes.get(reader)) return false;
+  std::size_t next = 0;
+  for (Node& node : nodes) {
+    if (!node.hasFacets()) continue;
+    node.facets = {};
+    for (std::size_t k = 0; k < node.facet_count; ++k) node.facets[k] = codes.at(next++);
+  }
+  return true;
+}
+
+bool FacetColumns::getRadiosity(PayloadReader& reader, std::span<Node> nodes) {
+  const MutableAxes columns = colorColumns(countFacets(nodes));
+  if (!getColors(reader, columns)) return false;
+  std::size_t next = 0;
+  for (Node& node : nodes) {
+    for (std::size_t k = 0; k < node.facet_count; ++k, ++next) {
+      node.facets[k].radiosity = {columns[0][next], columns[1][next], columns[2][next]};
+    }
+  }
+  return true;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,36 @@
+// Columns of the facets of a page's nodes. docs/format.md, "Node-group page", has the bytes.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "octree/node/node.h"
+#include "octree/page/byte_planes.h"
+
+namespace surfeit {
+
+// One object per thread at a time. To write, or to pass over what was written: nodes go in one
+// after the other.
+class FacetColumns {
+ public:
+  FacetColumns();
+  void add(const Node& node);
+
+  // Numbers of facets and all of them but radiosities, and these.
+  void put(PayloadWriter& writer) const;
+  void putRadiosity(PayloadWriter& writer, bool full_precision) const;
+  // Takes what put() gives for as many nodes and facets; false when it ends early.
+  bool pass(PayloadReader& reader) const;
+
+  // Gives nodes their facets: flags and child counts are there. False when the columns end early,
+  // or cannot be those of such nodes. First get(), then getRadiosity().
+  static bool get(PayloadReader& reader, std::span<Node> nodes);
+  static bool getRadiosity(PayloadReader& reader, std::span<Node> nodes);
+
+ private:
+  std::vector<std::uint8_t>& counts_;
+  std::vector<NodeFacet>& facets_;
+};
+
+}  // namespace surfeit

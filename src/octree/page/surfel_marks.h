@@ -1,0 +1,16 @@
+// What surfels of a scene that is not finished may lack.
+#pragma once
+
+#include <cstdint>
+
+namespace surfeit {
+
+// Marks surfels whose radius and area are to be found, and those whose normal may point to either
+// side of their surface (octree/neighbours/orientation.h); never in a finished file.
+inline constexpr std::uint32_t kSurfelNeedsSize = 1u << 7, kSurfelNeedsSide = 1u << 6;
+// Radius and area of such a surfel meanwhile: positive, because pages hold nothing else.
+inline constexpr float kPlaceholderSize = 1e-30f;
+// Surfels with a coverage keep their radius and have the coverage times the placeholder as area:
+// what is found is the area.
+
+}  // namespace surfeit

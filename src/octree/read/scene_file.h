@@ -1,0 +1,64 @@
+// An open .sft file: header, directory, provenance, and pages decoded on request. docs/format.md
+// specifies every byte.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/bounds.h"
+#include "core/curve_key.h"
+#include "octree/node/node.h"
+#include "octree/page/page_form.h"
+#include "octree/page/scene_header.h"
+#include "storage/page_file.h"
+#include "surfeit/status.h"
+#include "surfeit/surfel.h"
+#include "surfeit/up_axis.h"
+#include "surfeit/version.h"
+
+namespace surfeit {
+
+// Immutable once open; decode calls are safe from any thread.
+class SceneFile {
+ public:
+  // Checks header, footer, directory and provenance, but reads no page. `access` is how pages are
+  // read.
+  static Result<SceneFile> open(const std::string& path, Access access = Access::kCached);
+  static Result<SceneFile> open(PageFile pages);
+
+  const std::string& path() const;
+  std::uint64_t fileBytes() const;
+  const SceneHeader& header() const;
+  const std::string& provenance() const;  // JSON
+  std::uint32_t nodePageCount() const;
+  std::uint32_t surfelPageCount() const;
+  const PageFile& pages() const;
+
+  // Scratch for one decoding thread.
+  struct Scratch {
+    AlignedBuffer stored;
+    std::vector<std::byte> payload;
+  };
+  // Reads, checks and decodes a page into `nodes` or `surfels` (capacity of the header) and returns
+  // how many it holds. kCorruption names file, page, and what was wrong.
+  Result<std::uint32_t> decodeNodes(std::uint32_t page, Scratch& scratch,
+                                    std::span<Node> nodes) const;
+  Result<std::uint32_t> decodeSurfels(std::uint32_t page, Scratch& scratch,
+                                      std::span<Surfel> surfels) const;
+  // The groups of all surfels, as a set: those of the root, whose page is read. Group 0 alone in a
+  // scene without groups, without reading. Errors as of decodeNodes.
+  Result<std::uint64_t> readGroups() const;
+  // Stored bytes of a page.
+  std::uint32_t nodePageBytes(std::uint32_t page) const;
+  std::uint32_t surfelPageBytes(std::uint32_t page) const;
+
+ private:
+  PageFile pages_;
+  SceneHeader header_;
+};
+
+}  // namespace surfeit

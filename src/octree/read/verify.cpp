@@ -1,0 +1,285 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <mutex>
+
+#include "core/first_failure.h"
+#include "core/job_limits.h"
+#include "core/program_memory.h"
+#include "core/worker_threads.h"
+#include "octree/read/paged_octree.h"
+#include "octree/read/scene_file.h"
+#include "octree/read/verify_bounds.h"
+#include "surfeit/scene.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kMaxFindings = 100;
+// Stack and allocator of a thread.
+constexpr std::uint64_t kThreadBytes = std::uint64_t{256} << 10;
+// Quantized sums and spheres may differ by this part.
+constexpr float kAreaTolerance = 2e-3f;
+constexpr float kReachTolerance = 2e-3f;
+
+// Collects findings from several threads.
+class Findings {
+ public:
+  explicit Findings(VerifyReport& report) : report_(report) {}
+  void add(const std::string& finding) {
+    const std::lock_guard lock(mutex_);
+    // A damaged page is met again by every reference to it
+    if (std::find(report_.findings.begin(), report_.findings.end(), finding) !=
+        report_.findings.end()) {
+      return;
+    }
+    ++report_.finding_count;
+    if (report_.findings.size() < kMaxFindings) report_.findings.push_back(finding);
+  }
+  void finish() { std::sort(report_.findings.begin(), report_.findings.end()); }
+
+ private:
+  std::mutex mutex_;
+  VerifyReport& report_;
+};
+
+// A number that differs between places of records. Sums of it over all records and over all
+// references to records are equal when every record is referenced exactly once.
+std::uint64_t placeHash(std::uint32_t page, std::uint32_t index) {
+  std::uint64_t hash = (std::uint64_t{page} << 32 | index) + 0x9e3779b97f4a7c15ull;
+  hash = (hash ^ hash >> 30) * 0xbf58476d1ce4e5b9ull;
+  hash = (hash ^ hash >> 27) * 0x94d049bb133111ebull;
+  return hash ^ hash >> 31;
+}
+
+// Checks pages one by one. Each thread has its own.
+class PageChecker {
+ public:
+  PageChecker(const SceneFile& file, PagedOctree& octree, Findings& findings)
+      : file_(file), reader_(octree), findings_(findings) {
+    nodes_.resize(file.header().node_group_capacity);
+    surfels_.resize(file.header().surfel_group_capacity);
+  }
+
+  // Returns how many records the page holds, 0 when it is damaged; kIoError when it cannot be read.
+  Result<std::uint64_t> checkSurfelPage(std::uint32_t page) {
+    const Result<std::uint32_t> count = file_.decodeSurfels(page, scratch_, surfels_);
+    if (!count.ok()) return report(count.status());
+    for (std::uint32_t i = 0; i < *count; ++i) surfel_balance_ += placeHash(page, i);
+    return std::uint64_t{*count};
+  }
+
+  Result<std::uint64_t> checkNodePage(std::uint32_t page) {
+    const Result<std::uint32_t> count = file_.decodeNodes(page, scratch_, nodes_);
+    if (!count.ok()) return report(count.status());
+    for (std::uint32_t i = 0; i < *count; ++i) {
+      node_balance_ += placeHash(page, i);
+      const Status status = nodes_[i].isLeaf() ? checkLeaf(nodes_[i]) : checkInterior(nodes_[i]);
+      if (status.ok()) continue;
+      const Status at =
+          status.code() == StatusCode::kCorruption && !describesPage(status)
+              ? file_.pages().pageError(page, fmt::format("node {}: {}", i, status.message()))
+              : status;
+      SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t none, report(at));
+      static_cast<void>(none);
+    }
+    return std::uint64_t{*count};
+  }
+
+  // Records minus references to them, as sums of placeHash: zero over a sound file, once the root
+  // counts as referenced.
+  std::uint64_t nodeBalance() const { return node_balance_; }
+  std::uint64_t surfelBalance() const { return surfel_balance_; }
+
+ private:
+  // A damaged page is a finding and the check goes on; a failing disk is not.
+  Result<std::uint64_t> report(const Status& status) {
+    if (status.code() != StatusCode::kCorruption) return status;
+    findings_.add(status.message());
+    return std::uint64_t{0};
+  }
+
+  bool describesPage(const Status& status) const {
+    return status.message().rfind(file_.path(), 0) == 0;
+  }
+
+  // What a node claims, against what lies below it.
+  struct Below {
+    double area = 0;
+    std::uint64_t surfels = 0;
+    std::uint64_t groups = 0;
+    float reach = 0;
+    void add(const Node& node, const glm::vec3& at, float radius, float child_area,
+             std::uint64_t count, std::uint64_t child_groups) {
+      area += double(child_area);
+      surfels += count;
+      groups |= child_groups;
+      reach = std::max(reach, glm::length(at - node.position) + radius);
+    }
+  };
+
+  static Status compare(const Node& node, const Below& below) {
+    if (below.surfels != node.surfel_count) {
+      return Status::corruption(fmt::format("surfel count {}, expected {} from what lies below",
+                                            node.surfel_count, below.surfels));
+    }
+    if (below.groups != node.groups) {
+      return Status::corruption(fmt::format("groups {:#x}, expected {:#x} from what lies below",
+                                            node.groups, below.groups));
+    }
+    if (std::abs(below.area - double(node.area)) > double(kAreaTolerance * node.area)) {
+      return Status::corruption(
+          fmt::format("area {}, expected {} from what lies below", node.area, below.area));
+    }
+    return {};
+  }
+
+  Status checkInterior(const Node& node) {
+    for (std::uint32_t i = 0; i < node.child_count; ++i) {
+      node_balance_ -= placeHash(node.page, node.first + i);
+    }
+    SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> children, reader_.nodes(childrenOf(node)));
+    Below below;
+    for (const Node& child : children) {
+      below.add(node, child.position, 0, child.area, child.surfel_count, child.groups);
+      // A child's sphere may stick out of its parent's; its centre, a mean of surfels, may not
+      const float distance = glm::length(child.position - node.position);
+      if (distance > node.radius + (node.radius + child.radius) * kReachTolerance) {
+        return Status::corruption(
+            fmt::format("bounding radius {}, expected at least {} for the "
+                        "centres of its children",
+                        node.radius, distance));
+      }
+    }
+    return compare(node, below);
+  }
+
+  Status checkLeaf(const Node& node) {
+    Below below;
+    std::uint32_t page = node.page, place = node.first;
+    SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
+      for (const Surfel& surfel : surfels) {
+        below.add(node, surfel.position, surfel.radius, surfel.area, 1, groupBit(surfel.group));
+        surfel_balance_ -= placeHash(page, place++);
+      }
+      ++page;
+      place = 0;
+    }));
+    if (below.reach > node.radius * (1 + kReachTolerance)) {
+      return Status::corruption(
+          fmt::format("bounding radius {}, expected at least {} for the "
+                      "disks of its surfels",
+                      node.radius, below.reach));
+    }
+    return compare(node, below);
+  }
+
+  const SceneFile& file_;
+  PagedOctree::Reader reader_;
+  Findings& findings_;
+  SceneFile::Scratch scratch_;
+  std::vector<Node> nodes_;
+  std::vector<Surfel> surfels_;
+  std::uint64_t node_balance_ = 0, surfel_balance_ = 0;
+};
+
+// References are followed through small caches: pages come in curve order, so few are needed.
+Result<PagedOctree::Memory> planMemory(const SceneFile& file, std::uint64_t memory_bytes,
+                                       int threads) {
+  constexpr std::uint64_t kMostCacheBytes = std::uint64_t{64} << 20;
+  const std::uint64_t thread_bytes = file.header().node_group_capacity * sizeof(Node) +
+                                     file.header().surfel_group_capacity * sizeof(Surfel) +
+                                     kThreadBytes;
+  const std::uint64_t fixed = programBytes(threads) + PagedOctree::fixedBytes(file, threads) +
+                              static_cast<std::uint64_t>(threads) * thread_bytes;
+  const std::uint64_t least_caches = PagedOctree::leastCacheBytes(file, threads);
+  if (memory_bytes == 0) memory_bytes = defaultMemoryBytes();
+  if (memory_bytes < fixed + least_caches) {
+    return Status::budgetTooSmall(fmt::format(
+        "a memory budget of {:.1f} MiB is too small to verify {} with {} {}: {} MiB is the least "
+        "that works",
+        double(memory_bytes) / (1 << 20), file.path(), threads, threads == 1 ? "thread" : "threads",
+        ((fixed + least_caches) >> 20) + 1));
+  }
+  return PagedOctree::planMemory(
+      file, std::clamp(memory_bytes - fixed, least_caches, std::max(least_caches, kMostCacheBytes)),
+      threads);
+}
+
+}  // namespace
+
+Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress& progress,
+                                 std::uint64_t memory_bytes) {
+  VerifyReport report;
+  Findings findings(report);
+  Result<SceneFile> opened = SceneFile::open(path);
+  if (!opened.ok()) {
+    if (opened.status().code() != StatusCode::kCorruption) return opened.status();
+    findings.add(opened.status().message());
+    return report;
+  }
+  threads = threads > 0 ? threads : defaultThreadCount();
+  const std::uint32_t node_pages = opened->nodePageCount();
+  const std::uint32_t pages = opened->pages().pageCount();
+  const std::uint64_t expected_nodes = opened->header().node_count;
+  const std::uint64_t expected_surfels = opened->header().surfel_count;
+
+  SURFEIT_ASSIGN_OR_RETURN(const PagedOctree::Memory memory,
+                           planMemory(*opened, memory_bytes, threads));
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
+                           PagedOctree::create(std::move(*opened), memory));
+  const SceneFile& file = octree->file();
+  progress.beginPhase("verify", pages, "pages");
+  if (const Status tiling = file.pages().checkTiling(); !tiling.ok()) {
+    findings.add(tiling.message());
+  }
+
+  std::atomic<std::uint32_t> next_page{0};
+  std::atomic<std::uint64_t> nodes{0}, surfels{0};
+  std::atomic<std::uint64_t> node_balance{0}, surfel_balance{0};
+  FirstFailure failure;
+  const auto work = [&]() -> Status {
+    PageChecker checker(file, *octree, findings);
+    while (!failure.happened() && !progress.isCancelled()) {
+      const std::uint32_t page = next_page++;
+      if (page >= pages) break;
+      const bool is_node_page = page < node_pages;
+      SURFEIT_ASSIGN_OR_RETURN(
+          const std::uint64_t count,
+          is_node_page ? checker.checkNodePage(page) : checker.checkSurfelPage(page - node_pages));
+      (is_node_page ? nodes : surfels) += count;
+      progress.advance(1);
+    }
+    node_balance += checker.nodeBalance();
+    surfel_balance += checker.surfelBalance();
+    return {};
+  };
+  SURFEIT_RETURN_IF_ERROR(runOnThreads(threads, failure, "verify", work));
+  if (progress.isCancelled()) return Status::interrupted();
+
+  // Sums over the whole file
+  if (report.finding_count == 0 && (nodes != expected_nodes || surfels != expected_surfels)) {
+    findings.add(fmt::format("{}: {} nodes and {} surfels on the pages, the header says {} and {}",
+                             path, nodes.load(), surfels.load(), expected_nodes, expected_surfels));
+  }
+  if (report.finding_count == 0 &&
+      (node_balance != placeHash(kRootRange.page, kRootRange.first) || surfel_balance != 0)) {
+    findings.add(fmt::format("{}: {} are not each referenced once", path,
+                             surfel_balance != 0 ? "surfels" : "nodes"));
+  }
+
+  // What is not known to be a tree is not walked
+  if (report.finding_count == 0 && file.header().pageForm().has_bounds) {
+    SURFEIT_RETURN_IF_ERROR(verifyBounds(
+        *octree, threads, progress, [&](const std::string& finding) { findings.add(finding); }));
+  }
+  report.pages_checked = pages;
+  report.bytes_checked = file.fileBytes();
+  findings.finish();
+  return report;
+}
+
+}  // namespace surfeit

@@ -1,0 +1,142 @@
+#include "surfels/surfel_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+
+#include "cloud/cloud_formats.h"
+#include "cloud/property_aliases.h"
+#include "cloud/row_reader.h"
+#include "core/up_comment.h"
+#include "surfels/generated/recipe_surfel_source.h"
+#include "surfels/generated/scene_recipe.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kRowBufferBytes = 256 << 10;
+
+class RowSurfelSource final : public SurfelSource {
+ public:
+  RowSurfelSource(std::unique_ptr<RowReader> reader, SurfelMapping mapping, bool strict)
+      : reader_(std::move(reader)), mapping_(std::move(mapping)), is_strict_(strict) {}
+
+  const std::string& path() const override { return reader_->path(); }
+  std::uint64_t recordCount() const override { return reader_->element().count; }
+  CloudChannels channels() const override { return mapping_.channels(); }
+  void setOrigin(const glm::dvec3& origin) override { mapping_.setOrigin(origin); }
+  UpAxis up() const override { return statedUpAxis(reader_->comments()).value_or(kDefaultUpAxis); }
+  bool hasFloatPositions() const override { return mapping_.hasFloatPositions(); }
+  bool hasCoverage() const override { return mapping_.hasCoverage(); }
+  const SurfelDefects& defects() const override { return defects_; }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = reader_->notes();
+    const CloudChannels& has = mapping_.channels();
+    const bool lacks_color = !has.radiosity && !has.albedo;
+    for (std::string& note : notesOfLookalikes(reader_->element(), lacks_color, !has.normal)) {
+      notes.push_back(std::move(note));
+    }
+    return notes;
+  }
+
+  std::size_t rowBytes() const override { return mapping_.rowBytes(); }
+  bool isSeekable() const override { return reader_->isSeekable(); }
+
+  Result<std::size_t> read(std::span<Surfel> surfels) override {
+    std::size_t size = 0;
+    while (size < surfels.size()) {
+      // Fetch rows
+      if (rows_.empty()) {
+        const std::size_t max_rows = std::max<std::size_t>(1, kRowBufferBytes / rowBytes());
+        SURFEIT_ASSIGN_OR_RETURN(rows_, readRows(max_rows, buffer_));
+        if (rows_.empty()) break;
+      }
+
+      // Decode as many as there is room for
+      const std::size_t count = std::min(rows_.size() / rowBytes(), surfels.size() - size);
+      const Bytes rows = rows_.first(count * rowBytes());
+      const std::uint64_t first_record = record_;
+      rows_ = rows_.subspan(rows.size());
+      record_ += count;
+      SURFEIT_ASSIGN_OR_RETURN(const std::size_t valid,
+                               decodeRows(rows, first_record, surfels.subspan(size), defects_));
+      size += valid;
+    }
+    return size;
+  }
+
+  Status rewind() override {
+    rows_ = {};
+    record_ = 0;
+    defects_ = {};
+    return reader_->rewind();
+  }
+
+  Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
+    return reader_->readRows(max_rows, buffer);
+  }
+
+  Result<std::size_t> decodeRows(Bytes rows, std::uint64_t first_record, std::span<Surfel> surfels,
+                                 SurfelDefects& defects) const override {
+    SurfelDefects found;
+    const std::size_t size = mapping_.decodeRows(rows, first_record, surfels, found);
+    if (is_strict_ && found.total() > 0) {
+      const std::uint64_t record = found.firstRecord();
+      const std::size_t row = static_cast<std::size_t>(record - first_record);
+      return Status::corruption(
+          fmt::format("{}: record {}: {}", path(), record,
+                      mapping_.describeDefect(rows.data() + row * rowBytes())));
+    }
+    defects.add(found);
+    return size;
+  }
+
+  Status seekRow(std::uint64_t record) override { return reader_->seekRow(record); }
+
+ private:
+  std::unique_ptr<RowReader> reader_;
+  SurfelMapping mapping_;
+  bool is_strict_;
+
+  // Of read(): rows in the buffer that are still to be decoded, the first of them record_
+  SurfelDefects defects_;
+  AlignedBuffer buffer_;
+  Bytes rows_;
+  std::uint64_t record_ = 0;
+};
+
+// Whether the file stands for a generated scene.
+Result<bool> isRecipe(const std::string& path) {
+  std::array<std::byte, kRecipeMagic.size()> magic{};
+  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size, file.readSome(0, magic));
+  return std::string_view(reinterpret_cast<const char*>(magic.data()), size) == kRecipeMagic;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SurfelSource>> openSurfelSource(const std::string& path, bool strict,
+                                                       const RowReaderOptions& options) {
+  SURFEIT_ASSIGN_OR_RETURN(const bool is_recipe, isRecipe(path));
+  if (is_recipe && !options.filter.empty()) {
+    return Status::invalidArgument(
+        fmt::format("{}: a generated scene, which has no rows to filter", path));
+  }
+  if (is_recipe) return openRecipeSource(path);
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowReader> reader, openRowReader(path, options));
+  return makeSurfelSource(std::move(reader), strict);
+}
+
+Result<std::unique_ptr<SurfelSource>> makeSurfelSource(std::unique_ptr<RowReader> reader,
+                                                       bool strict) {
+  SURFEIT_ASSIGN_OR_RETURN(SurfelMapping mapping,
+                           SurfelMapping::create(reader->element(), reader->path()));
+  return std::unique_ptr<SurfelSource>(
+      std::make_unique<RowSurfelSource>(std::move(reader), std::move(mapping), strict));
+}
+
+}  // namespace surfeit

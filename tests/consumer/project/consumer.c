@@ -1,0 +1,180 @@
+/* Every function of surfeit.h, from C99, built through pkg-config.
+
+     c_consumer DIR */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <surfeit/surfeit.h>
+
+#define EDGE 40
+
+static int failures = 0;
+
+static void expect(int condition, const char* what) {
+  if (condition) return;
+  fprintf(stderr, "c_consumer: %s (last error: %s)\n", what, surfeit_last_error());
+  ++failures;
+}
+
+static int never(void* user) {
+  ++*(int*)user;
+  return 0;
+}
+
+static int at_once(void* user) {
+  (void)user;
+  return 1;
+}
+
+static void make_scene(const char* path) {
+  surfeit_surfel* surfels = calloc(EDGE * EDGE, sizeof *surfels);
+  surfeit_index_options options;
+  int i;
+  if (surfels == NULL) exit(1);
+  for (i = 0; i < EDGE * EDGE; ++i) {
+    surfels[i].position[0] = (i % EDGE + .5) / EDGE - .5;
+    surfels[i].position[1] = 1;
+    surfels[i].position[2] = (i / EDGE + .5) / EDGE - .5;
+    surfels[i].normal[1] = -1;
+    surfels[i].radius = .018f;
+    surfels[i].area = 1.f / (EDGE * EDGE);
+    surfels[i].radiosity[0] = 1;
+  }
+  surfeit_index_options_init(&options);
+  options.memory_bytes = 64 << 20;
+  options.threads = 1;
+  expect(surfeit_index_surfels(surfels, EDGE * EDGE, path, &options) == SURFEIT_OK, "index");
+  surfels[7].group = 64;
+  expect(surfeit_index_surfels(surfels, EDGE * EDGE, path, &options) == SURFEIT_INVALID_ARGUMENT &&
+             strstr(surfeit_last_error(), "group 64") != NULL,
+         "a group out of range");
+  expect(surfeit_index_surfels(NULL, 0, path, NULL) == SURFEIT_INVALID_ARGUMENT, "no surfels");
+  free(surfels);
+}
+
+static void* read_all(const char* path, size_t* size) {
+  FILE* file = fopen(path, "rb");
+  void* bytes;
+  if (file == NULL) return NULL;
+  fseek(file, 0, SEEK_END);
+  *size = (size_t)ftell(file);
+  rewind(file);
+  bytes = malloc(*size);
+  if (bytes == NULL || fread(bytes, 1, *size, file) != *size) exit(1);
+  fclose(file);
+  return bytes;
+}
+
+static void gather_from(surfeit_engine* engine, const surfeit_scene* scene) {
+  surfeit_settings settings;
+  surfeit_environment sky;
+  surfeit_gatherer *gatherer = NULL, *clone = NULL, *moved = NULL;
+  surfeit_instance instances[2] = {{NULL, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}},
+                                   {NULL, {1, 0, 0, 100, 0, 1, 0, 0, 0, 0, 1, 0}}};
+  surfeit_receiver receivers[2] = {{{0, 0, 0}, {0, 1, 0}, {0, 0, 0}},
+                                   {{100, 0, 0}, {0, 2, 0}, {0, 0, 0}}};
+  surfeit_result results[2], again;
+  float* white = malloc(3 * 8 * 4 * sizeof *white);
+  int asked = 0, i;
+  if (white == NULL) exit(1);
+  for (i = 0; i < 3 * 8 * 4; ++i) white[i] = 1;
+
+  surfeit_settings_init(&settings);
+  settings.mode = SURFEIT_BLEEDING;
+  expect(surfeit_settings_set_quality(&settings, SURFEIT_FINAL) == SURFEIT_OK &&
+             settings.raster_resolution == 40,
+         "quality");
+  expect(surfeit_settings_set_quality(&settings, 9) == SURFEIT_INVALID_ARGUMENT, "no quality");
+  surfeit_environment_init(&sky);
+  sky.width = 8;
+  sky.height = 4;
+  sky.pixels = white;
+
+  expect(surfeit_gatherer_create(engine, scene, &settings, &sky, &gatherer) == SURFEIT_OK,
+         "gatherer");
+  free(white); /* it was copied */
+  expect(surfeit_gather(gatherer, receivers, 2, results, never, &asked) == SURFEIT_OK, "gather");
+  expect(asked > 0, "nobody asked whether to stop");
+  expect(fabs(results[0].occlusion - .239) < .01, "occlusion of a square above");
+  expect(fabs(results[0].irradiance[0] - .239) < .01 && results[0].irradiance[1] == 0, "light");
+  expect(fabs(results[0].environment[1] - 3.14159 * .761) < .05, "environment");
+  expect(results[1].occlusion < .001, "nothing is there");
+  expect(surfeit_gather(gatherer, receivers, 2, results, at_once, NULL) == SURFEIT_INTERRUPTED,
+         "interrupted");
+  expect(surfeit_gather(NULL, receivers, 2, results, NULL, NULL) == SURFEIT_INVALID_ARGUMENT,
+         "no gatherer");
+
+  instances[0].scene = instances[1].scene = scene;
+  expect(surfeit_gatherer_create_instances(engine, instances, 2, &settings, NULL, &moved) ==
+             SURFEIT_OK,
+         "instances");
+  expect(surfeit_gather(moved, receivers, 2, results, NULL, NULL) == SURFEIT_OK, "gather");
+  expect(fabs(results[1].occlusion - .239) < .01, "occlusion of the instance");
+  expect(surfeit_gatherer_clone(moved, &clone) == SURFEIT_OK, "clone");
+  expect(surfeit_gather(clone, receivers + 1, 1, &again, NULL, NULL) == SURFEIT_OK, "gather");
+  expect(fabs(again.occlusion - results[1].occlusion) < .001, "the clone's result");
+  instances[1].m[0] = -1;
+  expect(surfeit_gatherer_create_instances(engine, instances, 2, NULL, NULL, &moved) ==
+             SURFEIT_INVALID_ARGUMENT,
+         "a mirror");
+
+  surfeit_gatherer_pause(clone);
+  surfeit_gatherer_release(clone);
+  surfeit_gatherer_release(moved);
+  surfeit_gatherer_release(gatherer);
+}
+
+int main(int argc, char** argv) {
+  char path[4096];
+  surfeit_engine_options options;
+  surfeit_engine* engine = NULL;
+  surfeit_scene *scene = NULL, *held = NULL;
+  surfeit_scene_info info;
+  surfeit_statistics statistics;
+  size_t size = 0;
+  void* bytes;
+  if (argc != 2) return 2;
+  snprintf(path, sizeof path, "%s/c.sft", argv[1]);
+  expect(strcmp(surfeit_last_error(), "") == 0, "an error before anything was done");
+  expect(strchr(surfeit_version(), '.') != NULL, "version");
+  make_scene(path);
+
+  surfeit_engine_options_init(&options);
+  options.memory_bytes = 64 << 20;
+  options.threads = 2;
+  expect(surfeit_engine_create(&options, &engine) == SURFEIT_OK, "engine");
+  options.memory_bytes = 1;
+  expect(surfeit_engine_create(&options, &engine) == SURFEIT_BUDGET_TOO_SMALL, "a byte");
+  options.size = 1;
+  expect(surfeit_engine_create(&options, &engine) == SURFEIT_INVALID_ARGUMENT, "a wrong size");
+
+  expect(surfeit_scene_open(engine, "/nowhere.sft", &scene) == SURFEIT_IO_ERROR, "no file");
+  expect(surfeit_scene_open(engine, path, &scene) == SURFEIT_OK, "open");
+  memset(&info, 0, sizeof info);
+  expect(surfeit_scene_get_info(scene, &info) == SURFEIT_INVALID_ARGUMENT, "no size");
+  info.size = sizeof info;
+  expect(surfeit_scene_get_info(scene, &info) == SURFEIT_OK && info.surfels == EDGE * EDGE, "info");
+
+  bytes = read_all(path, &size);
+  expect(surfeit_scene_open_bytes(engine, bytes, size, "held", &held) == SURFEIT_OK, "bytes");
+  expect(surfeit_scene_open_bytes(engine, bytes, size / 2, "held", &held) == SURFEIT_CORRUPTION,
+         "half of it");
+  free(bytes);
+
+  gather_from(engine, scene);
+  gather_from(engine, held);
+
+  statistics.size = sizeof statistics;
+  expect(surfeit_engine_statistics(engine, &statistics) == SURFEIT_OK && statistics.scenes == 2 &&
+             statistics.gatherers == 0 && statistics.receivers == 2 * 5,
+         "statistics");
+  surfeit_scene_release(held);
+  surfeit_scene_release(scene);
+  surfeit_engine_release(engine);
+  surfeit_engine_release(NULL);
+  surfeit_scene_release(NULL);
+  surfeit_gatherer_release(NULL);
+  if (failures == 0) puts("all functions of surfeit.h");
+  return failures == 0 ? 0 : 1;
+}

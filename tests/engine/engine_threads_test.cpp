@@ -1,0 +1,66 @@
+// Callers' threads, each with a gatherer of its own, and gatherAll with the library's.
+#include <thread>
+#include <vector>
+
+#include "engine/engine_scenes.h"
+
+namespace surfeit {
+namespace {
+
+constexpr int kThreads = 16;
+
+class EngineThreadsTest : public EngineTest {};
+
+// Caches that hold a part of the scene, so that threads take pages from each other.
+TEST_F(EngineThreadsTest, CallersThreadsDoNotDisturbEachOther) {
+  const std::string path = sceneFile(5), other_path = sceneFile(2);
+  const std::vector<Receiver> receivers = manyOf(receiversOf(makeRandomScene(5)), 512);
+  Engine alone = makeEngine();
+  Gatherer expected_gatherer =
+      valueOrFail(alone.gatherer(valueOrFail(alone.open(path)), bleedingSettings()));
+  const std::vector<GatherResult> expected = gatherAt(expected_gatherer, receivers);
+
+  Engine engine = makeEngine(48 * kMiB, kThreads);
+  const Scene scene = valueOrFail(engine.open(path));
+  Gatherer first = valueOrFail(engine.gatherer(scene, bleedingSettings()));
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < kThreads; ++i) {
+    threads.emplace_back([&, i] {
+      Gatherer own = i % 2 == 0 ? valueOrFail(first.another())
+                                : valueOrFail(engine.gatherer(scene, bleedingSettings()));
+      for (int round = 0; round < 2; ++round) {
+        EXPECT_TRUE(haveSameBytes(gatherAt(own, receivers), expected)) << i;
+        if (i % 4 == 0) own.pause();
+        if (i % 4 == 1) {  // scenes come and go beside it
+          const Result<Scene> other = engine.open(other_path);
+          EXPECT_TRUE(other.ok()) << other.status().message();
+        }
+        engine.statistics();
+      }
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(engine.statistics().gatherers, 1u);
+  EXPECT_EQ(engine.statistics().receivers, std::uint64_t{2} * kThreads * receivers.size());
+}
+
+TEST_F(EngineThreadsTest, AllAtOnceIsTheSameForAnyThreads) {
+  Engine engine = makeEngine(64 * kMiB, 4);
+  const Scene scene = valueOrFail(engine.open(sceneFile(5)));
+  const std::vector<Receiver> receivers = manyOf(receiversOf(makeRandomScene(5)), 10'000);
+  std::vector<GatherResult> by_one(receivers.size()), by_four(receivers.size());
+  Progress progress;
+  for (auto* results : {&by_one, &by_four}) {
+    const Status status =
+        engine.gatherAll({Instance{scene, {}}}, bleedingSettings(), receivers.data(),
+                         receivers.size(), results->data(), progress, results == &by_one ? 1 : 4);
+    ASSERT_TRUE(status.ok()) << status.message();
+  }
+  EXPECT_TRUE(haveSameBytes(by_one, by_four));
+  Gatherer gatherer = valueOrFail(engine.gatherer(scene, bleedingSettings()));
+  const Difference difference = differenceOf(by_one, gatherAt(gatherer, receivers));
+  EXPECT_LT(difference.mean_occlusion, .002);
+}
+
+}  // namespace
+}  // namespace surfeit

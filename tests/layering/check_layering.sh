@@ -1,0 +1,68 @@
+#!/usr/bin/env bash
+# Whether every file of src/ includes only what its room may (rooms.txt), formats do not know the
+# table that lists them, and no engine room includes a library that it must not link.
+#
+#   check_layering.sh SOURCE_DIRECTORY
+set -euo pipefail
+rooms=$(dirname "$(readlink -f "$0")")/rooms.txt
+cd "$1"
+
+awk -v rooms="$rooms" '
+  BEGIN {
+    while ((getline line < rooms) > 0) {
+      sub(/#.*/, "", line)
+      if (line !~ /:/) continue
+      split(line, sides, ":")
+      known[sides[1]] = 1
+      count = split(sides[2], names, " ")
+      for (i = 1; i <= count; ++i) may[sides[1], names[i]] = 1
+    }
+    if (length(known) == 0) { print rooms ": no rooms"; exit 2 }
+  }
+  # The longest room that holds a path below src/.
+  function roomOf(path,   room) {
+    room = path
+    while (sub(/\/[^\/]*$/, "", room)) if (room in known) return room
+    return ""
+  }
+  function mayInclude(from, to,   parent) {
+    if (from == to || (from, to) in may) return 1
+    parent = to
+    sub(/\/.*/, "/", parent)
+    return parent != to && (from, parent) in may
+  }
+  function complain(what) { print FILENAME ":" FNR ": " what; bad = 1 }
+  /^ *# *include *"/ {
+    split($0, parts, "\"")
+    path = FILENAME
+    sub(/^src\//, "", path)
+    from = roomOf(path)
+    to = parts[2]
+    if (from == "") complain("in no room of " rooms)
+    if (to ~ /^surfeit\//) next
+    if (roomOf(to) == "") complain("includes " to ", which is in no room")
+    else if (!mayInclude(from, roomOf(to))) complain("room " from " must not include " to)
+    if (from ~ /^cloud\// && to ~ /cloud_formats\.h$/) {
+      complain("a format must not include the table that lists it")
+    }
+  }
+  # Third-party libraries stay in the rooms that wrap them
+  /^ *# *include *<(oneapi\/tbb|tbb|OpenEXR|Imath|blosc|CLI|openvdb|png|embree|zstd|zlib)/ {
+    path = FILENAME
+    sub(/^src\//, "", path)
+    from = roomOf(path)
+    if (from ~ /^(cache|octree|gather|batch|tune|bounce|photons|index|surfels)/) {
+      complain("room " from " must not use a library itself: " $0)
+    }
+    if (from ~ /^(core|storage)$/ && $0 ~ /OpenEXR|Imath|blosc|CLI|openvdb|png|embree/) {
+      complain("the engine must not need " $0)
+    }
+  }
+  END { exit bad }
+' $(find src -name '*.h' -o -name '*.cpp' | sort)
+
+# Whoever calls the library needs its headers alone: those of include/surfeit know no room
+if grep -nE '^ *# *include *"' include/surfeit/*.h | grep -v '"surfeit/'; then
+  echo "public headers must include public headers alone" >&2
+  exit 1
+fi

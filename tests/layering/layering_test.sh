@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# The sources keep to their rooms, and the check notices when they do not.
+#
+#   layering_test.sh SOURCE_DIRECTORY
+set -euo pipefail
+here=$(dirname "$(readlink -f "$0")")
+source_dir=$1
+"$here/check_layering.sh" "$source_dir"
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$work/src" "$work/include"
+cp -r "$source_dir/include/surfeit" "$work/include/"
+cp -r "$source_dir/src/." "$work/src/"
+"$here/check_layering.sh" "$work"
+
+# expect_refusal FILE LINE: the check fails when LINE is added to FILE
+expect_refusal() {
+  cp "$work/$1" "$work/kept"
+  echo "$2" >>"$work/$1"
+  if "$here/check_layering.sh" "$work" >"$work/report" 2>&1; then
+    echo "not noticed: $2 in $1" >&2
+    exit 1
+  fi
+  cp "$work/kept" "$work/$1"
+}
+expect_refusal src/gather/packet/packet_raster.cpp '#include "gather/scalar/raster_cube.h"'
+expect_refusal src/gather/scalar/raster_cube.cpp '#include "gather/packet/packet_raster.h"'
+expect_refusal src/gather/cut/cut.cpp '#include "storage/file.h"'
+expect_refusal src/gather/rules/gather_rules.h '#include "batch/gather_memory.h"'
+expect_refusal src/octree/read/scene_file.cpp '#include "cloud/row_reader.h"'
+expect_refusal src/cache/page_cache.cpp '#include "storage/file.h"'
+expect_refusal src/cloud/text/xyz_reader.cpp '#include "cloud/cloud_formats.h"'
+expect_refusal src/gather/packet/packet_raster.cpp '#include <tbb/parallel_for.h>'
+expect_refusal src/storage/file.cpp '#include <OpenEXR/ImfHeader.h>'
+expect_refusal include/surfeit/gather.h '#include "gather/rules/receiver.h"'
+expect_refusal src/core/bounds.h '#include "surfels/surfel_names.h"'
