@@ -1,8 +1,8 @@
 // The engine as callers use it, through its public headers alone:
 //
-//   engine_bench calls SCENE.sft [--receivers 2560000] [--call 256] [--memory 64M ...]
+//   engine_bench calls SCENE.sft [--receivers 20480] [--call 256] [--memory 64 ...]
 //     many small calls against one call of all: processor time and hits, in turns
-//   engine_bench forest [--trees 10000] [--surfels 1M] [--receivers 20000] [--memory 512M]
+//   engine_bench forest [--trees 10000] [--surfels 1M] [--receivers 20480] [--memory 512]
 //     instances of one tree: rate beside that of the single tree, resident memory, and the error
 //     against the same forest indexed as one scene, at a size where that can be done
 #include <fmt/format.h>
@@ -347,7 +347,7 @@ int run(int argc, char** argv) {
   CLI::App app("Measures the engine");
   app.require_subcommand(1);
   std::string scene;
-  std::size_t receivers = 2'560'000, call = 256, trees = 10'000, surfels = 1'000'000;
+  std::size_t receivers = 20'480, call = 256, trees = 10'000, surfels = 1'000'000;
   std::vector<std::uint64_t> budgets = {64};
   std::size_t forest_receivers = 20'480;
   std::uint64_t memory = 512;

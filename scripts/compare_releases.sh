@@ -23,8 +23,11 @@ both() {
     status=0
     (cd "$work/$which" && "${!which}" "$@" --quiet >"$name.out" 2>"$name.err") || status=$?
     echo "$status" >"$work/$which/$name.status"
+    if ((status != 0)); then
+      echo "fails: $which $*: $(head -1 "$work/$which/$name.err")"
+      different=$((different + 1))
+    fi
   done
-  compare "$name.status"
   compare "$name.out"
 }
 
@@ -50,7 +53,7 @@ makes cloud city.ply generate -o city.ply --surfels 60k --threads 1
 for threads in 1 2; do
   makes "index_$threads" "city_$threads.sft" index city.ply -o "city_$threads.sft" --threads $threads
 done
-makes index_full full.sft index city.ply -o full.sft --full-precision
+makes index_full full.sft index city.ply -o full.sft --precision full
 makes index_small small.sft index city.ply -o small.sft --memory 96M --threads 1
 makes bare bare.ply convert city.ply -o bare.ply --keep position
 makes index_bare bare.sft index bare.ply -o bare.sft

@@ -13,10 +13,11 @@
 namespace surfeit {
 namespace {
 
-// Surfels that a node above instances adds up, about: the root of so many is .6 % of its area
-// off in a direction, and what a node may cover at most is .03 of a receiver's hemisphere.
-constexpr std::size_t kNodeSample = 8192;
-constexpr std::size_t kMostOfInstance = 1024;
+// Surfels that stand for an instance where it is seen with others: so many in all, and of each
+// within these limits. A group of eight of ten thousand has 3,200, and is 2 % of its area off in a
+// direction; what a node may cover at most is .03 of a receiver's hemisphere.
+constexpr std::size_t kAllSamples = std::size_t{4} << 20;
+constexpr std::size_t kLeastSamples = 64, kMostSamples = 1024;
 
 // A sphere that holds all of an instance.
 struct Sphere {
@@ -94,7 +95,8 @@ class InstanceTree::Builder {
     for (std::size_t i = 0; i < order_.size(); ++i) keys_[i] = keys[order_[i]];
 
     nodes_.resize(kMostSiblings);
-    const Node root = makeNode(0, order_.size());
+    NodeSums all;
+    const Node root = makeNode(0, order_.size(), all);
     nodes_.front() = root;
   }
 
@@ -103,20 +105,25 @@ class InstanceTree::Builder {
     return sphereOf(scenes_[instance.scene], instance.frame);
   }
 
-  Node makeNode(std::size_t begin, std::size_t end) {
-    Node node = summary(begin, end);
+  // Of a range of the order; `sums` gets those of its instances.
+  Node makeNode(std::size_t begin, std::size_t end, NodeSums& sums) {
     if (end - begin == 1) {
-      node.child_count = 0;
-      node.page = order_[begin];
-      return node;
+      addInstance(begin, sums);
+      Node leaf = nodeOf(begin, end, sums);
+      leaf.child_count = 0;
+      leaf.page = order_[begin];
+      return leaf;
     }
     const std::vector<std::size_t> ends = divide(begin, end);
     const std::size_t first = nodes_.size();
     nodes_.resize(first + kMostSiblings);
     for (std::size_t child = 0; child < ends.size(); ++child) {
-      const Node made = makeNode(child == 0 ? begin : ends[child - 1], ends[child]);
+      NodeSums below;
+      const Node made = makeNode(child == 0 ? begin : ends[child - 1], ends[child], below);
       nodes_[first + child] = made;
+      sums.add(below);
     }
+    Node node = nodeOf(begin, end, sums);
     node.child_count = static_cast<std::uint8_t>(ends.size());
     node.page = static_cast<std::uint32_t>(first / kMostSiblings);
     node.first = 0;
@@ -142,34 +149,32 @@ class InstanceTree::Builder {
     return ends;
   }
 
-  // What the instances of a range are together; for one of them only its bounds will count.
-  Node summary(std::size_t begin, std::size_t end) const {
-    const std::size_t count = end - begin;
-    const std::size_t most = std::clamp<std::size_t>(kNodeSample / count, 1, kMostOfInstance);
-    NodeSums sums;
-    std::uint64_t surfels = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      const PlacedScene& instance = instances_[order_[i]];
-      const std::vector<Surfel>& sample = scenes_[instance.scene].sample;
-      const std::size_t taken = std::min(most, sample.size());
-      const float factor = float(sample.size()) / float(taken);
-      // Others of the same scene show other parts of it
-      const std::size_t offset = splitMix(i) % sample.size();
-      for (std::size_t k = 0; k < taken; ++k) {
-        const Surfel& surfel = sample[(offset + k * sample.size() / taken) % sample.size()];
-        sums.add(moved(surfel, instance.frame, factor));
-      }
-      surfels += scenes_[instance.scene].root.surfel_count;
+  void addInstance(std::size_t place, NodeSums& sums) const {
+    const PlacedScene& instance = instances_[order_[place]];
+    const std::vector<Surfel>& sample = scenes_[instance.scene].sample;
+    const std::size_t wanted =
+        std::clamp(kAllSamples / instances_.size(), kLeastSamples, kMostSamples);
+    const std::size_t taken = std::min(wanted, sample.size());
+    const float factor = float(sample.size()) / float(taken);
+    // Others of the same scene show other parts of it
+    const std::size_t offset = splitMix(place) % sample.size();
+    for (std::size_t k = 0; k < taken; ++k) {
+      const Surfel& surfel = sample[(offset + k * sample.size() / taken) % sample.size()];
+      sums.add(moved(surfel, instance.frame, factor));
     }
+  }
 
+  // What the instances of a range are together; of one alone only its bounds count.
+  Node nodeOf(std::size_t begin, std::size_t end, const NodeSums& sums) const {
     const glm::vec3 centre = sums.centre();
     float radius = 0;
-    std::uint64_t groups = 0;
+    std::uint64_t groups = 0, surfels = 0;
     for (std::size_t i = begin; i < end; ++i) {
       const PlacedScene& instance = instances_[order_[i]];
       const Sphere sphere = sphereAt(instance);
       radius = std::max(radius, glm::distance(sphere.centre, centre) + sphere.radius);
       groups |= scenes_[instance.scene].root.groups;
+      surfels += scenes_[instance.scene].root.surfel_count;
     }
     Node node = sums.toNode(flatness_limit_, radius);
     node.surfel_count = surfels;
