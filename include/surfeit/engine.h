@@ -103,8 +103,8 @@ class SURFEIT_API Gatherer {
   // consecutive ones share one walk. Their results differ by less than .004 from those of other
   // companions. A receiver that is not finite, or with kGlossy lacks a normal or a view, gets NaN.
   // `progress`, where given, is asked now and then whether to stop. Errors: kIoError and
-  // kCorruption of a page, kInterrupted; results are then incomplete. The gatherer may be used
-  // again.
+  // kCorruption of a page, kInterrupted; results are then incomplete, and the gatherer may be used
+  // again. kInvalidArgument while another call of this gatherer is on its way.
   Status gather(const Receiver* receivers, std::size_t count, GatherResult* results,
                 const Progress* progress = nullptr);
 

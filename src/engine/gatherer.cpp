@@ -102,7 +102,11 @@ Gatherer::~Gatherer() = default;
 
 Status Gatherer::gather(const Receiver* receivers, std::size_t count, GatherResult* results,
                         const Progress* progress) {
-  return guarded("gather", [&]() -> Status {
+  // Two threads on one gatherer would spoil each other's results without a word
+  if (state_->is_busy.exchange(true, std::memory_order_acquire)) {
+    return Status::invalidArgument("gather: another call on this gatherer has not returned");
+  }
+  const Status status = guarded("gather", [&]() -> Status {
     for (std::size_t begin = 0; begin < count; begin += state_->group_size) {
       if (progress != nullptr && progress->isCancelled()) return Status::interrupted();
       const std::size_t size = std::min(state_->group_size, count - begin);
@@ -111,6 +115,8 @@ Status Gatherer::gather(const Receiver* receivers, std::size_t count, GatherResu
     }
     return {};
   });
+  state_->is_busy.store(false, std::memory_order_release);
+  return status;
 }
 
 void Gatherer::pause() { state_->reader.release(); }

@@ -1,6 +1,7 @@
 // What is behind a Gatherer.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -40,6 +41,7 @@ struct Gatherer::State {
   std::vector<GatherResult> found;
 
   std::uint64_t done_receivers = 0, invalid_receivers = 0;
+  std::atomic<bool> is_busy{false};  // a call is on its way
 };
 
 }  // namespace surfeit

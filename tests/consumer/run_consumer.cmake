@@ -33,6 +33,15 @@ if(libraries MATCHES "OpenEXR|blosc|Imath")
   message(FATAL_ERROR "the engine links formats of files:\n${libraries}")
 endif()
 
+# and a host that wants the engine alone needs none of them, nor what the program needs
+set(without "")
+foreach(package OpenEXR Blosc CLI11 embree PNG)
+  list(APPEND without -D CMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
+endforeach()
+run(${CMAKE_COMMAND} -S ${PROJECT_DIR}/../../.. -B ${WORK_DIR}/engine_only -G ${GENERATOR} ${without}
+  -D SURFEIT_BUILD_CLOUDS=OFF -D SURFEIT_BUILD_TOOLS=OFF -D SURFEIT_BUILD_TESTS=OFF
+  -D SURFEIT_BUILD_BENCH=OFF)
+
 # From C, as a Makefile would build it
 file(GLOB_RECURSE pc ${WORK_DIR}/prefix/*/surfeit.pc)
 get_filename_component(pc_dir ${pc} DIRECTORY)

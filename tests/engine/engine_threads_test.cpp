@@ -44,6 +44,33 @@ TEST_F(EngineThreadsTest, CallersThreadsDoNotDisturbEachOther) {
   EXPECT_EQ(engine.statistics().receivers, std::uint64_t{2} * kThreads * receivers.size());
 }
 
+// It is refused, not raced: a callback asks for a second call within the first.
+TEST_F(EngineThreadsTest, TwoCallsAtOnceOnOneGathererAreRefused) {
+  Engine engine = makeEngine();
+  const Scene scene = valueOrFail(engine.open(sceneFile(5)));
+  Gatherer gatherer = valueOrFail(engine.gatherer(scene, bleedingSettings()));
+  class CallsAgain : public Progress {
+   public:
+    explicit CallsAgain(Gatherer& gatherer) : gatherer_(gatherer) {}
+    bool isCancelled() const override {
+      const Receiver receiver;
+      GatherResult result;
+      code = gatherer_.gather(&receiver, 1, &result).code();
+      return false;
+    }
+    mutable StatusCode code = StatusCode::kOk;
+
+   private:
+    Gatherer& gatherer_;
+  };
+  const CallsAgain again(gatherer);
+  const Receiver receiver;
+  GatherResult result;
+  EXPECT_TRUE(gatherer.gather(&receiver, 1, &result, &again).ok());
+  EXPECT_EQ(again.code, StatusCode::kInvalidArgument);
+  EXPECT_TRUE(gatherer.gather(&receiver, 1, &result).ok());
+}
+
 TEST_F(EngineThreadsTest, AllAtOnceIsTheSameForAnyThreads) {
   Engine engine = makeEngine(64 * kMiB, 4);
   const Scene scene = valueOrFail(engine.open(sceneFile(5)));
