@@ -93,6 +93,7 @@ void EngineState::divideFrames() {
 
 // At most half of each cache, so that least-recently-used keeps something to choose from.
 std::size_t EngineState::frontSlots() const {
+  const std::lock_guard lock(mutex);
   const auto threads = static_cast<std::size_t>(std::max(options.threads, gatherer_count));
   const auto slots = [&](PageCache& cache, std::size_t pages) {
     const std::size_t frames = cache.frameLimit();
