@@ -360,7 +360,7 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
 
 Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase) {
   progress_.beginPhase(phase, totals_.surfels - distinct_->leftOut(), "surfels");
-  SURFEIT_RETURN_IF_ERROR(buildOctree(stream, writer, threads_, progress_));
+  SURFEIT_RETURN_IF_ERROR(buildOctree(stream, writer, plan_.slabs, progress_));
   const std::uint64_t expected = totals_.surfels - distinct_->leftOut();
   if (writer.header().surfel_count != expected) {
     return Status::failed(fmt::format("{}: {} surfels written, expected {}: this is a bug", output_,

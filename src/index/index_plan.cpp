@@ -33,6 +33,8 @@ constexpr std::uint64_t kFewBuckets = 1024;
 constexpr double kBucketShare = 0.75;
 // Smaller buckets than this are not worth their seams.
 constexpr std::uint64_t kLeastBucket = 32768;
+// Buckets of so many times the least size are no hindrance.
+constexpr std::uint64_t kEasyBuckets = 4;
 
 // Page directory of the scene, 24 bytes a page: the only thing, with the list of blocks, that grows
 // with the cloud.
@@ -85,8 +87,9 @@ std::uint64_t usualBucketCount(std::uint64_t records) {
 int threadsWithin(std::uint64_t memory_bytes, const SlabForm& slabs, int wanted) {
   const std::size_t read_bytes = readBytesWithin(memory_bytes);
   int threads = wanted;
-  while (threads > 1 && std::max(CloudReader::memoryBytes(read_bytes, threads),
-                                 buildOctreeBytes(slabs, threads)) > memory_bytes / 2) {
+  while (threads > 1 &&
+         std::max(CloudReader::memoryBytes(read_bytes, threads),
+                  buildOctreeBytes(slabs, threads, usualSlabs(threads))) > memory_bytes / 2) {
     --threads;
   }
   return threads;
@@ -112,12 +115,14 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
   const std::uint64_t lists = blockListBytes(task.records, kMinBlockSurfels);
   const std::uint64_t beside = programBytes(task.threads) + kFileBytes + lists;
   const std::uint64_t read_fixed = CloudReader::memoryBytes(plan.read_bytes, task.threads) + beside;
-  const std::uint64_t build_fixed =
-      buildOctreeBytes(task.slabs, task.threads) + directoryBytes(task) + beside;
+  const auto buildFixed = [&](std::size_t slabs) {
+    return buildOctreeBytes(task.slabs, task.threads, slabs) + directoryBytes(task) + beside;
+  };
+  plan.slabs = fewestSlabs(task.threads);
   const std::size_t surfel_bytes = BucketStream::kBytesPerSurfel + task.filter_bytes;
   const std::uint64_t least_bucket =
       std::max(std::min(kLeastBucket, task.records) * surfel_bytes, task.search_bytes);
-  const std::uint64_t least = std::max({kLeastIndexMemory, build_fixed + least_bucket,
+  const std::uint64_t least = std::max({kLeastIndexMemory, buildFixed(plan.slabs) + least_bucket,
                                         read_fixed + 64 * kMinBlockSurfels * sizeof(Surfel)});
   if (task.memory_bytes < least) {
     return Status::budgetTooSmall(fmt::format(
@@ -125,6 +130,10 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
         "the least that works",
         task.memory_bytes >> 20, task.records, task.threads, (least + kMega - 1) >> 20));
   }
+  // More slabs where they leave buckets large enough
+  const std::size_t usual = usualSlabs(task.threads);
+  if (task.memory_bytes >= buildFixed(usual) + kEasyBuckets * least_bucket) plan.slabs = usual;
+  const std::uint64_t build_fixed = buildFixed(plan.slabs);
   const std::uint64_t reading = task.memory_bytes - read_fixed;
   const std::uint64_t building = task.memory_bytes - build_fixed;
   plan.octree_memory = building;

@@ -41,6 +41,7 @@ struct IndexPlan {
   std::uint64_t block_memory = 0;   // for packed blocks, before they go to a temporary file
   std::uint64_t spare_memory = 0;   // for blocks of buckets that are distributed again
   std::uint64_t octree_memory = 0;  // what reading the octree of bare positions may take
+  std::size_t slabs = 0;            // on their way at a time, of buildOctree
   bool spills = false;              // the blocks are not expected to fit in memory
 };
 

@@ -20,20 +20,18 @@ struct Work {
   std::vector<EncodedPages> node_pages;  // one each; there may be more from before
 };
 
-// Slabs on their way: enough that stages do not wait for each other.
-std::size_t slabsInFlight(int threads) { return static_cast<std::size_t>(threads) * 3 / 2 + 2; }
-
 // The stages. What fails first ends the work: later stages pass what they get.
 class OctreePipeline {
  public:
-  OctreePipeline(SortedSurfelStream& stream, SceneWriter& writer, int threads, Progress& progress)
+  OctreePipeline(SortedSurfelStream& stream, SceneWriter& writer, std::size_t slabs,
+                 Progress& progress)
       : cutter_(stream),
         writer_(writer),
         // The writer's header changes while slabs are built
         header_(writer.header()),
         stitcher_(writer),
         progress_(progress),
-        works_(slabsInFlight(threads)) {
+        works_(slabs) {
     for (std::size_t i = 0; i < works_.size(); ++i) free_works_.push_back(i);
   }
 
@@ -192,25 +190,26 @@ void SlabStitcher::join(FinishedNode& node, int boundary_level) {
   complete_ = true;
 }
 
-Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, int threads,
+Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, std::size_t slabs,
                    Progress& progress) {
-  return OctreePipeline(stream, writer, threads, progress).run();
+  return OctreePipeline(stream, writer, slabs, progress).run();
 }
 
 double SlabForm::nodesPerSurfel() const { return std::min(2.0, 4.0 / leaf_capacity); }
 
-std::uint64_t buildOctreeBytes(const SlabForm& form, int threads) {
+std::uint64_t buildOctreeBytes(const SlabForm& form, int threads, std::size_t slabs) {
   // A slab has at most 2 * kBrickSurfels surfels, with their nodes and pages, in vectors that grow
-  // by doubling; a thread fetches the surfels of one slab at a time, and the batches that hold them
-  // stay meanwhile: beside small buckets that is as much again
+  // by doubling; the batches that its surfels came in stay meanwhile. A thread fetches the surfels
+  // of one slab at a time.
   constexpr double kSlack = 1.5;
   constexpr double kQuantizedBytes = 24, kFullBytes = 64;
-  constexpr std::uint64_t kFetchBytes = 4 * kBrickSurfels * (sizeof(Surfel) + sizeof(CurveKey));
-  const double surfel_bytes = form.nodesPerSurfel() * sizeof(LevelNode) +
-                              (form.full_precision ? kFullBytes : kQuantizedBytes);
-  const std::uint64_t slab_bytes =
-      static_cast<std::uint64_t>(kSlack * 2 * kBrickSurfels * surfel_bytes);
-  return slabsInFlight(threads) * slab_bytes + static_cast<std::uint64_t>(threads) * kFetchBytes;
+  constexpr std::uint64_t kSlabSurfels = 2 * kBrickSurfels;
+  constexpr std::uint64_t kFetchBytes = kSlabSurfels * (sizeof(Surfel) + sizeof(CurveKey));
+  constexpr double kBatchBytes = sizeof(Surfel) + sizeof(Ticket);
+  const double built_bytes = form.nodesPerSurfel() * sizeof(LevelNode) +
+                             (form.full_precision ? kFullBytes : kQuantizedBytes);
+  return slabs * static_cast<std::uint64_t>(kSlabSurfels * (kSlack * built_bytes + kBatchBytes)) +
+         static_cast<std::uint64_t>(threads) * kFetchBytes;
 }
 
 }  // namespace surfeit

@@ -49,12 +49,19 @@ struct SlabForm {
   double nodesPerSurfel() const;
 };
 
+// Slabs on their way at a time: enough that stages do not wait for each other, and the fewest that
+// keep the threads busy, for when memory is scarce.
+constexpr std::size_t usualSlabs(int threads) {
+  return static_cast<std::size_t>(threads) * 3 / 2 + 2;
+}
+constexpr std::size_t fewestSlabs(int threads) { return static_cast<std::size_t>(threads) + 1; }
+
 // Takes every surfel of the stream and hands all pages to the writer, with the threads of the
-// current arena; `threads` of them bound what is on its way. kInterrupted when cancelled.
-Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, int threads,
+// current arena; `slabs` bound what is on its way. kInterrupted when cancelled.
+Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, std::size_t slabs,
                    Progress& progress);
 
 // Memory that buildOctree takes at most, beside stream and writer.
-std::uint64_t buildOctreeBytes(const SlabForm& form, int threads);
+std::uint64_t buildOctreeBytes(const SlabForm& form, int threads, std::size_t slabs);
 
 }  // namespace surfeit
