@@ -21,7 +21,6 @@ namespace surfeit {
 namespace {
 
 constexpr int kStatsVersion = 1;
-constexpr int kMostThreads = 4096;
 
 ConsoleProgress::Style progressStyle(const CommonOptions& common) {
   using Style = ConsoleProgress::Style;

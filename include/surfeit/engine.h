@@ -156,8 +156,9 @@ class SURFEIT_API Engine {
                             const EnvironmentPixels* environment = nullptr);
 
   // Gathers at all receivers, in an order of its own along the curve of the world, on `threads`
-  // threads (0: EngineOptions::threads) with a gatherer each. Holds 24 bytes per receiver
-  // meanwhile, beside the budget. The result depends on instances, settings and receivers alone.
+  // threads (0: EngineOptions::threads) with a gatherer each. Holds 12 bytes per receiver
+  // meanwhile, beside the budget. At most 4 billion receivers. The
+  // result depends on instances, settings and receivers alone.
   // Errors: as gatherer and gather.
   Status gatherAll(const std::vector<Instance>& instances, const GatherSettings& settings,
                    const Receiver* receivers, std::size_t count, GatherResult* results,
@@ -170,7 +171,6 @@ class SURFEIT_API Engine {
   std::vector<GatherWindow> windows() const;
 
  private:
-  friend struct EngineAccess;
   explicit Engine(std::shared_ptr<EngineState> state) : state_(std::move(state)) {}
   Result<Scene> add(SceneFile file, std::uint64_t more_bytes = 0);
   std::shared_ptr<EngineState> state_;

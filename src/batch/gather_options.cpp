@@ -17,8 +17,6 @@
 namespace surfeit {
 namespace {
 
-constexpr int kMostThreads = 4096;
-
 Status refuse(const char* what, auto found, const std::string& expected) {
   return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
 }

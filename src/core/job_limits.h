@@ -32,4 +32,7 @@ std::uint64_t peakResidentBytes();
 // Processor time of all threads of this process so far, in seconds.
 double processCpuSeconds();
 
+// The most threads that a job may ask for.
+inline constexpr int kMostThreads = 4096;
+
 }  // namespace surfeit

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -27,7 +28,6 @@ namespace {
 constexpr PageNumber kNodePages = 1u << 22, kSurfelPages = 1u << 23;
 // Of these, so many are sampled for reuse distances.
 constexpr std::size_t kTrackedPages = 1 << 16;
-constexpr int kMostThreads = 4096;
 // An entry of a cache's table.
 constexpr std::uint64_t kPageTableBytes = 16;
 
@@ -189,6 +189,10 @@ Status Engine::gatherAll(const std::vector<Instance>& instances, const GatherSet
     const std::size_t wanted =
         std::min(runs, static_cast<std::size_t>(threads > 0 ? threads : state_->options.threads));
     if (count == 0) return {};
+    if (count > std::numeric_limits<std::uint32_t>::max()) {
+      return Status::invalidArgument(
+          fmt::format("{} receivers at once, expected less than 2^32: call it for parts", count));
+    }
     std::vector<Gatherer> gatherers;
     SURFEIT_ASSIGN_OR_RETURN(Gatherer first, gatherer(instances, settings, environment));
     gatherers.push_back(std::move(first));

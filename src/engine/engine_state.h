@@ -59,7 +59,6 @@ struct SceneState {
 
 // For those of the library who need what is behind a handle.
 struct EngineAccess {
-  static EngineState& state(const Engine& engine) { return *engine.state_; }
   static const SceneState& state(const Scene& scene) { return *scene.state_; }
 };
 

@@ -11,15 +11,13 @@
 #include <vector>
 
 #include "core/guard.h"
+#include "core/surfel_limits.h"
 #include "core/surfel_normal.h"
 #include "engine/gatherer_state.h"
 #include "gather/rules/gather_outputs.h"
 
 namespace surfeit {
 namespace {
-
-// Beyond this, sums of squares leave the range of floats (surfels/surfel_mapping.h).
-constexpr double kLargestLength = 1e12;
 
 bool isFinite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -58,7 +56,7 @@ Gatherer::State::~State() { world->engine().giveBack(world->gathererBytes(), 1);
 bool Gatherer::State::toLocal(const Receiver& receiver, LocalReceiver& result) const {
   const glm::dvec3 place = receiver.position - world->origin();
   for (int axis = 0; axis < 3; ++axis) {
-    if (!(std::abs(place[axis]) <= kLargestLength)) return false;
+    if (!(std::abs(place[axis]) <= double(kLargestLength))) return false;
   }
   if (!isFinite(receiver.normal) || !isFinite(receiver.view)) return false;
   result.position = glm::vec3(place);

@@ -27,7 +27,6 @@ class World {
   ~World();
 
   EngineState& engine() const { return *engine_; }
-  const std::shared_ptr<EngineState>& sharedEngine() const { return engine_; }
   const GatherRules& rules() const { return *rules_; }
   // What receivers are counted from.
   const glm::dvec3& origin() const { return origin_; }

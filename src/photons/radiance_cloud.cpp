@@ -43,7 +43,6 @@ namespace surfeit {
 namespace {
 
 constexpr std::uint32_t kMostPhotonsPerEstimate = 10000;
-constexpr int kMostThreads = 4096;
 constexpr std::uint32_t kLeafCapacity = 16;
 // Estimates reach at most this many times as far as the median one: over densities of 1 : 256.
 constexpr float kFarthestReach = 16;

@@ -12,17 +12,12 @@
 
 #include "cloud/row_layout.h"
 #include "cloud/surfel_names.h"
+#include "core/surfel_limits.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "surfels/float_row_decoder.h"
 
 namespace surfeit {
-
-// Largest values of a surfel: their squares and the sums over a cloud must be floats
-// (docs/format.md, "Limits").
-inline constexpr float kLargestLength = 1e12f;  // coordinates and radii
-inline constexpr float kLargestArea = 1e24f;
-inline constexpr float kLargestColor = 1e12f;  // radiosity and albedo
 
 // Records that hold no valid surfel, by kind, each with the number of the first (from 0).
 struct SurfelDefects {

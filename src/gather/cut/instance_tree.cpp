@@ -26,9 +26,12 @@ struct Sphere {
 };
 
 Sphere sphereOf(const InstancedScene& scene, const InstanceFrame& frame) {
-  // Rounding of the frame must not let anything out
-  constexpr float kMore = 1 + 1e-5f;
-  return {frame.toWorld(scene.root.position), kMore * frame.scale * scene.root.radius};
+  // Places in the world are rounded by up to so much of what they are added up from
+  constexpr float kRounding = 0x1p-21f;
+  const glm::vec3 centre = frame.toWorld(scene.root.position);
+  const float radius = frame.scale * scene.root.radius;
+  const glm::vec3 size = glm::abs(centre) + glm::abs(frame.shift);
+  return {centre, radius + kRounding * (radius + size.x + size.y + size.z)};
 }
 
 Surfel moved(const Surfel& surfel, const InstanceFrame& frame, float area_factor) {
@@ -94,7 +97,8 @@ class InstanceTree::Builder {
                      [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
     for (std::size_t i = 0; i < order_.size(); ++i) keys_[i] = keys[order_[i]];
 
-    nodes_.resize(kMostSiblings);
+    nodes_.reserve(2 * order_.size());
+    nodes_.resize(1);
     NodeSums all;
     const Node root = makeNode(0, order_.size(), all);
     nodes_.front() = root;
@@ -116,7 +120,7 @@ class InstanceTree::Builder {
     }
     const std::vector<std::size_t> ends = divide(begin, end);
     const std::size_t first = nodes_.size();
-    nodes_.resize(first + kMostSiblings);
+    nodes_.resize(first + ends.size());
     for (std::size_t child = 0; child < ends.size(); ++child) {
       NodeSums below;
       const Node made = makeNode(child == 0 ? begin : ends[child - 1], ends[child], below);
@@ -125,8 +129,8 @@ class InstanceTree::Builder {
     }
     Node node = nodeOf(begin, end, sums);
     node.child_count = static_cast<std::uint8_t>(ends.size());
-    node.page = static_cast<std::uint32_t>(first / kMostSiblings);
-    node.first = 0;
+    node.page = static_cast<std::uint32_t>(first >> 16);
+    node.first = static_cast<std::uint16_t>(first);
     return node;
   }
 
@@ -199,11 +203,10 @@ InstanceTree::InstanceTree(std::span<const InstancedScene> scenes,
   Builder(scenes, instances_, flatness_limit, nodes_).build();
 }
 
-// A group of siblings for each inner node, of which there are fewer than instances.
+// A node for each instance, and fewer above them; while it is made, keys and their order.
 std::size_t InstanceTree::memoryBytes(std::size_t count) {
-  constexpr std::size_t kGrowth = 2;  // of a vector
-  return count * (sizeof(PlacedScene) + kGrowth * kMostSiblings * sizeof(Node) +
-                  2 * sizeof(std::uint64_t) + sizeof(std::uint32_t));
+  return count *
+         (sizeof(PlacedScene) + 2 * sizeof(Node) + 2 * sizeof(CurveKey) + sizeof(std::uint32_t));
 }
 
 }  // namespace surfeit

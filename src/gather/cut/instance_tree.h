@@ -62,8 +62,7 @@ class InstanceTree {
 
   // For CutWalk: leaves are instances (Node::page is their number).
   Result<std::span<const Node>> nodes(const NodeRange& range) const {
-    return std::span(nodes_).subspan(std::size_t{range.page} * kMostSiblings + range.first,
-                                     range.count);
+    return std::span(nodes_).subspan(std::size_t{range.page} << 16 | range.first, range.count);
   }
   Status checkVisits(std::uint64_t, std::uint64_t) const { return {}; }
 
@@ -73,7 +72,7 @@ class InstanceTree {
  private:
   class Builder;
   std::vector<PlacedScene> instances_;
-  std::vector<Node> nodes_;  // kMostSiblings to each parent; the root's own first
+  std::vector<Node> nodes_;  // siblings side by side; the root first
 };
 
 }  // namespace surfeit

@@ -65,9 +65,7 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
       rules_(rules),
       near_disk_radii_(nearFieldRadii(rules, false)),
       near_sphere_radii_(nearFieldRadii(rules, true)),
-      max_distance_sq_(rules.quality.max_distance < 1e19f
-                           ? rules.quality.max_distance * rules.quality.max_distance
-                           : std::numeric_limits<float>::infinity()),
+      max_distance_sq_(maxDistanceSquared(rules)),
       geometry_(rasterGeometry(rules)),
       weights_(rules, 1 / geometry_.pixelsPerSlope()),
       pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers *

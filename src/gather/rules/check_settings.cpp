@@ -12,8 +12,6 @@
 namespace surfeit {
 namespace {
 
-constexpr float kNoDistance = 1e19f;
-
 Status refuse(const char* what, auto found, const std::string& expected) {
   return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 
 #include "gather/rules/raster_geometry.h"
 #include "gather/rules/receiver.h"
@@ -86,6 +87,13 @@ struct GatherRules {
   bool hasConeRaster() const { return weights.cone_angle <= kWidestConeRaster; }
   std::uint32_t channels() const { return (hasLight() ? 3u : 0u) + (fades() ? 1u : 0u); }
 };
+
+// From here on a max distance is none: its square is no float.
+inline constexpr float kNoDistance = 1e19f;
+inline float maxDistanceSquared(const GatherRules& rules) {
+  const float distance = rules.quality.max_distance;
+  return distance < kNoDistance ? distance * distance : std::numeric_limits<float>::infinity();
+}
 
 // The raster that is drawn to.
 inline RasterGeometry rasterGeometry(const GatherRules& rules) {

@@ -21,9 +21,7 @@ ReceiverRaster::ReceiverRaster(const GatherRules& rules)
                           ribbonNested(pixelsPerSlope(rules))},
       near_disk_radii_(nearFieldRadii(rules, false)),
       near_sphere_radii_(nearFieldRadii(rules, true)),
-      max_distance_sq_(rules.quality.max_distance < 1e19f
-                           ? rules.quality.max_distance * rules.quality.max_distance
-                           : std::numeric_limits<float>::infinity()),
+      max_distance_sq_(maxDistanceSquared(rules)),
       has_frame_(rules.hasConeRaster()),
       geometry_(rasterGeometry(rules)),
       weights_(rules, 1 / geometry_.pixelsPerSlope()),
