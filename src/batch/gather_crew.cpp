@@ -8,8 +8,7 @@
 
 #include "core/seconds_since.h"
 #include "core/worker_threads.h"
-#include "gather/packet/interpolating_gatherer.h"
-#include "gather/packet/packet_gatherer.h"
+#include "gather/packet/group_gatherer.h"
 
 namespace surfeit {
 
@@ -23,22 +22,13 @@ Status GatherCrew::run() {
   return runOnThreads(setup_.threads, failure_, "gather", [this] { return gatherRuns(); });
 }
 
-Status GatherCrew::gatherRuns() {
-  if (!(setup_.rules.quality.max_variation > 0)) {
-    const auto gatherer = std::make_unique<PacketGatherer>(setup_.rules);
-    return gatherRuns(*gatherer, kClusterReceivers);
-  }
-  const auto gatherer = std::make_unique<InterpolatingGatherer>(setup_.rules);
-  const Status status = gatherRuns(*gatherer, kGroupReceivers);
-  interpolated_count_ += gatherer->interpolatedCount();
-  return status;
-}
-
 // Takes runs until none is left or some thread has failed. Runs are whole groups, so that what is
 // gathered together is a matter of the order alone.
-template <typename Gatherer>
-Status GatherCrew::gatherRuns(Gatherer& gatherer, std::size_t group_size) {
+Status GatherCrew::gatherRuns() {
+  GroupGatherer gatherer(setup_.rules);
+  const std::size_t group_size = gatherer.size();
   PagedOctree::Reader reader(setup_.octree);
+  WorldReader world(reader);
   std::vector<SortedReceiver> run;
   std::vector<ResultStore::Entry> results;
   std::vector<LocalReceiver> group(group_size);
@@ -50,14 +40,14 @@ Status GatherCrew::gatherRuns(Gatherer& gatherer, std::size_t group_size) {
     const std::size_t run_size =
         std::max<std::size_t>(setup_.controller.runReceivers(), group_size);
     SURFEIT_RETURN_IF_ERROR(setup_.queue.take(run, run_size));
-    if (run.empty()) return {};
+    if (run.empty()) break;
     prefetcher_.notify();
     results.clear();
     for (std::size_t begin = 0; begin < run.size(); begin += group_size) {
       if (setup_.progress.isCancelled()) return Status::interrupted();
       const std::size_t count = std::min(group_size, run.size() - begin);
       for (std::size_t i = 0; i < count; ++i) group[i] = run[begin + i].receiver;
-      SURFEIT_RETURN_IF_ERROR(gatherer.gather(std::span(group).first(count), reader,
+      SURFEIT_RETURN_IF_ERROR(gatherer.gather(std::span(group).first(count), world,
                                               std::span(group_results).first(count)));
       for (std::size_t i = 0; i < count; ++i) {
         results.push_back({run[begin + i].index, group_results[i]});
@@ -67,6 +57,7 @@ Status GatherCrew::gatherRuns(Gatherer& gatherer, std::size_t group_size) {
     setup_.progress.advance(run.size());
     setup_.controller.advance(run.size());
   }
+  interpolated_count_ += gatherer.interpolatedCount();
   return {};
 }
 

@@ -47,8 +47,6 @@ class GatherCrew {
 
  private:
   Status gatherRuns();
-  template <typename Gatherer>
-  Status gatherRuns(Gatherer& gatherer, std::size_t group_size);
 
   const Setup setup_;
   const Sink sink_;

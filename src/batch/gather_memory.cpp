@@ -14,8 +14,7 @@
 #include "cache/reuse_distances.h"
 #include "core/program_memory.h"
 #include "engine/gatherer_memory.h"
-#include "gather/packet/interpolating_gatherer.h"
-#include "gather/packet/packet_gatherer.h"
+#include "gather/packet/group_gatherer.h"
 #include "gather/rules/gather_outputs.h"
 
 namespace surfeit {
@@ -37,8 +36,7 @@ constexpr std::uint64_t kMostReadingBytes = std::uint64_t{32} << 20;
 
 // Bytes of a thread beside its part of the caches.
 std::uint64_t threadBytes(const SceneFile& file, const GatherWork& work) {
-  const bool interpolates = work.rules.quality.max_variation > 0;
-  const std::size_t group_size = interpolates ? kGroupReceivers : kClusterReceivers;
+  const std::size_t group_size = GroupGatherer::groupSize(work.rules);
   const std::size_t most_run = std::max<std::size_t>(PagingController::kMostRun, group_size);
   return gathererBytes(work.rules, file.header().surfel_count) +
          most_run * (sizeof(SortedReceiver) + sizeof(ResultStore::Entry)) +

@@ -37,18 +37,12 @@ Gatherer::State::State(std::shared_ptr<const World> of)
       view(world->instances() != nullptr
                ? WorldReader(reader, *world->instances(), world->octrees())
                : WorldReader(reader)),
-      no_result(noResult(world->rules().outputs)) {
+      no_result(noResult(world->rules().outputs)),
+      gatherer(world->rules()) {
   if (world->instances() == nullptr) reader.use(*world->octrees().front());
-  if (world->rules().quality.max_variation > 0) {
-    interpolating = std::make_unique<InterpolatingGatherer>(world->rules());
-    group_size = kGroupReceivers;
-  } else {
-    packets = std::make_unique<PacketGatherer>(world->rules());
-    group_size = kClusterReceivers;
-  }
-  local.resize(group_size);
-  places.resize(group_size);
-  found.resize(group_size);
+  local.resize(gatherer.size());
+  places.resize(gatherer.size());
+  found.resize(gatherer.size());
 }
 
 Gatherer::State::~State() { world->engine().giveBack(world->gathererBytes(), 1); }
@@ -69,7 +63,7 @@ bool Gatherer::State::toLocal(const Receiver& receiver, LocalReceiver& result) c
   return !result.isSpherical() && (length > 0 || isFinite(rules.eye));
 }
 
-// At most group_size.
+// At most a group.
 Status Gatherer::State::gatherGroup(std::span<const Receiver> receivers,
                                     std::span<GatherResult> results) {
   std::size_t count = 0;
@@ -84,8 +78,7 @@ Status Gatherer::State::gatherGroup(std::span<const Receiver> receivers,
   const auto gathered = std::span(found).first(count);
   if (count > 0) {
     const auto at = std::span<const LocalReceiver>(local).first(count);
-    SURFEIT_RETURN_IF_ERROR(packets != nullptr ? packets->gather(at, view, gathered)
-                                               : interpolating->gather(at, view, gathered));
+    SURFEIT_RETURN_IF_ERROR(gatherer.gather(at, view, gathered));
   }
   for (std::size_t i = 0; i < count; ++i) results[places[i]] = gathered[i];
   done_receivers += receivers.size();
@@ -105,9 +98,10 @@ Status Gatherer::gather(const Receiver* receivers, std::size_t count, GatherResu
     return Status::invalidArgument("gather: another call on this gatherer has not returned");
   }
   const Status status = guarded("gather", [&]() -> Status {
-    for (std::size_t begin = 0; begin < count; begin += state_->group_size) {
+    const std::size_t group_size = state_->gatherer.size();
+    for (std::size_t begin = 0; begin < count; begin += group_size) {
       if (progress != nullptr && progress->isCancelled()) return Status::interrupted();
-      const std::size_t size = std::min(state_->group_size, count - begin);
+      const std::size_t size = std::min(group_size, count - begin);
       SURFEIT_RETURN_IF_ERROR(
           state_->gatherGroup({receivers + begin, size}, {results + begin, size}));
     }

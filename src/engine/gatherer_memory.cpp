@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "gather/packet/interpolating_gatherer.h"
-#include "gather/packet/packet_gatherer.h"
+#include "gather/packet/group_gatherer.h"
 
 namespace surfeit {
 
@@ -16,10 +15,8 @@ std::uint64_t gathererBytes(const GatherRules& rules, std::uint64_t surfels) {
   const double cut = kPatches * 4 * double(kPi) / double(maxSolidAngle(rules)) * kLayers;
   const double most = std::min(double(surfels), cut);
   const double more = std::max(0.0, most - double(PacketRaster::kReservedPatches));
-  const bool interpolates = rules.quality.max_variation > 0;
-  return (interpolates ? InterpolatingGatherer::memoryBytes(rules)
-                       : PacketGatherer::memoryBytes(rules)) +
-         kThreadBytes + static_cast<std::uint64_t>(more * kBytes);
+  return GroupGatherer::memoryBytes(rules) + kThreadBytes +
+         static_cast<std::uint64_t>(more * kBytes);
 }
 
 }  // namespace surfeit

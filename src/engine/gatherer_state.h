@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "engine/world.h"
-#include "gather/packet/interpolating_gatherer.h"
-#include "gather/packet/packet_gatherer.h"
+#include "gather/packet/group_gatherer.h"
 #include "gather/packet/world_walk.h"
 #include "surfeit/engine.h"
 
@@ -31,9 +30,7 @@ struct Gatherer::State {
   PagedOctree::Reader reader;
   WorldReader view;
   const GatherResult no_result;
-  std::unique_ptr<PacketGatherer> packets;  // or
-  std::unique_ptr<InterpolatingGatherer> interpolating;
-  std::size_t group_size = 0;  // receivers that are gathered together at most
+  GroupGatherer gatherer;
 
   // Of a group
   std::vector<LocalReceiver> local;
