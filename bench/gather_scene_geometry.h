@@ -77,7 +77,12 @@ Status sendCitySurfels(const SceneGeometry& geometry, std::uint64_t count, const
 // 64,000 or so, each of about .065 by .037. Surfels are those of the sampler of meshes.
 SceneGeometry makeLeaves();
 
-// Bunny and lion on a ground, Sponza, hair: from files in `data`. kIoError where one is missing.
+// Scenes that no number of the gather was chosen by.
+bool isUnseenScene(const std::string& name);
+SceneGeometry makeUnseenScene(const std::string& name);
+
+// Bunny and lion on a ground, Sponza, hair; unseen ones, too: from files in `data`. kIoError where
+// one is missing.
 bool isMeshScene(const std::string& name);
 std::string meshSceneFile(const std::string& name, const std::string& data);
 Result<SceneGeometry> loadMeshScene(const std::string& name, const std::string& data,

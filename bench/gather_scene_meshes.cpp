@@ -31,6 +31,11 @@ constexpr std::array kMeshScenes = {
     MeshScene{"lion", "meshes/lion_reconstruction.ply", 2, false, 1e-4f, 0.25f},
     MeshScene{"sponza", "scenes/sponza/sponza.obj", -1, false, 3e-5f, 0.1f},
     MeshScene{"hair", "hair/straight_ribbons.ply", -1, true, 2e-6f, 0.1f},
+    MeshScene{"koala", "meshes/koala.ply", 2, false, 1e-4f, 0.25f},
+    MeshScene{"scan", "meshes/koala.ply", 2, false, 1e-4f, 0.25f},
+    MeshScene{"igea", "meshes/igea.ply", 1, false, 1e-4f, 0.25f},
+    MeshScene{"dragon", "meshes/dragon_res2.ply", 1, false, 1e-4f, 0.25f},
+    MeshScene{"cornell", "scenes/cornell_box/cornell_box.obj", -1, false, 3e-5f, 0.5f},
 };
 constexpr std::uint64_t kSurfels = 2'000'000;
 constexpr float kGroundSize = 1;  // over the diagonal: about half of the surfels are the object's
@@ -107,7 +112,9 @@ Result<SceneGeometry> loadMeshScene(const std::string& name, const std::string& 
 
 Status sendMeshSurfels(const SceneGeometry& geometry, std::uint64_t count,
                        const std::string& directory, int threads, const SurfelSink& sink) {
-  const std::string mesh_path = directory + "/turned.ply", cloud_path = directory + "/sampled.ply";
+  // Others may be made in the directory at the same time
+  const std::string name = fmt::format("{}/{:x}", directory, std::uintptr_t(&geometry));
+  const std::string mesh_path = name + "_turned.ply", cloud_path = name + "_sampled.ply";
   SURFEIT_RETURN_IF_ERROR(writeMesh(geometry.mesh, mesh_path));
   Progress quiet;
   SampleOptions options;

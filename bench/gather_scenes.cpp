@@ -78,6 +78,13 @@ const std::vector<std::string>& gatherSceneNames() {
   return names;
 }
 
+const std::vector<std::string>& unseenSceneNames() {
+  static const std::vector<std::string> names = {"koala",  "igea",      "dragon",   "cornell",
+                                                 "scan",   "furniture", "terraces", "forest",
+                                                 "shrubs", "grass",     "pipes",    "scales"};
+  return names;
+}
+
 std::string missingSceneFile(const std::string& name, const SceneOptions& options) {
   if (!isMeshScene(name)) return {};
   std::string path = meshSceneFile(name, options.data);
@@ -108,15 +115,20 @@ WorkDirectory::~WorkDirectory() {
 
 Result<GatherScene> GatherScene::open(const std::string& name, const SceneOptions& options,
                                       Progress& progress) {
-  const auto& names = gatherSceneNames();
-  if (std::find(names.begin(), names.end(), name) == names.end()) {
-    return Status::invalidArgument(
-        fmt::format("scene {}: expected one of {}", name, fmt::join(names, ", ")));
+  const auto isOf = [&](const std::vector<std::string>& names) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  if (!isOf(gatherSceneNames()) && !isOf(unseenSceneNames())) {
+    return Status::invalidArgument(fmt::format("scene {}: expected one of {}, {}", name,
+                                               fmt::join(gatherSceneNames(), ", "),
+                                               fmt::join(unseenSceneNames(), ", ")));
   }
   SURFEIT_ASSIGN_OR_RETURN(WorkDirectory directory, WorkDirectory::open(options.keep));
   GatherScene scene(name, std::move(directory));
   if (isMeshScene(name)) {
     SURFEIT_ASSIGN_OR_RETURN(scene.geometry_, loadMeshScene(name, options.data, progress));
+  } else if (isUnseenScene(name)) {
+    scene.geometry_ = makeUnseenScene(name);
   } else {
     scene.geometry_ = name == "city" ? makeCity() : name == "leaves" ? makeLeaves() : makeSpheres();
   }
@@ -133,11 +145,12 @@ Result<GatherScene> GatherScene::open(const std::string& name, const SceneOption
 Status GatherScene::makeOctree(std::uint64_t count, int threads, Progress& progress) const {
   const std::string cloud_path = octree_path_ + ".ply";
   CloudChannels channels;
-  channels.normal = channels.radius = channels.area = channels.radiosity = true;
+  channels.normal = channels.radiosity = true;
+  channels.radius = channels.area = name_ != "scan";  // that brings places and normals alone
   channels.two_sided = channels.long_side = geometry_.is_two_sided;
   SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(cloud_path, channels));
   const SurfelSink sink = [&](std::span<const Surfel> surfels) { return writer.write(surfels); };
-  if (isMeshScene(name_) || name_ == "leaves") {
+  if (isMeshScene(name_) || isUnseenScene(name_) || name_ == "leaves") {
     SURFEIT_RETURN_IF_ERROR(sendMeshSurfels(geometry_, count, directory_.path(), threads, sink));
   } else if (name_ == "city") {
     SURFEIT_RETURN_IF_ERROR(sendCitySurfels(geometry_, count, sink));
@@ -148,6 +161,7 @@ Status GatherScene::makeOctree(std::uint64_t count, int threads, Progress& progr
 
   IndexOptions index;
   index.threads = threads;
+  index.origin = glm::dvec3(0);  // receivers and rays are about it
   index.memory_bytes = std::min<std::uint64_t>(memoryLimitBytes() / 2, std::uint64_t{4} << 30);
   SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats,
                            indexClouds({cloud_path}, octree_path_, index, progress));

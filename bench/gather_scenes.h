@@ -24,8 +24,10 @@ struct SceneOptions {
   int threads = 0;                      // to build with; 0: all that the job may use
 };
 
-// Names of all scenes.
+// Names of the scenes that errors are reported for, and of others that no number of the gather was
+// chosen by.
 const std::vector<std::string>& gatherSceneNames();
+const std::vector<std::string>& unseenSceneNames();
 // The file that a scene lacks, empty when it can be made.
 std::string missingSceneFile(const std::string& name, const SceneOptions& options);
 

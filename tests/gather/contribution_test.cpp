@@ -389,8 +389,8 @@ TEST(RoughNode, ShowsNoMoreThanAPartOfItsOutline) {
   Node node = nodeOf(positions, normals);
   node.area = 10;
   // The square has the covariance of an ellipse of 4 pi / 12
-  EXPECT_NEAR(roughCover(node, {0, 0, 1}, 10, 0).area, kFilledOutline * kPi / 3, .01f);
-  EXPECT_NEAR(roughCover(node, {0, 1, 0}, 10, 0).area, kFilledOutline * kPi / 3, .02f);
+  EXPECT_NEAR(roughCover(node, {0, 0, 1}, 10, 0).area, kFidelity.filled_outline * kPi / 3, .01f);
+  EXPECT_NEAR(roughCover(node, {0, 1, 0}, 10, 0).area, kFidelity.filled_outline * kPi / 3, .02f);
 }
 
 TEST(RoughNode, OfAWireShowsAllThatFacesTheReceiver) {
@@ -421,7 +421,7 @@ TEST(RoughNode, OfAThicketCoversItsOutlineInPart) {
     EXPECT_NEAR(leaves.area, kPi, .02f);
     EXPECT_NEAR(leaves.opacity, 1 - std::exp(-shown / kPi), .01f);
     const RoughCover surface = roughCover(node, direction, shown, 0);
-    EXPECT_NEAR(surface.area, std::min(shown, kFilledOutline * .8f * kPi), .03f);
+    EXPECT_NEAR(surface.area, std::min(shown, kFidelity.filled_outline * .8f * kPi), .03f);
     EXPECT_EQ(surface.opacity, 1);
     const RoughCover half = roughCover(node, direction, shown, .5f);
     EXPECT_NEAR(half.area, (leaves.area + surface.area) / 2, 1e-5f);

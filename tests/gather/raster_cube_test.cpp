@@ -206,9 +206,9 @@ TEST(RasterCube, LayersBeginByAndBy) {
     return cube.coverage(3);
   };
   EXPECT_NEAR(covered(-.1f), 1, 1e-5);
-  EXPECT_NEAR(covered(.5f * kLayerGap), .75f, 1e-5);  // half of the range is its reach
+  EXPECT_NEAR(covered(.5f * kFidelity.layer_gap), .75f, 1e-5);  // half of the range is its reach
   float before = 1;
-  for (float gap = 0; gap < .6f * kLayerGap; gap += .01f * kLayerGap) {
+  for (float gap = 0; gap < .6f * kFidelity.layer_gap; gap += .01f * kFidelity.layer_gap) {
     const float now = covered(gap);
     EXPECT_LE(now, before + 1e-5f) << gap;
     EXPECT_GT(now, before - .02f) << gap;

@@ -14,34 +14,21 @@
 #include <hwy/highway.h>
 
 #include "gather/cut/vectors_of_3-inl.h"
+#include "gather/rules/fidelity.h"
 
 #ifndef SURFEIT_CUT_CONSTANTS
 #define SURFEIT_CUT_CONSTANTS
 namespace surfeit {
 namespace {
 
-// What rises less than this above the horizon, in radians, is left out: even a full circle of it
-// covers no more than the square of this.
-constexpr float kHorizonSlope = 0.01f;
-
-// What a node that is not flat may look like, as a part of the max solid angle. A flat one is a
-// tile of a surface and drawn as such; others are corners, edges or thickets, of which the receiver
-// sees a part. (With .5, .67, .8, 1, at .13 sr and 14 pixels: color RMSE of the lion on a plane
-// 1.9, 1.9, 2.0, 2.2 %; AO RMSE of spheres .0041, .0045, .0050, .0060.)
-constexpr float kUnevenShare = 2.f / 3;
-
-// What is seen at a cosine to the normal below this weighs less: nodes may look larger by as much,
-// up to mostCoarser. Not flat ones: tiles of a surface leave gaps when they are large. (Covered of
-// a closed shell of 200,000 disks .9954 with and without, and .9927 if flat ones are larger as
-// well.)
-constexpr float kWholeCosine = 0.8f;
-
 // The slab and the cone of a node bound what a reader decodes; lengths and cosines are rounded once
 // more on the way.
 constexpr float kRoundingSlack = 1e-4f;
 
-float fadingOf(const Node& node) { return node.isLeaf() ? kLeafFading : kFading; }
-float shareOf(const Node& node) { return node.isFlat() ? 1 : kUnevenShare; }
+float fadingOf(const Node& node) {
+  return node.isLeaf() ? kFidelity.leaf_fading : kFidelity.fading;
+}
+float shareOf(const Node& node) { return node.isFlat() ? 1 : kFidelity.uneven_share; }
 float mostCoarserOf(const Node& node, const CutRules& rules) {
   return node.isFlat() ? 1 : rules.most_coarser;
 }
@@ -51,7 +38,9 @@ float mostCoarserOf(const Node& node, const CutRules& rules) {
 // better but the city, AO RMSE .0053 instead of .0056, at .6 of its rate.)
 float inverseOffPlane(const CutRules& rules) { return 1 / rules.pixel; }
 
-float horizonSlope(const CutRules& rules) { return rules.approximates() ? kHorizonSlope : 0; }
+float horizonSlope(const CutRules& rules) {
+  return rules.approximates() ? kFidelity.horizon_slope : 0;
+}
 
 }  // namespace
 }  // namespace surfeit
@@ -200,8 +189,8 @@ Bounds BoundsOf(const Columns& columns, std::size_t at, const PacketView& view, 
   const V farthest = hn::Add(places.distance, Splat(view.radius));
   V gain = one;
   if (view.has_horizon) {
-    const V low =
-        hn::Div(hn::Mul(Splat(kWholeCosine), places.nearest), hn::Max(places.highest, tiny));
+    const V low = hn::Div(hn::Mul(Splat(kFidelity.whole_cosine), places.nearest),
+                          hn::Max(places.highest, tiny));
     gain = hn::Min(most, hn::Max(one, low));
   }
   const V near_sq = hn::Max(Square(places.nearest), tiny);
@@ -309,7 +298,7 @@ bool turnsAway(const Node& node, const glm::vec3& to_node, float distance, const
   return depth > 0 && depth * node.normal_cosine > aside * other(1, node.normal_cosine);
 }
 
-// Whether no receiver sees anything of a node, or less of it than kHorizonSlope says.
+// Whether no receiver sees anything of a node, or less of it than Fidelity::horizon_slope says.
 bool isHidden(const Node& node, const PacketView& view, const CutRules& rules) {
   const glm::vec3 to_node = node.position - view.centre;
   const float distance = glm::length(to_node), nearest = distance - view.radius;
@@ -348,9 +337,9 @@ float openPart(const Node& node, const LocalReceiver& receiver, const CutRules& 
   const float most_coarser = mostCoarserOf(node, rules);
   if (most_coarser > 1 && !receiver.isSpherical()) {
     const float highest = glm::dot(to_node, receiver.normal) + riseOf(node, receiver.normal);
-    gain =
-        std::clamp(kWholeCosine * distance / std::max(highest, std::numeric_limits<float>::min()),
-                   1.f, most_coarser);
+    gain = std::clamp(
+        kFidelity.whole_cosine * distance / std::max(highest, std::numeric_limits<float>::min()),
+        1.f, most_coarser);
   }
   const float limit = 2 * shareOf(node) * gain * rules.max_solid_angle;
   const float off_plane = node.off_plane * inverseOffPlane(rules);

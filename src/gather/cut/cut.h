@@ -12,6 +12,7 @@
 #include <span>
 
 #include "core/curve_key.h"
+#include "gather/rules/fidelity.h"
 #include "gather/rules/gather_rules.h"
 #include "gather/rules/receiver.h"
 #include "octree/node/node.h"
@@ -68,18 +69,6 @@ float riseOf(const Node& node, const glm::vec3& up);
 // looks small enough, 1 when it does not, and in between while it fades from one into the other.
 // The definition of the cut (docs/algorithm.md, "Choosing the cut").
 float openPart(const Node& node, const LocalReceiver& receiver, const CutRules& rules);
-
-// From one place to the next, a node would give way to its children at once, and what they show
-// differently would be a step. So it fades into them while it looks by this part smaller to this
-// part larger than it may. (Largest steps of irradiance along lines in a box, of its
-// mean: 2.2, 1.7, .5, .8, .3 % with 0; 1.1, 1.0, .2, .4, .2 with .015, .02 and .03, for 3 to 5 %
-// more patches with .02. bench/line_steps.sh)
-inline constexpr float kFading = 0.02f;
-// Leaves fade by this part: their surfels are near and ray traced, which differs more, and where a
-// surface touches another the next receiver may be farther by a percent. (Largest jump of
-// irradiance below a sphere on the floor, bench/line_steps.sh: .62 % with kFading, .45 %, for 2 %
-// more patches.)
-inline constexpr float kLeafFading = 0.1f;
 
 // Of one parent.
 inline constexpr std::size_t kMostSiblings = 8;

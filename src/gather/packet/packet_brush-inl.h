@@ -178,7 +178,7 @@ class Brush {
     // Numbers of lanes that see nothing must be numbers, too
     const V distance_sq = hn::IfThenElse(seen, sight.distance_sq, Splat(1));
     const V distance = hn::Mul(distance_sq, InverseSqrt(distance_sq));
-    seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kLeastAxis), distance)));
+    seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kFidelity.least_axis), distance)));
     if (hn::AllFalse(D(), seen)) return;
 
     // The visible area, times the distance
@@ -201,8 +201,8 @@ class Brush {
   // As touchPart.
   static V InverseTouch(const Parallelogram& shape) {
     const V area = hn::Mul(Splat(4), hn::Mul(shape.half_x, shape.half_y));
-    const V counts = hn::Min(Splat(1), hn::Max(Splat(kLeastTouched), area));
-    return Reciprocal(hn::Mul(Splat(kTouch), counts));
+    const V counts = hn::Min(Splat(1), hn::Max(Splat(kFidelity.least_touched), area));
+    return Reciprocal(hn::Mul(Splat(kFidelity.touch), counts));
   }
 
   // As facingAreas of a facet; all times the distance.
@@ -220,7 +220,7 @@ class Brush {
 
   // As RasterCube::onFace; `area` is the visible area times the distance.
   HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse) const {
-    const V one = Splat(1), least = Splat(kLeastSpread);
+    const V one = Splat(1), least = Splat(kFidelity.least_spread);
     const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
     const Normal normal = InRaster(patch.normal);
     const V u = hn::Mul(Axis(offset, u_axis), inverse);
@@ -243,7 +243,7 @@ class Brush {
 
     // Area on the face: du dv = area / distance^2 * (distance / w)^3, and more for large ones
     const V inverse_sq = hn::Mul(inverse, inverse);
-    const V extent = hn::Min(Splat(kMostExtent), hn::Mul(Splat(patch.area), inverse_sq));
+    const V extent = hn::Min(Splat(kFidelity.most_extent), hn::Mul(Splat(patch.area), inverse_sq));
     const V depth = hn::NegMulAdd(n_axis, n_axis, one);
     const V bulge = hn::MulAdd(extent, hn::Mul(Splat(0.5f), depth), one);
     const V half_area =
@@ -315,7 +315,7 @@ class Brush {
     from_ray.facing = Dot(to_centre, patch.normal);
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
              MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part,
-                       Splat(1 / (kTouch * kLeastTouched))));
+                       Splat(1 / (kFidelity.touch * kFidelity.least_touched))));
   }
 
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
@@ -397,7 +397,7 @@ class Brush {
     const bool is_open =
         CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, Splat(1), cover, hull_);
     if (!is_open || !cover.has_hull) return is_open;
-    const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(kTracedHull)));
+    const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(kFidelity.traced_hull)));
     hull_.Add(pixel, hn::IfThenElseZero(is_hull, SplatU(kHullSamples)),
               SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.depth_begin, cover.depth_end);
     return true;

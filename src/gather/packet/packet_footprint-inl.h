@@ -122,7 +122,8 @@ struct SampleRun {
 inline VU Widening(const Parallelogram& shape, bool is_solid) {
   if (!is_solid) return hn::Zero(DU());
   const V side = hn::Sqrt(hn::Mul(shape.half_x, shape.half_y));
-  const V samples = hn::MulAdd(side, Splat(kHullWidening * float(kHullSide)), Splat(0.5f));
+  const V samples =
+      hn::MulAdd(side, Splat(kFidelity.hull_widening * float(kHullSide)), Splat(0.5f));
   const V within = hn::Min(Splat(float(kHullSide)), hn::Max(Splat(1), samples));
   return hn::BitCast(DU(), hn::ConvertTo(DI(), within));
 }

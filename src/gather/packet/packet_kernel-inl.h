@@ -121,7 +121,7 @@ void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sigh
   sight.facing = facingAreas(total, mean_of[kAreaKind], second, fourth);
   const float area = facing_of[kAreaKind];
   sight.radiosity = node.radiosity;
-  if (area > kLeastVisiblePart * node.area) {
+  if (area > kFidelity.least_visible_part * node.area) {
     const float inverse = 1 / area;
     for (int c = 0; c < 3; ++c) sight.radiosity[c] = inverse * facing_of[powerKind(c)];
   }

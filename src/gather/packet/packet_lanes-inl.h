@@ -148,7 +148,7 @@ struct Sight {
 inline V NearPart(const Patch& patch, const Sight& sight) {
   const float inverse = 1 / nearBorderSq(patch.near_distance);
   const V rest = hn::NegMulAdd(sight.distance_sq, Splat(inverse), Splat(1));
-  const V part = hn::Mul(rest, Splat(1 / (1 - kWholeNear * kWholeNear)));
+  const V part = hn::Mul(rest, Splat(1 / (1 - kFidelity.whole_near * kFidelity.whole_near)));
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
 }
 
@@ -167,7 +167,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   if (!(patch.near_distance > 0)) return sight;
 
   if (patch.isRound()) {
-    const float clearance = kSphereClearance * patch.radius;
+    const float clearance = kFidelity.sphere_clearance * patch.radius;
     const M too_close =
         hn::And(receivers.spherical, hn::Lt(sight.distance_sq, Splat(clearance * clearance)));
     sight.in_reach = hn::AndNot(too_close, sight.in_reach);
@@ -180,10 +180,11 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const V cosine = Dot(receivers.normal, patch.normal);
   const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
   const float size = patch.isRibbon() ? patch.ribbonWidth() : patch.radius;
-  const float bias = canvas.bias * size * (patch.isRibbon() ? kRibbonBias : 1);
+  const float bias = canvas.bias * size * (patch.isRibbon() ? kFidelity.ribbon_bias : 1);
   V part = hn::MulAdd(Splat(turned), cosine, one);
   if (patch.facing_limit == Patch::kBothSides) {
-    part = hn::Max(zero, hn::NegMulAdd(sight.height, Splat(1 / (kBiasHeight * size)), one));
+    part =
+        hn::Max(zero, hn::NegMulAdd(sight.height, Splat(1 / (kFidelity.bias_height * size)), one));
   }
   sight.bias = hn::Mul(Splat(bias), hn::Min(one, part));
   const V rise =

@@ -18,7 +18,8 @@ namespace {
 
 // Of thickets, in radii of the node: with outlines as long as the node, and a sheared image.
 constexpr float kThicketExtent = 1.5f;
-// The most that a patch spreads, with lengths 8 times the widths (kLeastSpread), grown by half.
+// The most that a patch spreads, with lengths 8 times the widths (Fidelity::least_spread), grown by
+// half.
 constexpr float kMostSpread = 24;
 // A parallelogram may reach farther than the rectangle with its spread.
 constexpr float kShear = 1.3f;
@@ -135,7 +136,7 @@ std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
   const glm::vec3 middle = patch.position - view_.centre;
   const glm::vec3 size = glm::abs(middle);
   const float largest = std::max({size.x, size.y, size.z});
-  const float extent = std::min(kMostExtent, patch.area / (largest * largest));
+  const float extent = std::min(kFidelity.most_extent, patch.area / (largest * largest));
   if (extent > kLargeExtent) return facesThatSeeLarge(patch, extent);
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
   const float half = std::max(0.5f * side, leastHalf(patch));
@@ -179,7 +180,7 @@ std::uint32_t PacketRaster::facesThatSeeLarge(const Patch& patch, float extent) 
       const float half_sq = std::max(
           kShear * kShear * half_side_sq * std::min(growth * spread, kMostSpread), least_half_sq);
       // On the face it is drawn larger by (distance / w)^(3/2) than at its middle
-      const float w = std::max(size[axis] - view_.radius, kLeastAxis * distance);
+      const float w = std::max(size[axis] - view_.radius, kFidelity.least_axis * distance);
       if (gap * gap * w > half_sq * distance) continue;
     }
     faces |= (middle[axis] + view_.radius > 0 ? 1u : 0u) << 2 * axis;
@@ -268,7 +269,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   const glm::vec3 to_node = node.position - local_centre_, direction = glm::normalize(to_node);
   kernel_.seeRoughNode(node, direction, seen);
   const float round_area = shownArea(seen.facing, sides);
-  if (!(round_area > kLeastVisiblePart * node.area)) return;
+  if (!(round_area > kFidelity.least_visible_part * node.area)) return;
   const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
   if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(node.position + visible.middle))) return;
   Patch& patch = patches_.emplace_back();

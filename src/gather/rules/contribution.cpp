@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "gather/rules/coverage_rules.h"
+#include "gather/rules/fidelity.h"
 #include "gather/rules/ribbon.h"
 
 namespace surfeit {
@@ -71,7 +72,7 @@ float projectedSum(const ShCoefficients& coefficients, const ShCoefficients& bas
 // of a cut in Sponza, by a probe that was not kept: areas 0.3 % too large and off by 2.4 % in the
 // mean, where `projectedSum` gives 7.7 % too little and is off by 10.8 %.)
 FacingAreas facingAreas(float total, float mean, float second, float fourth) {
-  constexpr float kUpwards = 0.64f, kTiny = 1e-9f;
+  constexpr float kTiny = 1e-9f;
   const float inverse = 1 / total;
   const float p2 = second * inverse, p4 = fourth * inverse;
   const float m = mean * inverse, s = std::clamp((1 + 2 * p2) / 3, 0.f, 1.f);
@@ -80,7 +81,7 @@ FacingAreas facingAreas(float total, float mean, float second, float fourth) {
   const float at_one = (q - s * s) / std::max(1 - 2 * s + q, kTiny);
   const float rest_sq = (s - q) / std::max(1 - s, kTiny);
   const float greatest = at_one + (1 - at_one) * std::sqrt(rest_sq);
-  const float both = std::max(std::abs(m), least + kUpwards * (greatest - least));
+  const float both = std::max(std::abs(m), least + kFidelity.upwards * (greatest - least));
   return {0.5f * total * (both + m), 0.5f * total * (both - m)};
 }
 
@@ -142,7 +143,7 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
   const float length = glm::length(middle);
   if (length > node.radius) middle *= node.radius / length;
   const float turn = part * (glm::dot(v, weighted) - trace) / distance;
-  return {middle, 1 + std::clamp(turn, -kMostTurn, kMostTurn)};
+  return {middle, 1 + std::clamp(turn, -kFidelity.most_turn, kFidelity.most_turn)};
 }
 
 namespace {
@@ -170,10 +171,10 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
 // in front plus back, which the limit of the area takes back head-on.)
 RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket) {
   const float ellipse = ellipseArea(node, direction), sphere = kPi * node.radius * node.radius;
-  const float filled = kFilledOutline + spherePart(node) * (1 - kFilledOutline);
+  const float filled = kFidelity.filled_outline + spherePart(node) * (1 - kFidelity.filled_outline);
   const float most = std::min({node.area, sphere, filled * ellipse});
   const float surface = std::min(shown, most);
-  const float outline = std::min(sphere, kThicketOutline * ellipse);
+  const float outline = std::min(sphere, kFidelity.thicket_outline * ellipse);
   if (!(thicket > 0 && outline > 0)) return {surface, 1, most};
   const float hidden = outline * thicketOpacity(std::min(shown, node.area), outline);
   const float area = surface + thicket * (outline - surface);
@@ -186,13 +187,13 @@ float mostVisibleArea(const Facet& facet) {
 
 float reachOf(const Facet& facet, const glm::vec3& direction) {
   const float reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
-  return facet.is_thicket ? kThicketReach * reach : reach;
+  return facet.is_thicket ? kFidelity.thicket_reach * reach : reach;
 }
 
 float thicketPart(const Surfel& surfel) {
   if (!surfel.isTwoSided()) return 0;
   const bool is_ribbon = surfel.long_side != kNoLongSide
-                             ? elongationOf(surfel) > kRibbonElongation
+                             ? elongationOf(surfel) > kFidelity.ribbon_elongation
                              : looksLikeRibbon(surfel.radius, surfel.area);
   return is_ribbon ? 1 : 0;
 }
@@ -201,10 +202,11 @@ float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
               const glm::vec3& direction) {
   const bool is_thicket = thicketPart(surfel) > 0;
   if (is_thicket && !ribbon.isEmpty()) {
-    return kRibbonReach * ribbon.halfExtent(direction) + kRibbonDepth * ribbon.width;
+    return kFidelity.ribbon_reach * ribbon.halfExtent(direction) +
+           kFidelity.ribbon_depth * ribbon.width;
   }
   const float reach = layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
-  return is_thicket ? kThicketReach * reach : reach;
+  return is_thicket ? kFidelity.thicket_reach * reach : reach;
 }
 
 float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionRules& rules) {
@@ -234,7 +236,7 @@ glm::vec3 seenRadiosity(const Node& node, const glm::vec3& to_receiver) {
   const ShCoefficients basis = shBasis(to_receiver);
   float ignored;
   const float area = projectedSum(node.rough.coefficients(kAreaKind), basis, ignored);
-  if (!(area > kLeastVisiblePart * node.area)) return node.radiosity;
+  if (!(area > kFidelity.least_visible_part * node.area)) return node.radiosity;
   glm::vec3 power;
   for (int channel = 0; channel < 3; ++channel) {
     power[channel] = projectedSum(node.rough.coefficients(powerKind(channel)), basis, ignored);
@@ -278,7 +280,7 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   const glm::vec3 direction = glm::normalize(to_node);
   const FacingAreas facing = facingAreas(node, -direction);
   const float area = shownArea(facing, rules.sides);
-  if (!(area > kLeastVisiblePart * node.area)) return false;
+  if (!(area > kFidelity.least_visible_part * node.area)) return false;
   const SeenPart seen = seenPart(node, to_node, facing, rules.sides);
   const glm::vec3 to_seen = to_node + seen.middle;
   const float distance_sq = glm::dot(to_seen, to_seen);

@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 
 #include "core/symmetric_matrix.h"
+#include "gather/rules/fidelity.h"
 #include "octree/node/node.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
@@ -12,10 +13,6 @@
 namespace surfeit {
 
 struct Ribbon;
-
-// A rough node that shows less than this part of its area shows nothing: three bands cannot tell so
-// little from zero, and dividing power by it would make up bright specks.
-inline constexpr float kLeastVisiblePart = 0.01f;
 
 // A patch as the receiver sees it. Plain floats without padding.
 struct Contribution {

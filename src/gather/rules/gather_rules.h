@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 
+#include "gather/rules/fidelity.h"
 #include "gather/rules/raster_geometry.h"
 #include "gather/rules/receiver.h"
 #include "surfeit/gather.h"
@@ -19,14 +20,8 @@ namespace surfeit {
 class EnvironmentCube;
 class EnvironmentMap;
 
-// Cones up to this half angle (radians) get a raster of their own, of one face around their axis;
-// wider ones are parts of the cube. At 60 degrees the outermost pixels are as narrow as a third.
-inline constexpr float kWidestConeRaster = 1.05f;
-
-// Half angle of the cone that is all above a receiver, and where a glossy lobe ends: at directions
-// that weigh this little.
+// Half angle of the cone that is all above a receiver.
 inline constexpr float kHemisphere = kPi / 2;
-inline constexpr float kLobeEnd = 0.01f;
 
 // Of the cosine, as Blinn-Phong lobes of a Beckmann roughness have it.
 inline float lobeExponent(float roughness) { return 2 / (roughness * roughness) - 2; }
@@ -38,7 +33,8 @@ inline GatherWeights withConeAngle(GatherWeights weights, GatherMode mode) {
     return weights;
   }
   const float exponent = mode == GatherMode::kGlossy ? lobeExponent(weights.roughness) : 0;
-  weights.cone_angle = exponent > 0 ? std::acos(std::pow(kLobeEnd, 1 / exponent)) : kHemisphere;
+  weights.cone_angle =
+      exponent > 0 ? std::acos(std::pow(kFidelity.lobe_end, 1 / exponent)) : kHemisphere;
   return weights;
 }
 
@@ -84,7 +80,7 @@ struct GatherRules {
   bool isGlossy() const { return mode == GatherMode::kGlossy; }
   // Whether only a cone is looked at, and drawn to a raster of its own.
   bool hasCone() const { return weights.cone_angle < kHemisphere; }
-  bool hasConeRaster() const { return weights.cone_angle <= kWidestConeRaster; }
+  bool hasConeRaster() const { return weights.cone_angle <= kFidelity.widest_cone_raster; }
   std::uint32_t channels() const { return (hasLight() ? 3u : 0u) + (fades() ? 1u : 0u); }
 };
 
@@ -107,33 +103,21 @@ inline float pixelsPerSlope(const GatherRules& rules) {
   return 0.5f * float(rules.quality.raster_resolution) / slope;
 }
 
-// The max solid angle of a cone is this many times its share of the hemisphere: 4 by 4 of its
-// pixels at standard quality. (light_bench, glossy .2: error .030 with 4, .034 with 10, at 1.3 and
-// 0.7 times the time of bleeding.)
-inline constexpr float kConeShare = 10;
-
-// No node is drawn as a patch of more pixels: what it does not know of its own shape would be seen.
-// So finer pixels converge, whatever the max solid angle. (Covered of a closed shell of 20,000
-// disks at 32 and 64 pixels: .998 and .995; with .1 sr .991 and .982. bench/leaks)
-inline constexpr float kMostNodePixels = 6.5f;
-
 // A raster that looks closer needs smaller clusters, and disks where others have patches. Shares of
 // the hemisphere keep their number of clusters.
 inline float maxSolidAngle(const GatherRules& rules) {
-  const float share = std::min(1.f, kConeShare * (1 - std::cos(rules.weights.cone_angle)));
+  const float share =
+      std::min(1.f, kFidelity.cone_share * (1 - std::cos(rules.weights.cone_angle)));
   const float pixel = 1 / pixelsPerSlope(rules);
   return std::min(rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1),
-                  kMostNodePixels * pixel * pixel);
+                  kFidelity.most_node_pixels * pixel * pixel);
 }
-// Where directions weigh by the cosine of their angle to the normal, what is low may look this many
-// times as large, and no larger than a limit: of what exceeds it, a footprint on the raster is no
-// image.
-inline constexpr float kMostCoarser = 4, kMostLowSolidAngle = 0.4f;
 inline float mostCoarser(const GatherRules& rules) {
   const bool weighs_by_cosine = !rules.isGlossy() && !rules.hasCone() &&
                                 rules.weights.distribution == GatherWeights::Distribution::kCosine;
-  const float whole = std::max(maxSolidAngle(rules), kMostLowSolidAngle / kMostCoarser);
-  return weighs_by_cosine ? std::max(1.f, kMostLowSolidAngle / whole) : 1;
+  const float whole =
+      std::max(maxSolidAngle(rules), kFidelity.most_low_solid_angle / kFidelity.most_coarser);
+  return weighs_by_cosine ? std::max(1.f, kFidelity.most_low_solid_angle / whole) : 1;
 }
 // In radii of a surfel. Disks more than two pixels wide are ray traced in any case, unless nothing
 // is: between such patches the widest hull leaves gaps. Spheres stand alone, and rays through the

@@ -10,6 +10,7 @@
 #include "core/long_side.h"
 #include "core/symmetric_matrix.h"
 #include "gather/rules/coverage_rules.h"
+#include "gather/rules/fidelity.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
@@ -26,10 +27,11 @@ struct Ribbon {
     const glm::vec3 side = directionOf(surfel.long_side);
     const glm::vec3 in_plane = side - glm::dot(side, surfel.normal) * surfel.normal;
     const float cosine = glm::length(in_plane);
-    if (!(cosine > kLeastInPlane)) return ribbon;
+    if (!(cosine > kFidelity.least_in_plane)) return ribbon;
     ribbon.along = in_plane / cosine;
     ribbon.across = glm::cross(surfel.normal, ribbon.along);
-    ribbon.length = std::sqrt(surfel.area * std::max(elongationOf(surfel), kLeastElongation));
+    ribbon.length =
+        std::sqrt(surfel.area * std::max(elongationOf(surfel), kFidelity.least_elongation));
     ribbon.width = surfel.area / ribbon.length;
     return ribbon;
   }
@@ -76,14 +78,8 @@ struct Ribbon {
   }
 
  private:
-  static constexpr float kLeastInPlane = 0.3f;  // of a side that says anything
   // Squares are taken to be longer than wide, so that their shape has axes.
-  static constexpr float kLeastElongation = 1.04f;
 };
-
-// Closer than this part of its length for each radius of the near field a ribbon is ray traced.
-// (AO RMSE of hair with twice and half as much: .0077, .0086.)
-inline constexpr float kRibbonRadius = 1.f / 4;
 
 // Of the circle that a surfel is drawn within, as the ribbon that it is, if it is one.
 inline float drawnRadius(const Surfel& surfel, const Ribbon& ribbon) {
@@ -93,7 +89,7 @@ inline float drawnRadius(const Surfel& surfel, const Ribbon& ribbon) {
 
 // Closer than this, for each radius of the near field, it is ray traced.
 inline float nearFieldSize(float drawn_radius, const Ribbon& ribbon) {
-  return ribbon.isEmpty() ? drawn_radius : kRibbonRadius * ribbon.length;
+  return ribbon.isEmpty() ? drawn_radius : kFidelity.ribbon_radius * ribbon.length;
 }
 
 // How much of a pixel lies between -half and half, which reaches from x - foot to x + foot.

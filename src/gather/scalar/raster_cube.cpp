@@ -265,13 +265,13 @@ RasterCube::Parallelogram RasterCube::onFace(const Patch& patch, int axis) {
   const SymmetricMatrix& m = patch.shape;
   const float sign = d[axis] < 0 ? -1.f : 1.f;
   const float uw = sign * m(u_axis, axis), vw = sign * m(v_axis, axis), ww = m(axis, axis);
-  const float a = std::max(kLeastSpread, m(u_axis, u_axis) - u * (2 * uw - u * ww));
-  const float c = std::max(kLeastSpread, m(v_axis, v_axis) - v * (2 * vw - v * ww));
+  const float a = std::max(kFidelity.least_spread, m(u_axis, u_axis) - u * (2 * uw - u * ww));
+  const float c = std::max(kFidelity.least_spread, m(v_axis, v_axis) - v * (2 * vw - v * ww));
   const float b = m(u_axis, v_axis) - u * vw - v * (uw - u * ww);
   const float shear = b / c;
-  const float row_a = std::max(kLeastSpread * a, a - b * shear);
+  const float row_a = std::max(kFidelity.least_spread * a, a - b * shear);
 
-  const float extent = std::min(kMostExtent, patch.spread * inverse * inverse);
+  const float extent = std::min(kFidelity.most_extent, patch.spread * inverse * inverse);
   const float bulge = 0.5f * extent * (1 - n_axis * n_axis), shift = extent / 3;
   const float half_area = 0.25f * patch.solid_angle * inverse * inverse * inverse * (1 + bulge);
   const float half_u = std::sqrt(half_area * std::sqrt(row_a / c));
@@ -281,7 +281,7 @@ RasterCube::Parallelogram RasterCube::onFace(const Patch& patch, int axis) {
 
 void RasterCube::splat(const Patch& patch, const DepthRange& depth, const glm::vec3& radiosity) {
   for (int axis = 0; axis < 3; ++axis) {
-    if (!(std::abs(patch.direction[axis]) > kLeastAxis)) continue;
+    if (!(std::abs(patch.direction[axis]) > kFidelity.least_axis)) continue;
     const int face = 2 * axis + (patch.direction[axis] < 0 ? 1 : 0);
     if (face >= geometry_->faceCount()) return;
     const Parallelogram shape = onFace(patch, axis);
@@ -318,7 +318,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
         const float amount = texture.opacity * amountOf(pixels[pixel].direction);
         if (!(amount > 0)) continue;
         coverPixel(pixel, amount, touchPart(amount, 0), 1, texture, depth, radiosity);
-        if (texture.thicket == 0 && amount >= kTracedHull) {
+        if (texture.thicket == 0 && amount >= kFidelity.traced_hull) {
           addHull(pixel, kHullSamples, texture.is_solid ? kHullSide / 2 : 0, depth);
         }
       }

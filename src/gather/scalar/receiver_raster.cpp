@@ -70,7 +70,7 @@ void ReceiverRaster::addSurfel(const Surfel& stored, float part) {
   if (!(distance_sq <= max_distance_sq_)) return;
 
   if (is_spherical_ && surfel.isSphere()) {
-    const float clearance = kSphereClearance * surfel.radius;
+    const float clearance = kFidelity.sphere_clearance * surfel.radius;
     if (distance_sq < clearance * clearance) return;
   }
 
@@ -161,7 +161,7 @@ void ReceiverRaster::sortByDistance() {
 float ReceiverRaster::rayBias(const Surfel& surfel) const {
   const Ribbon ribbon = Ribbon::of(surfel);
   const float radius = ribbon.isEmpty() ? surfel.radius : ribbon.width;
-  float bias = rules_.quality.bias * radius * (ribbon.isEmpty() ? 1 : kRibbonBias);
+  float bias = rules_.quality.bias * radius * (ribbon.isEmpty() ? 1 : kFidelity.ribbon_bias);
   if (surfel.isTwoSided()) {
     const glm::vec3 to_surfel = surfel.position - receiver_.position;
     bias *= biasPart(heightAboveHorizon(receiver_, to_surfel) / radius);
