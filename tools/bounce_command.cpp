@@ -78,16 +78,16 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
   BounceOptions& options = arguments->options;
   command
       ->add_option("SCENE", arguments->scene,
-                   "Scene file (.sft) with albedo, and as radiosity emission and direct light")
+                   "Scene file (.sft) with albedo; its radiosity is emission and direct light")
       ->required();
   command->add_option("-o,--output", arguments->result, "Scene file to write (.sft)")->required();
-  command->add_option("--bounces", options.bounces, "How often light bounces")
+  command->add_option("--bounces", options.bounces, "Number of bounces")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   command
       ->add_option("--surfels-per-receiver", options.surfels_per_receiver,
-                   "Gather all bounces but the last at about one of so many surfels, and "
-                   "interpolate; 1: at every surfel")
+                   "Gather all bounces but the last at about one surfel out of N, and interpolate; "
+                   "1: at every surfel")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   addQualityOptions(*command, options.quality);

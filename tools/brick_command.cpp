@@ -56,15 +56,15 @@ Status runBrick(BrickArguments& arguments, CommandContext& context) {
 void addBrickOptions(CLI::App& command, BrickOptions& options) {
   command
       .add_option("--channel", options.channels,
-                  "Channels or properties to keep, separated by commas (default: what a gather "
-                  "wrote, else all that is not geometry)")
+                  "Channels or properties to keep, separated by commas (default: the outputs of a "
+                  "gather, else all channels but the geometry)")
       ->delimiter(',')
       ->allow_extra_args(false)  // else it takes the clouds behind it, too
       ->type_name("NAME");
   command
       .add_option("--max-error", options.max_error,
-                  "Voxels are divided where a value differs by more within them, in the units of "
-                  "the channel; 0 keeps all of the finest level")
+                  "Divide a voxel where a value differs by more than this within it, in the units "
+                  "of the channel; 0 keeps all voxels of the finest level")
       ->type_name("E")
       ->check(CLI::NonNegativeNumber.description(""))
       ->capture_default_str();
@@ -83,9 +83,9 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
 
 void addBrickCommand(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand(
-      "brick", "Keep baked values of clouds in a multiresolution OpenVDB file, to look them up");
+      "brick", "Write baked values of clouds into a multiresolution OpenVDB file, for look-ups");
   const auto arguments = std::make_shared<BrickArguments>();
-  command->add_option("CLOUD", arguments->clouds, "Clouds with baked values; several merge")
+  command->add_option("CLOUD", arguments->clouds, "Clouds with baked values; several are merged")
       ->required();
   command->add_option("-o,--output", arguments->output, "Brick map to write (.vdb)")
       ->required()

@@ -16,8 +16,8 @@ void addColorRangeOption(CLI::App& command, ColorRange& color_range) {
                                                             {"unit", ColorRange::kUnit}};
   command
       .add_option("--color-range", color_range,
-                  "Colors that are no bytes: 8 or 16 bits of sRGB, unit (reals are scene-linear), "
-                  "or auto: by a sample of the cloud (docs/files.md)")
+                  "Meaning of colors that are not bytes: 8 or 16 bits of sRGB, unit (reals are "
+                  "scene-linear), or auto: decided by a sample of the cloud (docs/files.md)")
       ->type_name("8|16|unit|auto")
       ->transform(CLI::CheckedTransformer(kRanges).description(""))
       ->default_str("auto");
@@ -31,8 +31,8 @@ void addChannelOptions(CLI::App& command, std::string& channels, std::string& pa
   command
       .add_option_function<std::string>(
           "--channels", append,
-          "Channels of the clouds to be called otherwise: FROM=TO,FROM=TO; FROM=- drops one; in "
-          "text, FROM may be the number of a column")
+          "New names for channels of the clouds: FROM=TO,FROM=TO; FROM=- drops a channel; in text, "
+          "FROM may be the number of a column")
       ->type_name("FROM=TO,...");
   command
       .add_option_function<std::string>(
@@ -40,12 +40,12 @@ void addChannelOptions(CLI::App& command, std::string& channels, std::string& pa
           [append](const std::string& reading) {
             append(fmt::format("{}={}", kTextChannel, reading));
           },
-          "How commas in text are read (default: as the lines tell)")
+          "Meaning of commas in text (default: found from the lines)")
       ->check(CLI::IsMember({std::string(kDecimalComma), std::string(kDecimalPoint)}))
       ->type_name("decimal-comma|decimal-point");
   command
       .add_option("--part", part,
-                  "Of files with several: the grid (.vdb), layer (.exr) or element (PLY) to read "
+                  "The grid (.vdb), layer (.exr) or element (PLY) to read, in files with several "
                   "(default: the first that holds a cloud)")
       ->type_name("NAME");
   addFilterOption(command, filter);
@@ -54,8 +54,8 @@ void addChannelOptions(CLI::App& command, std::string& channels, std::string& pa
 void addFilterOption(CLI::App& command, std::string& filter) {
   command
       .add_option("--filter", filter,
-                  "Only points for which this holds: \"classification == 2 and return == 1\"; "
-                  "true: all, also those withheld and noise, which are left out by default")
+                  "Read only points for which this holds: \"classification == 2 and return == 1\"; "
+                  "true: all points (by default withheld points and noise are left out)")
       ->type_name("CONDITION");
 }
 
@@ -66,7 +66,7 @@ void addCloudOutputOption(CLI::App& command, std::string& output, const std::str
           "-o,--output", output,
           what +
               "; the extension tells the format: .ply, .ptc, .las, .prt, .bgeo, .pdb, .xyz, "
-              ".csv, .txt or .asc, with .gz or .zst behind it, or .vdb" +
+              ".csv, .txt or .asc, each may be followed by .gz or .zst, or .vdb" +
               (has_pictures ? ", .exr for pixels of pictures" : ""))
       ->required()
       ->type_name("CLOUD");

@@ -64,8 +64,9 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
       ->check(CLI::IsMember({"auto", "bar", "percent", "json", "none"}))
       ->group(kGroup);
   command
-      .add_flag("--strict", common.strict,
-                "Refuse what is guessed, skipped, narrowed or left out instead of telling it")
+      .add_flag(
+          "--strict", common.strict,
+          "Fail where data is guessed, skipped, narrowed or left out, instead of reporting it")
       ->group(kGroup);
   command.add_flag("-q,--quiet", common.quiet, "Say nothing but errors")->group(kGroup);
   command.add_flag("-v,--verbose", common.verbose, "Say which phase begins")->group(kGroup);

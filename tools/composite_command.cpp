@@ -43,8 +43,8 @@ void addCompositeCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<CompositeArguments>();
   command
       ->add_option("FILES", arguments->inputs,
-                   "OpenEXR pictures with positions: results of gather, and passes whose channels "
-                   "they lack")
+                   "OpenEXR pictures with positions: results of gather, and passes with the "
+                   "channels that they lack")
       ->required();
   command
       ->add_option("-o,--output", arguments->picture,
@@ -53,7 +53,7 @@ void addCompositeCommand(CLI::App& app, CommandContext& context) {
   addCompositeOptions(*command, arguments->options);
   context.addCommonOptions(*command, {.threads = false});
   command->footer(
-      "Pixels are those of the first file; the others add the channels that it lacks.\n"
+      "The first file decides the pixels; the others add the channels that it lacks.\n"
       "Examples:\n"
       "  surfeit composite passes.exr light.exr -o lit.png --channel lit --exposure 1\n"
       "  surfeit composite passes.exr light.exr -o small.png --channel occlusion \\\n"

@@ -141,15 +141,15 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
       ->group(kGroup);
   addUpOption(
       command, arguments.options.up,
-      "Turns the cloud so that this is up: from the axis that it states, else from the other "
-      "of y and z",
-      "as it is")
+      "Turns the cloud so that this axis is up: from the axis that it states, else from the "
+      "other of y and z",
+      "unchanged")
       ->group(kGroup);
   command
       .add_option_function<std::string>(
           "--transform",
           [&](const std::string& text) { arguments.options.transform = parseTransform(text); },
-          "Affine matrix, row by row; it acts on columns, so translations stand at the end of rows")
+          "Affine matrix, row by row; it acts on column vectors: translations end the rows")
       ->type_name("\"12 or 16 numbers\"")
       ->group(kGroup);
   command
@@ -159,7 +159,7 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
             const auto n = parseNumberList<6>("--crop", text, "six numbers, x0,y0,z0,x1,y1,z1");
             arguments.options.crop = CropBox{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
           },
-          "Only positions from x0 y0 z0 to below x1 y1 z1")
+          "Only positions from X0,Y0,Z0 to below X1,Y1,Z1")
       ->type_name("X0,Y0,Z0,X1,Y1,Z1")
       ->group(kGroup);
 }
@@ -174,8 +174,8 @@ void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
           ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 53).description(""));
   command
       .add_option("--spacing", options.spacing,
-                  "Only one record per cell of a grid of edge D, the one nearest to its middle, "
-                  "which stands for all of them")
+                  "Only one record per cell of a grid of edge D: the nearest to the middle, which "
+                  "stands for all records of the cell")
       ->type_name("D")
       ->excludes(every);
   addTemporaryOption(command, options.temporary_directory);
@@ -210,9 +210,9 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
   addPlaceOptions(*command, *arguments);
   context.addCommonOptions(*command, {.threads = false, .works_in_place = true});
   command->footer(
-      "Several clouds become one with the properties of all; what one of them lacks is 0 there.\n"
-      "Memory is some MiB, whatever the size of the clouds; only .vdb holds what it writes, and\n"
-      "--spacing sorts, both within --memory (default 2G).\n"
+      "Several clouds become one with the properties of all; a property that a cloud lacks is 0.\n"
+      "Clouds of any size take some MiB of memory. Only .vdb, which is held until it is written,\n"
+      "and --spacing, which sorts, take more, within --memory (default 2G).\n"
       "Examples:\n"
       "  surfeit convert scan.las -o scan.ply --units ft:m --up y\n"
       "  surfeit convert a.ptc b.ptc -o both.ply.zst\n"

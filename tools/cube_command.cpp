@@ -28,7 +28,7 @@
 namespace surfeit {
 namespace {
 
-constexpr const char* kReceiverGroup = "LocalReceiver";
+constexpr const char* kReceiverGroup = "Receiver";
 constexpr const char* kCubePictureGroup = "Picture";
 
 struct CubeArguments {
@@ -186,7 +186,7 @@ void addReceiverOptions(CLI::App& command, CubeArguments& arguments) {
           [&](const std::string& text) {
             receiver.normal = glm::vec3(parsePlace("--normal", text));
           },
-          "Its normal, of any length; without one it looks all around")
+          "Normal of the receiver, of any length; without one it gathers over the whole sphere")
       ->type_name("X,Y,Z")
       ->needs(at)
       ->group(kReceiverGroup);
@@ -196,7 +196,7 @@ void addReceiverOptions(CLI::App& command, CubeArguments& arguments) {
                                      ->excludes(at)
                                      ->type_name("CLOUD")
                                      ->group(kReceiverGroup);
-  command.add_option("--number", arguments.number, "Its row in the cloud, from 0")
+  command.add_option("--number", arguments.number, "Row of the receiver in the cloud, from 0")
       ->needs(receivers)
       ->type_name("N")
       ->default_str("0")
@@ -215,8 +215,9 @@ void addCubePictureOptions(CLI::App& command, CubeArguments& arguments) {
       ->default_str("light,coverage,depth,layers,kind")
       ->group(kCubePictureGroup);
   command
-      .add_option("--zoom", drawing.zoom,
-                  "Edge of a pixel in a PNG (default: faces of about 128, a cone's of 384)")
+      .add_option(
+          "--zoom", drawing.zoom,
+          "Edge of a pixel in a PNG (default: faces are about 128 wide, the face of a cone 384)")
       ->check(CLI::Range(1, 64).description(""))
       ->type_name("N")
       ->group(kCubePictureGroup);
@@ -229,8 +230,8 @@ void addCubePictureOptions(CLI::App& command, CubeArguments& arguments) {
       ->group(kCubePictureGroup);
   command
       .add_option("--reference", arguments.reference,
-                  "Trace rays on this mesh (PLY or OBJ, as sample reads it; several add up) and "
-                  "show their coverage and depth beside; they bring no light")
+                  "Trace rays on this mesh (PLY or OBJ, as sample reads it; repeatable), and show "
+                  "their coverage and depth beside the gather's; they carry no light")
       ->type_name("MESH")
       ->group(kCubePictureGroup);
   command.add_option("--rays", arguments.rays, "Rays along an edge of a pixel, with --reference")
@@ -243,12 +244,12 @@ void addCubePictureOptions(CLI::App& command, CubeArguments& arguments) {
 
 void addCubeCommand(CLI::App& app, CommandContext& context) {
   CLI::App* command = app.add_subcommand(
-      "cube", "Show what one receiver sees: its raster cube, unfolded, and what fills each pixel");
+      "cube", "Show the raster cube of one receiver, unfolded, and the source of each pixel");
   const auto arguments = std::make_shared<CubeArguments>();
   command->add_option("SCENE", arguments->scene, "Scene file (.sft)")->required();
   command
       ->add_option("-o,--output", arguments->picture,
-                   "Picture: .png (panels) or .exr (values, a pixel for each of the raster's)")
+                   "Picture: .png (panels) or .exr (values, one pixel per pixel of the raster)")
       ->required();
   addReceiverOptions(*command, *arguments);
   addModeOption(*command, arguments->options.mode);
@@ -262,8 +263,8 @@ void addCubeCommand(CLI::App& app, CommandContext& context) {
       "--show, and a legend on stdout; the middle face is the one that the normal points to.\n"
       "An EXR has the channels R G B coverage depth layers kind weight, and with --reference\n"
       "reference.coverage reference.depth; kind is 0 nothing, 1 flat node, 2 facet, 3 rough node,\n"
-      "4 surfel as a patch, 5 ray-traced surfel; the sum of weight * coverage over that of weight\n"
-      "is the occlusion.\n"
+      "4 surfel as a patch, 5 ray-traced surfel; the occlusion is the sum of weight * coverage\n"
+      "over the sum of weight.\n"
       "Examples:\n"
       "  surfeit cube cornell.sft --at 0.5,0,0.5 --normal 0,1,0 -o floor.png\n"
       "  surfeit cube cornell.sft --receivers receivers.ply --number 1234 -o cube.exr \\\n"

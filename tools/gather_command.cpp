@@ -133,15 +133,17 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
   addLightOptions(*command, arguments->options);
   addSubsetOption(*command, arguments->options.groups);
   command->add_option("--cache-series", arguments->series,
-                      "Write what the caches did over time to this file, .csv or .json");
+                      "Write statistics of the caches over time to this file, .csv or .json");
   command->add_flag("--dry-run", arguments->is_dry_run,
-                    "Write no result; say what memory, files and time it would take, by a sample");
+                    "Write no result; estimate memory, files and time from a sample");
   context.addCommonOptions(*command);
   command->footer(
       "The result holds the receivers in their order with all their properties, and `occlusion`;\n"
       "with --mode bleeding also `irradiance_r irradiance_g irradiance_b`, with --mode glossy\n"
       "`reflection_r reflection_g reflection_b`, with --environment also `environment_r ...`;\n"
-      "--outputs chooses. Lights are in units of radiosity: albedo times them is reflected.\n"
+      "--outputs chooses others. Lights are in units of radiosity: a surface reflects albedo "
+      "times\n"
+      "them.\n"
       "Examples:\n"
       "  surfeit gather lion.sft lion.ply -o lion_ao.ply\n"
       "  surfeit gather city.sft street.ply -o street_gi.ply --mode bleeding --memory 2G\n"

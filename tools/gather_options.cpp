@@ -31,13 +31,13 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
             }
             throw CLI::ValidationError("--quality", found + ", expected draft|standard|final");
           },
-          "Sets the options below that are not given, but for --bias, --max-dist and --sides")
+          "Sets the options below that are not given, except --bias, --max-dist and --sides")
       ->type_name("draft|standard|final")
       ->default_str("standard")
       ->group(kGroup);
   command
       .add_option("--max-solid-angle,--maxsolidangle", quality.max_solid_angle,
-                  "Largest cluster drawn as one, in steradians; 0 opens all")
+                  "Largest node drawn as a whole, in steradians; 0 opens every node")
       ->check(CLI::Range(0.0, 6.3))
       ->capture_default_str()
       ->group(kGroup);
@@ -77,7 +77,7 @@ void addSubsetOption(CLI::App& command, std::uint64_t& groups) {
             if (!chosen.ok()) throw CLI::ValidationError("--subset", chosen.status().message());
             groups = *chosen;
           },
-          "Groups of surfels that send light and cover, such as 0,2-5; others are as if not there")
+          "Object groups that send light and cover, such as 0,2-5; other surfels are ignored")
       ->type_name("GROUPS")
       ->default_str("all");
 }
@@ -85,7 +85,7 @@ void addSubsetOption(CLI::App& command, std::uint64_t& groups) {
 void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io) {
   command
       .add_option("--cache-split", cache_split,
-                  "Share of the cache memory for nodes, 0 to 1; else found by measurement")
+                  "Part of the cache memory for nodes, 0 to 1 (default: found by measurement)")
       ->check(CLI::Range(0.0, 1.0))
       ->default_str("")
       ->group(kPagingGroup);
@@ -105,7 +105,7 @@ void addPagingOptions(CLI::App& command, GatherOptions& options) {
   addCacheOptions(command, options.cache_split, options.direct_io);
   command
       .add_flag("--prefetch,!--no-prefetch", options.prefetch,
-                "Read ahead along the order when reading is slow (default: on)")
+                "Read ahead in this order when reading is slow (default: on)")
       ->group(kPagingGroup);
   addTemporaryOption(command, options.temporary_directory)->group(kPagingGroup);
 }

@@ -78,7 +78,8 @@ void addSceneOptions(CLI::App& command, SceneRecipe& recipe) {
                   })
       ->type_name("COUNT")
       ->default_str("10M");
-  command.add_option("--seed", recipe.seed, "Another seed, another scene of the same kind")
+  command
+      .add_option("--seed", recipe.seed, "Seed: another seed gives another scene of the same kind")
       ->capture_default_str();
   addParsedOption(command, "--order",
                   "Order of the records: scan (neighbours follow each other), or shuffled",
@@ -92,7 +93,7 @@ void addSceneOptions(CLI::App& command, SceneRecipe& recipe) {
                   [&recipe](const std::string& text) { return parseScenePart(text, recipe); })
       ->type_name("K/N");
   command.add_option("--outlier", recipe.outlier_distance,
-                     "One more surfel, so many metres away (the last record)");
+                     "One more surfel, this many metres away (the last record)");
   command.add_option("--duplicates", recipe.duplicate_percent,
                      "Percentage of records that repeat an earlier one exactly");
 }
@@ -104,11 +105,12 @@ void addGenerateCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<GenerateArguments>();
   addCloudOutputOption(*command, arguments->output, "Cloud to write (or a recipe, of any name)");
   addSceneOptions(*command, arguments->recipe);
-  command->add_flag("--recipe", arguments->is_recipe,
-                    "Write a recipe: a few lines that index takes in place of the cloud");
+  command->add_flag(
+      "--recipe", arguments->is_recipe,
+      "Write a recipe instead of a cloud: a few lines that index accepts like a cloud");
   context.addCommonOptions(*command, {.threads = true, .stats = true});
   command->footer(
-      "A kilometre by a kilometre, the same surfaces at every number of surfels.\n"
+      "Scenes measure a kilometre by a kilometre; their surfaces do not depend on --surfels.\n"
       "Examples:\n"
       "  surfeit generate -o city.ply --surfels 10M\n"
       "  surfeit generate -o city.recipe --surfels 1G --recipe\n"

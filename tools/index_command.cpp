@@ -116,7 +116,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
   addChannelOptions(*command, options.channels, options.part, options.filter);
   addColorRangeOption(*command, options.color_range);
-  command->add_option("--leaf", options.leaf_capacity, "Most surfels in a leaf of the octree")
+  command->add_option("--leaf", options.leaf_capacity, "The most surfels in a leaf of the octree")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   command
@@ -128,7 +128,9 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       ->add_option_function<std::string>(
           "--overlap",
           [&options](const std::string& text) { options.repeats = parseRepeats(text); },
-          "Surfels that repeat another at its place, where tiles overlap: keep all, or thin to one")
+          "Surfels that repeat another at the same position, where tiles overlap: keep all, or "
+          "thin "
+          "to one")
       ->type_name("keep|thin")
       ->default_str("keep");
   command
@@ -147,22 +149,20 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
             const auto at = parseNumberList<3>("--origin", text, "three numbers X,Y,Z");
             options.origin = glm::dvec3(at[0], at[1], at[2]);
           },
-          "What places in the scene are counted from (default: 0, or a corner of a cloud far away)")
+          "Origin of positions in the scene (default: 0, or a corner of a cloud far away)")
       ->type_name("X,Y,Z");
   addUpOption(*command, options.up, "Axis that is up in the scene",
-              "what the clouds say, z for LAS, else y");
+              "as the clouds state, z for LAS, else y");
   addTemporaryOption(*command, options.temporary_directory);
   command->add_flag("--dry-run", arguments->is_dry_run,
-                    "Write no scene; say what memory, files and time it would take, by a sample");
+                    "Write no scene; estimate memory, files and time from a sample");
   context.addCommonOptions(*command);
   command->footer(
-      "What a cloud lacks is made up by rules that are told once: no area, pi r^2 over the "
-      "disk overlap;\n"
-      "no radius, that of the area; neither, its cell among the neighbours; no normal, a sphere\n"
-      "(or --normals estimate).\n"
-      "--memory defaults to 1G, or 3/4 of what the job may hold where that is less; 64M is the "
-      "least\n"
-      "for one thread, 72M for two.\n"
+      "Missing channels are filled in by rules, and each rule used is reported once: area from\n"
+      "radius and disk overlap; radius from area; both from the neighbours; without a normal a\n"
+      "surfel is a sphere (or --normals estimate).\n"
+      "--memory defaults to 1G, or 3/4 of what the job may hold where that is less; the least\n"
+      "is 64M, and some 13M more for each thread beyond the second.\n"
       "Examples:\n"
       "  surfeit index lion.ply -o lion.sft\n"
       "  surfeit index city.ply -o city.sft --memory 512M --dry-run\n"

@@ -407,9 +407,10 @@ void addInfoCommand(CLI::App& app, CommandContext& context) {
   command->add_flag("--json", arguments->json, "JSON on standard output");
   context.addCommonOptions(*command, {.threads = false, .memory = false, .stats = false});
   command->footer(
-      "Spacing is that of places on a surface, sqrt(pi r^2 / 8) with the 8th nearest place at r, "
-      "by a\n"
-      "sample of 1,000 points; a cloud is read twice for it, or three times on a map.\n"
+      "Spacing assumes points on a surface: sqrt(pi r^2 / 8), with r the distance to the 8th\n"
+      "nearest point, over a sample of 1,000 points. A cloud is read twice for it, and once more "
+      "if\n"
+      "it lies far from 0.\n"
       "Examples:\n"
       "  surfeit info scan.las\n"
       "  surfeit info lion.sft --json");

@@ -64,8 +64,9 @@ void addDirectionOptions(CLI::App& command, GatherOptions& options) {
                           {"1", FalloffMode::kPolynomial}})
       ->group(kGroup);
   command
-      .add_option("--roughness", weights.roughness,
-                  "Width of the glossy lobe, over 0 to 1; 1: all of the cone alike")
+      .add_option(
+          "--roughness", weights.roughness,
+          "Width of the glossy lobe, above 0, up to 1; 1: all directions of the cone weigh alike")
       ->check(CLI::Range(0.001, 1.0))
       ->capture_default_str()
       ->group(kGroup);
@@ -76,12 +77,13 @@ void addDirectionOptions(CLI::App& command, GatherOptions& options) {
             const auto at = parseNumberList<3>("--camera", text, "a position X,Y,Z");
             options.eye = {at[0], at[1], at[2]};
           },
-          "Where glossy surfaces are looked at from, else view_x view_y view_z of the receivers")
+          "Viewpoint for glossy surfaces (default: view_x view_y view_z of the receivers)")
       ->type_name("X,Y,Z")
       ->group(kGroup);
   command
       .add_flag_callback(
-          "--clamp", [] {}, "For scripts of older tools: pixels never count more than once here")
+          "--clamp", [] {},
+          "Accepted for scripts of older tools; has no effect, pixels never count more than once")
       ->group(kGroup);
 }
 
@@ -91,7 +93,7 @@ void addEnvironmentOptions(CLI::App& command, GatherEnvironment& environment) {
   constexpr const char* kGroup = "Environment";
   command
       .add_option("--environment", environment.path,
-                  "Picture of what surrounds the scene: lat-long or cube OpenEXR, lat-long .hdr")
+                  "Picture of the surroundings: lat-long or cube OpenEXR, lat-long .hdr")
       ->group(kGroup);
   command
       .add_option_function<double>(
@@ -99,11 +101,11 @@ void addEnvironmentOptions(CLI::App& command, GatherEnvironment& environment) {
           [&environment](double degrees) {
             environment.rotation = float(degrees * 0.017453292519943295);
           },
-          "Turns it about the up axis, in degrees, counterclockwise seen from above")
+          "Turns the picture about the up axis, in degrees, counterclockwise seen from above")
       ->check(CLI::Range(-360.0, 360.0))
       ->default_str("0")
       ->group(kGroup);
-  command.add_option("--environment-intensity", environment.intensity, "Multiplies its light")
+  command.add_option("--environment-intensity", environment.intensity, "Factor of its light")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group(kGroup);
@@ -117,12 +119,12 @@ void addLightOptions(CLI::App& command, GatherOptions& options) {
       .add_option_function<std::string>(
           "--outputs",
           [&options](const std::string& text) { options.outputs = parseOutputs(text); },
-          "What receivers get, separated by commas: " + outputWords(kAllOutputs))
+          "Outputs at the receivers, separated by commas: " + outputWords(kAllOutputs))
       ->type_name("LIST")
       ->default_str("what the mode gives");
   command
       .add_option("--max-variation,--maxvariation", options.quality.max_variation,
-                  "Interpolate where results vary less than this between neighbours, such as 0.02; "
+                  "Interpolate where results of neighbours differ by less than this, such as 0.02; "
                   "0: gather at every receiver")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str()

@@ -43,10 +43,9 @@ void addNormalOptions(CLI::App& command, NormalEstimation& estimation) {
           },
           "Which way normals point: up (terrain, airborne scans), outward from the middle of the "
           "cloud (round things), consistent with their neighbours (closed surfaces outward, open "
-          "ones up), \"sensor X,Y,Z\": to the place that all points were seen from, or of the "
-          "command "
-          "normals \"trajectory FILE\": to where the sensor was at their gps_time; FILE is a cloud "
-          "of its places with gps_time")
+          "ones up), \"sensor X,Y,Z\": to the place that all points were seen from, or, only for "
+          "the command normals, \"trajectory FILE\": to the place of the sensor at their gps_time; "
+          "FILE is a cloud of the sensor's positions with gps_time")
       ->type_name("up|outward|consistent|\"sensor X,Y,Z\"|\"trajectory FILE\"")
       ->default_str("up");
   command
@@ -55,7 +54,7 @@ void addNormalOptions(CLI::App& command, NormalEstimation& estimation) {
           [&estimation](const std::string& text) {
             estimation.thin_is_two_sided = text == "two-sided";
           },
-          "Points on no surface (foliage, wires): spheres, without a normal, or two-sided disks")
+          "Points on no surface (foliage, wires): spheres (no normal), or two-sided disks")
       ->check(CLI::IsMember({"spheres", "two-sided"}))
       ->type_name("spheres|two-sided")
       ->default_str("spheres");

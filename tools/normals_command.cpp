@@ -49,9 +49,9 @@ Status runNormals(NormalsArguments& arguments, CommandContext& context) {
 
 void addNormalsOptions(CLI::App& command, NormalsOptions& options) {
   addNormalOptions(command, options.estimation);
-  addUpOption(command, options.up, "Axis that is up", "what the cloud says, z for LAS, else y");
+  addUpOption(command, options.up, "Axis that is up", "as the cloud states, z for LAS, else y");
   command.add_flag("--sizes", options.with_sizes,
-                   "Write radius and area, too, as index finds them without");
+                   "Write radius and area, too, as index would find them");
   addChannelOptions(command, options.channels, options.part, options.filter);
   addColorRangeOption(command, options.color_range);
   addTemporaryOption(command, options.temporary_directory);
@@ -60,7 +60,7 @@ void addNormalsOptions(CLI::App& command, NormalsOptions& options) {
 }  // namespace
 
 void addNormalsCommand(CLI::App& app, CommandContext& context) {
-  CLI::App* command = app.add_subcommand("normals", "Find normals of a cloud that has none");
+  CLI::App* command = app.add_subcommand("normals", "Estimate normals of a cloud that has none");
   const auto arguments = std::make_shared<NormalsArguments>();
   command->add_option("CLOUD", arguments->input, "Cloud of points, or a scene (.sft)")->required();
   addCloudOutputOption(*command, arguments->output, "Cloud to write, with all that CLOUD has");

@@ -58,7 +58,7 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
 void addEstimateOptions(CLI::App& command, RadianceOptions& options) {
   command
       .add_option("--photons-per-estimate,--nphotons", options.photons_per_estimate,
-                  "Nearest photons that an estimate takes: more make less noise, and blur")
+                  "Nearest photons per estimate: more give less noise and more blur")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   command
@@ -73,7 +73,7 @@ void addEstimateOptions(CLI::App& command, RadianceOptions& options) {
             const auto numbers = parseNumberList<3>("--albedo", text, "\"r g b\"");
             for (int i = 0; i < 3; ++i) options.default_albedo[i] = float(numbers[std::size_t(i)]);
           },
-          "Reflectance where photons bring none [\"0.5 0.5 0.5\"]")
+          "Reflectance of photons without albedo [\"0.5 0.5 0.5\"]")
       ->type_name("\"r g b\"");
   command
       .add_option("--disk-overlap", options.disk_overlap,
@@ -101,10 +101,9 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
   addTemporaryOption(*command, options.temporary_directory);
   context.addCommonOptions(*command);
   command->footer(
-      "The radiosity is what surfaces reflect: albedo times the power of the nearest photons over "
-      "the\n"
-      "area on which they lie. Final gathering takes it from there. A .vdb is held until it is\n"
-      "written: in up to half of --memory.\n"
+      "The radiosity is reflected light: albedo times the power of the nearest photons over the\n"
+      "area on which they lie. It is the input of final gathering. A .vdb is held in memory until\n"
+      "it is written, in up to half of --memory.\n"
       "Examples:\n"
       "  surfeit sample cornell.obj -o photons.ply --photons 1000000\n"
       "  surfeit radiance photons.ply -o radiosity.ply --nphotons 100\n"

@@ -82,8 +82,8 @@ void addSampleCommand(CLI::App& app, CommandContext& context) {
   addSampleOptions(*command, *arguments);
   context.addCommonOptions(*command, {.threads = true, .stats = true});
   command->footer(
-      "Meshes are held whole, some 100 bytes a triangle; --memory refuses what takes more than "
-      "that.\n"
+      "Meshes are held in memory, some 100 bytes per triangle; meshes that exceed --memory are\n"
+      "refused.\n"
       "Examples:\n"
       "  surfeit sample cornell.obj -o cornell.ply --count 1000000\n"
       "  surfeit sample lion.ply -o lion.ply --spacing 0.01 --ground-plane --up z \\\n"

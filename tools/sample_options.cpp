@@ -82,8 +82,8 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->check(CLI::Range(1, 65536))
       ->group("Light");
   app.add_flag("--emission", lights.with_emission,
-               "Emissive surfaces carry their emission; a gather from them then counts the light "
-               "that they bake into others once more")
+               "Surfels of emissive surfaces carry the emission, too; a gather then counts their "
+               "light twice, because it is already in the direct light of other surfels")
       ->group("Light");
 
   const auto color = [](const std::string& name, glm::vec3& target) {
@@ -97,8 +97,9 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->type_name("\"r g b\"");
 
   GroundPlane& ground = surroundings.ground;
-  app.add_flag("--ground-plane", ground.enabled, "Add a square below everything")->group("Ground");
-  app.add_option("--ground-size", ground.size, "Edge of the ground over the scene's diagonal")
+  app.add_flag("--ground-plane", ground.enabled, "Add a square below the meshes")->group("Ground");
+  app.add_option("--ground-size", ground.size,
+                 "Edge of the ground, as a multiple of the scene's diagonal")
       ->capture_default_str()
       ->check(CLI::PositiveNumber)
       ->group("Ground");
@@ -108,7 +109,7 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->group("Ground");
   app.add_option_function<std::string>(
          "--up", [&ground](const std::string& axis) { ground.up = UpAxis(axis[0] - 'x'); },
-         "Axis that points up: x, y or z; the cloud says so [y]")
+         "Axis that points up: x, y or z; the cloud states it [y]")
       ->check(CLI::IsMember({"x", "y", "z"}))
       ->type_name("AXIS");
 }
@@ -118,7 +119,7 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
   addCloudOutputOption(app, arguments.output, "Cloud to write");
   CLI::Option* const count =
       app.add_option("--count", arguments.options.count,
-                     "Surfels, shared out by area; long thin triangles add some")
+                     "Number of surfels, distributed by area; long thin triangles add some")
           ->capture_default_str()
           ->check(CLI::PositiveNumber);
   CLI::Option* const spacing =
@@ -128,15 +129,16 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
           ->excludes(count);
   CLI::Option* const photons =
       app.add_option("--photons", arguments.photons,
-                     "Send so many photons from the lights and write where they arrive, for "
-                     "surfeit radiance, instead of surfels")
+                     "Instead of surfels, trace this many photons from the lights and write where "
+                     "they arrive, for surfeit radiance")
           ->check(CLI::PositiveNumber)
           ->excludes(count)
           ->excludes(spacing);
   app.add_flag("--two-sided", arguments.options.is_two_sided,
                "Both sides of the meshes send and block light: leaves, cloth, hair")
       ->excludes(photons);
-  app.add_option("--seed", arguments.photon_seed, "Another seed, other photons of the same lights")
+  app.add_option("--seed", arguments.photon_seed,
+                 "Seed of the photons: another seed gives other photons of the same lights")
       ->needs(photons);
   addSurroundingsOptions(app, arguments.options.surroundings);
 }

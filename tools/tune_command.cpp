@@ -198,8 +198,9 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
                    "Receivers whose look-ups are followed; 0: all")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_flag("--check", options.check,
-                    "Run the gather in every budget of the table, without a result, to compare");
+  command->add_flag(
+      "--check", options.check,
+      "Run the gather in every budget of the table, without writing results, to compare");
   command->add_option("--plot", arguments->plot, "Plot misses, bytes read and time (SVG)");
   command->add_flag("--json", arguments->json, "Print the report as JSON on stdout");
   addGatherOptions(*command, options.gather);
@@ -208,10 +209,11 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
   context.addCommonOptions(*command);
   command->footer(
       "Follows the look-ups of a sample of the receivers, and predicts hit rates, bytes read and\n"
-      "time of a gather in budgets from the least that works to all in memory. `knee` is where\n"
-      "more memory hardly saves a read; `recommended` the least that is within 5 % of the best\n"
-      "time, with pages read from where they are now: use --direct-io to see the device itself.\n"
-      "--memory bounds the tuning itself.\n"
+      "time of a gather, in budgets from the least that works to the whole scene in memory.\n"
+      "`knee`: beyond it more memory hardly saves a read. `recommended`: the smallest budget "
+      "within\n"
+      "5 % of the best time. Pages may come from the page cache of the system; --direct-io times\n"
+      "the device itself. --memory bounds the tuning itself.\n"
       "Examples:\n"
       "  surfeit tune city.sft street.ply\n"
       "  surfeit tune city.sft street.ply --mode bleeding --sample 1000000 --plot tune.svg\n"

@@ -47,9 +47,9 @@ Status runView(ViewArguments& arguments, CommandContext& context) {
   arguments.options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const ViewStats stats, viewCloud(arguments.input, arguments.picture,
                                                             arguments.options, context.progress()));
-  const std::string camera =
-      fmt::format("--eye \"{:.10g} {:.10g} {:.10g}\" --look-at \"{:.10g} {:.10g} {:.10g}\"", stats.eye.x,
-                  stats.eye.y, stats.eye.z, stats.look_at.x, stats.look_at.y, stats.look_at.z);
+  const std::string camera = fmt::format(
+      "--eye \"{:.10g} {:.10g} {:.10g}\" --look-at \"{:.10g} {:.10g} {:.10g}\"", stats.eye.x,
+      stats.eye.y, stats.eye.z, stats.look_at.x, stats.look_at.y, stats.look_at.z);
   if (!arguments.options.passes.empty()) {
     context.say(fmt::format("{}: {} of {}x{} pixels see the cloud; {}", arguments.options.passes,
                             formatCount(stats.pass_pixels), arguments.options.width,
@@ -73,8 +73,8 @@ void addViewCommand(CLI::App& app, CommandContext& context) {
                       "Picture: .png (8-bit sRGB) or .exr (linear half RGBA, and Z)");
   command
       ->add_option("--passes", arguments->options.passes,
-                   "Write what each pixel sees as OpenEXR, position, normal, depth, albedo and "
-                   "radiosity: receivers for gather. With or without -o")
+                   "Write position, normal, depth, albedo and radiosity of each pixel as OpenEXR: "
+                   "receivers for gather. With or without -o")
       ->type_name("FILE");
   addChannelOptions(*command, arguments->options.channels, arguments->options.part,
                     arguments->options.filter);

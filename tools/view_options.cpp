@@ -103,10 +103,10 @@ void addDisplayOptions(CLI::App& app, float& exposure, glm::vec3& background) {
 
 void addCameraOptions(CLI::App& app, CameraOptions& camera, std::optional<UpAxis>& up) {
   addVector(app, "--eye", camera.eye,
-            "Where the eye stands. Default: a three-quarter view that frames the cloud; strays "
+            "Position of the eye. Default: a three-quarter view that frames the cloud; outliers "
             "beyond three standard deviations may be cut off");
   addVector(app, "--look-at", camera.look_at,
-            "What the eye looks at. Default: the centre of the cloud's bounds");
+            "Point that the eye looks at. Default: the centre of the cloud's bounds");
   app.add_option_function<std::string>(
          "--up,--up-axis",
          [&camera, &up](const std::string& text) {
@@ -114,7 +114,7 @@ void addCameraOptions(CLI::App& app, CameraOptions& camera, std::optional<UpAxis
            if (is_axis) up = UpAxis(text[0] - 'x');
            if (!is_axis) camera.up = parseVector("--up", text);
          },
-         "Axis that is up, x, y or z, or a direction. Default: what the cloud says, else y")
+         "Axis that is up, x, y or z, or a direction. Default: as the cloud states, else y")
       ->type_name("AXIS|\"X Y Z\"")
       ->group(kCameraGroup);
   app.add_option("--fov", camera.fov_degrees, "Vertical field of view in degrees (default 35)")
@@ -131,7 +131,7 @@ void addSurfelOptions(CLI::App& app, ViewOptions& options) {
       ->type_name("MODE")
       ->group(kSurfelGroup);
   app.add_option("--channel", options.channel,
-                 "What to show: any property or triple (radiosity, irradiance, albedo, color, "
+                 "Channel to show: any property or triple (radiosity, irradiance, albedo, color, "
                  "environment, reflection, fluence, bent_normal, normal, position, ...), or lit = "
                  "radiosity + albedo * (irradiance + environment), indirect = albedo * "
                  "(irradiance + environment), ao = 1 - occlusion. Default: the first of lit, ao, "
@@ -141,13 +141,13 @@ void addSurfelOptions(CLI::App& app, ViewOptions& options) {
       ->group(kSurfelGroup);
   app.add_option(
          "--brick", options.brick,
-         "Brick map (docs/brick.md) that channels are looked up in, at each surfel; those of "
-         "the same name in the cloud give way")
+         "Brick map (docs/brick.md) to look up channels in, at each surfel; its channels replace "
+         "channels of the same name in the cloud")
       ->type_name("FILE")
       ->group(kSurfelGroup);
   app.add_option("--filter-width", options.filter_width,
-                 "Width over which --brick averages, scene units; 0: the finest there is (default: "
-                 "the diameter of the surfel)")
+                 "Width over which --brick averages, scene units; 0: the finest level there "
+                 "(default: the diameter of the surfel)")
       ->type_name("W")
       ->check(CLI::NonNegativeNumber.description(""))
       ->group(kSurfelGroup);
@@ -195,7 +195,7 @@ void addViewOptions(CLI::App& app, ViewOptions& options) {
 
 void addCompositeOptions(CLI::App& app, CompositeOptions& options) {
   app.add_option("--channel", options.channel,
-                 "What to show: radiosity (direct light), indirect = albedo * (irradiance + "
+                 "Channel to show: radiosity (direct light), indirect = albedo * (irradiance + "
                  "environment), lit = radiosity + indirect, ao = 1 - occlusion, or any other "
                  "channel of the files. Default: the first of lit, ao, radiosity, color, albedo, "
                  "normal, position that they have. Values that are not finite are magenta")

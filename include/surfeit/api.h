@@ -1,4 +1,4 @@
-/* What the shared library shows. */
+/* Marks the symbols that the shared library exports. */
 #ifndef SURFEIT_API_H
 #define SURFEIT_API_H
 

@@ -1,12 +1,12 @@
-// Several bounces of light: the radiosity of every surfel of a paged octree file from what it
-// receives, again and again (memo 08-01, section 7.4).
+// Several bounces of light: computes the radiosity of every surfel of a paged octree file from the
+// light that it receives, once per bounce (memo 08-01, section 7.4).
 //
 //   B_0 = the radiosity in the scene: emission and direct light
 //   B_k = B_0 + albedo * E(B_{k-1}),   k = 1 .. bounces
 //
-// with E the irradiance that a gather finds at the surfel (surfeit/gather.h), in the unit of the
-// radiosity: inside a closed shell of radiosity B it is B. A gather from the result adds one bounce
-// more at its receivers.
+// E is the irradiance that a gather finds at the surfel (surfeit/gather.h), in the unit of the
+// radiosity: inside a closed shell of radiosity B, E = B. A gather from the result adds one more
+// bounce at its receivers.
 #pragma once
 
 #include <cstdint>
@@ -23,26 +23,26 @@
 
 namespace surfeit {
 
-// `temporary_directory` holds intermediate bounces; `strict` changes nothing.
+// `temporary_directory` holds intermediate bounces. `strict` has no effect.
 struct BounceOptions : JobOptions {
   int bounces = 1;  // 1 to 100
   GatherQuality quality;
-  // All bounces but the last are gathered at about one of so many surfels, 1 to 64, and
-  // interpolated to their neighbours by distance and normal. 1: at every surfel.
+  // All bounces but the last are gathered at about one surfel out of this many, 1 to 64, and
+  // interpolated to its neighbours by distance and normal. 1: at every surfel.
   int surfels_per_receiver = 1;
-  // Set of the groups of surfels that send light and cover, as in GatherOptions; all receive.
+  // Set of the object groups that send light and cover, as in GatherSettings; all surfels receive.
   std::uint64_t groups = kAllGroups;
 
-  double cache_split = -1;  // as in GatherOptions
+  double cache_split = -1;  // as in GatherOptions (surfeit/bake.h)
   bool direct_io = false;
 };
 
-// What one bounce did.
+// Statistics of one bounce.
 struct BouncePass {
-  std::uint64_t receivers = 0;  // places at which it gathered
+  std::uint64_t receivers = 0;  // gathered
   double gather_seconds = 0, write_seconds = 0;
-  glm::dvec3 mean_radiosity{0};  // after it, by area
-  double largest_change = 0;     // of any color of any surfel's radiosity, from the bounce before
+  glm::dvec3 mean_radiosity{0};  // after the bounce, weighted by area
+  double largest_change = 0;     // of any color of any surfel's radiosity, since the last bounce
   GatherCacheStats node_cache, surfel_cache;
 };
 
@@ -55,18 +55,18 @@ struct BounceStats {
   std::vector<BouncePass> passes;
 };
 
-// Writes `result_path`: the scene with the radiosity after so many bounces. Surfels, their order,
-// pages, nodes and references are the same, bit for bit; radiosities of surfels and nodes and the
-// power coefficients are new. It appears under its name only when complete.
+// Writes `result_path`: the scene with the radiosity after `options.bounces` bounces. Surfels,
+// their order, pages, nodes and references stay the same, bit for bit. Radiosities of surfels and
+// nodes and the power coefficients are new. The file appears under its name only when complete.
 //
-// A two-sided surfel, which has one radiosity for both sides, receives the mean of what its sides
-// receive; a sphere, the mean over all directions. So no light is lost, and none is made.
+// A two-sided surfel has one radiosity for both sides; it receives the mean of its two sides. A
+// sphere receives the mean over all directions. So no light is lost, and none is made.
 //
-// The result depends on scene, bounces, quality, surfels_per_receiver and the machine's instruction
-// set alone, bit for bit. What a surfel takes from albedo above 1 grows without end; radiosity is
+// The result depends only on scene, bounces, quality, surfels_per_receiver, groups and the
+// machine's instruction set, bit for bit. With albedo above 1 radiosity can grow without end; it is
 // limited to 1e12.
 // Errors: as indexClouds; kCorruption for a scene without albedo or radiosity; kInvalidArgument for
-// one that bounce has written: its bounces would count again.
+// a scene that bounceScene has written, because its bounces would count twice.
 SURFEIT_API Result<BounceStats> bounceScene(const std::string& scene_path,
                                             const std::string& result_path,
                                             const BounceOptions& options, Progress& progress);

@@ -1,6 +1,6 @@
 // Brick maps: baked values of clouds (occlusion, irradiance, any channel) in a multiresolution
-// OpenVDB file, and looking them up at any place: the counterpart of brickmake and texture3d.
-// docs/brick.md has the layout of the file and what is computed.
+// OpenVDB file, with look-ups at any place: the counterpart of brickmake and texture3d.
+// docs/brick.md describes the file and the computation.
 #pragma once
 
 #include <cstddef>
@@ -19,25 +19,25 @@
 
 namespace surfeit {
 
-// Numbers of a point that a brick map keeps at most, over all its channels.
+// The most numbers per point that a brick map keeps, over all its channels.
 inline constexpr std::size_t kMaxBrickValues = 64;
 
-// `memory_bytes`: at least 64 MiB; 0 stands for 1 GiB, or three quarters of what the job may hold
-// where that is less.
+// `memory_bytes`: at least 64 MiB; 0 stands for 1 GiB, or for three quarters of the memory that the
+// job may hold where that is less.
 struct BrickOptions : JobOptions {
-  // Channels or properties to keep. Empty: what a gather writes, as far as the first cloud has it;
-  // without any of that all that does not tell of the points' geometry.
+  // Channels or properties to keep. Empty: the outputs of a gather that the first cloud has; if it
+  // has none, all channels except the geometry of the points.
   std::vector<std::string> channels;
   // A voxel is divided where a number of a channel differs by more than this within it. 0 keeps
   // every voxel of the finest level.
   double max_error = 0.01;
-  // Edge of the finest voxels, scene units. 0: twice the spacing of the points, by the median of
-  // their areas, or by their density where they have no sizes.
+  // Edge of the finest voxels, scene units. 0: twice the spacing of the points, from the median of
+  // their areas, or from their density where they have no sizes.
   double voxel_size = 0;
-  // Which records are read, "classification == 2" (docs/files.md, "Filters"); empty: all but those
-  // that the format marks as not to be used.
+  // Condition for the records to read, "classification == 2" (docs/files.md, "Filters"). Empty: all
+  // records but those that the format marks as unusable.
   std::string filter{};
-  // How colors are read whose numbers do not say what they mean.
+  // Meaning of color numbers where the file does not state it.
   ColorRange color_range = ColorRange::kAuto;
 };
 
@@ -55,8 +55,9 @@ struct BrickStats {
 };
 
 // Writes `output`, an OpenVDB file, from the points of all inputs (clouds of any format, docs/
-// files.md). It depends on the points and the options above memory_bytes alone, bit for bit, not on
-// their order or in which input they are. It appears under its name only when complete. Errors:
+// files.md). The file depends only on the points and on the members of BrickOptions itself, bit for
+// bit, not on the order of the points or of the inputs. It appears under its name only when
+// complete. Errors:
 // kInvalidArgument (options; a channel that an input lacks), kCorruption (bad input, or no valid
 // point at all), kBudgetTooSmall, kIoError, kInterrupted.
 SURFEIT_API Result<BrickStats> brickClouds(const std::vector<std::string>& inputs,
@@ -72,9 +73,10 @@ struct BrickChannel {
 // An open brick map. Safe from any thread.
 class SURFEIT_API BrickMap {
  public:
-  // Reads the file once, to find its pages. `memory_bytes` holds a list of these, 12 bytes and 8
-  // for every grid per leaf of 8^3 voxels, and a cache of those that look-ups need. Errors:
-  // kIoError, kCorruption (no brick map, or a damaged one), kBudgetTooSmall with what would do.
+  // Reads the file once, to find its pages. `memory_bytes` holds a list of the pages (12 bytes per
+  // leaf of 8^3 voxels, and 8 more for every grid) and a cache of pages that look-ups need. Errors:
+  // kIoError, kCorruption (no brick map, or a damaged one), kBudgetTooSmall with the least budget
+  // that works.
   static Result<BrickMap> open(const std::string& path,
                                std::uint64_t memory_bytes = std::uint64_t{64} << 20);
   BrickMap(BrickMap&&) noexcept;
@@ -82,21 +84,21 @@ class SURFEIT_API BrickMap {
   ~BrickMap();
 
   const std::vector<BrickChannel>& channels() const;
-  // Numbers of a look-up: those of all channels, in their order.
+  // Numbers that a look-up returns: all channels, in their order.
   std::size_t valueCount() const;
   // Level 0 is the finest.
   int levelCount() const;
   double voxelSize(int level) const;
 
-  // The values at a place of a surface with that normal, or of any surface where the normal is
-  // zero, averaged over about `filter_width` scene units; 0 takes the finest there are. Linear
-  // between voxels and between levels. `values` has valueCount() numbers. False, and zeros, where
-  // no point that faces that way is within reach of the coarsest voxels. A first look-up of a page
-  // reads it: kIoError, kCorruption.
+  // The values at `position` on a surface with that normal, or on any surface where the normal is
+  // zero, averaged over about `filter_width` scene units; 0 takes the finest level there. Linear
+  // between voxels and between levels. `values` has valueCount() numbers. Returns false and zeros
+  // where no point that faces that way is within reach of the coarsest voxels. The first look-up of
+  // a page reads it. Errors: kIoError, kCorruption.
   Result<bool> lookup(const glm::dvec3& position, const glm::vec3& normal, double filter_width,
                       float* values) const;
 
-  // Bytes of pages in the cache now, and of the list of pages.
+  // Bytes of the pages in the cache now, and bytes of the list of pages.
   std::uint64_t cachedBytes() const;
   std::uint64_t directoryBytes() const;
 

@@ -1,13 +1,13 @@
-// The engine: scenes that stay open, and gathers at receivers in memory. Renderers, plug-ins and
-// viewers call it; the jobs on files (surfeit/bake.h) stand on it.
+// The engine keeps scenes open and gathers at receivers in memory. Renderers, plug-ins and viewers
+// call it; the jobs on files (surfeit/bake.h) use it.
 //
 //   Engine engine = *Engine::create({.memory_bytes = 512 << 20, .threads = 16});
 //   Scene scene = *engine.open("set.sft");
 //   Gatherer gatherer = *engine.gatherer(scene, settings);      // one per thread
 //   Status status = gatherer.gather(receivers, count, results);  // thousands of times
 //
-// Compiles as C++17. No function throws: failures are values (surfeit/status.h), those of memory
-// too.
+// Compiles as C++17. No function throws: failures are values (surfeit/status.h), and so is a lack
+// of memory.
 #pragma once
 
 #include <array>
@@ -33,37 +33,37 @@ struct EngineState;
 struct SceneState;
 
 struct EngineOptions {
-  // Budget of the engine: pages of all scenes, their directories, and what gatherers hold. Code,
-  // libraries and what the caller holds are not counted. 0: three quarters of what the job may use.
+  // Budget of the engine: pages of all scenes, their directories, and the memory of gatherers.
+  // Code, libraries and the caller's own memory are not counted. 0: three quarters of the memory
+  // that the job may use.
   std::uint64_t memory_bytes = 0;
-  // Gatherers that are expected to exist at a time, one per thread; more are possible, and find
-  // less room in front of the caches. 0: as many as processors that the job may use.
+  // Expected number of gatherers at a time, one per thread. More are possible, with less room in
+  // front of the caches. 0: one per processor that the job may use.
   int threads = 0;
   bool direct_io = false;  // read scenes past the page cache of the system
 };
 
-// What an engine did since it was made. Counts of a moment: of calls that run they may be a few
-// look-ups old.
+// Counts since the engine was created. During calls they may be a few look-ups old.
 struct EngineStatistics {
   std::uint64_t receivers = 0;                // gathered by all gatherers
   std::uint64_t memory_bytes = 0;             // the budget
-  std::uint64_t held_bytes = 0;               // of it: directories, tables and gatherers
-  std::uint32_t scenes = 0, gatherers = 0;    // that are open, that exist
-  GatherCacheStats node_cache, surfel_cache;  // working sets are those of the last seconds
+  std::uint64_t held_bytes = 0;               // of the budget: directories, tables and gatherers
+  std::uint32_t scenes = 0, gatherers = 0;    // open scenes, existing gatherers
+  GatherCacheStats node_cache, surfel_cache;  // working sets are of the last seconds
 };
 
-// A similarity: turned, scaled alike along all axes, and moved. Rows of a 3x4 matrix:
-// x' = m[0] x + m[1] y + m[2] z + m[3], and so on. It turns by a proper rotation (no mirror) times
-// a scale over 0, to a relative 1e-4.
+// A similarity: rotation, uniform scale and translation. Rows of a 3x4 matrix:
+// x' = m[0] x + m[1] y + m[2] z + m[3], and so on. The left 3x3 part must be a proper rotation (no
+// mirror) times a scale above 0, to a relative 1e-4.
 struct Transform {
   std::array<double, 12> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 };
 
-// An open scene: immutable, shared, cheap to copy; any thread may copy and ask. It stays open as
-// long as some copy, or a gatherer made from it, exists.
+// A handle of an open scene: immutable, shared, cheap to copy. Safe from any thread. The scene
+// stays open as long as a copy of the handle, or a gatherer of the scene, exists.
 class SURFEIT_API Scene {
  public:
-  // What readSceneInfo tells, without reading again.
+  // The same as readSceneInfo (surfeit/scene.h), without reading the file again.
   const SceneInfo& info() const;
   const std::string& path() const;
 
@@ -74,49 +74,51 @@ class SURFEIT_API Scene {
   std::shared_ptr<SceneState> state_;
 };
 
-// A scene as it stands in a world with others: a set that was indexed once, a character of the
-// frame, one tree of a forest.
+// A scene with its place in a world of several: a set, a character of the frame, one tree of a
+// forest.
 struct Instance {
   Scene scene;
   Transform transform{};
 };
 
-// A picture of light from all around, in memory (memo 7.3): lat-long, twice as wide as high, the
-// top row up, as docs/algorithm.md, "Environment", has it. Radiances, finite and not negative.
+// An environment picture in memory, light from infinitely far away (memo 7.3): lat-long, twice as
+// wide as high, the top row up (docs/algorithm.md, "Environment light"). Radiances, finite and not
+// negative.
 struct EnvironmentPixels : EnvironmentPlacement {
   int width = 0, height = 0;
   const glm::vec3* pixels = nullptr;  // width * height, copied
 };
 
-// One thread's way of gathering. Calls on one gatherer must not overlap; different gatherers are
-// free of each other. It holds its scenes and its engine, whatever becomes of their handles.
+// Gathers for one thread at a time. Calls on one gatherer must not overlap; different gatherers are
+// independent. A gatherer keeps its scenes and its engine alive, even after their handles are gone.
 class SURFEIT_API Gatherer {
  public:
   Gatherer(Gatherer&&) noexcept;
   Gatherer& operator=(Gatherer&&) noexcept;
   ~Gatherer();
 
-  // Gathers at `count` receivers. After its first calls it allocates nothing, unless a cut grows
-  // larger than any before; where the caches are smaller than the scenes, the engine looks four
-  // times a second how they should share their memory, which takes some allocations. Neighbours
-  // share work, so hand over neighbours, in the order of a curve or of the picture: up to 256
-  // consecutive ones share one walk. Their results differ by less than .004 from those of other
+  // Gathers at `count` receivers. After its first calls a gatherer allocates nothing, unless a cut
+  // grows larger than any before. Where the caches are smaller than the scenes, the engine divides
+  // memory between them anew four times a second, which takes some allocations. Neighbours share
+  // work, so pass neighbours together, in the order of a curve or of the picture. The gatherer
+  // takes 256 consecutive receivers at a time and divides them into packets of up to 16, which
+  // share a walk through the octree. A receiver's result differs by less than .004 with other
   // companions. A receiver that is not finite, or with kGlossy lacks a normal or a view, gets NaN.
-  // `progress`, where given, is asked now and then whether to stop. Errors: kIoError and
-  // kCorruption of a page, kInterrupted; results are then incomplete, and the gatherer may be used
-  // again. kInvalidArgument while another call of this gatherer is on its way.
+  // The call polls `progress`, where given, for a request to stop. Errors: kIoError and kCorruption
+  // of a page, kInterrupted; results are then incomplete, and the gatherer may be used again.
+  // kInvalidArgument while another call of this gatherer runs.
   Status gather(const Receiver* receivers, std::size_t count, GatherResult* results,
                 const Progress* progress = nullptr);
 
-  // A gatherer of the same world for another thread: what they can share, they do. Errors:
-  // kBudgetTooSmall with the budget that would do.
+  // A gatherer of the same world for another thread; the two share data where they can. Errors:
+  // kBudgetTooSmall with the least budget that works.
   Result<Gatherer> another() const;
 
-  // Lets go of the pages that it holds in front of the caches. For threads that do something else
-  // for long: others may wait for these pages' memory.
+  // Releases the pages that the gatherer holds in front of the caches. Call it in threads that do
+  // something else for long, because others may wait for the memory of these pages.
   void pause();
 
-  // Receivers of all calls so far, and of these the ones without a result.
+  // Receivers of all calls so far, and the receivers among them without a result.
   std::uint64_t receivers() const;
   std::uint64_t invalidReceivers() const;
 
@@ -128,37 +130,37 @@ class SURFEIT_API Gatherer {
   std::unique_ptr<State> state_;
 };
 
-// One memory budget and two caches for any number of scenes. A handle: copies are of one engine,
-// which lives as long as any of them, its scenes and gatherers. Safe from any thread. An engine has
-// no threads of its own, but while gatherAll runs.
+// One memory budget and two caches for any number of scenes. A handle: copies refer to one engine,
+// which lives as long as any copy, scene or gatherer of it. Safe from any thread. An engine has no
+// threads of its own, except while gatherAll runs.
 class SURFEIT_API Engine {
  public:
   // Errors: kInvalidArgument, kBudgetTooSmall, kFailed when address space cannot be had.
   static Result<Engine> create(const EngineOptions& options);
 
-  // Opens a paged octree file (surfeit/index.h makes them). Reads header and directory, no page.
-  // Files may be opened many times: each is a scene of its own, with its own pages in the caches.
-  // Errors: kIoError, kCorruption, kBudgetTooSmall with the budget that would do.
+  // Opens a paged octree file (surfeit/index.h builds them). Reads header and directory, no page. A
+  // file may be opened many times: each time gives another scene, with its own pages in the caches.
+  // Errors: kIoError, kCorruption, kBudgetTooSmall with the least budget that works.
   Result<Scene> open(const std::string& path);
-  // The same of a file's bytes, which are copied and count as part of the budget. `name` begins
-  // messages about it.
+  // Opens the bytes of a file. They are copied and count as part of the budget. Messages about the
+  // scene begin with `name`.
   Result<Scene> openBytes(const void* bytes, std::size_t size, const std::string& name);
 
-  // A gatherer of one scene in its own coordinates, or of several that see each other in one world.
-  // Its environment is copied; null: none. Instances are grouped in a tree of their own: what is
-  // far is seen as one, however many it is. To make one reads the upper pages of every scene and a
-  // sample of its surfels.
-  // Errors: kInvalidArgument (settings, transforms, no instance, groups that no scene has),
-  // kBudgetTooSmall with the budget that would do, kIoError, kCorruption.
+  // A gatherer of one scene in its own coordinates, or of several instances that see each other in
+  // one world. The environment is copied; null: none. A tree over the instances lets the gather see
+  // many far instances as one node. Creation reads the upper pages of every scene and a sample of
+  // its surfels.
+  // Errors: kInvalidArgument (settings, transforms, no instance, object groups that no scene has),
+  // kBudgetTooSmall with the least budget that works, kIoError, kCorruption.
   Result<Gatherer> gatherer(const Scene& scene, const GatherSettings& settings,
                             const EnvironmentPixels* environment = nullptr);
   Result<Gatherer> gatherer(const std::vector<Instance>& instances, const GatherSettings& settings,
                             const EnvironmentPixels* environment = nullptr);
 
-  // Gathers at all receivers, in an order of its own along the curve of the world, on `threads`
-  // threads (0: EngineOptions::threads) with a gatherer each. Holds 12 bytes per receiver
-  // meanwhile, beside the budget. At most 4 billion receivers. The
-  // result depends on instances, settings and receivers alone.
+  // Gathers at all receivers, along the Hilbert curve of the world, on `threads` threads (0:
+  // EngineOptions::threads) with a gatherer each. It holds 12 bytes per receiver meanwhile, beside
+  // the budget. At most 4 billion receivers. The result depends only on instances, settings,
+  // environment and receivers.
   // Errors: as gatherer and gather.
   Status gatherAll(const std::vector<Instance>& instances, const GatherSettings& settings,
                    const Receiver* receivers, std::size_t count, GatherResult* results,
@@ -166,8 +168,8 @@ class SURFEIT_API Engine {
                    const EnvironmentPixels* environment = nullptr);
 
   EngineStatistics statistics() const;
-  // What the caches did over time, in order; at most some hundreds, however long it took. The last
-  // one ends now.
+  // Cache statistics over time, in order; at most some hundreds, for any running time. The last
+  // window ends now.
   std::vector<GatherWindow> windows() const;
 
  private:

@@ -1,4 +1,4 @@
-// What every job from files to files may use, and how it reads.
+// Resources of a job from files to files, and options for reading clouds.
 #pragma once
 
 #include <cstdint>
@@ -9,28 +9,27 @@
 namespace surfeit {
 
 struct JobOptions {
-  // Budget of the job. The library's part of the process alone: code, libraries and what the caller
-  // holds are not counted (the program counts them). 0: three quarters of what the job may use; the
-  // commands that build something take no more than they name in their own header.
+  // Budget of the library's part of the process. Code, libraries and the caller's own memory are
+  // not counted (the program does count them). 0: three quarters of the memory that the job may
+  // use; some jobs take less by default, as their header says.
   std::uint64_t memory_bytes = 0;
-  int threads = 0;      // 0: all that the job may use and the budget feeds
+  int threads = 0;      // 0: all that the job may use and the budget has room for
   bool strict = false;  // refuse invalid records instead of leaving them out
-  // Where files go that do not outlive the job. Empty: where the job wants them (SLURM_TMPDIR,
-  // TMPDIR), else beside the output.
+  // Directory of temporary files. Empty: SLURM_TMPDIR or TMPDIR where set, else beside the output.
   std::string temporary_directory{};
 };
 
 // How clouds are read (docs/files.md).
 struct ReadOptions {
-  // Channels to be called otherwise, "FROM=TO,FROM=TO".
+  // New names for channels, "FROM=TO,FROM=TO".
   std::string channels{};
-  // Of files with several parts (grids, layers, elements) the one to read; empty: the first with a
-  // cloud.
+  // The part to read in a file with several (grids, layers, elements); empty: the first that holds
+  // a cloud.
   std::string part{};
-  // Which records are read, "classification == 2"; empty: all but those that the format marks as
-  // not to be used.
+  // Condition for the records to read, "classification == 2". Empty: all records but those that the
+  // format marks as unusable.
   std::string filter{};
-  // How colors are read whose numbers do not say what they mean.
+  // Meaning of color numbers where the file does not state it.
   ColorRange color_range = ColorRange::kAuto;
 };
 

@@ -1,6 +1,6 @@
-// Grids of OpenVDB in memory, for programs that link OpenVDB themselves (10.0 or later): surfels
-// and receivers from points, receivers at voxels, results into grids. Header alone; the library
-// does not need OpenVDB.
+// OpenVDB grids in memory, for programs that link OpenVDB themselves (10.0 or later): surfels and
+// receivers from point grids, receivers at voxels, results in grids. Header only; the library does
+// not need OpenVDB.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -22,15 +22,15 @@
 
 namespace surfeit {
 
-// How attributes of points are called. Those that a grid does not have are left out; vectors are
-// openvdb::Vec3f, all else floats.
+// Names of point attributes. Attributes that a grid does not have are left out. Vectors are
+// openvdb::Vec3f, all others floats.
 struct VdbPointNames {
   std::string normal = "N", radius = "pscale", area = "area";
   std::string radiosity = "radiosity", albedo = "Cd";
 };
 
-// The points of a grid as surfels in memory, 64 bytes each; frustum transforms are refused by
-// check(). For indexSurfels.
+// The points of a grid as surfels in memory, 64 bytes each, for indexSurfels. check() refuses
+// frustum transforms.
 class VdbPointSurfels : public SurfelProvider {
  public:
   explicit VdbPointSurfels(const openvdb::points::PointDataGrid& grid,
@@ -52,7 +52,7 @@ class VdbPointSurfels : public SurfelProvider {
     for (auto leaf = first; leaf; ++leaf) addLeaf(grid, *leaf, names);
   }
 
-  // kInvalidArgument for a grid whose transform is no affine map, or without points.
+  // kInvalidArgument for a grid without points, or whose transform is not affine.
   Status check() const {
     if (!is_linear_) {
       return Status::invalidArgument("a grid of points in a frustum, expected an affine transform");
@@ -70,7 +70,7 @@ class VdbPointSurfels : public SurfelProvider {
     return {};
   }
 
-  // The same places as receivers, with their normals.
+  // The positions and normals of the surfels, as receivers.
   std::vector<Receiver> receivers() const {
     std::vector<Receiver> receivers;
     receivers.reserve(surfels_.size());
@@ -83,7 +83,7 @@ class VdbPointSurfels : public SurfelProvider {
  private:
   using Leaf = openvdb::points::PointDataTree::LeafNodeType;
 
-  // A vector or a float of each point, where the leaf has it.
+  // A handle of an attribute of the leaf, where it exists.
   template <typename Value>
   static std::unique_ptr<openvdb::points::AttributeHandle<Value>> handleOf(const Leaf& leaf,
                                                                            const std::string& name,
@@ -122,16 +122,17 @@ class VdbPointSurfels : public SurfelProvider {
   std::vector<Surfel> surfels_;
 };
 
-// Grids that take results; null ones are left out. They get the topology and the transform of the
-// voxels gathered at.
+// Grids that receive results; null grids are left out. They take over the topology and the
+// transform of the grid whose voxels are gathered at.
 struct VdbResults {
   openvdb::FloatGrid::Ptr occlusion;
   openvdb::Vec3SGrid::Ptr irradiance, fluence;
 };
 
-// Gathers over the whole sphere at the middle of every active voxel of `where`, leaf by leaf, which
-// is a coherent order. The gatherer must have the outputs that are asked for. Holds the receivers
-// and results of 4,096 voxels at a time. Errors: as Gatherer::gather.
+// Gathers over the whole sphere at the middle of every active voxel of `where`, leaf by leaf, so
+// that neighbours follow each other. The settings of the gatherer must include the outputs of
+// `results`. Holds the receivers and results of 4,096 voxels at a time. Errors: as
+// Gatherer::gather.
 template <typename GridT>
 Status gatherAtVoxels(Gatherer& gatherer, const GridT& where, const VdbResults& results,
                       const Progress* progress = nullptr) {
@@ -173,7 +174,7 @@ Status gatherAtVoxels(Gatherer& gatherer, const GridT& where, const VdbResults& 
     return receivers.size() == kRun ? flush() : Status();
   };
   for (auto value = where.cbeginValueOn(); value; ++value) {
-    const openvdb::CoordBBox box = value.getBoundingBox();  // of a tile all its voxels
+    const openvdb::CoordBBox box = value.getBoundingBox();  // all voxels of a tile
     for (auto voxel = box.begin(); voxel != box.end(); ++voxel)
       SURFEIT_RETURN_IF_ERROR(add(*voxel));
   }

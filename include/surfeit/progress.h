@@ -1,4 +1,4 @@
-// How long-running work tells its caller where it stands, and learns that it should stop.
+// How long-running work reports its progress, and learns that it should stop.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace surfeit {
 
-// Implement to show progress or to cancel. All calls may come from any thread.
+// Implement it to show progress or to cancel. All calls may come from any thread.
 class SURFEIT_API Progress {
  public:
   virtual ~Progress() = default;
@@ -23,10 +23,10 @@ class SURFEIT_API Progress {
   // `count` bytes were read from or written to files, for rates only.
   virtual void advanceBytes(std::uint64_t count) { (void)count; }
 
-  // What was guessed, dropped, narrowed, ignored or left dark, how many, and what to do: the user
-  // reads it once, and may want such a thing to be an error (`--strict`).
+  // Reports data that was guessed, dropped, narrowed, ignored or left dark: what, how many, and
+  // what to do about it. Each rule is reported once. `--strict` turns a note into an error.
   virtual void note(const std::string& message) { (void)message; }
-  // What the user may like to know: nothing is lost by it.
+  // Reports a fact of interest; no data is lost.
   virtual void inform(const std::string& message) { (void)message; }
 
   // Polled often; true makes the work stop with Status::interrupted() and leave nothing behind.

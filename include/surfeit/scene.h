@@ -1,4 +1,4 @@
-// What a paged octree file says about itself, and whether all of it is sound.
+// Reads the description of a paged octree file, and verifies the file.
 #pragma once
 
 #include <cstdint>
@@ -21,18 +21,19 @@ struct SceneInfo {
   std::uint32_t node_pages = 0, surfel_pages = 0;
   std::uint64_t node_page_bytes = 0, surfel_page_bytes = 0;    // stored
   std::uint64_t node_cache_bytes = 0, surfel_cache_bytes = 0;  // all pages decoded
-  // Bounds of the surfel positions in the cloud's coordinates, and what the file counts them from.
+  // Bounds of the surfel positions, and the origin of positions in the file; all in the cloud's
+  // coordinates.
   glm::dvec3 min{0}, max{0}, origin{0};
   UpAxis up = kDefaultUpAxis;
-  CloudChannels channels;  // what the input brought
+  CloudChannels channels;  // channels of the input
   bool full_precision = false;
   std::vector<std::uint32_t> level_pages;  // node pages of levels 0..21
   std::string provenance;                  // JSON
-  std::uint64_t groups = 0;  // set of those that surfels have; group 0 alone without the channel
+  std::uint64_t groups = 0;  // object groups with surfels, as bits; without the channel group 0
 };
 
-// Reads header and directory, and of a scene with groups the first page. Errors: kIoError,
-// kCorruption.
+// Reads header and directory; for a scene with object groups, the first page as well. Errors:
+// kIoError, kCorruption.
 SURFEIT_API Result<SceneInfo> readSceneInfo(const std::string& path);
 
 struct VerifyReport {
@@ -42,11 +43,11 @@ struct VerifyReport {
   std::uint64_t finding_count = 0;
 };
 
-// Reads every page and checks every checksum, and the invariants of docs/format.md: references,
-// counts, areas that add up, bounding spheres that hold what is below. Damage ends up in `findings`
-// and the check goes on with the next page. `memory_bytes`: budget; 0: three quarters of what the
-// job may hold; more than some 100 MiB are left alone. Errors: kIoError, kBudgetTooSmall,
-// kInterrupted.
+// Reads every page and checks every checksum and the invariants of docs/format.md: references,
+// counts, sums of areas, bounding spheres that contain their surfels. Damage is recorded in
+// `findings`, and the check goes on with the next page. `memory_bytes`: the budget; 0: three
+// quarters of the memory that the job may hold; more than some 100 MiB are never used. Errors:
+// kIoError, kBudgetTooSmall, kInterrupted.
 SURFEIT_API Result<VerifyReport> verifyScene(const std::string& path, int threads,
                                              Progress& progress, std::uint64_t memory_bytes = 0);
 

@@ -1,4 +1,4 @@
-// Status and Result: how every function of the library reports that the world went wrong. The
+// Status and Result: how every function of the library reports failures of the world outside. The
 // library never prints, throws across its border, exits or aborts because of input.
 #pragma once
 
@@ -11,18 +11,18 @@
 
 namespace surfeit {
 
-// What kind of failure; the program maps each kind to its exit status (docs/architecture.md).
+// Kinds of failures; the program maps each kind to an exit status (docs/architecture.md).
 enum class StatusCode : std::uint8_t {
   kOk = 0,
   kInvalidArgument,  // an option or a call that cannot work; exit status 2
-  kCorruption,       // bytes that are not what the format says; exit status 3
+  kCorruption,       // bytes that break the rules of the format; exit status 3
   kBudgetTooSmall,   // the memory budget cannot hold the work; exit status 33
   kIoError,          // the system refused to open, read, write, sync or rename; exit status 74
   kInterrupted,      // the caller asked to stop; exit status 130
   kFailed,           // anything else; exit status 1
 };
 
-// A code and a message of one line: what, where, found and expected. Immutable once made.
+// A code and a message of one line: what, where, found and expected. Immutable.
 class [[nodiscard]] Status {
  public:
   Status() = default;

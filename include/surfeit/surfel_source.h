@@ -1,4 +1,4 @@
-// Surfels that a caller has in memory, or makes as they are asked for, on the way to a scene.
+// Builds a scene from surfels that a caller holds in memory or makes on demand.
 #pragma once
 
 #include <algorithm>
@@ -16,27 +16,27 @@
 
 namespace surfeit {
 
-// Implement to index without a file. Functions are called from one thread at a time, not always the
-// same one.
+// Implement it to index surfels without a file. Functions are called from one thread at a time, not
+// always from the same one.
 class SURFEIT_API SurfelProvider {
  public:
   virtual ~SurfelProvider() = default;
 
-  // Begins messages: "surfels".
+  // Messages about the surfels begin with this name.
   virtual std::string name() const { return "surfels"; }
   virtual std::uint64_t count() const = 0;
-  // Which members of the surfels mean something; positions always do. What is missing is filled in
-  // as for clouds (docs/format.md, "Filled in").
+  // The members of the surfels that hold data, besides the position. The others are filled in as
+  // for clouds (docs/format.md, "Rules for what is missing").
   virtual CloudChannels channels() const = 0;
-  // What positions are counted from, in scene units.
+  // The origin of positions, in scene units.
   virtual glm::dvec3 origin() const { return glm::dvec3(0); }
   virtual UpAxis up() const { return kDefaultUpAxis; }
-  // Copies surfels number first to first + count - 1, which exist, to `surfels`. Called for all of
-  // them more than once, and each time it must give the same.
+  // Copies surfels number first to first + count - 1, which exist, to `surfels`. Each surfel is
+  // read more than once, and must be the same each time.
   virtual Status read(std::uint64_t first, std::size_t count, Surfel* surfels) = 0;
 };
 
-// An array that a caller holds.
+// An array that the caller holds.
 class SURFEIT_API SurfelSpan : public SurfelProvider {
  public:
   SurfelSpan(const Surfel* surfels, std::size_t count, const CloudChannels& channels,
@@ -58,7 +58,7 @@ class SURFEIT_API SurfelSpan : public SurfelProvider {
   glm::dvec3 origin_;
 };
 
-// As indexClouds, of surfels from a provider. What a provider holds is not counted in the budget.
+// As indexClouds, for surfels from a provider. The budget does not count the provider's memory.
 // Errors: as indexClouds, and the provider's own.
 SURFEIT_API Result<IndexStats> indexSurfels(SurfelProvider& provider, const std::string& output,
                                             const IndexOptions& options, Progress& progress);

@@ -5,7 +5,7 @@
 
 namespace surfeit {
 
-// Clouds say theirs by a comment "up z" (docs/files.md), and LAS files have z; others have y.
+// Clouds may state it in a comment "up z" (docs/files.md). Otherwise it is z for LAS files, else y.
 enum class UpAxis : std::uint8_t { kX, kY, kZ };
 
 inline constexpr UpAxis kDefaultUpAxis = UpAxis::kY;
