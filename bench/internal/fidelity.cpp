@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/error_summary.h"
+#include "bench/internal/error_summary.h"
 #include "cloud/ply/ply_reader.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"

@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "bench/gather_measure.h"
-#include "bench/random_truth.h"
+#include "bench/internal/gather_measure.h"
+#include "bench/internal/random_truth.h"
 #include "random/indexed_scene.h"
 #include "random/random_scene.h"
 #include "random/random_scene_files.h"

@@ -1,4 +1,4 @@
-#include "cache_traces.h"
+#include "bench/internal/cache_traces.h"
 
 #include <fmt/format.h>
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "bench/gather_scene_geometry.h"
+#include "bench/internal/gather_scene_geometry.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "batch/environment_file.h"
-#include "bench/gather_bench_options.h"
-#include "bench/gather_measure.h"
-#include "bench/gather_scenes.h"
+#include "bench/internal/gather_bench_options.h"
+#include "bench/internal/gather_measure.h"
+#include "bench/internal/gather_scenes.h"
 #include "gather/light/environment_map.h"
 #include "gather/packet/packet_gatherer.h"
 #include "gather/rules/gather_outputs.h"

@@ -1,4 +1,4 @@
-#include "bench/embree_truth.h"
+#include "bench/internal/embree_truth.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include <limits>
 #include <thread>
 
-#include "bench/embree_scene.h"
+#include "bench/internal/embree_scene.h"
 #include "core/square_strata.h"
 #include "gather/rules/gather_outputs.h"
 #include "storage/file.h"

@@ -1,4 +1,4 @@
-#include "bench/embree_peers.h"
+#include "bench/internal/embree_peers.h"
 
 #include <fmt/format.h>
 #if defined(__x86_64__)

@@ -1,4 +1,4 @@
-#include "bench/gather_measure.h"
+#include "bench/internal/gather_measure.h"
 
 #include <fmt/format.h>
 #include <time.h>

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "bench/gather_scene_geometry.h"
+#include "bench/internal/gather_scene_geometry.h"
 #include "sample/sample.h"
 #include "storage/file.h"
 #include "surfels/surfel_source.h"

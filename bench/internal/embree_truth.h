@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/gather_scenes.h"
+#include "bench/internal/gather_scenes.h"
 #include "gather/scalar/receiver_raster.h"
 #include "surfeit/status.h"
 

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "bench/embree_scene.h"
-#include "bench/gather_measure.h"
-#include "bench/gather_scenes.h"
+#include "bench/internal/embree_scene.h"
+#include "bench/internal/gather_measure.h"
+#include "bench/internal/gather_scenes.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
 

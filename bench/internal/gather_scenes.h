@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/gather_scene_geometry.h"
+#include "bench/internal/gather_scene_geometry.h"
 #include "gather/scalar/receiver_raster.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/progress.h"

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "bench/error_summary.h"
-#include "bench/gather_scenes.h"
+#include "bench/internal/error_summary.h"
+#include "bench/internal/gather_scenes.h"
 #include "gather/scalar/receiver_raster.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/gather.h"

@@ -1,4 +1,4 @@
-#include "bench/gather_scene_geometry.h"
+#include "bench/internal/gather_scene_geometry.h"
 
 #include <cmath>
 

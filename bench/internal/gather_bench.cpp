@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "bench/gather_bench_options.h"
-#include "bench/gather_measure.h"
-#include "bench/gather_scenes.h"
+#include "bench/internal/gather_bench_options.h"
+#include "bench/internal/gather_measure.h"
+#include "bench/internal/gather_scenes.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/gather_scenes.h"
+#include "bench/internal/gather_scenes.h"
 
 #include <fmt/format.h>
 #include <stdlib.h>

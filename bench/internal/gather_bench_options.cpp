@@ -1,11 +1,11 @@
-#include "bench/gather_bench_options.h"
+#include "bench/internal/gather_bench_options.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdio>
 
-#include "bench/gather_measure.h"
+#include "bench/internal/gather_measure.h"
 #include "surfels/generated/scene_recipe.h"
 
 namespace surfeit {

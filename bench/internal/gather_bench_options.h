@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/gather_scenes.h"
+#include "bench/internal/gather_scenes.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
 

@@ -3,7 +3,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "bench/gather_scene_geometry.h"
+#include "bench/internal/gather_scene_geometry.h"
 #include "core/square_strata.h"
 #include "surfels/generated/scene_surfaces.h"
 #include "surfels/generated/surface_surfel.h"

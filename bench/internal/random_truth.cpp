@@ -1,4 +1,4 @@
-#include "bench/random_truth.h"
+#include "bench/internal/random_truth.h"
 
 #include <embree3/rtcore.h>
 
@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "bench/embree_scene.h"
+#include "bench/internal/embree_scene.h"
 
 namespace surfeit {
 namespace {

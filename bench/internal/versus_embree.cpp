@@ -17,11 +17,11 @@
 #include <utility>
 #include <vector>
 
-#include "bench/embree_peers.h"
-#include "bench/embree_truth.h"
-#include "bench/gather_bench_options.h"
-#include "bench/gather_measure.h"
-#include "bench/gather_scenes.h"
+#include "bench/internal/embree_peers.h"
+#include "bench/internal/embree_truth.h"
+#include "bench/internal/gather_bench_options.h"
+#include "bench/internal/gather_measure.h"
+#include "bench/internal/gather_scenes.h"
 #include "core/job_limits.h"
 
 namespace surfeit {

@@ -1,4 +1,4 @@
-#include "cache_designs.h"
+#include "bench/internal/cache_designs.h"
 
 #include <cstdlib>
 #include <list>

@@ -1,4 +1,4 @@
-#include "bench/embree_scene.h"
+#include "bench/internal/embree_scene.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "cache_designs.h"
+#include "bench/internal/cache_designs.h"
 
 namespace surfeit {
 namespace {

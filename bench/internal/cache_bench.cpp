@@ -18,8 +18,8 @@
 #include <random>
 #include <thread>
 
-#include "cache_designs.h"
-#include "cache_traces.h"
+#include "bench/internal/cache_designs.h"
+#include "bench/internal/cache_traces.h"
 
 namespace surfeit {
 namespace {
