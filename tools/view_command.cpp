@@ -4,10 +4,10 @@
 #include <memory>
 #include <string>
 
+#include "surfeit/view.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/view_options.h"
-#include "view/view.h"
 
 namespace surfeit {
 namespace {
@@ -47,9 +47,9 @@ Status runView(ViewArguments& arguments, CommandContext& context) {
   arguments.options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(const ViewStats stats, viewCloud(arguments.input, arguments.picture,
                                                             arguments.options, context.progress()));
-  const std::string camera =
-      fmt::format("--eye \"{:.10g} {:.10g} {:.10g}\" --look-at \"{:.10g} {:.10g} {:.10g}\"", stats.eye.x,
-                  stats.eye.y, stats.eye.z, stats.look_at.x, stats.look_at.y, stats.look_at.z);
+  const std::string camera = fmt::format(
+      "--eye \"{:.10g} {:.10g} {:.10g}\" --look-at \"{:.10g} {:.10g} {:.10g}\"", stats.eye.x,
+      stats.eye.y, stats.eye.z, stats.look_at.x, stats.look_at.y, stats.look_at.z);
   if (!arguments.options.passes.empty()) {
     context.say(fmt::format("{}: {} of {}x{} pixels see the cloud; {}", arguments.options.passes,
                             formatCount(stats.pass_pixels), arguments.options.width,

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bench/internal/gather_scene_geometry.h"
-#include "sample/sample.h"
 #include "storage/file.h"
+#include "surfeit/sample.h"
 #include "surfels/surfel_source.h"
 
 namespace surfeit {

@@ -29,9 +29,9 @@
 #include "core/square_strata.h"
 #include "storage/file.h"
 #include "storage/page_file.h"
+#include "surfeit/generate.h"
 #include "surfeit/index.h"
 #include "tools/command.h"
-#include "tools/generate_scene.h"
 
 namespace surfeit {
 namespace {

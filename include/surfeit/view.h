@@ -1,5 +1,5 @@
 // Pictures of surfel clouds, streamed: the memory it takes depends on the picture, not on the
-// cloud.
+// cloud. Needs the component `view`, which links libpng (docs/engine.md).
 #pragma once
 
 #include <cstdint>
@@ -8,12 +8,28 @@
 #include <optional>
 #include <string>
 
+#include "surfeit/api.h"
 #include "surfeit/color_range.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
-#include "view/camera.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
+
+enum class PictureFormat : std::uint8_t { kPng, kExr };
+
+// The format that a file name asks for; kInvalidArgument when it is neither .png nor .exr.
+SURFEIT_API Result<PictureFormat> pictureFormat(const std::string& path);
+
+// A camera in perspective, in scene units; whatever is absent is chosen so that the bounds of the
+// cloud fill the picture.
+struct CameraOptions {
+  std::optional<glm::dvec3> eye;
+  std::optional<glm::dvec3> look_at;  // absent: the centre of the bounds
+  std::optional<glm::dvec3> up;       // absent: up_axis
+  UpAxis up_axis = kDefaultUpAxis;
+  double fov_degrees = 35;  // vertical field of view, 1..170
+};
 
 // How surfels are drawn.
 enum class ViewMode : std::uint8_t {
@@ -24,7 +40,11 @@ enum class ViewMode : std::uint8_t {
 
 struct ViewOptions {
   ViewMode mode = ViewMode::kDiscs;
-  std::string channel;             // view/channel.h; empty: the most telling one
+  // What to show: a property or triple of the cloud (radiosity, irradiance, albedo, color, normal,
+  // position, ...), or lit = radiosity + albedo * (irradiance + environment), indirect = albedo *
+  // (irradiance + environment), ao = 1 - occlusion. Empty: the first of lit, ao, radiosity, color,
+  // albedo, normal, position that the cloud has.
+  std::string channel;
   CameraOptions camera;            // but for its up axis
   std::optional<UpAxis> up{};      // absent: the cloud's
   int width = 1280, height = 960;  // pixels
@@ -38,7 +58,8 @@ struct ViewOptions {
   // Value shown black and value shown white, for any channel. Absent: scalars other than occlusion
   // are stretched over the values they take, in PNG; everything else is shown as it is.
   std::optional<glm::dvec2> range;
-  // Where to write what every pixel sees (view/pass_file.h), .exr; empty: nowhere.
+  // Where to write what every pixel sees, as OpenEXR: position, normal, depth, albedo and
+  // radiosity, receivers for a gather. A name in .exr; empty: nowhere.
   std::string passes;
   // Channels of the cloud to be called otherwise, "FROM=TO,FROM=TO" (docs/files.md), and of a file
   // with several parts (grids, layers, elements) the one to read; empty: the first with a cloud.
@@ -48,13 +69,12 @@ struct ViewOptions {
   std::string filter;
   // How colors are read whose numbers do not say what they mean.
   ColorRange color_range = ColorRange::kAuto;
-  // A brick map of whose values the cloud takes those of its surfels (view/brick_rows.h), over that
+  // A brick map of whose values the cloud takes those of its surfels (docs/brick.md), over that
   // width or over each surfel's diameter; empty: none.
   std::string brick;
   std::optional<double> filter_width;
-  std::uint64_t memory_bytes =
-      0;            // budget of the process; 0: three quarters of what the job may use
-  int threads = 0;  // 0: all that the job may use
+  std::uint64_t memory_bytes = 0;  // budget; 0: three quarters of what the job may use
+  int threads = 0;                 // 0: all that the job may use
 };
 
 struct ViewStats {
@@ -78,8 +98,8 @@ struct ViewStats {
 // cloud and the options alone, not on the threads; reordering the records changes it by rounding
 // only. EXR files hold the channel's own values. Errors: kInvalidArgument (options, or a channel
 // that the cloud lacks: the message lists those it has), kBudgetTooSmall (picture too large),
-// kCorruption, kIoError, kInterrupted.
-Result<ViewStats> viewCloud(const std::string& input, const std::string& picture,
-                            const ViewOptions& options, Progress& progress);
+// kCorruption, kIoError, kInterrupted. Calls are independent, so threads may call at once.
+SURFEIT_API Result<ViewStats> viewCloud(const std::string& input, const std::string& picture,
+                                        const ViewOptions& options, Progress& progress);
 
 }  // namespace surfeit

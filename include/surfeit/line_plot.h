@@ -1,10 +1,12 @@
-// Line plots as SVG: measured and predicted quantities against a size in bytes.
+// Line plots as SVG: measured and predicted quantities against a size in bytes, such as those of
+// surfeit/tune.h. Needs the component `view`. Safe from any thread.
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "surfeit/api.h"
 
 namespace surfeit {
 
@@ -38,9 +40,9 @@ struct LinePlot {
   std::vector<PlotMarker> markers;  // in rising order of bytes
 };
 
-// One SVG document with the plots below each other. Texts may be any bytes (SvgDocument). The same
-// plots give the same bytes. Points and markers that an axis cannot show are left out: those not
-// finite, and on logarithmic axes those not above 0.
-std::string encodeSvg(std::string_view title, std::span<const LinePlot> plots);
+// One SVG document with the plots below each other. Texts may be any bytes: they are taken as
+// UTF-8. The same plots give the same bytes. Points and markers that an axis cannot show are left
+// out: those not finite, and on logarithmic axes those not above 0.
+SURFEIT_API std::string encodeSvg(std::string_view title, const std::vector<LinePlot>& plots);
 
 }  // namespace surfeit
