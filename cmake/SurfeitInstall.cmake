@@ -1,5 +1,5 @@
 # Installs the headers, static libraries of all rooms and a shared one, and what finds them:
-# find_package(surfeit COMPONENTS engine clouds) and pkg-config.
+# find_package(surfeit COMPONENTS engine clouds sample view) and pkg-config.
 include(CMakePackageConfigHelpers)
 
 install(DIRECTORY include/surfeit DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
@@ -7,6 +7,12 @@ install(TARGETS ${SURFEIT_ENGINE_TARGETS} EXPORT surfeitEngineTargets ARCHIVE DE
 if(SURFEIT_BUILD_CLOUDS)
   install(TARGETS ${SURFEIT_CLOUD_TARGETS} surfeit EXPORT surfeitCloudsTargets
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
+if(SURFEIT_BUILD_SAMPLE)
+  install(TARGETS surfeit_sample EXPORT surfeitSampleTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
+if(SURFEIT_BUILD_VIEW)
+  install(TARGETS surfeit_view EXPORT surfeitViewTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endif()
 install(TARGETS surfeit_shared EXPORT surfeitSharedTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -20,6 +26,12 @@ install(EXPORT surfeitSharedTargets NAMESPACE surfeit:: DESTINATION ${surfeit_pa
 if(SURFEIT_BUILD_CLOUDS)
   install(EXPORT surfeitCloudsTargets NAMESPACE surfeit:: DESTINATION ${surfeit_package_dir})
 endif()
+if(SURFEIT_BUILD_SAMPLE)
+  install(EXPORT surfeitSampleTargets NAMESPACE surfeit:: DESTINATION ${surfeit_package_dir})
+endif()
+if(SURFEIT_BUILD_VIEW)
+  install(EXPORT surfeitViewTargets NAMESPACE surfeit:: DESTINATION ${surfeit_package_dir})
+endif()
 configure_package_config_file(cmake/surfeitConfig.cmake.in surfeitConfig.cmake
   INSTALL_DESTINATION ${surfeit_package_dir})
 write_basic_package_version_file(surfeitConfigVersion.cmake COMPATIBILITY SameMinorVersion)
@@ -27,6 +39,7 @@ install(FILES
   ${CMAKE_CURRENT_BINARY_DIR}/surfeitConfig.cmake
   ${CMAKE_CURRENT_BINARY_DIR}/surfeitConfigVersion.cmake
   cmake/FindBlosc.cmake
+  cmake/Findstb.cmake
   cmake/FindxxHash.cmake
   DESTINATION ${surfeit_package_dir})
 

@@ -10,6 +10,12 @@ if(SURFEIT_SANITIZE)
   target_link_options(surfeit_build_options INTERFACE -fsanitize=${SURFEIT_SANITIZE})
 endif()
 
+# The include root of the rooms: each library has it to itself, whoever links one sees include/ alone. Tests
+# and bench/internal, which look inside, link this as well.
+add_library(surfeit_internals INTERFACE)
+add_library(surfeit::internals ALIAS surfeit_internals)
+target_include_directories(surfeit_internals INTERFACE ${PROJECT_SOURCE_DIR}/src)
+
 # surfeit_add_layer(<name> SOURCES ... LINKS ... [PRIVATE_LINKS ...])
 function(surfeit_add_layer name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
@@ -19,11 +25,10 @@ function(surfeit_add_layer name)
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   target_compile_features(surfeit_${name} PUBLIC cxx_std_20)
   target_include_directories(surfeit_${name}
-    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>
-    PRIVATE ${PROJECT_SOURCE_DIR}/src)
+    PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(surfeit_${name}
     PUBLIC ${ARG_LINKS}
-    PRIVATE $<BUILD_INTERFACE:surfeit_build_options> ${ARG_PRIVATE_LINKS})
+    PRIVATE $<BUILD_INTERFACE:surfeit_build_options> $<BUILD_INTERFACE:surfeit::internals> ${ARG_PRIVATE_LINKS})
 endfunction()
 
 # surfeit_join_sources(<target>): a unity build. Most of the time of small sources goes into headers of CLI11
@@ -38,8 +43,8 @@ function(surfeit_add_test layer)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${layer}_test ${ARG_SOURCES})
   surfeit_join_sources(${layer}_test)
-  target_include_directories(${layer}_test PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
-  target_link_libraries(${layer}_test PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main surfeit_build_options)
+  target_include_directories(${layer}_test PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_link_libraries(${layer}_test PRIVATE ${ARG_LINKS} surfeit::internals GTest::gmock GTest::gtest_main surfeit_build_options)
   target_compile_definitions(${layer}_test PRIVATE
     SURFEIT_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}/tests"
     SURFEIT_SHARED_DATA_DIR="${PROJECT_SOURCE_DIR}/../shared/data")

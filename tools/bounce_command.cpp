@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "core/job_limits.h"
 #include "surfeit/bounce.h"
+#include "surfeit/process.h"
 #include "tools/cache_report.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/job_limits.h"
 #include "surfeit/brick.h"
+#include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 

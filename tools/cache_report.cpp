@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "surfeit/output.h"
 #include "tools/command.h"
 
 namespace surfeit {
@@ -99,7 +100,7 @@ std::string cacheTable(const GatherStats& stats) {
 }
 
 Status writeCacheSeries(const std::string& path, const std::vector<GatherWindow>& windows) {
-  return writeTextFile(
+  return writeOutput(
       path, path.ends_with(".json") ? windowsJson(windows).dump(2) + "\n" : seriesCsv(windows));
 }
 

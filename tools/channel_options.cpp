@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "cloud/channels.h"
+#include "surfeit/job.h"
 
 namespace surfeit {
 

@@ -12,8 +12,8 @@ namespace surfeit {
 // --color-range: how colors are read whose numbers do not say what they mean.
 void addColorRangeOption(CLI::App& command, ColorRange& color_range);
 
-// --channels, --part, --filter, and --text, which goes into `channels` (cloud/channels.h,
-// kTextChannel). The library parses `channels`: a text that is no list of FROM=TO is a usage error
+// --channels, --part, --filter, and --text, which goes into `channels` (kTextChannel of
+// surfeit/job.h). The library parses `channels`: a text that is no list of FROM=TO is a usage error
 // of its own.
 void addChannelOptions(CLI::App& command, std::string& channels, std::string& part,
                        std::string& filter);

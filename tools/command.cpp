@@ -10,11 +10,8 @@
 #include <limits>
 #include <new>
 
-#include "core/job_limits.h"
-#include "core/program_memory.h"
-#include "core/resident_limit.h"
-#include "core/seconds_since.h"
-#include "storage/file.h"
+#include "surfeit/output.h"
+#include "surfeit/process.h"
 #include "tools/output_check.h"
 
 namespace surfeit {
@@ -76,10 +73,7 @@ void CommandContext::run(const std::function<Status()>& body) {
   Status status;
   progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
                                                 common.strict);
-  countProgramInBudgets();
-  if (programBytes(1) > 0) {
-    limitResidentBytes(common.memory_bytes > 0 ? common.memory_bytes : defaultMemoryBytes());
-  }
+  limitProcess(common.memory_bytes);
   try {
     status = checkParsed();
     if (status.ok()) status = body();
@@ -134,15 +128,11 @@ Status CommandContext::writeStats(nlohmann::json fields) {
   fields["cpu_seconds"] = processCpuSeconds();
   fields["peak_resident_bytes"] = peakResidentBytes();
   fields["threads"] = threads();
-  return writeTextFile(common.stats_path, fields.dump(2) + "\n");
+  return writeOutput(common.stats_path, fields.dump(2) + "\n");
 }
 
-double CommandContext::wallSeconds() const { return secondsSince(start_); }
-
-Status writeTextFile(const std::string& path, const std::string& text) {
-  SURFEIT_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::create(path));
-  SURFEIT_RETURN_IF_ERROR(file.append(std::as_bytes(std::span(text))));
-  return file.commit();
+double CommandContext::wallSeconds() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
 }
 
 int CommandContext::threads() const {

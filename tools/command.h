@@ -98,9 +98,6 @@ using PhaseSeconds = std::vector<std::pair<std::string, double>>;
 std::string formatPhases(const PhaseSeconds& phases);
 nlohmann::json jsonOfPhases(const PhaseSeconds& phases);
 
-// Writes a whole file, which appears when complete.
-Status writeTextFile(const std::string& path, const std::string& text);
-
 // Exit status of a failure (docs/architecture.md): 2 usage, 3 bad data, 33 budget, 74 I/O, 130
 // interrupted.
 int exitStatus(StatusCode code);

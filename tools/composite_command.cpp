@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/composite.h"
 #include "tools/command.h"
 #include "tools/view_options.h"
-#include "view/composite.h"
 
 namespace surfeit {
 namespace {

@@ -8,8 +8,6 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "core/seconds_since.h"
-
 namespace surfeit {
 namespace {
 
@@ -81,7 +79,8 @@ void ConsoleProgress::advance(std::uint64_t count) {
 
 void ConsoleProgress::draw() {
   const std::uint64_t done = done_;
-  const double seconds = secondsSince(phase_start_);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - phase_start_).count();
   const double rate = seconds > 0 ? double(done) / seconds : 0;
   const double part = total_ > 0 ? std::min(1.0, double(done) / double(total_)) : 0;
   const double left = rate > 0 && total_ > done ? double(total_ - done) / rate : 0;

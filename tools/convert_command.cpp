@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/job_limits.h"
 #include "surfeit/convert.h"
+#include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/number_list.h"

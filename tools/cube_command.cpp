@@ -10,20 +10,17 @@
 #include <string_view>
 #include <vector>
 
-#include "batch/gather_memory.h"
-#include "batch/gather_options.h"
-#include "core/program_memory.h"
-#include "sample/traced_cube.h"
 #include "surfeit/cube.h"
+#include "surfeit/cube_picture.h"
+#include "surfeit/sample.h"
 #include "surfeit/scene.h"
+#include "surfeit/view.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
 #include "tools/light_options.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
-#include "view/cube_picture.h"
-#include "view/picture_file.h"
 
 namespace surfeit {
 namespace {
@@ -69,17 +66,6 @@ std::vector<CubePanel> parsePanels(std::string_view text) {
   return panels;
 }
 
-Result<CubeImage> traceReference(const CubeImage& cube, const CubeArguments& arguments,
-                                 CommandContext& context) {
-  const GatherQuality& quality = arguments.options.quality;
-  SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh,
-                           loadMeshes(arguments.reference, Material().albedo, context.progress()));
-  SURFEIT_ASSIGN_OR_RETURN(const RayScene rays, RayScene::build(mesh, context.threads()));
-  return traceCube(
-      cube, mesh, rays,
-      {.rays = arguments.rays, .sides = quality.sides, .max_distance = quality.max_distance});
-}
-
 // Root mean square of the difference of coverage, by what directions count.
 double coverageError(const CubeImage& cube, const CubeImage& traced) {
   double sum = 0, weight_sum = 0;
@@ -91,25 +77,6 @@ double coverageError(const CubeImage& cube, const CubeImage& traced) {
     weight_sum += weight;
   }
   return weight_sum > 0 ? std::sqrt(sum / weight_sum) : 0;
-}
-
-// The gather's memory is free again when the picture is drawn.
-Status writeCube(const CubeViews& cubes, const CubeArguments& arguments) {
-  SURFEIT_ASSIGN_OR_RETURN(const PictureFormat format, pictureFormat(arguments.picture));
-  if (format == PictureFormat::kExr) {
-    return writeCubeExr(arguments.picture, cubes, arguments.drawing.up);
-  }
-  const std::uint64_t needed = programBytes(1) + cubePictureBytes(cubes, arguments.drawing);
-  const std::uint64_t budget = withDefaults(arguments.options).memory_bytes;
-  if (budget < needed) {
-    return Status::budgetTooSmall(fmt::format(
-        "a memory budget of {:.1f} MiB is too small for the picture: {} is the least that works; "
-        "fewer panels (--show) or a smaller --zoom take less",
-        double(budget) / (1 << 20), formatMebibytes(needed)));
-  }
-  PngOptions png;
-  png.is_data = true;
-  return writePicture(arguments.picture, drawCube(cubes, arguments.drawing), png);
 }
 
 std::string describe(const CubeImage& cube, const CubeArguments& arguments) {
@@ -139,12 +106,20 @@ Status runCube(CubeArguments& arguments, CommandContext& context) {
                                                             options, context.progress()));
   std::optional<CubeImage> traced;
   if (!arguments.reference.empty()) {
-    SURFEIT_ASSIGN_OR_RETURN(traced, traceReference(cube, arguments, context));
+    TracedCubeOptions tracing;
+    tracing.rays = arguments.rays;
+    tracing.sides = options.quality.sides;
+    tracing.max_distance = options.quality.max_distance;
+    tracing.threads = context.threads();
+    SURFEIT_ASSIGN_OR_RETURN(traced,
+                             traceCube(cube, arguments.reference, tracing, context.progress()));
   }
   const CubeViews cubes = {&cube, traced ? &*traced : nullptr};
   SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.scene));
   arguments.drawing.up = arguments.up.value_or(info.up);
-  SURFEIT_RETURN_IF_ERROR(writeCube(cubes, arguments));
+  // The gather's memory is free again when the picture is drawn
+  SURFEIT_RETURN_IF_ERROR(
+      writeCubePicture(arguments.picture, cubes, arguments.drawing, options.memory_bytes));
 
   context.say(describe(cube, arguments));
   nlohmann::json fields = {

@@ -4,12 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "batch/gather_options.h"
-#include "batch/receiver_sorter.h"
-#include "core/job_limits.h"
-#include "gather/rules/gather_outputs.h"
-#include "storage/file.h"
 #include "surfeit/bake.h"
+#include "surfeit/process.h"
 #include "surfeit/tune.h"
 #include "tools/cache_report.h"
 #include "tools/channel_options.h"
@@ -26,34 +22,11 @@ struct GatherArguments {
   GatherOptions options;
 };
 
-// The last row of the curve that a budget reaches.
-const TuneRow& rowFor(const TuneReport& report, std::uint64_t memory_bytes) {
-  const TuneRow* found = &report.rows.front();
-  for (const std::vector<TuneRow>* rows : {&report.rows, &report.curve}) {
-    for (const TuneRow& row : *rows) {
-      const bool is_reached = row.memory_bytes <= memory_bytes;
-      if (is_reached && row.memory_bytes > found->memory_bytes) found = &row;
-    }
-  }
-  return *found;
-}
-
 // --dry-run: what tune finds out, at the budget of the gather.
 Status sayForecast(const GatherArguments& arguments, CommandContext& context) {
-  constexpr std::uint64_t kSample = 50'000;
-  TuneOptions tuning;
-  tuning.gather = arguments.options;
-  tuning.sample_receivers = kSample;
-  SURFEIT_ASSIGN_OR_RETURN(const TuneReport report, tuneGather(arguments.scene, arguments.receivers,
-                                                               tuning, context.progress()));
-  const GatherOptions options = withDefaults(arguments.options);
-  const std::uint64_t memory = options.memory_bytes;
-  const TuneRow& row = rowFor(report, memory);
-  const std::uint64_t result_bytes = resultFloats(options.outputs) * sizeof(float);
-  const std::uint64_t temporary =
-      report.receivers * (sizeof(SortedReceiver) + result_bytes + sizeof(std::uint32_t));
-  SURFEIT_ASSIGN_OR_RETURN(const InputFile receivers, InputFile::open(arguments.receivers));
-  const std::uint64_t output = receivers.size() + report.receivers * result_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(
+      const GatherForecast forecast,
+      forecastGather(arguments.scene, arguments.receivers, arguments.options, context.progress()));
   context.answer(fmt::format(
       "{}: {} receivers, by a sample of {}:\n"
       "  memory           {} (the least that works {}, recommended {})\n"
@@ -61,19 +34,19 @@ Status sayForecast(const GatherArguments& arguments, CommandContext& context) {
       "  result           about {}, where it is no text and not compressed\n"
       "  time             about {:.0f} s with {} threads\n"
       "Nothing was written.",
-      arguments.result, formatCount(report.receivers), formatCount(report.sampled_receivers),
-      formatBytes(memory), formatBytes(report.rows.front().memory_bytes),
-      formatBytes(report.recommended.memory_bytes), formatBytes(temporary), formatBytes(output),
-      row.predicted.seconds, report.threads));
+      arguments.result, formatCount(forecast.receivers), formatCount(forecast.sampled_receivers),
+      formatBytes(forecast.memory_bytes), formatBytes(forecast.least_memory_bytes),
+      formatBytes(forecast.recommended_memory_bytes), formatBytes(forecast.temporary_bytes),
+      formatBytes(forecast.result_bytes), forecast.seconds, forecast.threads));
   return context.writeStats({{"command", "gather"},
                              {"dry_run", true},
-                             {"receivers", report.receivers},
-                             {"sampled_receivers", report.sampled_receivers},
-                             {"memory_bytes", memory},
-                             {"recommended_memory_bytes", report.recommended.memory_bytes},
-                             {"temporary_bytes", temporary},
-                             {"output_bytes", output},
-                             {"seconds", row.predicted.seconds}});
+                             {"receivers", forecast.receivers},
+                             {"sampled_receivers", forecast.sampled_receivers},
+                             {"memory_bytes", forecast.memory_bytes},
+                             {"recommended_memory_bytes", forecast.recommended_memory_bytes},
+                             {"temporary_bytes", forecast.temporary_bytes},
+                             {"output_bytes", forecast.result_bytes},
+                             {"seconds", forecast.seconds}});
 }
 
 Status runGather(GatherArguments& arguments, CommandContext& context) {
@@ -100,7 +73,7 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
   }
   return context.writeStats({{"command", "gather"},
                              {"mode", modeName(options.mode)},
-                             {"outputs", outputWords(withDefaults(options).outputs)},
+                             {"outputs", describeOutputs(stats.outputs)},
                              {"max_solid_angle", options.quality.max_solid_angle},
                              {"raster_resolution", options.quality.raster_resolution},
                              {"near_field_radii", options.quality.near_field_radii},

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "octree/read/group_set.h"
+#include "surfeit/scene.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 

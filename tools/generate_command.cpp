@@ -6,10 +6,9 @@
 #include <memory>
 #include <string>
 
-#include "core/resident_limit.h"
+#include "surfeit/generate.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
-#include "tools/generate_scene.h"
 
 namespace surfeit {
 namespace {
@@ -46,10 +45,6 @@ Status runGenerate(const GenerateArguments& arguments, CommandContext& context) 
         fmt::format("{}: a recipe of {} surfels", arguments.output, formatCount(recipe.surfels)));
     return context.writeStats(std::move(fields));
   }
-  // Batches on their way; a scene that is written as it is made takes no more
-  constexpr std::uint64_t kBatchBytes = 10 << 20, kThreadBytes = 4 << 20;
-  SURFEIT_RETURN_IF_ERROR(checkResidentBytes(
-      "generate", kBatchBytes + kThreadBytes * std::uint64_t(context.threads())));
   SURFEIT_ASSIGN_OR_RETURN(
       const GenerateStats stats,
       generateScene(recipe, arguments.output, context.threads(), context.progress()));

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/job_limits.h"
 #include "surfeit/index.h"
+#include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/normal_options.h"

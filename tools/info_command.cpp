@@ -2,22 +2,11 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "cloud/channels.h"
-#include "cloud/cloud_formats.h"
-#include "cloud/ply/ply_reader.h"
-#include "core/bounds.h"
-#include "core/up_comment.h"
-#include "index/cloud_density.h"
-#include "octree/read/group_set.h"
-#include "octree/read/scene_file.h"
-#include "storage/byte_input.h"
+#include "surfeit/cloud_info.h"
 #include "surfeit/scene.h"
-#include "surfels/surfel_source.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 
@@ -25,10 +14,12 @@ namespace surfeit {
 namespace {
 
 struct InfoArguments {
-  std::string path, channels, part, filter;
+  std::string path;
+  ReadOptions reading;
   bool json = false;
-  ColorRange color_range = ColorRange::kAuto;
 };
+
+char upAxisName(UpAxis up) { return "xyz"[static_cast<int>(up)]; }
 
 nlohmann::json vectorJson(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
 
@@ -166,49 +157,13 @@ std::string sceneText(const std::string& path, const SceneInfo& info) {
       formatBytes(info.surfel_cache_bytes), info.provenance);
 }
 
-Result<RowReaderOptions> readingOf(const InfoArguments& arguments) {
-  RowReaderOptions options;
-  SURFEIT_ASSIGN_OR_RETURN(options.channels, parseChannelRenames(arguments.channels));
-  options.part = arguments.part;
-  options.filter = arguments.filter;
-  options.color_range = arguments.color_range;
-  return options;
-}
-
-// What a pass over a cloud finds.
-struct CloudScan {
-  Bounds3d bounds;
-  std::uint64_t spheres = 0;  // surfels without a normal
-  PlaceSample sample;
-};
-
-// Reads all surfels, which are counted from `origin`.
-Result<CloudScan> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(source.rewind());
-  source.setOrigin(origin);
-  CloudScan scan{{}, 0, PlaceSample(source.recordCount())};
-  std::vector<Surfel> batch(16384);
-  progress.beginPhase("scan", source.recordCount(), "surfels");
-  for (;;) {
-    if (progress.isCancelled()) return Status::interrupted();
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source.read(batch));
-    if (count == 0) return scan;
-    for (const Surfel& surfel : std::span(batch).first(count)) {
-      scan.bounds.add(glm::dvec3(surfel.position) + origin);
-      scan.spheres += surfel.isSphere() ? 1 : 0;
-    }
-    scan.sample.add(std::span(batch).first(count));
-    progress.advance(count);
-  }
-}
-
-void addMissing(const SurfelSource& source, const CloudScan& scan, nlohmann::json& json) {
-  const CloudChannels channels = source.channels();
+void addMissing(const CloudSurfels& surfels, nlohmann::json& json) {
+  const CloudChannels& channels = surfels.channels;
   std::string normals, sizes;
-  if (scan.spheres > 0) {
+  if (surfels.spheres > 0) {
     normals = "`surfeit normals` finds them, or `surfeit index --normals estimate`";
     if (channels.normal) {
-      normals = fmt::format("of {} surfels: {}", formatCount(scan.spheres), normals);
+      normals = fmt::format("of {} surfels: {}", formatCount(surfels.spheres), normals);
     }
   }
   if (!channels.radius && !channels.area) {
@@ -219,31 +174,17 @@ void addMissing(const SurfelSource& source, const CloudScan& scan, nlohmann::jso
 
 // Of records that are surfels: how many are valid, their channels, bounds and density, and what
 // they lack. Those of a cloud without surfels are left out.
-Status addSurfels(const InfoArguments& arguments, nlohmann::json& json, Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions options, readingOf(arguments));
-  Result<std::unique_ptr<SurfelSource>> source =
-      openSurfelSource(arguments.path, /* strict= */ false, options);
-  if (!source.ok()) return {};
-  SURFEIT_ASSIGN_OR_RETURN(CloudScan scan, scanSurfels(**source, glm::dvec3(0), progress));
-  // Floats about an origin near the cloud have its digits: once more when 0 is far
-  if (!scan.bounds.isEmpty() && originFor(scan.bounds) != glm::dvec3(0)) {
-    SURFEIT_ASSIGN_OR_RETURN(scan, scanSurfels(**source, originFor(scan.bounds), progress));
-  }
-  const Bounds3d& bounds = scan.bounds;
-  json["surfels"] = scan.sample.surfelCount();
-  json["notes"] = (*source)->notes();
-  json["input_channels"] = channelNames((*source)->channels());
-  if (!bounds.isEmpty()) {
-    json["bounds"] = {vectorJson(bounds.min), vectorJson(bounds.max)};
-  }
-  const std::string defects = (*source)->defects().describe();
-  if (!defects.empty()) json["defects"] = defects;
-  if (bounds.isEmpty()) return {};
-  addMissing(**source, scan, json);
-  SURFEIT_ASSIGN_OR_RETURN(const CloudDensity density,
-                           measureDensity(**source, scan.sample, progress));
-  addDensity(density, json);
-  return {};
+void addSurfels(const CloudInfo& info, nlohmann::json& json) {
+  if (!info.surfels) return;
+  const CloudSurfels& surfels = *info.surfels;
+  json["surfels"] = surfels.count;
+  json["notes"] = info.notes;
+  json["input_channels"] = channelNames(surfels.channels);
+  if (!surfels.defects.empty()) json["defects"] = surfels.defects;
+  if (surfels.count == 0) return;
+  json["bounds"] = {vectorJson(surfels.min), vectorJson(surfels.max)};
+  addMissing(surfels, json);
+  addDensity(surfels.density, json);
 }
 
 std::string notesText(const nlohmann::json& json) {
@@ -265,20 +206,18 @@ std::string surfelsText(const nlohmann::json& json) {
   return text + densityText(json) + missingText(json);
 }
 
-// Any PLY as it is stored: elements and properties; bounds when the records are surfels.
-Result<nlohmann::json> plyJson(const InfoArguments& arguments, Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(const PlyReader reader, PlyReader::open(arguments.path));
-  nlohmann::json json = {{"format", "ply"}, {"elements", nlohmann::json::array()}};
-  for (const RowLayout& element : reader.header().elements) {
+// A PLY as it is stored: elements and properties; bounds when the records are surfels.
+nlohmann::json plyJson(const CloudInfo& info) {
+  nlohmann::json json = {{"format", info.format}, {"elements", nlohmann::json::array()}};
+  for (const CloudElement& element : info.elements) {
     nlohmann::json properties = nlohmann::json::array();
-    for (const RowProperty& property : element.properties) {
-      properties.push_back(std::string(property.is_list ? "list " : "") +
-                           std::string(valueTypeName(property.type)) + " " + property.name);
+    for (const CloudProperty& property : element.properties) {
+      properties.push_back((property.is_list ? "list " : "") + property.type + " " + property.name);
     }
     json["elements"].push_back(
         {{"name", element.name}, {"count", element.count}, {"properties", properties}});
   }
-  SURFEIT_RETURN_IF_ERROR(addSurfels(arguments, json, progress));
+  addSurfels(info, json);
   return json;
 }
 
@@ -297,26 +236,17 @@ std::string plyText(const std::string& path, const nlohmann::json& json) {
 
 // Any other cloud, and a PLY whose channels are renamed: what a row holds, and what of the file it
 // does not.
-Result<nlohmann::json> cloudJson(const InfoArguments& arguments, Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions options, readingOf(arguments));
-  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader,
-                           openRowReader(arguments.path, options));
-  const RowLayout& element = reader->element();
-  nlohmann::json json = {{"format", reader->formatName()},
-                         {"count", element.count},
+nlohmann::json cloudJson(const CloudInfo& info) {
+  nlohmann::json json = {{"format", info.format},
+                         {"count", info.records},
                          {"channels", nlohmann::json::array()},
-                         {"comments", reader->comments()},
-                         {"notes", reader->notes()}};
-  for (const RowChannel& channel : channelsOf(element)) {
-    nlohmann::json properties = nlohmann::json::array();
-    for (const std::size_t i : channel.properties) {
-      properties.push_back(element.properties[i].name);
-    }
-    json["channels"].push_back({{"name", channel.name},
-                                {"type", valueTypeName(channel.type)},
-                                {"properties", properties}});
+                         {"comments", info.comments},
+                         {"notes", info.notes}};
+  for (const CloudChannel& channel : info.channels) {
+    json["channels"].push_back(
+        {{"name", channel.name}, {"type", channel.type}, {"properties", channel.properties}});
   }
-  SURFEIT_RETURN_IF_ERROR(addSurfels(arguments, json, progress));
+  addSurfels(info, json);
   return json;
 }
 
@@ -334,16 +264,6 @@ std::string cloudText(const std::string& path, const nlohmann::json& json) {
   return text + notesText(json) + surfelsText(json);
 }
 
-// The first bytes of a file, decompressed.
-Result<std::string> firstBytes(const std::string& path) {
-  SURFEIT_ASSIGN_OR_RETURN(ByteInput file, ByteInput::open(path));
-  std::string bytes(8, '\0');
-  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
-                           file.readSome(0, std::as_writable_bytes(std::span(bytes))));
-  bytes.resize(size);
-  return bytes;
-}
-
 // Density of a scene, and what it lacks. Where pages are damaged, that is told, and the rest all
 // the same.
 Status addSurfelsOfScene(const std::string& path, const SceneInfo& info, nlohmann::json& json,
@@ -352,8 +272,7 @@ Status addSurfelsOfScene(const std::string& path, const SceneInfo& info, nlohman
       info.channels,
       info.channels.normal ? "" : "`surfeit index --normals estimate` of the cloud finds them", "",
       json);
-  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(path));
-  const Result<CloudDensity> density = measureDensity(std::move(scene), progress);
+  const Result<CloudDensity> density = measureSceneDensity(path, progress);
   if (density.status().code() == StatusCode::kCorruption) {
     progress.note(density.status().message() + ": the density is not known");
     return {};
@@ -364,16 +283,11 @@ Status addSurfelsOfScene(const std::string& path, const SceneInfo& info, nlohman
 }
 
 Status runInfo(const InfoArguments& arguments, CommandContext& context) {
-  SURFEIT_ASSIGN_OR_RETURN(const std::string first_bytes, firstBytes(arguments.path));
   nlohmann::json json;
   std::string text;
-  const bool is_as_stored =
-      arguments.channels.empty() && arguments.part.empty() && arguments.filter.empty();
-  if (is_as_stored && first_bytes.starts_with("ply")) {
-    SURFEIT_ASSIGN_OR_RETURN(json, plyJson(arguments, context.progress()));
-    text = plyText(arguments.path, json);
-  } else if (isSceneFile(first_bytes)) {
-    if (!arguments.filter.empty()) {
+  SURFEIT_ASSIGN_OR_RETURN(const bool is_scene, isScene(arguments.path));
+  if (is_scene) {
+    if (!arguments.reading.filter.empty()) {
       return Status::invalidArgument(fmt::format(
           "{}: a scene, whose surfels are not filtered: give the filter to `surfeit index`",
           arguments.path));
@@ -383,8 +297,11 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
     SURFEIT_RETURN_IF_ERROR(addSurfelsOfScene(arguments.path, info, json, context.progress()));
     text = sceneText(arguments.path, info) + densityText(json) + missingText(json);
   } else {
-    SURFEIT_ASSIGN_OR_RETURN(json, cloudJson(arguments, context.progress()));
-    text = cloudText(arguments.path, json);
+    SURFEIT_ASSIGN_OR_RETURN(const CloudInfo info,
+                             readCloudInfo(arguments.path, arguments.reading, context.progress()));
+    const bool is_ply = info.format == "ply";
+    json = is_ply ? plyJson(info) : cloudJson(info);
+    text = is_ply ? plyText(arguments.path, json) : cloudText(arguments.path, json);
   }
   json["path"] = arguments.path;
   if (arguments.json) {
@@ -402,8 +319,9 @@ void addInfoCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<InfoArguments>();
   command->add_option("FILE", arguments->path, "Scene file (.sft) or cloud (docs/files.md)")
       ->required();
-  addChannelOptions(*command, arguments->channels, arguments->part, arguments->filter);
-  addColorRangeOption(*command, arguments->color_range);
+  ReadOptions& reading = arguments->reading;
+  addChannelOptions(*command, reading.channels, reading.part, reading.filter);
+  addColorRangeOption(*command, reading.color_range);
   command->add_flag("--json", arguments->json, "JSON on standard output");
   context.addCommonOptions(*command, {.threads = false, .memory = false, .stats = false});
   command->footer(

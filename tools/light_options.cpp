@@ -2,39 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <string_view>
+#include <cstdint>
+#include <string>
 
-#include "gather/rules/gather_outputs.h"
 #include "tools/gather_options.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
 
 namespace surfeit {
-namespace {
-
-// Words between commas.
-std::uint32_t parseOutputs(std::string_view text) {
-  std::uint32_t outputs = 0;
-  while (!text.empty()) {
-    const std::string_view word = text.substr(0, text.find(','));
-    text.remove_prefix(std::min(text.size(), word.size() + 1));
-    bool is_known = false;
-    for (const OutputColumns& columns : outputColumns()) {
-      if (columns.word != word) continue;
-      outputs |= columns.output;
-      is_known = true;
-    }
-    if (!is_known) {
-      throw CLI::ValidationError("--outputs", fmt::format("found \"{}\", expected some of {}", word,
-                                                          outputWords(kAllOutputs)));
-    }
-  }
-  return outputs;
-}
-
-}  // namespace
-
 void addDirectionOptions(CLI::App& command, GatherOptions& options) {
   constexpr const char* kGroup = "Directions";
   using Distribution = GatherWeights::Distribution;
@@ -118,8 +93,12 @@ void addLightOptions(CLI::App& command, GatherOptions& options) {
   command
       .add_option_function<std::string>(
           "--outputs",
-          [&options](const std::string& text) { options.outputs = parseOutputs(text); },
-          "Outputs at the receivers, separated by commas: " + outputWords(kAllOutputs))
+          [&options](const std::string& text) {
+            const Result<std::uint32_t> outputs = parseOutputs(text);
+            if (!outputs.ok()) throw CLI::ValidationError("--outputs", outputs.status().message());
+            options.outputs = *outputs;
+          },
+          "Outputs at the receivers, separated by commas: " + describeOutputs(kAllOutputs))
       ->type_name("LIST")
       ->default_str("what the mode gives");
   command
@@ -131,15 +110,6 @@ void addLightOptions(CLI::App& command, GatherOptions& options) {
       ->group("Quality");
   addDirectionOptions(command, options);
   addEnvironmentOptions(command, options.environment);
-}
-
-std::string outputWords(std::uint32_t outputs) {
-  std::string words;
-  for (const OutputColumns& columns : outputColumns()) {
-    if ((outputs & columns.output) == 0) continue;
-    words += (words.empty() ? "" : ",") + std::string(columns.word);
-  }
-  return words;
 }
 
 }  // namespace surfeit

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <cstdint>
-#include <string>
 
 #include "surfeit/bake.h"
 
@@ -14,8 +12,5 @@ void addLightOptions(CLI::App& command, GatherOptions& options);
 
 // A part of it: weights of directions, and falloff.
 void addDirectionOptions(CLI::App& command, GatherOptions& options);
-
-// "occlusion,irradiance": the words of a set of GatherOutput.
-std::string outputWords(std::uint32_t outputs);
 
 }  // namespace surfeit

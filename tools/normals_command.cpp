@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "core/job_limits.h"
 #include "surfeit/normals.h"
+#include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/normal_options.h"

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "storage/output_target.h"
+#include "surfeit/output.h"
 
 namespace surfeit {
 namespace {
@@ -45,7 +45,7 @@ Status checkOutputs(const CLI::App& command, bool works_in_place) {
   for (const CLI::Option* const option : command.get_options()) {
     if (option->count() == 0 || !isOutput(*option)) continue;
     Output output{"--" + option->get_lnames().front(), option->results().back(), {}, false};
-    SURFEIT_ASSIGN_OR_RETURN(const OutputTarget target, resolveOutput(output.path));
+    SURFEIT_ASSIGN_OR_RETURN(const OutputPlace target, findOutput(output.path));
     output.is_file = !target.is_stream && ::stat(target.path.c_str(), &output.info) == 0;
     for (const Output& earlier : outputs) {
       const bool is_same = output.path == earlier.path && !target.is_stream;

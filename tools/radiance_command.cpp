@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/job_limits.h"
+#include "surfeit/process.h"
 #include "surfeit/radiance.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "sample/photon_tracer.h"
-#include "sample/sample.h"
+#include "surfeit/sample.h"
 #include "tools/command.h"
 #include "tools/sample_options.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sample/sample.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 

@@ -8,11 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "surfeit/line_plot.h"
+#include "surfeit/output.h"
 #include "surfeit/tune.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
 #include "tools/light_options.h"
-#include "view/line_plot.h"
 
 namespace surfeit {
 namespace {
@@ -152,7 +153,7 @@ Status writePlot(const TuneArguments& arguments, const TuneReport& report) {
   addSeries(plots[2], report, "time", [](const TuneOutcome& outcome) { return outcome.seconds; });
   const std::string svg =
       encodeSvg(fmt::format("{} with {}", arguments.scene, arguments.receivers), plots);
-  return writeTextFile(arguments.plot, svg);
+  return writeOutput(arguments.plot, svg);
 }
 
 Status runTune(TuneArguments& arguments, CommandContext& context) {

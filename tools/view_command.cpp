@@ -4,10 +4,10 @@
 #include <memory>
 #include <string>
 
+#include "surfeit/view.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/view_options.h"
-#include "view/view.h"
 
 namespace surfeit {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "view/composite.h"
-#include "view/view.h"
+#include "surfeit/composite.h"
+#include "surfeit/view.h"
 
 namespace surfeit {
 

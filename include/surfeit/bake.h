@@ -46,6 +46,7 @@ struct GatherOptions : GatherSettings, JobOptions, ReadOptions {
 };
 
 struct GatherStats {
+  std::uint32_t outputs = 0;  // what receivers got, set of GatherOutput
   std::uint64_t receivers = 0;
   std::uint64_t invalid_receivers = 0;
   std::uint64_t interpolated_receivers = 0;  // all other valid receivers were gathered

@@ -7,8 +7,11 @@
 #include <glm/vec3.hpp>
 #include <limits>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "surfeit/api.h"
+#include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "surfeit/up_axis.h"
 
@@ -37,6 +40,14 @@ enum GatherOutput : std::uint32_t {
   // environment, over the sphere; over the hemisphere for a receiver with a normal
   kOutputRadianceSh = 1u << 6,
 };
+
+inline constexpr std::uint32_t kAllOutputs = 2 * kOutputRadianceSh - 1;
+
+// A set of outputs in words, "occlusion,irradiance", and the set that such words mean:
+// kInvalidArgument names one that is no output. Words: occlusion, irradiance, bent_normal,
+// illumination_direction, environment, fluence, radiance_sh. Safe from any thread.
+SURFEIT_API std::string describeOutputs(std::uint32_t outputs);
+SURFEIT_API Result<std::uint32_t> parseOutputs(std::string_view words);
 
 // Weights of directions, and falloff of occlusion with distance (app note 2.3). For a receiver
 // without a normal all directions weigh alike.

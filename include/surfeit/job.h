@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "surfeit/color_range.h"
 
@@ -18,6 +19,11 @@ struct JobOptions {
   // Directory of temporary files. Empty: SLURM_TMPDIR or TMPDIR where set, else beside the output.
   std::string temporary_directory{};
 };
+
+// Among the channels of ReadOptions, "--text=decimal-comma" or "--text=decimal-point": how commas
+// in text are read. Without, the lines tell.
+inline constexpr std::string_view kTextChannel = "--text", kDecimalComma = "decimal-comma",
+                                  kDecimalPoint = "decimal-point";
 
 // How clouds are read (docs/files.md).
 struct ReadOptions {

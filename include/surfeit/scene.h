@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "surfeit/api.h"
@@ -35,6 +36,12 @@ struct SceneInfo {
 // Reads header and directory; for a scene with object groups, the first page as well. Errors:
 // kIoError, kCorruption.
 SURFEIT_API Result<SceneInfo> readSceneInfo(const std::string& path);
+
+// The groups of a set in rising order, runs of three or more as ranges, "0,2-5"; "none" for the
+// empty set. And the set that such a list means: kInvalidArgument tells the part that is neither
+// group nor range, or that names one beyond kMaxGroups - 1. Safe from any thread.
+SURFEIT_API std::string describeGroups(std::uint64_t groups);
+SURFEIT_API Result<std::uint64_t> parseGroups(std::string_view text);
 
 struct VerifyReport {
   std::uint64_t pages_checked = 0;

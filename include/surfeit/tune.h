@@ -91,4 +91,21 @@ SURFEIT_API Result<TuneReport> tuneGather(const std::string& scene_path,
                                           const std::string& receivers_path,
                                           const TuneOptions& options, Progress& progress);
 
+// What a gather in the budget of its options will take, about.
+struct GatherForecast {
+  std::uint64_t receivers = 0, sampled_receivers = 0;
+  int threads = 0;
+  std::uint64_t memory_bytes = 0;                                      // the budget
+  std::uint64_t least_memory_bytes = 0, recommended_memory_bytes = 0;  // as TuneReport has them
+  std::uint64_t temporary_bytes = 0;                                   // at most
+  std::uint64_t result_bytes = 0;  // where it is no text and not compressed
+  double seconds = 0;              // wall time inside the gather proper
+};
+
+// Tunes by a small sample, and reads the row of the report that the budget reaches. Writes nothing
+// but temporary files. Errors: as tuneGather.
+SURFEIT_API Result<GatherForecast> forecastGather(const std::string& scene_path,
+                                                  const std::string& receivers_path,
+                                                  const GatherOptions& options, Progress& progress);
+
 }  // namespace surfeit

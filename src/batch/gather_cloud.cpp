@@ -44,6 +44,7 @@ class CloudGather {
         options_(options),
         temporary_directory_(temporaryDirectory(options.temporary_directory, result_path)),
         progress_(progress) {
+    stats_.outputs = options.outputs;
     stats_.threads = options.threads;
     stats_.memory_bytes = options.memory_bytes;
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cloud/row_layout.h"
+#include "surfeit/job.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -22,10 +23,8 @@ enum class ChannelKind { kFloat, kPoint, kVector, kNormal, kColor, kMatrix };
 struct ChannelRename {
   std::string from, to;
 };
-// In place of a channel: how text is read, "--text=decimal-comma" or "--text=decimal-point".
-inline constexpr std::string_view kTextChannel = "--text", kDecimalComma = "decimal-comma",
-                                  kDecimalPoint = "decimal-point";
-// Parses "from=to,from=to"; kInvalidArgument naming the part that is not of that form.
+// Parses "from=to,from=to", where kTextChannel (surfeit/job.h) may stand in place of a channel;
+// kInvalidArgument naming the part that is not of that form.
 Result<std::vector<ChannelRename>> parseChannelRenames(std::string_view text);
 
 // Properties of a channel named `name` in a file, `components` values each, after the renames and

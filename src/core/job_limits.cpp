@@ -90,6 +90,8 @@ std::uint64_t memoryLimitBytes(const std::string& root) {
   return limit;
 }
 
+std::uint64_t memoryLimitBytes() { return memoryLimitBytes(std::string()); }
+
 std::uint64_t defaultMemoryBytes(std::uint64_t most) {
   return std::min(most, memoryLimitBytes() / 4 * 3);
 }

@@ -11,23 +11,13 @@
 
 #include "core/bounds.h"
 #include "octree/read/scene_file.h"
+#include "surfeit/cloud_info.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "surfels/surfel_source.h"
 
 namespace surfeit {
-
-// Spacing at a place is sqrt(pi r^2 / k), r being the distance of the k-th nearest other place and
-// k 8, or all where there are fewer: the edge of the square that a place has for its own on a
-// surface.
-struct CloudDensity {
-  std::uint64_t sampled = 0;  // points whose places were looked at
-  // Over places: the median, and what 5 and 95 % are below. 0 where there is one place at most.
-  double median_spacing = 0, low_spacing = 0, high_spacing = 0;
-  double points_per_area = 0;  // of the median spacing, all points of a place counted
-  double repeated_share = 0;   // of the places, those that have several points
-};
 
 // Points from all over a cloud: one, by chance that is the same each time, of each thousandth of
 // its records. One thread at a time.

@@ -11,6 +11,7 @@
 #include "cloud/parts/property_renames.h"
 #include "core/parallel.h"
 #include "core/up_comment.h"
+#include "surfeit/cloud_info.h"
 #include "surfels/surfel_rows.h"
 
 namespace surfeit {

@@ -20,9 +20,6 @@ namespace surfeit {
 Result<std::unique_ptr<RowReader>> readSceneAsCloud(SceneFile scene,
                                                     const RowReaderOptions& options = {});
 
-// Whether the file begins like a scene. kIoError.
-Result<bool> isScene(const std::string& path);
-
 // Opens a cloud of any format (openRowReader), or a scene as one.
 Result<std::unique_ptr<RowReader>> openCloud(const std::string& path,
                                              const RowReaderOptions& options = {});

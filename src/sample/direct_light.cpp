@@ -41,17 +41,16 @@ float luminance(const glm::vec3& rgb) {
 
 }  // namespace
 
-Lights Lights::countedFrom(const glm::dvec3& origin) const {
-  Lights moved = *this;
-  for (PointLight& light : moved.points) light.position -= origin;
-  for (AreaLight& light : moved.areas) light.centre -= origin;
-  return moved;
+Lights countedFrom(Lights lights, const glm::dvec3& origin) {
+  for (PointLight& light : lights.points) light.position -= origin;
+  for (AreaLight& light : lights.areas) light.centre -= origin;
+  return lights;
 }
 
 DirectLight::DirectLight(const Mesh& mesh, const RayScene& scene, const Lights& lights)
     : mesh_(mesh),
       scene_(scene),
-      lights_(lights.countedFrom(mesh.origin)),
+      lights_(countedFrom(lights, mesh.origin)),
       offset_(scene.surfaceOffset()) {
   // Triangles emit in proportion to area and luminance, so they are chosen that way
   double sum = 0;

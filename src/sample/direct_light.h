@@ -10,41 +10,12 @@
 #include "core/split_mix.h"
 #include "sample/mesh.h"
 #include "sample/ray_scene.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 
-struct PointLight {
-  glm::dvec3 position{0};
-  glm::vec3 intensity{0};  // W/sr: E = I cos / d^2
-};
-
-struct DirectionalLight {
-  glm::vec3 direction{0, -1, 0};  // in which the light travels; any length but zero
-  glm::vec3 irradiance{0};        // on a surface that faces it
-};
-
-// A rectangle with corners centre +- u +- v that emits on the side of u x v. It is no geometry:
-// it neither casts shadows nor is seen.
-struct AreaLight {
-  glm::dvec3 centre{0};
-  glm::vec3 u{0}, v{0};
-  glm::vec3 radiance{0};
-};
-
-struct Lights {
-  std::vector<PointLight> points;
-  std::vector<DirectionalLight> directionals;
-  std::vector<AreaLight> areas;
-  // Shadow rays per area light, and as many for all emissive triangles together.
-  int samples = 16;
-  // Do emissive surfaces carry their own emission as radiosity? They light the others either way; a
-  // gather from surfels that carry it too would count that light twice.
-  bool with_emission = false;
-
-  // The same lights, their places counted from an origin.
-  Lights countedFrom(const glm::dvec3& origin) const;
-  bool isEmpty() const { return points.empty() && directionals.empty() && areas.empty(); }
-};
+// The same lights, their places counted from an origin.
+Lights countedFrom(Lights lights, const glm::dvec3& origin);
 
 // Lights of the options and the emissive triangles of the mesh. Immutable; safe from any thread.
 class DirectLight {

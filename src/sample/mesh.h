@@ -13,8 +13,8 @@
 #include "core/bounds.h"
 #include "sample/texture.h"
 #include "surfeit/progress.h"
+#include "surfeit/sample.h"
 #include "surfeit/status.h"
-#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -84,14 +84,6 @@ double triangleArea(const Mesh& mesh, std::uint32_t triangle);
 // without any triangle.
 Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& default_albedo,
                         Progress& progress);
-
-// A square on the ground below everything else.
-struct GroundPlane {
-  bool enabled = false;
-  UpAxis up = kDefaultUpAxis;
-  float size = 2;  // edge length over the diagonal of the bounds
-  glm::vec3 albedo{0.5f};
-};
 
 // Appends the ground: centred below the bounds, lowered by 1/10000 of their diagonal so that flat
 // bottoms do not share its plane.

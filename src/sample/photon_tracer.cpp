@@ -1,4 +1,5 @@
-#include "sample/photon_tracer.h"
+// Photon maps: photons sent from the lights and scattered through the meshes, stored wherever they
+// meet a diffuse surface (Jensen 1996; app note 6.1).
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
@@ -10,6 +11,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <exception>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -28,9 +30,13 @@
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
+#include "core/split_mix.h"
 #include "core/tangent_frame.h"
 #include "core/up_comment.h"
+#include "sample/direct_light.h"
 #include "sample/ray_scene.h"
+#include "sample/surroundings.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 namespace {
@@ -132,7 +138,7 @@ class Emitters {
  public:
   // Mesh and scene must outlive it.
   Emitters(const Mesh& mesh, const RayScene& scene, const Lights& lights)
-      : mesh_(mesh), lights_(lights.countedFrom(mesh.origin)), offset_(scene.surfaceOffset()) {
+      : mesh_(mesh), lights_(countedFrom(lights, mesh.origin)), offset_(scene.surfaceOffset()) {
     centre_ = scene.bounds().centre();
     reach_ = 0.5f * glm::length(scene.bounds().extent()) + offset_;
     for (std::size_t i = 0; i < lights.points.size(); ++i) {
@@ -337,6 +343,7 @@ Status checkOptions(const PhotonTracingOptions& options) {
 Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
                                         const std::string& output,
                                         const PhotonTracingOptions& options, Progress& progress) {
+  if (meshes.empty()) return Status::invalidArgument("sample: no mesh");
   SURFEIT_RETURN_IF_ERROR(checkOptions(options));
   PhotonTracingStats stats;
   stats.threads = options.threads > 0 ? options.threads : defaultThreadCount();
@@ -389,6 +396,8 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
     stats.trace_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));
+  } catch (const std::exception& error) {
+    return Status::failed(fmt::format("{}: {}", output, error.what()));
   }
   return stats;
 }

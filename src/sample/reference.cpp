@@ -8,6 +8,7 @@
 
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
+#include "sample/surroundings.h"
 
 namespace surfeit {
 namespace {

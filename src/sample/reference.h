@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "sample/direct_light.h"
 #include "sample/ray_scene.h"
-#include "sample/sample.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 

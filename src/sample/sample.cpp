@@ -1,4 +1,4 @@
-#include "sample/sample.h"
+#include "surfeit/sample.h"
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -20,7 +21,9 @@
 #include "core/spherical_harmonics.h"
 #include "core/up_comment.h"
 #include "sample/dice.h"
+#include "sample/direct_light.h"
 #include "sample/ray_scene.h"
+#include "sample/surroundings.h"
 #include "surfels/surfel_writer.h"
 
 namespace surfeit {
@@ -272,49 +275,9 @@ Result<std::uint64_t> surfelCountFor(const SampleOptions& options, double area) 
 
 }  // namespace
 
-Status checkSurroundings(const Surroundings& surroundings) {
-  if (surroundings.lights.samples < 1 || surroundings.lights.samples > 65536) {
-    return Status::invalidArgument(
-        fmt::format("light samples {}: expected 1 to 65536", surroundings.lights.samples));
-  }
-  const GroundPlane& ground = surroundings.ground;
-  if (!(ground.size > 0) || !(ground.size < 1e6f)) {
-    return Status::invalidArgument(
-        fmt::format("ground of size {}: expected a size up to 1e6", ground.size));
-  }
-  // A sum is finite only when all its terms are
-  const auto isFinite = [](const glm::vec3& sum) { return std::isfinite(sum.x + sum.y + sum.z); };
-  for (const PointLight& light : surroundings.lights.points) {
-    if (!isFinite(glm::vec3(light.position) + light.intensity)) {
-      return Status::invalidArgument("point light: a value is not finite");
-    }
-  }
-  for (const DirectionalLight& light : surroundings.lights.directionals) {
-    const float length = glm::length(light.direction);
-    if (!(length > 0) || !isFinite(light.direction / length + light.irradiance)) {
-      return Status::invalidArgument("directional light: direction is zero or a value not finite");
-    }
-  }
-  for (const AreaLight& light : surroundings.lights.areas) {
-    const float quarter_area = glm::length(glm::cross(light.u, light.v));
-    if (!(quarter_area > 0) || !std::isfinite(quarter_area) ||
-        !isFinite(glm::vec3(light.centre) + light.radiance)) {
-      return Status::invalidArgument(
-          "area light: half edges u and v are parallel or zero, or a value is not finite");
-    }
-  }
-  return {};
-}
-
-Result<Mesh> loadScene(const std::vector<std::string>& meshes, const Surroundings& surroundings,
-                       Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(Mesh mesh, loadMeshes(meshes, surroundings.default_albedo, progress));
-  addGroundPlane(surroundings.ground, mesh);
-  return mesh;
-}
-
 Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const std::string& output,
                                  const SampleOptions& options, Progress& progress) {
+  if (meshes.empty()) return Status::invalidArgument("sample: no mesh");
   SURFEIT_RETURN_IF_ERROR(checkOptions(options));
   SampleStats stats;
   stats.threads = options.threads > 0 ? options.threads : defaultThreadCount();
@@ -370,6 +333,8 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     stats.sample_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));
+  } catch (const std::exception& error) {
+    return Status::failed(fmt::format("{}: {}", output, error.what()));
   }
   return stats;
 }

@@ -6,6 +6,9 @@
 #include <limits>
 #include <optional>
 
+#include "core/guard.h"
+#include "core/job_limits.h"
+
 namespace surfeit {
 namespace {
 
@@ -84,6 +87,20 @@ CubeImage traceCube(const CubeImage& cube, const Mesh& mesh, const RayScene& ray
   }
   traced.occlusion = weight_sum > 0 ? float(sum / weight_sum) : 0;
   return traced;
+}
+
+Result<CubeImage> traceCube(const CubeImage& cube, const std::vector<std::string>& meshes,
+                            const TracedCubeOptions& options, Progress& progress) {
+  if (options.rays < 1) {
+    return Status::invalidArgument("rays along an edge of a pixel: expected at least 1");
+  }
+  if (meshes.empty()) return Status::invalidArgument("traced cube: no mesh");
+  return guarded(meshes.front(), [&]() -> Result<CubeImage> {
+    SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh, loadMeshes(meshes, Material().albedo, progress));
+    const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
+    SURFEIT_ASSIGN_OR_RETURN(const RayScene rays, RayScene::build(mesh, threads));
+    return traceCube(cube, mesh, rays, options);
+  });
 }
 
 }  // namespace surfeit

@@ -5,16 +5,9 @@
 #include "sample/mesh.h"
 #include "sample/ray_scene.h"
 #include "surfeit/cube.h"
-#include "surfeit/gather.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
-
-struct TracedCubeOptions {
-  int rays = 8;  // along an edge of a pixel
-  // Surfaces that rays pass through are those whose surfels do not cover.
-  GatherSides sides = GatherSides::kFront;
-  float max_distance = 1e30f;
-};
 
 // The same receiver, faces and pixels as `cube`, with coverage and depth of rays in a grid over
 // each pixel; there is no light, and one layer. Rays begin 1/10000 of the mesh's diagonal above the

@@ -7,23 +7,13 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <optional>
 
 #include "core/bounds.h"
 #include "surfeit/status.h"
-#include "surfeit/up_axis.h"
+#include "surfeit/view.h"
 #include "view/view_frame.h"
 
 namespace surfeit {
-
-// What the user asks for; whatever is absent is chosen so that the bounds fill the picture.
-struct CameraOptions {
-  std::optional<glm::dvec3> eye;
-  std::optional<glm::dvec3> look_at;  // absent: the centre of the bounds
-  std::optional<glm::dvec3> up;       // absent: up_axis
-  UpAxis up_axis = kDefaultUpAxis;
-  double fov_degrees = 35;  // vertical field of view, 1..170
-};
 
 // Immutable. Works in double outside the camera, so that clouds far from the origin stay sharp.
 class Camera {

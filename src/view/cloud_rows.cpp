@@ -9,6 +9,7 @@
 #include "core/up_comment.h"
 #include "index/scene_rows.h"
 #include "octree/read/scene_file.h"
+#include "surfeit/cloud_info.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "view/composite.h"
+#include "surfeit/composite.h"
 
 #include <OpenEXR/ImfHeader.h>
 #include <fmt/format.h>
@@ -7,8 +7,10 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <exception>
 #include <memory>
 #include <new>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -269,13 +271,15 @@ Result<CompositeStats> compose(std::span<const std::string> inputs, const std::s
 
 }  // namespace
 
-Result<CompositeStats> compositePicture(std::span<const std::string> inputs,
+Result<CompositeStats> compositePicture(const std::vector<std::string>& inputs,
                                         const std::string& picture, const CompositeOptions& options,
                                         Progress& progress) {
   try {
     return compose(inputs, picture, options, progress);
   } catch (const std::bad_alloc&) {
     return Status::budgetTooSmall(fmt::format("{}: out of memory", picture));
+  } catch (const std::exception& error) {
+    return Status::failed(fmt::format("{}: {}", picture, error.what()));
   }
 }
 

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "surfeit/cube.h"
-#include "view/camera.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 

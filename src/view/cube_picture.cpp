@@ -11,7 +11,11 @@
 #include <utility>
 
 #include "cloud/exr/exr_image_writer.h"
+#include "core/guard.h"
+#include "core/job_limits.h"
+#include "core/program_memory.h"
 #include "view/cube_layout.h"
+#include "view/picture_file.h"
 #include "view/srgb.h"
 
 namespace surfeit {
@@ -282,6 +286,26 @@ Status writeCubeExr(const std::string& path, const CubeViews& cubes, UpAxis up) 
     SURFEIT_RETURN_IF_ERROR(image->writeLine());
   }
   return image->finish();
+}
+
+Status writeCubePicture(const std::string& path, const CubeViews& cubes,
+                        const CubePictureOptions& options, std::uint64_t memory_bytes) {
+  return guarded(path, [&]() -> Status {
+    SURFEIT_ASSIGN_OR_RETURN(const PictureFormat format, pictureFormat(path));
+    if (format == PictureFormat::kExr) return writeCubeExr(path, cubes, options.up);
+    const std::uint64_t needed = programBytes(1) + cubePictureBytes(cubes, options);
+    const std::uint64_t budget = memory_bytes > 0 ? memory_bytes : defaultMemoryBytes();
+    if (budget < needed) {
+      return Status::budgetTooSmall(
+          fmt::format("a memory budget of {:.1f} MiB is too small for the picture: {:.1f} MiB is "
+                      "the least that "
+                      "works; fewer panels (--show) or a smaller --zoom take less",
+                      double(budget) / (1 << 20), std::ceil(double(needed) / (1 << 20) * 10) / 10));
+    }
+    PngOptions png;
+    png.is_data = true;
+    return writePicture(path, drawCube(cubes, options), png);
+  });
 }
 
 }  // namespace surfeit

@@ -1,4 +1,4 @@
-#include "view/line_plot.h"
+#include "surfeit/line_plot.h"
 
 #include <fmt/format.h>
 
@@ -216,7 +216,7 @@ void drawPlot(SvgDocument& svg, const LinePlot& plot, double top) {
 
 }  // namespace
 
-std::string encodeSvg(std::string_view title, std::span<const LinePlot> plots) {
+std::string encodeSvg(std::string_view title, const std::vector<LinePlot>& plots) {
   SvgDocument svg(title, kWidth, kTitleHeight + kPanelHeight * double(plots.size()));
   svg.addText({kWidth / 2, 26}, title, {.anchor = Anchor::kMiddle, .size = 16});
   double top = kTitleHeight;

@@ -9,11 +9,10 @@
 #include <vector>
 
 #include "surfeit/status.h"
+#include "surfeit/view.h"
 #include "view/picture.h"
 
 namespace surfeit {
-
-enum class PictureFormat : std::uint8_t { kPng, kExr };
 
 // How scene-linear pixels become the display values of a PNG file.
 struct PngOptions {
@@ -21,9 +20,6 @@ struct PngOptions {
   bool is_data = false;         // values are display values already: neither exposure nor curve
   glm::vec3 background{0.13f};  // behind the cloud; display values
 };
-
-// The format that a file name asks for; kInvalidArgument when it is neither .png nor .exr.
-Result<PictureFormat> pictureFormat(const std::string& path);
 
 // 8-bit RGB with the sRGB curve.
 Result<std::vector<std::byte>> encodePng(const Picture& picture, const PngOptions& options);

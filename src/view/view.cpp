@@ -1,4 +1,4 @@
-#include "view/view.h"
+#include "surfeit/view.h"
 
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <memory>
 #include <new>
 
@@ -14,6 +15,7 @@
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "view/brick_rows.h"
+#include "view/camera.h"
 #include "view/channel.h"
 #include "view/cloud_record.h"
 #include "view/cloud_renderer.h"
@@ -285,6 +287,8 @@ Result<ViewStats> viewCloud(const std::string& input, const std::string& picture
     return result;
   } catch (const std::bad_alloc&) {
     return Status::budgetTooSmall(fmt::format("{}: out of memory", picture));
+  } catch (const std::exception& error) {
+    return Status::failed(fmt::format("{}: {}", picture, error.what()));
   }
 }
 

@@ -13,7 +13,7 @@
 #include "cloud/cloud_formats.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
-#include "sample/sample.h"
+#include "surfeit/sample.h"
 #include "surfels/surfel_source.h"
 
 namespace surfeit {

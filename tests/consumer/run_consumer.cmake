@@ -16,28 +16,37 @@ endif()
 file(REMOVE_RECURSE ${WORK_DIR})
 file(MAKE_DIRECTORY ${WORK_DIR}/scene)
 run(${CMAKE_COMMAND} --install ${SURFEIT_BINARY_DIR} --config ${BUILD_TYPE} --prefix ${WORK_DIR}/prefix)
-run(${CMAKE_COMMAND} -S ${PROJECT_DIR} -B ${WORK_DIR}/build -G ${GENERATOR}
+set(settings
   -D CMAKE_BUILD_TYPE=${BUILD_TYPE}
   -D CMAKE_CXX_COMPILER=${CXX_COMPILER}
   -D CMAKE_CXX_COMPILER_LAUNCHER=${CXX_LAUNCHER}
   -D CMAKE_CXX_FLAGS=${flags}
   -D CMAKE_PREFIX_PATH=${WORK_DIR}/prefix)
+run(${CMAKE_COMMAND} -S ${PROJECT_DIR} -B ${WORK_DIR}/build -G ${GENERATOR} ${settings})
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build --config ${BUILD_TYPE})
 run(${WORK_DIR}/build/consumer ${WORK_DIR}/scene)
 run(${WORK_DIR}/build/shared_consumer ${WORK_DIR}/scene)
 run(${WORK_DIR}/build/engine_consumer ${WORK_DIR}/scene/ceiling.sft)
+file(GLOB sample_targets ${WORK_DIR}/prefix/*/cmake/surfeit/surfeitSampleTargets.cmake
+  ${WORK_DIR}/prefix/*/*/cmake/surfeit/surfeitSampleTargets.cmake)
+if(sample_targets)
+  run(${WORK_DIR}/build/sample_consumer ${WORK_DIR}/scene)
+endif()
 
 # The engine alone links no formats of files
 execute_process(COMMAND ldd ${WORK_DIR}/build/engine_consumer OUTPUT_VARIABLE libraries)
-if(libraries MATCHES "OpenEXR|blosc|Imath")
+if(libraries MATCHES "OpenEXR|blosc|Imath|embree|png")
   message(FATAL_ERROR "the engine links formats of files:\n${libraries}")
 endif()
 
-# and a host that wants the engine alone needs none of them, nor what the program needs
+# and a host that wants the engine alone needs none of them, nor what the program needs, whether it
+# finds the library or builds it
 set(without "")
 foreach(package OpenEXR Blosc CLI11 embree PNG)
   list(APPEND without -D CMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
 endforeach()
+run(${CMAKE_COMMAND} -S ${PROJECT_DIR} -B ${WORK_DIR}/engine_consumer -G ${GENERATOR} ${settings} ${without}
+  -D ENGINE_ONLY=ON)
 run(${CMAKE_COMMAND} -S ${PROJECT_DIR}/../../.. -B ${WORK_DIR}/engine_only -G ${GENERATOR} ${without}
   -D SURFEIT_BUILD_CLOUDS=OFF -D SURFEIT_BUILD_TOOLS=OFF -D SURFEIT_BUILD_TESTS=OFF
   -D SURFEIT_BUILD_BENCH=OFF)

@@ -13,10 +13,10 @@
 #include "cloud/ply/ply_reader.h"
 #include "io/test_directory.h"
 #include "sample/reference.h"
-#include "sample/sample.h"
 #include "surfeit/bake.h"
 #include "surfeit/bounce.h"
 #include "surfeit/index.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 namespace {

@@ -14,9 +14,9 @@
 #include "fidelity/baked_rows.h"
 #include "io/test_directory.h"
 #include "sample/reference.h"
-#include "sample/sample.h"
 #include "surfeit/bake.h"
 #include "surfeit/index.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 

@@ -15,12 +15,11 @@
 #include "core/tangent_frame.h"
 #include "fidelity/baked_rows.h"
 #include "io/test_directory.h"
-#include "sample/photon_tracer.h"
 #include "sample/reference.h"
-#include "sample/sample.h"
 #include "surfeit/bake.h"
 #include "surfeit/index.h"
 #include "surfeit/radiance.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 namespace {

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Whether every file of src/ includes only what its room may (rooms.txt), formats do not know the
-# table that lists them, and no engine room includes a library that it must not link.
+# table that lists them, no engine room includes a library that it must not link, and who calls the
+# library includes its public headers alone.
 #
 #   check_layering.sh SOURCE_DIRECTORY
 set -euo pipefail
@@ -61,8 +62,31 @@ awk -v rooms="$rooms" '
   END { exit bad }
 ' $(find src -name '*.h' -o -name '*.cpp' | sort)
 
-# Whoever calls the library needs its headers alone: those of include/surfeit know no room
-if grep -nE '^ *# *include *"' include/surfeit/*.h | grep -v '"surfeit/'; then
-  echo "public headers must include public headers alone" >&2
-  exit 1
-fi
+# What calls the library, or may be called by it, knows no room.
+#
+#   includes_only WHO ALLOWED FILE...: no file includes another header in quotes than those
+#   whose names match ALLOWED; paths that climb are not allowed either
+bad=0
+includes_only() {
+  local who=$1 allowed=$2
+  shift 2
+  [ $# -gt 0 ] || return 0
+  if grep -HnE '^ *# *include *"' "$@" | grep -vE ":[0-9]+: *# *include *\"($allowed)" ||
+    grep -HnE '^ *# *include *["<].*\.\./' "$@"; then
+    echo "$who must include $allowed alone" >&2
+    bad=1
+  fi
+  # In angle brackets a room would be found as well
+  if grep -HnE "^ *# *include *<(src|$rooms_below)/" "$@"; then
+    echo "$who must not include rooms" >&2
+    bad=1
+  fi
+}
+rooms_below=$(find src -mindepth 1 -maxdepth 1 -type d -printf '%f|')
+rooms_below=${rooms_below%|}
+shopt -s nullglob
+includes_only "public headers" 'surfeit/' include/surfeit/*.h
+includes_only "tools/" 'surfeit/|tools/' tools/*.h tools/*.cpp
+includes_only "bench/, but for bench/internal," 'surfeit/|bench/[a-z_]*\.h' bench/*.h bench/*.cpp
+includes_only "examples/" 'surfeit/|[a-z_]*\.h' examples/*.h examples/*.cpp
+exit $bad

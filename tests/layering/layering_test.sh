@@ -9,9 +9,11 @@ source_dir=$1
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-mkdir -p "$work/src" "$work/include"
+mkdir -p "$work/src" "$work/include" "$work/bench"
 cp -r "$source_dir/include/surfeit" "$work/include/"
 cp -r "$source_dir/src/." "$work/src/"
+cp -r "$source_dir/tools" "$source_dir/examples" "$work/"
+cp "$source_dir"/bench/*.h "$source_dir"/bench/*.cpp "$work/bench/"
 "$here/check_layering.sh" "$work"
 
 # expect_refusal FILE LINE: the check fails when LINE is added to FILE
@@ -35,3 +37,12 @@ expect_refusal src/gather/packet/packet_raster.cpp '#include <tbb/parallel_for.h
 expect_refusal src/storage/file.cpp '#include <OpenEXR/ImfHeader.h>'
 expect_refusal include/surfeit/gather.h '#include "gather/rules/receiver.h"'
 expect_refusal src/core/bounds.h '#include "surfels/surfel_names.h"'
+expect_refusal tools/command.h '#include "core/job_limits.h"'
+expect_refusal tools/main.cpp '#include "src/core/job_limits.h"'
+expect_refusal tools/main.cpp '#include "tools/../src/core/job_limits.h"'
+expect_refusal tools/main.cpp '#include <core/job_limits.h>'
+expect_refusal tools/main.cpp '#include "bench/or_exit.h"'
+expect_refusal bench/engine_bench.cpp '#include "gather/cut/cut.h"'
+expect_refusal bench/engine_bench.cpp '#include "bench/internal/error_summary.h"'
+expect_refusal bench/or_exit.h '#include "storage/file.h"'
+expect_refusal examples/renderer.cpp '#include "engine/engine_state.h"'

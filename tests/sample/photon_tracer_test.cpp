@@ -1,5 +1,3 @@
-#include "sample/photon_tracer.h"
-
 #include <gmock/gmock.h>
 
 #include <atomic>
@@ -13,6 +11,7 @@
 #include "core/spherical_harmonics.h"
 #include "sample/reference.h"
 #include "sample/scene_files.h"
+#include "surfeit/sample.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-#include "sample/sample.h"
+#include "surfeit/sample.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "view/composite.h"
+#include "surfeit/composite.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "view/line_plot.h"
+#include "surfeit/line_plot.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

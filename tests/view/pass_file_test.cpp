@@ -12,7 +12,7 @@
 
 #include "io/exr_test_picture.h"
 #include "io/test_directory.h"
-#include "view/view.h"
+#include "surfeit/view.h"
 
 namespace surfeit {
 namespace {

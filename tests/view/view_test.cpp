@@ -1,4 +1,4 @@
-#include "view/view.h"
+#include "surfeit/view.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

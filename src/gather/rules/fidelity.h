@@ -106,7 +106,7 @@ struct Fidelity {
 };
 
 // bench/sensitivity changes them; everywhere else they are constants.
-#ifdef SURFEIT_CHANGES_FIDELITY  // bench/CMakeLists.txt
+#ifdef SURFEIT_CHANGES_FIDELITY  // bench/internal/CMakeLists.txt
 inline Fidelity kFidelity;
 #else
 inline constexpr Fidelity kFidelity;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 
@@ -23,6 +24,32 @@ using ResultArray = std::array<float, kResultFloats>;
 }  // namespace
 
 std::span<const OutputColumns> outputColumns() { return kColumns; }
+
+std::string describeOutputs(std::uint32_t outputs) {
+  std::string words;
+  for (const OutputColumns& columns : kColumns) {
+    if ((outputs & columns.output) == 0) continue;
+    words += (words.empty() ? "" : ",") + std::string(columns.word);
+  }
+  return words;
+}
+
+Result<std::uint32_t> parseOutputs(std::string_view words) {
+  std::uint32_t outputs = 0;
+  while (!words.empty()) {
+    const std::string_view word = words.substr(0, words.find(','));
+    words.remove_prefix(std::min(words.size(), word.size() + 1));
+    const auto found =
+        std::find_if(kColumns.begin(), kColumns.end(),
+                     [word](const OutputColumns& columns) { return columns.word == word; });
+    if (found == kColumns.end()) {
+      return Status::invalidArgument(
+          fmt::format("found \"{}\", expected some of {}", word, describeOutputs(kAllOutputs)));
+    }
+    outputs |= found->output;
+  }
+  return outputs;
+}
 
 std::size_t resultFloats(std::uint32_t outputs) {
   std::size_t sum = 0;

@@ -22,8 +22,6 @@ struct OutputColumns {
 };
 std::span<const OutputColumns> outputColumns();
 
-inline constexpr std::uint32_t kAllOutputs = 2 * kOutputRadianceSh - 1;
-
 // Floats that a set of outputs takes when packed, and their names as properties, in that order.
 std::size_t resultFloats(std::uint32_t outputs);
 std::vector<std::string> resultNames(std::uint32_t outputs, GatherMode mode);

@@ -1,7 +1,0 @@
-#include "cache_designs.h"
-
-namespace surfeit {
-
-std::vector<NamedDesign> rocksDbDesigns() { return {}; }
-
-}  // namespace surfeit

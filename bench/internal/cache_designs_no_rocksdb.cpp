@@ -1,0 +1,7 @@
+#include "bench/internal/cache_designs.h"
+
+namespace surfeit {
+
+std::vector<NamedDesign> rocksDbDesigns() { return {}; }
+
+}  // namespace surfeit

@@ -1,0 +1,156 @@
+// Step one of the memo: surfels with direct light, or a photon map, from triangle meshes (memo
+// 08-01, section 3.1); and the rays that a raster cube is held to. Needs the component `sample`,
+// which links Embree (docs/engine.md).
+//
+// Meshes are PLY files, or OBJ files with their MTL; several are taken as one. Lengths are scene
+// units. Exitance and irradiance are in W/m2, radiance in W/(m2 sr), all scene-linear rgb. Calls
+// are independent, so threads may call at once; each uses the threads that it is given. Meshes are
+// held whole, some 100 bytes a triangle: nothing but limitProcess (surfeit/process.h) bounds that.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "surfeit/api.h"
+#include "surfeit/cube.h"
+#include "surfeit/gather.h"
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+#include "surfeit/up_axis.h"
+
+namespace surfeit {
+
+// A light at one place.
+struct PointLight {
+  glm::dvec3 position{0};
+  glm::vec3 intensity{0};  // W/sr: E = I cos / d^2
+};
+
+// Light from infinitely far away.
+struct DirectionalLight {
+  glm::vec3 direction{0, -1, 0};  // in which the light travels; any length but zero
+  glm::vec3 irradiance{0};        // on a surface that faces it
+};
+
+// A rectangle with corners centre +- u +- v that emits on the side of u x v. It is no geometry:
+// it neither casts shadows nor is seen.
+struct AreaLight {
+  glm::dvec3 centre{0};
+  glm::vec3 u{0}, v{0};
+  glm::vec3 radiance{0};
+};
+
+struct Lights {
+  std::vector<PointLight> points;
+  std::vector<DirectionalLight> directionals;
+  std::vector<AreaLight> areas;
+  // Shadow rays per area light, and as many for all emissive triangles together.
+  int samples = 16;
+  // Do emissive surfaces carry their own emission as radiosity? They light the others either way; a
+  // gather from surfels that carry it too would count that light twice.
+  bool with_emission = false;
+
+  bool isEmpty() const { return points.empty() && directionals.empty() && areas.empty(); }
+};
+
+// A square on the ground below everything else.
+struct GroundPlane {
+  bool enabled = false;
+  UpAxis up = kDefaultUpAxis;
+  float size = 2;  // edge length over the diagonal of the bounds
+  glm::vec3 albedo{0.5f};
+};
+
+// What stands around the meshes; the sampler and the reference share it.
+struct Surroundings {
+  glm::vec3 default_albedo{0.5f};  // of meshes without colors and materials
+  GroundPlane ground;
+  Lights lights;
+};
+
+struct SampleOptions {
+  Surroundings surroundings;
+  std::uint64_t count = 1'000'000;  // surfels, in proportion to area; slivers add a few
+  double spacing = 0;               // > 0: one surfel per spacing^2 instead of a count
+  bool is_two_sided = false;        // both sides send and block light, and pieces have longer sides
+  int threads = 0;                  // 0: all that the job may use
+};
+
+struct SampleStats {
+  std::uint64_t triangles = 0;
+  std::uint64_t degenerate_faces = 0;
+  std::uint64_t surfels = 0;         // written
+  std::uint64_t sliver_surfels = 0;  // beyond the count asked for, from cutting slivers
+  std::uint64_t clear_surfels = 0;   // not written: nothing of them is there (d, Tr, map_d)
+  double area = 0;                   // of the meshes
+  double disk_area = 0;              // sum of pi r^2: over `area`, how often disks overlap
+  double spacing = 0;                // root of the area per surfel
+  double load_seconds = 0, build_seconds = 0, sample_seconds = 0;
+  int threads = 0;
+};
+
+// Writes a cloud of the format that its name tells, with normals, radii, areas, albedo, when
+// anything emits, radiosity, and of two-sided meshes two_sided and longer sides. The cloud depends
+// on meshes and options alone, not on the threads. Memory: the meshes, Embree's hierarchy (less
+// than 100 bytes per triangle) and a few batches of surfels, whatever the count. Errors: kIoError,
+// kCorruption (bad mesh), kInvalidArgument (options), kInterrupted, kFailed.
+SURFEIT_API Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes,
+                                             const std::string& output,
+                                             const SampleOptions& options, Progress& progress);
+
+struct PhotonTracingOptions {
+  Surroundings surroundings;
+  std::uint64_t photons = 1'000'000;  // sent from all lights together, at least 1
+  std::uint64_t seed = 0;             // another seed, other photons of the same light
+  int threads = 0;                    // 0: all that the job may use
+};
+
+struct PhotonTracingStats {
+  std::uint64_t triangles = 0;
+  std::uint64_t degenerate_faces = 0;
+  std::uint64_t emitted = 0;
+  std::uint64_t stored = 0;         // at most one per surface that a photon meets
+  std::uint64_t escaped = 0;        // photons that left the scene in the end
+  std::uint64_t lost_at_backs = 0;  // photons that met the back of a surface, which is black
+  glm::dvec3 emitted_power{0};      // of all lights
+  glm::dvec3 stored_power{0};       // arrives at surfaces, those of later bounces included
+  double load_seconds = 0, build_seconds = 0, trace_seconds = 0;
+  int threads = 0;
+};
+
+// Photon maps: photons sent from the lights and scattered through the meshes, stored wherever they
+// meet a diffuse surface (Jensen 1996; app note 6.1). surfeit/radiance.h makes surfels of them.
+//
+// Writes a photon cloud of the format that the name of the output tells: position, normal of the
+// surface, power before reflection, direction that the photon came from, albedo; floats, by the
+// names of docs/photons.md. Lights get photons in proportion to power; directional ones fill a disk
+// that covers the scene. Russian roulette ends the paths, so that powers stay as large as albedos
+// are alike, and no bounce is left out. The cloud depends on meshes, surroundings, number and seed
+// alone, not on the threads. Memory: the meshes, Embree's hierarchy and a few batches of photons,
+// whatever their number. Errors: as sampleMeshes; kInvalidArgument when nothing emits.
+SURFEIT_API Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
+                                                    const std::string& output,
+                                                    const PhotonTracingOptions& options,
+                                                    Progress& progress);
+
+struct TracedCubeOptions {
+  int rays = 8;  // along an edge of a pixel, at least 1
+  // Surfaces that rays pass through are those whose surfels do not cover.
+  GatherSides sides = GatherSides::kFront;
+  float max_distance = 1e30f;  // scene units
+  int threads = 0;             // that build the hierarchy; 0: all that the job may use
+};
+
+// The raster cube of a receiver traced on the true triangles, which are what the gathered `cube` is
+// held to. The same receiver, faces and pixels as `cube`, with coverage and depth of rays in a grid
+// over each pixel; there is no light, and one layer. Rays begin 1/10000 of the mesh's diagonal
+// above the receiver, and those below its horizon do not count; a pixel without others sees
+// nothing. depth is that of the nearest hit, occlusion that of the pixels by their weights. Errors:
+// as sampleMeshes.
+SURFEIT_API Result<CubeImage> traceCube(const CubeImage& cube,
+                                        const std::vector<std::string>& meshes,
+                                        const TracedCubeOptions& options, Progress& progress);
+
+}  // namespace surfeit

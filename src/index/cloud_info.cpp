@@ -1,0 +1,155 @@
+#include "surfeit/cloud_info.h"
+
+#include <memory>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "cloud/channels.h"
+#include "cloud/cloud_formats.h"
+#include "cloud/ply/ply_reader.h"
+#include "core/bounds.h"
+#include "core/guard.h"
+#include "index/cloud_density.h"
+#include "octree/read/scene_file.h"
+#include "storage/byte_input.h"
+#include "surfels/surfel_source.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kBatchSurfels = 16384;
+
+Result<RowReaderOptions> rowOptions(const ReadOptions& options) {
+  RowReaderOptions reading;
+  SURFEIT_ASSIGN_OR_RETURN(reading.channels, parseChannelRenames(options.channels));
+  reading.part = options.part;
+  reading.filter = options.filter;
+  reading.color_range = options.color_range;
+  return reading;
+}
+
+// The first bytes of a file, decompressed.
+Result<std::string> firstBytes(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput file, ByteInput::open(path));
+  std::string bytes(8, '\0');
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                           file.readSome(0, std::as_writable_bytes(std::span(bytes))));
+  bytes.resize(size);
+  return bytes;
+}
+
+// What a pass over a cloud finds.
+struct CloudScan {
+  Bounds3d bounds;
+  std::uint64_t spheres = 0;
+  PlaceSample sample;
+};
+
+// Reads all surfels, which are counted from `origin`.
+Result<CloudScan> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(source.rewind());
+  source.setOrigin(origin);
+  CloudScan scan{{}, 0, PlaceSample(source.recordCount())};
+  std::vector<Surfel> batch(kBatchSurfels);
+  progress.beginPhase("scan", source.recordCount(), "surfels");
+  for (;;) {
+    if (progress.isCancelled()) return Status::interrupted();
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t count, source.read(batch));
+    if (count == 0) return scan;
+    for (const Surfel& surfel : std::span(batch).first(count)) {
+      scan.bounds.add(glm::dvec3(surfel.position) + origin);
+      scan.spheres += surfel.isSphere() ? 1 : 0;
+    }
+    scan.sample.add(std::span(batch).first(count));
+    progress.advance(count);
+  }
+}
+
+// Reads the records as surfels, unless they are none.
+Status addSurfels(const std::string& path, const RowReaderOptions& options, CloudInfo& info,
+                  Progress& progress) {
+  Result<std::unique_ptr<SurfelSource>> source =
+      openSurfelSource(path, /* strict= */ false, options);
+  if (!source.ok()) return {};
+  SURFEIT_ASSIGN_OR_RETURN(CloudScan scan, scanSurfels(**source, glm::dvec3(0), progress));
+  // Floats about an origin near the cloud have its digits: once more when 0 is far
+  if (!scan.bounds.isEmpty() && originFor(scan.bounds) != glm::dvec3(0)) {
+    SURFEIT_ASSIGN_OR_RETURN(scan, scanSurfels(**source, originFor(scan.bounds), progress));
+  }
+  CloudSurfels surfels;
+  surfels.count = scan.sample.surfelCount();
+  surfels.spheres = scan.spheres;
+  surfels.channels = (*source)->channels();
+  surfels.defects = (*source)->defects().describe();
+  info.notes = (*source)->notes();
+  if (!scan.bounds.isEmpty()) {
+    surfels.min = scan.bounds.min;
+    surfels.max = scan.bounds.max;
+    SURFEIT_ASSIGN_OR_RETURN(surfels.density, measureDensity(**source, scan.sample, progress));
+  }
+  info.surfels = std::move(surfels);
+  return {};
+}
+
+Status addElements(const std::string& path, CloudInfo& info) {
+  SURFEIT_ASSIGN_OR_RETURN(const PlyReader reader, PlyReader::open(path));
+  info.format = "ply";
+  for (const RowLayout& element : reader.header().elements) {
+    CloudElement& added = info.elements.emplace_back();
+    added.name = element.name;
+    added.count = element.count;
+    for (const RowProperty& property : element.properties) {
+      added.properties.push_back(
+          {property.name, std::string(valueTypeName(property.type)), property.is_list});
+    }
+  }
+  return {};
+}
+
+Status addRecords(const std::string& path, const RowReaderOptions& options, CloudInfo& info) {
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, openRowReader(path, options));
+  const RowLayout& element = reader->element();
+  info.format = reader->formatName();
+  info.records = element.count;
+  info.comments = reader->comments();
+  info.notes = reader->notes();
+  for (const RowChannel& channel : channelsOf(element)) {
+    CloudChannel& added = info.channels.emplace_back();
+    added.name = channel.name;
+    added.type = valueTypeName(channel.type);
+    for (const std::size_t i : channel.properties) {
+      added.properties.push_back(element.properties[i].name);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<CloudInfo> readCloudInfo(const std::string& path, const ReadOptions& options,
+                                Progress& progress) {
+  return guarded(path, [&]() -> Result<CloudInfo> {
+    CloudInfo info;
+    const bool is_as_stored =
+        options.channels.empty() && options.part.empty() && options.filter.empty();
+    SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions reading, rowOptions(options));
+    SURFEIT_ASSIGN_OR_RETURN(const std::string bytes, firstBytes(path));
+    if (is_as_stored && bytes.starts_with("ply")) {
+      SURFEIT_RETURN_IF_ERROR(addElements(path, info));
+    } else {
+      SURFEIT_RETURN_IF_ERROR(addRecords(path, reading, info));
+    }
+    SURFEIT_RETURN_IF_ERROR(addSurfels(path, reading, info, progress));
+    return info;
+  });
+}
+
+Result<CloudDensity> measureSceneDensity(const std::string& path, Progress& progress) {
+  return guarded(path, [&]() -> Result<CloudDensity> {
+    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(path));
+    return measureDensity(std::move(scene), progress);
+  });
+}
+
+}  // namespace surfeit
