@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "gather/spill_test.h"
+#include "io/spill_test.h"
 
 namespace surfeit {
 namespace {
