@@ -5,7 +5,7 @@
 #include <string>
 
 #include "batch/gather_options.h"
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "core/job_limits.h"
 #include "gather/rules/gather_outputs.h"
 #include "storage/file.h"

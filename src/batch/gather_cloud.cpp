@@ -19,8 +19,8 @@
 #include "batch/gather_input.h"
 #include "batch/gather_memory.h"
 #include "batch/gather_options.h"
-#include "batch/receiver_sorter.h"
 #include "batch/result_store.h"
+#include "batch/sorted_receiver.h"
 #include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/parallel.h"
@@ -102,8 +102,9 @@ Result<GatherStats> gatherCloudOrThrow(const std::string& scene_path,
   };
   noteOfWriter();
   progress.beginPhase("sort", stats.receivers, "receivers");
-  auto sorter = std::make_unique<ReceiverSorter>(
-      ReceiverSorter::Options{.count = stats.receivers,
+  auto sorter = std::make_unique<ExternalSorter>(
+      ExternalSorter::Options{.record_bytes = sizeof(SortedReceiver),
+                              .count = stats.receivers,
                               .memory_bytes = memory.sorter_bytes,
                               .reading_bytes = memory.sorter_reading_bytes,
                               .temporary_directory = temporary_directory});
