@@ -20,7 +20,7 @@
 
 #include "batch/gather_input.h"
 #include "batch/receiver_queue.h"
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "cache/reuse_distances.h"
 #include "gather/cut/cut.h"
 #include "octree/read/paged_octree.h"
@@ -228,7 +228,8 @@ Status runBench(const std::string& scene_path, const std::string& receivers_path
   SURFEIT_ASSIGN_OR_RETURN(const Tree tree, readTree(*octree));
 
   SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(receivers_path));
-  ReceiverSorter sorter({.count = input.receiverCount(),
+  ExternalSorter sorter({.record_bytes = sizeof(SortedReceiver),
+                         .count = input.receiverCount(),
                          .memory_bytes = input.receiverCount() * sizeof(SortedReceiver),
                          .temporary_directory = "."});
   Progress progress;

@@ -19,8 +19,8 @@
 #include "batch/gather_input.h"
 #include "batch/gather_memory.h"
 #include "batch/gather_options.h"
-#include "batch/receiver_sorter.h"
 #include "batch/result_store.h"
+#include "batch/sorted_receiver.h"
 #include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/parallel.h"
@@ -28,6 +28,7 @@
 #include "octree/read/group_set.h"
 #include "octree/read/scene_file.h"
 #include "octree/read/scene_light.h"
+#include "storage/external_sorter.h"
 #include "storage/file.h"
 #include "storage/output_target.h"
 #include "surfeit/bake.h"
@@ -66,7 +67,7 @@ class CloudGather {
     }
     noteOf(*writer);
 
-    SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<ReceiverSorter> sorter,
+    SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<ExternalSorter> sorter,
                              sort(input, scene.header(), memory));
     ResultStore results({.count = stats_.receivers,
                          .outputs = options_.outputs,
@@ -122,11 +123,12 @@ class CloudGather {
     return createRowWriter(result_path_, writing);
   }
 
-  Result<std::unique_ptr<ReceiverSorter>> sort(GatherInput& input, const SceneHeader& scene,
+  Result<std::unique_ptr<ExternalSorter>> sort(GatherInput& input, const SceneHeader& scene,
                                                const GatherMemory& memory) {
     progress_.beginPhase("sort", stats_.receivers, "receivers");
-    auto sorter = std::make_unique<ReceiverSorter>(
-        ReceiverSorter::Options{.count = stats_.receivers,
+    auto sorter = std::make_unique<ExternalSorter>(
+        ExternalSorter::Options{.record_bytes = sizeof(SortedReceiver),
+                                .count = stats_.receivers,
                                 .memory_bytes = memory.sorter_bytes,
                                 .reading_bytes = memory.sorter_reading_bytes,
                                 .temporary_directory = temporary_directory_});

@@ -61,7 +61,7 @@ Status GatherCrew::gatherRuns() {
   return {};
 }
 
-Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
+Status gatherSorted(SceneFile scene, ExternalSorter& sorter, const GatherMemory& memory,
                     const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
                     Progress& progress, const LoadedEnvironment* environment) {
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,

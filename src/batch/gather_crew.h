@@ -57,7 +57,7 @@ class GatherCrew {
 
 // The gather proper: opens the caches of `scene`, gathers at what is in `sorter` (finished), and
 // fills in the statistics of that; threads of `stats` work, as many prefetch as `memory` says.
-Status gatherSorted(SceneFile scene, ReceiverSorter& sorter, const GatherMemory& memory,
+Status gatherSorted(SceneFile scene, ExternalSorter& sorter, const GatherMemory& memory,
                     const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
                     Progress& progress, const LoadedEnvironment* environment = nullptr);
 

@@ -91,7 +91,7 @@ Result<Bytes> GatherInput::readSlice(Progress& progress) {
 }
 
 Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool strict,
-                         ReceiverSorter& sorter, Progress& progress) {
+                         ExternalSorter& sorter, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(reader_->rewind());
   defects_ = {};
   mapping_.setOrigin(scene.origin);

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "batch/receiver_rows.h"
-#include "batch/receiver_sorter.h"
 #include "batch/result_store.h"
+#include "batch/sorted_receiver.h"
 #include "cloud/row_reader.h"
 #include "cloud/row_writer.h"
 #include "gather/rules/gather_rules.h"
@@ -41,7 +41,7 @@ class GatherInput {
 
   // Gives all valid receivers to the sorter, about the scene's origin and with keys of `order` in
   // its cube. Invalid ones are counted; kCorruption with `strict`.
-  Status sort(ReceiverOrder order, const SceneHeader& scene, bool strict, ReceiverSorter& sorter,
+  Status sort(ReceiverOrder order, const SceneHeader& scene, bool strict, ExternalSorter& sorter,
               Progress& progress);
   // Of the last sort.
   const SurfelDefects& defects() const { return defects_; }

@@ -9,8 +9,8 @@
 #include "batch/paging_controller.h"
 #include "batch/prefetcher.h"
 #include "batch/receiver_rows.h"
-#include "batch/receiver_sorter.h"
 #include "batch/result_store.h"
+#include "batch/sorted_receiver.h"
 #include "cache/reuse_distances.h"
 #include "core/program_memory.h"
 #include "engine/gatherer_memory.h"
@@ -63,7 +63,7 @@ std::uint64_t resultBytes(const GatherWork& work) {
 std::uint64_t leastReceiverBytes(const GatherWork& work) {
   const std::uint64_t all = work.receivers * (sizeof(SortedReceiver) + resultBytes(work));
   return std::min(
-      all, ReceiverSorter::leastMemoryBytes(work.receivers) +
+      all, ExternalSorter::leastMemoryBytes(work.receivers, sizeof(SortedReceiver)) +
                ResultStore::leastMemoryBytes(work.receivers, resultFloats(work.rules.outputs)));
 }
 
@@ -83,7 +83,8 @@ void planReceivers(const GatherWork& work, std::uint64_t bytes, std::uint64_t sp
     memory.result_bytes = all_results;
     return;
   }
-  const std::uint64_t least_sorter = ReceiverSorter::leastMemoryBytes(receivers);
+  const std::uint64_t least_sorter =
+      ExternalSorter::leastMemoryBytes(receivers, sizeof(SortedReceiver));
   const std::uint64_t least_results =
       ResultStore::leastMemoryBytes(receivers, resultFloats(work.rules.outputs));
   memory.sorter_reading_bytes =

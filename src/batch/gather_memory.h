@@ -35,7 +35,7 @@ struct GatherWork {
 GatherWork gatherWork(const RowLayout& receivers, const GatherOptions& options);
 
 struct GatherMemory {
-  std::uint64_t sorter_bytes = 0, sorter_reading_bytes = 0;  // of ReceiverSorter
+  std::uint64_t sorter_bytes = 0, sorter_reading_bytes = 0;  // of ExternalSorter
   std::uint64_t result_bytes = 0;                            // of ResultStore
   std::uint64_t cache_bytes = 0;                             // of both caches
   PagedOctree::Memory caches;

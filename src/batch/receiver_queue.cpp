@@ -5,7 +5,7 @@
 
 namespace surfeit {
 
-ReceiverQueue::ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers)
+ReceiverQueue::ReceiverQueue(ExternalSorter& sorter, std::size_t buffer_receivers)
     : sorter_(sorter), buffer_(buffer_receivers) {}
 
 Status ReceiverQueue::take(std::vector<SortedReceiver>& run, std::size_t count) {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "gather/rules/receiver.h"
 #include "surfeit/status.h"
 
@@ -19,7 +19,7 @@ class ReceiverQueue {
  public:
   // `sorter` is finished, and not used by anyone else meanwhile. Takes buffer_receivers * 56 bytes;
   // runs are no longer than that.
-  ReceiverQueue(ReceiverSorter& sorter, std::size_t buffer_receivers);
+  ReceiverQueue(ExternalSorter& sorter, std::size_t buffer_receivers);
 
   // Replaces `run` by the next receivers, up to `count` of them; none at the end.
   Status take(std::vector<SortedReceiver>& run, std::size_t count);
@@ -32,7 +32,7 @@ class ReceiverQueue {
   // All: mutex_ held
   Status refill();
 
-  ReceiverSorter& sorter_;
+  ExternalSorter& sorter_;
 
   std::mutex mutex_;
   std::vector<SortedReceiver> buffer_;

@@ -16,8 +16,8 @@
 #include "core/guard.h"
 #include "core/job_limits.h"
 #include "core/parallel.h"
+#include "storage/external_sorter.h"
 #include "storage/output_target.h"
-#include "storage/record_sorter.h"
 #include "surfeit/brick.h"
 
 namespace surfeit {
@@ -115,7 +115,7 @@ class BrickBuild {
   int levelOf(double area) const;
   Status sweep();
   Status write();
-  RecordSorter::Options sorterOptions(std::size_t record_bytes) const;
+  ExternalSorter::Options sorterOptions(std::size_t record_bytes) const;
 
   const std::vector<std::string>& inputs_;
   const std::string& output_;
@@ -128,7 +128,7 @@ class BrickBuild {
   bool has_sizes_ = true;
   BrickExtent extent_;
   Lattice lattice_;
-  std::optional<RecordSorter> points_, voxels_;
+  std::optional<ExternalSorter> points_, voxels_;
   std::vector<BrickGroup> groups_;
 };
 
@@ -238,9 +238,10 @@ Status BrickBuild::chooseVoxelSize(const AreaMedian& areas) {
   return {};
 }
 
-RecordSorter::Options BrickBuild::sorterOptions(std::size_t record_bytes) const {
-  return {record_bytes, (options_.memory_bytes - kFixedMemory) / 2,
-          temporaryDirectory(options_.temporary_directory, output_)};
+ExternalSorter::Options BrickBuild::sorterOptions(std::size_t record_bytes) const {
+  return {.record_bytes = record_bytes,
+          .memory_bytes = (options_.memory_bytes - kFixedMemory) / 2,
+          .temporary_directory = temporaryDirectory(options_.temporary_directory, output_)};
 }
 
 // The finest level whose voxels are as large as a point of that area: the points between those of a
@@ -252,7 +253,7 @@ int BrickBuild::levelOf(double area) const {
 
 // Records of points: [Morton cell : 64 | level : 32, area : 32 | normal : 96 | values : 32 each].
 Status BrickBuild::sortPoints() {
-  const std::size_t bytes = RecordSorter::kKeyBytes + 4 * (3 + value_count_);
+  const std::size_t bytes = kRecordKeyBytes + 4 * (3 + value_count_);
   points_.emplace(sorterOptions(bytes));
   std::vector<std::byte> record(bytes);
   SURFEIT_RETURN_IF_ERROR(forEach("sort", [&](const BrickInputPoint& point) {

@@ -69,7 +69,7 @@ void BrickGroup::add(const VdbCoord& voxel) {
   ++voxels;
 }
 
-BrickWriter::BrickWriter(RecordSorter& voxels, std::span<const BrickGroup> groups,
+BrickWriter::BrickWriter(ExternalSorter& voxels, std::span<const BrickGroup> groups,
                          std::span<const BrickChannel> channels, double voxel_size)
     : voxels_(voxels), groups_(groups), voxel_size_(voxel_size) {
   std::size_t offset = 1;
@@ -102,7 +102,7 @@ Status BrickWriter::write(const std::string& path, double max_error, Progress& p
 
 // The sorter stands at the first voxel of the group, and at the end at that of the next.
 Status BrickWriter::writeGroup(VdbOutput& output, int group, Progress& progress) {
-  const RecordSorter::Mark begin = voxels_.mark();
+  const ExternalSorter::Mark begin = voxels_.mark();
   std::vector<BrickKey> nodes;
   SURFEIT_RETURN_IF_ERROR(findNodes(group, nodes));
   for (const Grid& grid : grids_) {
@@ -198,7 +198,7 @@ Status BrickWriter::writeNode(VdbOutput& output, const BrickKey& node) {
 Status BrickWriter::writeBuffers(VdbOutput& output, int group, const Grid& grid,
                                  Progress& progress) {
   const std::size_t value_bytes = 4 * grid.components;
-  const std::size_t offset = RecordSorter::kKeyBytes + 4 * grid.offset;
+  const std::size_t offset = kRecordKeyBytes + 4 * grid.offset;
   std::vector<std::byte> values;
   while (voxels_.current() != nullptr) {
     const BrickKey first = keyOf(voxels_.current());

@@ -11,7 +11,7 @@
 
 #include "brick/brick_layout.h"
 #include "cloud/vdb/vdb_output.h"
-#include "storage/record_sorter.h"
+#include "storage/external_sorter.h"
 #include "surfeit/brick.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -28,7 +28,7 @@ struct BrickGroup {
 
 // Records of the sorter: a BrickKey, a weight, and values, as floats.
 inline std::size_t brickRecordBytes(std::size_t value_count) {
-  return RecordSorter::kKeyBytes + sizeof(float) * (1 + value_count);
+  return kRecordKeyBytes + sizeof(float) * (1 + value_count);
 }
 
 // One thread at a time.
@@ -36,7 +36,7 @@ class BrickWriter {
  public:
   // Voxels of level 0 have edges of `voxel_size`. `groups` are by level and direction; all
   // references must outlive the writer.
-  BrickWriter(RecordSorter& voxels, std::span<const BrickGroup> groups,
+  BrickWriter(ExternalSorter& voxels, std::span<const BrickGroup> groups,
               std::span<const BrickChannel> channels, double voxel_size);
 
   // Writes all and gives the file its name; `file_bytes` is its size.
@@ -59,7 +59,7 @@ class BrickWriter {
   Status writeNode(VdbOutput& output, const BrickKey& node);
   Status writeBuffers(VdbOutput& output, int group, const Grid& grid, Progress& progress);
 
-  RecordSorter& voxels_;
+  ExternalSorter& voxels_;
   std::span<const BrickGroup> groups_;
   double voxel_size_;
   std::vector<Grid> grids_;  // of a group

@@ -94,9 +94,10 @@ Result<std::unique_ptr<GridThinner>> GridThinner::create(Options options,
   return thinner;
 }
 
-RecordSorter::Options GridThinner::sorting(std::size_t head_bytes) const {
-  return {head_bytes + sums_.size() * sizeof(double), options_.memory_bytes / 2,
-          options_.temporary_directory};
+ExternalSorter::Options GridThinner::sorting(std::size_t head_bytes) const {
+  return {.record_bytes = head_bytes + sums_.size() * sizeof(double),
+          .memory_bytes = options_.memory_bytes / 2,
+          .temporary_directory = options_.temporary_directory};
 }
 
 Result<std::optional<GridThinner::Place>> GridThinner::placeOf(const std::byte* row) const {

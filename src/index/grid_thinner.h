@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cloud/row_layout.h"
-#include "storage/record_sorter.h"
+#include "storage/external_sorter.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
@@ -25,7 +25,7 @@ namespace surfeit {
 // threads of the arena.
 class GridThinner {
  public:
-  static constexpr std::uint64_t kLeastMemory = 2 * RecordSorter::kLeastMemory;
+  static constexpr std::uint64_t kLeastMemory = 2 * ExternalSorter::kLeastMemory;
 
   struct Options {
     double spacing = 0;              // edge of a cell; finite, above 0
@@ -66,14 +66,14 @@ class GridThinner {
   Status addPick(const std::byte* first, std::uint64_t count);
   void stand(std::byte* row, const std::byte* pick) const;
   double valueOf(const std::byte* row, std::size_t sum) const;
-  RecordSorter::Options sorting(std::size_t head_bytes) const;
+  ExternalSorter::Options sorting(std::size_t head_bytes) const;
 
   Options options_;
   std::size_t row_bytes_ = 0;
   std::array<RowProperty, 3> position_;
   std::vector<RowProperty> sums_, lengths_;
   std::optional<std::size_t> area_;  // among sums_
-  std::optional<RecordSorter> cells_, picks_;
+  std::optional<ExternalSorter> cells_, picks_;
   std::vector<std::byte> record_;
   std::vector<double> totals_;  // of a cell
   std::uint64_t measured_ = 0, placeless_ = 0, kept_ = 0;

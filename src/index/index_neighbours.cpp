@@ -7,7 +7,7 @@
 #include "octree/neighbours/local_density.h"
 #include "octree/neighbours/orientation.h"
 #include "octree/read/paged_octree.h"
-#include "storage/record_sorter.h"
+#include "storage/external_sorter.h"
 
 namespace surfeit {
 namespace {
@@ -48,7 +48,7 @@ Result<std::optional<SceneFile>> buildFound(SceneFile places, const NeighbourBui
 Status buildOriented(SceneFile scene, const NeighbourBuild& how, IndexStats& stats,
                      PhaseClock& clock, Progress& progress) {
   const std::uint64_t sorter_bytes =
-      std::max<std::uint64_t>(how.memory_bytes / 4, RecordSorter::kLeastMemory);
+      std::max<std::uint64_t>(how.memory_bytes / 4, ExternalSorter::kLeastMemory);
   const std::uint64_t scene_bytes = scene.fileBytes();
   SURFEIT_ASSIGN_OR_RETURN(
       const std::unique_ptr<PagedOctree> octree,
@@ -67,7 +67,7 @@ Status buildOriented(SceneFile scene, const NeighbourBuild& how, IndexStats& sta
 std::uint64_t leastNeighbourBytes(const NormalEstimation& estimation, int threads) {
   constexpr std::uint64_t kCacheBytes = std::uint64_t{1} << 20;  // of a thread, for a few pages
   const std::uint64_t caches = std::uint64_t(threads) * kCacheBytes;
-  const std::uint64_t sides = RecordSorter::kLeastMemory + Sides::searcherBytes(threads);
+  const std::uint64_t sides = ExternalSorter::kLeastMemory + Sides::searcherBytes(threads);
   const bool needs_sides = estimation.orientation.toward == NormalOrientation::Toward::kConsistent;
   return caches + (needs_sides ? sides : SizedSurfelStream::searcherBytes(threads));
 }

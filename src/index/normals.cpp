@@ -26,8 +26,8 @@
 #include "index/trajectory.h"
 #include "octree/neighbours/normal_rule.h"
 #include "octree/neighbours/surface_search.h"
+#include "storage/external_sorter.h"
 #include "storage/output_target.h"
-#include "storage/record_sorter.h"
 
 namespace surfeit {
 namespace {
@@ -181,7 +181,7 @@ class NormalsJob {
       const std::uint64_t beside =
           programBytes(threads_) + PagedOctree::fixedBytes(scene, threads_) + rows +
           std::uint64_t(threads_) * (SurfaceSearch::memoryBytes() + kPlacesPerThread * kPlaceBytes);
-      const std::uint64_t least = beside + 3 * RecordSorter::kLeastMemory;
+      const std::uint64_t least = beside + 3 * ExternalSorter::kLeastMemory;
       if (stats_.memory_bytes >= least) {
         if (threads_ < wanted) {
           progress_.inform(fmt::format("{} of {} threads: a budget of {} MiB feeds no more",
@@ -197,8 +197,10 @@ class NormalsJob {
     }
   }
 
-  RecordSorter::Options sorting(std::size_t record_bytes) const {
-    return {record_bytes, sorter_bytes_, temporaryDirectory(options_.temporary_directory, output_)};
+  ExternalSorter::Options sorting(std::size_t record_bytes) const {
+    return {.record_bytes = record_bytes,
+            .memory_bytes = sorter_bytes_,
+            .temporary_directory = temporaryDirectory(options_.temporary_directory, output_)};
   }
 
   // The next rows; none at the end.
@@ -221,8 +223,7 @@ class NormalsJob {
         if (!isFinite(ordered.place)) continue;
         ordered.key = curveKey(ordered.place, cube);
         if (trajectory_) ordered.sensor = sensorAt(rows.data() + at);
-        SURFEIT_RETURN_IF_ERROR(
-            places_in_order_->add(reinterpret_cast<const std::byte*>(&ordered)));
+        SURFEIT_RETURN_IF_ERROR(places_in_order_->add(ordered));
       }
       progress_.advance(rows.size() / row_bytes);
     }
@@ -260,7 +261,7 @@ class NormalsJob {
           searches, surfels, [](std::size_t) { return true; },
           [&](std::size_t i, const SurfaceAt& surface) { found[i] = foundAt(batch[i], surface); }));
       for (const FoundRow& row : found) {
-        SURFEIT_RETURN_IF_ERROR(found_rows_->add(reinterpret_cast<const std::byte*>(&row)));
+        SURFEIT_RETURN_IF_ERROR(found_rows_->add(row));
       }
       progress_.advance(batch.size());
     }
@@ -406,7 +407,7 @@ class NormalsJob {
   std::optional<NormalRule> rule_;
   std::uint64_t sorter_bytes_ = 0;  // of each
   std::unique_ptr<PagedOctree> octree_;
-  std::optional<RecordSorter> places_in_order_, found_rows_;
+  std::optional<ExternalSorter> places_in_order_, found_rows_;
   std::unique_ptr<RowWriter> writer_;
   std::vector<Copy> copies_;
   std::vector<std::string> told_;

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "cache/reuse_distances.h"
 #include "gather/cut/cut.h"
 #include "gather/cut/packet_cluster.h"

@@ -33,9 +33,12 @@ SampledGather::SampledGather(std::unique_ptr<PagedOctree> octree, const GatherOp
 Result<double> SampledGather::gather(std::span<const SortedReceiver> receivers) {
   // They are few enough to stay in memory
   const std::uint64_t bytes =
-      std::max(receivers.size_bytes(), ReceiverSorter::leastMemoryBytes(receivers.size()));
-  ReceiverSorter sorter(
-      {.count = receivers.size(), .memory_bytes = bytes, .temporary_directory = {}});
+      std::max(receivers.size_bytes(),
+               ExternalSorter::leastMemoryBytes(receivers.size(), sizeof(SortedReceiver)));
+  ExternalSorter sorter({.record_bytes = sizeof(SortedReceiver),
+                         .count = receivers.size(),
+                         .memory_bytes = bytes,
+                         .temporary_directory = {}});
   for (const SortedReceiver& receiver : receivers) SURFEIT_RETURN_IF_ERROR(sorter.add(receiver));
   SURFEIT_RETURN_IF_ERROR(sorter.finish());
 

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "batch/paging_controller.h"
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/bake.h"
 #include "surfeit/progress.h"

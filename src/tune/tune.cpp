@@ -16,7 +16,7 @@
 #include "batch/gather_memory.h"
 #include "batch/gather_options.h"
 #include "batch/memory_advice.h"
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "core/guard.h"
 #include "octree/read/group_set.h"
 #include "octree/read/paged_octree.h"
@@ -140,7 +140,8 @@ Result<GatherMemory> Tuning::planOwnMemory() const {
 Status Tuning::sample(const GatherMemory& memory) {
   input_->note(progress_);
   progress_.beginPhase("sort", work_.receivers, "receivers");
-  ReceiverSorter sorter({.count = work_.receivers,
+  ExternalSorter sorter({.record_bytes = sizeof(SortedReceiver),
+                         .count = work_.receivers,
                          .memory_bytes = memory.sorter_bytes,
                          .reading_bytes = memory.sorter_reading_bytes,
                          .temporary_directory = gather_.temporary_directory});
@@ -235,7 +236,8 @@ Result<TuneOutcome> Tuning::measure(std::uint64_t memory_bytes) const {
   QuietProgress progress(progress_);
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openScene());
   SURFEIT_ASSIGN_OR_RETURN(const GatherMemory memory, planGatherMemory(scene, memory_bytes, work_));
-  ReceiverSorter sorter({.count = work_.receivers,
+  ExternalSorter sorter({.record_bytes = sizeof(SortedReceiver),
+                         .count = work_.receivers,
                          .memory_bytes = memory.sorter_bytes,
                          .reading_bytes = memory.sorter_reading_bytes,
                          .temporary_directory = gather_.temporary_directory});

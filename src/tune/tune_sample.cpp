@@ -102,14 +102,14 @@ class Sampling {
         threads_(threads),
         progress_(progress) {}
 
-  Result<TuneSample> run(ReceiverSorter& sorter, std::uint64_t receivers,
+  Result<TuneSample> run(ExternalSorter& sorter, std::uint64_t receivers,
                          std::uint64_t sample_receivers);
 
  private:
   Result<SceneFile> openScene() const {
     return SceneFile::open(scene_path_, sceneAccess(options_));
   }
-  Status followAll(ReceiverSorter& sorter, Pieces& timed);
+  Status followAll(ExternalSorter& sorter, Pieces& timed);
   Status followPieces(const Pieces& stretches, const Pieces& spread, double share);
   Status followStretch(LookUpTrace& trace, std::span<const SortedReceiver> stretch,
                        StretchMisses& node_misses, StretchMisses& surfel_misses);
@@ -124,7 +124,7 @@ class Sampling {
   TuneSample sample_;
 };
 
-Result<TuneSample> Sampling::run(ReceiverSorter& sorter, std::uint64_t receivers,
+Result<TuneSample> Sampling::run(ExternalSorter& sorter, std::uint64_t receivers,
                                  std::uint64_t sample_receivers) {
   const Clock::time_point begin = Clock::now();
   const std::uint64_t wanted = std::max(sample_receivers, kLeastSample);
@@ -169,7 +169,7 @@ Result<TuneSample> Sampling::run(ReceiverSorter& sorter, std::uint64_t receivers
 }
 
 // Draws those to be timed on the way.
-Status Sampling::followAll(ReceiverSorter& sorter, Pieces& timed) {
+Status Sampling::followAll(ExternalSorter& sorter, Pieces& timed) {
   LookUps look_ups(octree_->file(), kTrackedPages);
   LookUpTrace trace(*octree_, GatherRules(options_), threads_, progress_);
   SURFEIT_RETURN_IF_ERROR(trace.follow(
@@ -295,7 +295,7 @@ std::uint64_t tuneSampleBytes(const SceneFile& file, std::uint64_t sample_receiv
          (sample_receivers + 2 * timed + kQueueReceivers) * sizeof(SortedReceiver);
 }
 
-Result<TuneSample> sampleGather(const std::string& scene_path, ReceiverSorter& sorter,
+Result<TuneSample> sampleGather(const std::string& scene_path, ExternalSorter& sorter,
                                 std::uint64_t receivers, std::uint64_t sample_receivers,
                                 const PagedOctree::Memory& memory, const GatherOptions& options,
                                 int threads, Progress& progress) {

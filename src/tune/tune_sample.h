@@ -7,7 +7,7 @@
 #include <string>
 
 #include "batch/gather_memory.h"
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "cache/miss_ratio_curve.h"
 #include "surfeit/bake.h"
 #include "surfeit/progress.h"
@@ -35,7 +35,7 @@ std::uint64_t tuneSampleBytes(const SceneFile& file, std::uint64_t sample_receiv
 // Follows the look-ups of about sample_receivers of the `receivers` that the sorter (finished)
 // holds, and gathers at some of them, in the caches of `memory`. With 0, or no less than there are,
 // all are followed, and the curves are those of all.
-Result<TuneSample> sampleGather(const std::string& scene_path, ReceiverSorter& sorter,
+Result<TuneSample> sampleGather(const std::string& scene_path, ExternalSorter& sorter,
                                 std::uint64_t receivers, std::uint64_t sample_receivers,
                                 const PagedOctree::Memory& memory, const GatherOptions& options,
                                 int threads, Progress& progress);

@@ -9,7 +9,7 @@
 
 #include "batch/gather_crew.h"
 #include "batch/gather_input.h"
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "io/fault_injector.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/bake.h"
@@ -33,7 +33,8 @@ Status gatherInFrames(const FramesGather& gather, GatherStats& stats, Take&& tak
   SURFEIT_ASSIGN_OR_RETURN(GatherInput input, GatherInput::open(gather.receivers));
   stats.receivers = input.receiverCount();
   stats.threads = gather.threads;
-  ReceiverSorter sorter({.count = stats.receivers,
+  ExternalSorter sorter({.record_bytes = sizeof(SortedReceiver),
+                         .count = stats.receivers,
                          .memory_bytes = stats.receivers * sizeof(SortedReceiver),
                          .temporary_directory = gather.temporary_directory});
   SURFEIT_RETURN_IF_ERROR(

@@ -15,12 +15,13 @@ namespace {
 class ReceiverQueueTest : public testing::Test {
  protected:
   void fill(std::uint64_t count) {
-    sorter_ = std::make_unique<ReceiverSorter>(
-        ReceiverSorter::Options{.count = count,
+    sorter_ = std::make_unique<ExternalSorter>(
+        ExternalSorter::Options{.record_bytes = sizeof(SortedReceiver),
+                                .count = count,
                                 .memory_bytes = count * sizeof(SortedReceiver),
                                 .temporary_directory = "."});
     for (std::uint64_t i = count; i-- > 0;) {
-      ASSERT_TRUE(sorter_->add({i, i, {{float(i), 0, 0}, {0, 0, 1}}}).ok());
+      ASSERT_TRUE(sorter_->add(SortedReceiver{i, i, {{float(i), 0, 0}, {0, 0, 1}}}).ok());
     }
     ASSERT_TRUE(sorter_->finish().ok());
   }
@@ -34,7 +35,7 @@ class ReceiverQueueTest : public testing::Test {
     }
   }
 
-  std::unique_ptr<ReceiverSorter> sorter_;
+  std::unique_ptr<ExternalSorter> sorter_;
 };
 
 TEST_F(ReceiverQueueTest, HandsOutAllInOrder) {

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "gather/spill_test.h"
+#include "io/spill_test.h"
 
 namespace surfeit {
 namespace {

@@ -14,7 +14,7 @@
 #include "octree/neighbours/local_density.h"
 #include "octree/neighbours/places.h"
 #include "octree/neighbours/side_forest.h"
-#include "storage/record_sorter.h"
+#include "storage/external_sorter.h"
 
 namespace surfeit {
 namespace {
@@ -209,7 +209,9 @@ class SideSearch {
         options_(options),
         progress_(progress),
         labels_(std::move(labels)),
-        edges_({sizeof(OuterEdge), options.memory_bytes, options.temporary_directory}) {}
+        edges_({.record_bytes = sizeof(OuterEdge),
+                .memory_bytes = options.memory_bytes,
+                .temporary_directory = options.temporary_directory}) {}
 
   Status run() {
     SURFEIT_RETURN_IF_ERROR(findPieces());
@@ -264,7 +266,7 @@ class SideSearch {
         [&](std::uint32_t a, std::uint32_t b, float agreed) { vote(first + a, first + b, agreed); },
         [&](OuterEdge edge) {
           edge.piece += first;
-          return edges_.add(reinterpret_cast<const std::byte*>(&edge));
+          return edges_.add(edge);
         });
   }
 
@@ -338,7 +340,7 @@ class SideSearch {
   const OrientationOptions& options_;
   Progress& progress_;
   TemporaryFile labels_;
-  RecordSorter edges_;
+  ExternalSorter edges_;
   std::vector<PieceSums> pieces_;
   std::vector<std::uint32_t> numbered_;
   std::unordered_map<std::uint64_t, double> votes_;  // by pair of pieces
