@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "batch/gather_options.h"
-#include "batch/receiver_sorter.h"
+#include "batch/sorted_receiver.h"
 #include "core/guard.h"
 #include "gather/rules/gather_outputs.h"
 #include "storage/file.h"

@@ -260,7 +260,7 @@ Node nodeOf(std::span<const glm::vec3> positions, std::span<const glm::vec3> nor
 
 // The middle of what is seen of a node, along v from its position towards the receiver.
 glm::vec3 middleOfSeen(const Node& node, const glm::vec3& v, GatherSides sides) {
-  return seenMiddle(node, -100.f * v, facingAreas(node, v), sides);
+  return seenPart(node, -100.f * v, facingAreas(node, v), sides).middle;
 }
 
 TEST(RoughNode, OfASphereTheCapTowardsTheReceiverIsSeen) {
@@ -292,6 +292,31 @@ TEST(RoughNode, OfAnEdgeTheFaceThatShowsIsSeen) {
   EXPECT_LT(glm::length(seenFrom({0, 0, 1}) - glm::vec3(-.5f, .5f, 0)), .02f);
   EXPECT_LT(glm::length(seenFrom({1, 0, 0}) - glm::vec3(0, .5f, -.5f)), .02f);
   EXPECT_LT(glm::length(seenFrom({1, 0, 1}) - glm::vec3(-.25f, .5f, -.25f)), .02f);
+}
+
+// What a node looks like from `distance` of its position, over its projected area.
+float perspectiveOf(const Node& node, const glm::vec3& v, float distance) {
+  Contribution patch;
+  EXPECT_TRUE(makeContribution(node, -distance * v, {}, patch));
+  return patch.solid_angle * distance * distance / facingAreas(node, v).front;
+}
+
+TEST(RoughNode, IsAsLargeFromCloseByAsItLooks) {
+  const std::vector<glm::vec3> all = evenDirections(2000);
+  const Node sphere = nodeOf(all, all);
+  // A disk seen from behind the same sphere, and its hollow
+  std::vector<glm::vec3> bowl, bowl_normals;
+  for (const glm::vec3& d : all) {
+    if (d.z < 0) bowl.push_back(d), bowl_normals.push_back(-d);
+  }
+  const Node hollow = nodeOf(bowl, bowl_normals);
+  for (const float distance : {8.f, 16.f, 100.f}) {
+    const float ball = 2 * (distance * distance) * (1 - std::sqrt(1 - 1 / (distance * distance)));
+    EXPECT_NEAR(perspectiveOf(sphere, {0, 0, 1}, distance), ball, .03f) << distance;
+    // Through its rim, half a radius before its middle
+    const float rim = distance / (distance - .5f);
+    EXPECT_NEAR(perspectiveOf(hollow, {0, 0, 1}, distance), rim * rim, .03f) << distance;
+  }
 }
 
 // A cap of a sphere: the area that faces away from it shows at its rim.
@@ -337,11 +362,12 @@ TEST(Facet, OfTwoSidedSurfelsShowsAndLightsBothSides) {
   ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {.sides = GatherSides::kBack}, back));
   EXPECT_EQ(back.solid_angle, .01f);
   EXPECT_EQ(back.radiosity, glm::vec3(0));
-  // One of several hides behind its own layer as behind others
+  // One of several stands apart from what is before and behind it
   facet.is_thicket = true;
   ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {}, thicket));
   EXPECT_EQ(thicket.thicket, 1);
   EXPECT_EQ(thicket.overlap, 1);
+  EXPECT_LT(thicket.reach, .2f * front.reach);
 }
 
 TEST(RoughNode, TheMiddleOfWhatIsSeenStaysWithinTheRadius) {
@@ -438,9 +464,11 @@ TEST(SurfelContribution, PiecesOfRibbonsAreThickets) {
   ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, ribbon));
   EXPECT_EQ(ribbon.thicket, 1);
   EXPECT_EQ(ribbon.overlap, 0);
+  EXPECT_LT(ribbon.reach, .2f * surface.reach);
   surfel.area *= 2;
   ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, leaf));
   EXPECT_EQ(leaf.thicket, 0);
+  EXPECT_EQ(leaf.reach, surface.reach);
 }
 
 TEST(SurfelContribution, SphereLooksTheSameFromEverywhere) {

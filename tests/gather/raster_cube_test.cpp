@@ -193,7 +193,7 @@ TEST(RasterCube, LayersCoverEachOtherInsteadOfAdding) {
   EXPECT_NEAR(cube.radiosity(pixel).y, .5f, 1e-5);
 }
 
-TEST(RasterCube, AGapInDepthBeginsALayer) {
+TEST(RasterCube, LayersBeginByAndBy) {
   const RasterGeometry geometry(2);
   RasterCube cube(geometry, false);
   const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
@@ -205,8 +205,178 @@ TEST(RasterCube, AGapInDepthBeginsALayer) {
     cube.splat(half, {2 + gap, 3 + gap}, kWhite);
     return cube.coverage(3);
   };
-  EXPECT_NEAR(covered(-.1f), 1, 1e-5) << "of one layer, side by side";
-  EXPECT_NEAR(covered(.1f), .75f, 1e-5) << "behind each other, anywhere";
+  EXPECT_NEAR(covered(-.1f), 1, 1e-5);
+  EXPECT_NEAR(covered(.5f * kFidelity.layer_gap), .75f, 1e-5);  // half of the range is its reach
+  float before = 1;
+  for (float gap = 0; gap < .6f * kFidelity.layer_gap; gap += .01f * kFidelity.layer_gap) {
+    const float now = covered(gap);
+    EXPECT_LE(now, before + 1e-5f) << gap;
+    EXPECT_GT(now, before - .02f) << gap;
+    before = now;
+  }
+}
+
+TEST(RasterCube, WhatHardlyTouchesAPixelHardlyChangesIt) {
+  const RasterGeometry geometry(4);
+  RasterCube cube(geometry, false);
+  // All in pixels of the face +x
+  const auto square = [&](float column, float row, float side, const DepthRange& depth) {
+    const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f * column - 1, .5f * row - 1));
+    const float area = .25f * side * side;
+    cube.splat(diskPatch(direction, {-1, 0, 0}, area * direction.x * direction.x * direction.x),
+               depth, kWhite);
+  };
+  // Something deep beside the pixel laps over it, between two of different layers
+  const auto covered = [&](float lap) {
+    cube.clear();
+    square(1.5f, 1.5f, .7f, {1, 2});
+    square(2.5f - lap, 1.5f, 1, {1.5f, 9});
+    square(1.5f, 1.5f, .7f, {3, 4});
+    return cube.coverage(1 * 4 + 1);
+  };
+  const float apart = covered(0);
+  EXPECT_NEAR(apart, .49f + .51f * .49f, 1e-4);
+  EXPECT_NEAR(covered(1e-4f), apart, .005f);
+  EXPECT_NEAR(covered(1e-3f), apart, .05f);
+  EXPECT_GT(covered(.1f), .97f) << "now they are of one layer";
+}
+
+TEST(RasterCube, WhatIsNestedHidesBehindTheLargerLayer) {
+  const RasterGeometry geometry(2);
+  RasterCube cube(geometry, false);
+  const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
+  const float axis_cubed = direction.x * direction.x * direction.x;
+  const auto cover = [&](float amount, float depth, float nested) {
+    RasterCube::Patch patch = diskPatch(direction, kRound, amount * axis_cubed);
+    patch.texture.nested = nested;
+    cube.splat(patch, {depth, depth + .5f}, kWhite);
+    return double(cube.coverage(3));
+  };
+  for (const float nested : {0.f, .4f, 1.f}) {
+    const double apart = 1 - double(nested);
+    cube.clear();
+    EXPECT_NEAR(cover(.5f, 1, nested), .5, 1e-5) << "nothing is before the first layer";
+    EXPECT_NEAR(cover(.3f, 2, nested), .5 + apart * .15, 1e-5) << "the smaller lies behind";
+    cube.clear();
+    cover(.3f, 1, nested);
+    EXPECT_NEAR(cover(.5f, 2, nested), .5 + apart * .15, 1e-5) << "the larger rises above";
+    EXPECT_NEAR(cover(1.5f, 3, nested), 1, 1e-6) << "what fills the pixel fills all that was open";
+  }
+  // Of one layer, what is nested adds nothing to more than it would cover with all before it
+  cube.clear();
+  cover(.5f, 1, 0);
+  const double anywhere = cover(.5f, 2, 0);
+  EXPECT_NEAR(anywhere, .75, 1e-5);
+  EXPECT_NEAR(cover(.1f, 2, 1), anywhere, 1e-5);
+}
+
+// A sheet of disks that face the cube at x = `distance`, on the face +x of 16 pixels: squares of
+// `side` pixels, scattered by a part of that, within a square of `half` pixels around the middle.
+struct SheetOfDisks {
+  float distance = 1, side = .8f, scatter = .3f, half = 8;
+  bool is_solid = true;
+  float thicket = 0;
+
+  void drawTo(RasterCube& cube, const glm::vec3& radiosity) const {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    const float step = side * distance / 8;
+    const int count = int(2 * half / side);
+    for (int i = 0; i < count * count; ++i) {
+      const float u =
+          (float(i % count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const float v =
+          (float(i / count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const glm::vec3 to(distance, u, v), direction = glm::normalize(to);
+      const float length_sq = glm::dot(to, to);
+      RasterCube::Patch patch =
+          diskPatch(direction, {-1, 0, 0}, step * step * direction.x / length_sq);
+      patch.texture.is_solid = is_solid;
+      patch.texture.thicket = thicket;
+      cube.splat(patch, {.99f * distance, 1.01f * distance}, radiosity);
+    }
+  }
+};
+
+class Closing : public ::testing::Test {
+ protected:
+  // Mean of the light, and of what is covered, of pixels in the middle of the face.
+  glm::vec2 seen(int half) const {
+    glm::vec2 sum(0);
+    for (int row = 8 - half; row < 8 + half; ++row) {
+      for (int column = 8 - half; column < 8 + half; ++column) {
+        const auto pixel = std::size_t(row * 16 + column);
+        sum += glm::vec2(cube_.radiosity(pixel).x, cube_.coverage(pixel));
+      }
+    }
+    return sum / float(4 * half * half);
+  }
+  const glm::vec3 dark_{0};
+  RasterGeometry geometry_{16};
+  RasterCube cube_{geometry_, true};
+};
+
+TEST_F(Closing, NothingShinesThroughTheGapsOfASheet) {
+  for (const float side : {.1f, .3f, .8f, 1.7f}) {
+    cube_.clear();
+    SheetOfDisks{.side = side}.drawTo(cube_, dark_);
+    ASSERT_LT(seen(4).y, .999f) << side;  // gaps
+    SheetOfDisks{.distance = 3}.drawTo(cube_, kWhite);
+    cube_.close();
+    EXPECT_LT(seen(4).x, .003f) << side;
+    EXPECT_NEAR(seen(4).y, 1, .003f) << side;
+  }
+}
+
+TEST_F(Closing, WhatIsClosedShinesAsItsOwnLayerDoes) {
+  SheetOfDisks{}.drawTo(cube_, kWhite);
+  SheetOfDisks{.distance = 3}.drawTo(cube_, dark_);
+  cube_.close();
+  EXPECT_NEAR(seen(4).x, 1, .003f);
+}
+
+// The sheet covers a square of 6 by 6 pixels, and a part of those around.
+TEST_F(Closing, OutlinesStayWhereTheyAre) {
+  SheetOfDisks{.side = .5f, .scatter = 0, .half = 3.25f}.drawTo(cube_, dark_);
+  const float before = seen(8).y;
+  cube_.close();
+  EXPECT_NEAR(seen(8).y, before, .01f * before);
+  EXPECT_NEAR(before * 256, 6.5f * 6.5f, .8f);
+}
+
+TEST_F(Closing, GapsBetweenLeavesAndBetweenSpheresStayOpen) {
+  for (const bool is_thicket : {false, true}) {
+    cube_.clear();
+    SheetOfDisks{.scatter = 1.5f, .is_solid = is_thicket, .thicket = is_thicket ? 1.f : 0.f}.drawTo(
+        cube_, kWhite);
+    const float before = seen(8).y;
+    cube_.close();
+    EXPECT_NEAR(seen(8).y, before, is_thicket ? 1e-6f : .02f) << is_thicket;
+  }
+}
+
+// Of less than a pixel, before a wall: it sends what its area says, wherever it is.
+TEST_F(Closing, SmallThingsKeepTheirPower) {
+  SheetOfDisks wall{.distance = 3};
+  double sum = 0;
+  constexpr int kPlaces = 400;
+  for (int i = 0; i < kPlaces; ++i) {
+    cube_.clear();
+    const glm::vec3 direction =
+        glm::normalize(glm::vec3(1, .013f * float(i % 20), .017f * float(i / 20)));
+    const float solid_angle = .1f * 4 / 256;
+    RasterCube::Patch lamp = diskPatch(direction, kRound, solid_angle);
+    lamp.texture.is_solid = false;
+    cube_.splat(lamp, {.999f, 1.001f}, kWhite);
+    wall.drawTo(cube_, dark_);
+    cube_.close();
+    double power = 0;
+    for (std::size_t pixel = 0; pixel < 256; ++pixel) {
+      power += double(cube_.radiosity(pixel).x * geometry_.pixels()[pixel].solid_angle);
+    }
+    sum += power / double(solid_angle) / kPlaces;
+  }
+  EXPECT_NEAR(sum, 1, .01);
 }
 
 TEST(RasterCube, WhatOverlapsHidesBehindItsOwnLayer) {

@@ -41,6 +41,7 @@ class Brush {
         lane_(lane),
         resolution_(canvas.geometry->resolution()),
         scale_(canvas.geometry->pixelsPerSlope()),
+        ribbon_nested_(ribbonNested(scale_)),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane) {}
 
@@ -130,15 +131,19 @@ class Brush {
   }
 
   // Of this part of it.
-  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
+  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part,
+                  V inverse_touch) const {
     const V reach = Splat(patch.reach);
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
     cover.depth_end = hn::Add(distance, reach);
-    cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
+    cover.inverse_gap = inverseLayerGap(patch.reach);
+    cover.inverse_touch = inverse_touch;
+    cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
     cover.overlap = patch.overlap;
     cover.has_hull = patch.thicket == 0;
     cover.is_solid = patch.is_solid;
+    cover.nested = patch.nested(ribbon_nested_);
     cover.opacity = hn::Mul(part, Opacity(patch));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
@@ -187,9 +192,17 @@ class Brush {
         hn::Mul(Splat(patch.most_area), distance));
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
     const Parallelogram shape = OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w);
-    const Cover cover = MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part));
+    const Cover cover =
+        MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape));
     CoverParallelogram(shape, seen, cover);
     if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
+  }
+
+  // As touchPart.
+  static V InverseTouch(const Parallelogram& shape) {
+    const V area = hn::Mul(Splat(4), hn::Mul(shape.half_x, shape.half_y));
+    const V counts = hn::Min(Splat(1), hn::Max(Splat(kFidelity.least_touched), area));
+    return Reciprocal(hn::Mul(Splat(kFidelity.touch), counts));
   }
 
   // As facingAreas of a facet; all times the distance.
@@ -230,7 +243,7 @@ class Brush {
 
     // Area on the face: du dv = area / distance^2 * (distance / w)^3, and more for large ones
     const V inverse_sq = hn::Mul(inverse, inverse);
-    const V extent = hn::Min(one, hn::Mul(Splat(patch.area), inverse_sq));
+    const V extent = hn::Min(Splat(kFidelity.most_extent), hn::Mul(Splat(patch.area), inverse_sq));
     const V depth = hn::NegMulAdd(n_axis, n_axis, one);
     const V bulge = hn::MulAdd(extent, hn::Mul(Splat(0.5f), depth), one);
     const V half_area =
@@ -301,7 +314,8 @@ class Brush {
     Sight from_ray = sight;
     from_ray.facing = Dot(to_centre, patch.normal);
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
-             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part));
+             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part,
+                       Splat(1 / (kFidelity.touch * kFidelity.least_touched))));
   }
 
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
@@ -324,9 +338,9 @@ class Brush {
         return SphereAmount(patch, ray, centre, centre_sq);
       });
     }
-    if (patch.is_ribbon) {
+    if (patch.isRibbon()) {
       const Ribbon ribbon =
-          Ribbon::ofShape(patch.shape, patch.normal, patch.area, patch.ribbon_width);
+          Ribbon::ofShape(patch.shape, patch.normal, patch.area, patch.ribbonWidth());
       const RibbonRays<Normal> rays(centre, c_n, normal, InRaster(ribbon.along),
                                     InRaster(ribbon.across), ribbon, 0.5f / scale_);
       return TracePixels(traced, range, cover,
@@ -370,7 +384,7 @@ class Brush {
     // What lies there is seen from the middle of a pixel, of ribbons the parts of all; and some to
     // spare
     constexpr float kSpare = 0.02f;
-    const float inset = (patch.is_ribbon ? -0.5f : 0.5f) - kSpare;
+    const float inset = (patch.isRibbon() ? -0.5f : 0.5f) - kSpare;
     const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
     begin = hn::Add(hn::MulAdd(low, scale, middle), Splat(inset));
     end = hn::Sub(hn::MulAdd(high, scale, middle), Splat(inset));
@@ -449,6 +463,7 @@ class Brush {
   const std::size_t lane_;
   const int resolution_;
   const float scale_;  // pixels for a slope of 1
+  const float ribbon_nested_;
   const Receivers receivers_;
   const Frames frames_;
   int face_ = 0;

@@ -29,9 +29,11 @@ namespace {
 // How some of the receivers' pixels are covered.
 struct Cover {
   V depth_begin, depth_end;
+  float inverse_gap;  // inverseLayerGap
+  V inverse_touch;    // of touchPart
   M is_lit;
   bool is_all_lit;
-  float overlap;
+  float overlap, nested;
   bool has_hull;  // it is no thicket
   bool is_solid;  // and its hull is widened
   V opacity;
@@ -67,13 +69,19 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
   const V end = hn::Load(d, end_at);
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
-  const M is_new = hn::And(is_drawn, hn::Gt(cover.depth_begin, end));
-  if (!hn::AllFalse(d, is_new)) hull.Turn(place, is_new);
+  // A gap in depth begins a new layer, by and by
+  const V touch = hn::Min(one, hn::Mul(amount, cover.inverse_touch));
+  const V gap = hn::Mul(hn::Sub(cover.depth_begin, end), Splat(cover.inverse_gap));
+  const V is_new = hn::Mul(touch, hn::Min(one, hn::Max(zero, gap)));
+  const M ends = hn::And(is_drawn, hn::Ge(gap, one));
+  if (!hn::AllFalse(d, hn::Gt(is_new, zero))) {
+    hull.Turn(place, ends, hn::And(is_drawn, hn::Gt(is_new, zero)));
+  }
   const V open = hn::Load(d, open_at);
-  room = hn::IfThenElse(is_new, open, room);
-  before = hn::IfThenZeroElse(is_new, before);
+  room = hn::MulAdd(is_new, hn::Sub(open, room), room);
+  before = hn::NegMulAdd(is_new, before, before);
   hn::Store(room, d, room_at);
-  hn::Store(hn::IfThenElse(is_drawn, hn::Max(end, cover.depth_end), end), d, end_at);
+  hn::Store(hn::MulAdd(touch, hn::Max(zero, hn::Sub(cover.depth_end, end)), end), d, end_at);
 
   V counts = amount;
   if constexpr (kOverlaps) {
@@ -82,7 +90,7 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
   }
   const V layer = hn::Min(one, hn::Add(before, counts));
   hn::Store(layer, d, layer_at);
-  const V left = hn::Min(open, OpenBehind(room, layer));
+  const V left = hn::Min(open, OpenBehind(room, layer, Splat(cover.nested)));
   const V covered = hn::IfThenElseZero(hn::Gt(amount, zero), hn::Sub(open, left));
   hn::Store(hn::Sub(open, covered), d, open_at);
   float* const rest_at = pixel + PacketCanvas::kRest * kStep;

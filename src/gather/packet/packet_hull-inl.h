@@ -78,13 +78,14 @@ class FaceHull {
     return true;
   }
 
-  // What comes before something is drawn that begins new layers in these lanes.
-  HWY_INLINE void Turn(std::size_t at, M begins) const {
+  // What comes before something is drawn that begins layers of their own in lanes of `ends`, and
+  // new ones in lanes of `begins`.
+  HWY_INLINE void Turn(std::size_t at, M ends, M begins) const {
     const D d;
     float* const pixel = pixels_.at(at);
     const V before = hn::Load(d, pixel + kRestBefore * kStep);
     V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
-    const M has_layer = hn::And(begins, hn::Gt(before, rest));
+    const M has_layer = hn::And(ends, hn::Gt(before, rest));
     if (!hn::AllFalse(d, has_layer)) Close(at, has_layer);
     rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
     begins = hn::And(begins, hn::Ne(before, rest));

@@ -76,7 +76,7 @@ HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& pat
       const V shift =
           hn::Min(hn::Div(Splat(0.5f * patch.area), largest), hn::Mul(Splat(0.5f), largest));
       const float side =
-          patch.is_ribbon ? patch.area / patch.ribbon_width : std::sqrt(patch.most_area);
+          patch.isRibbon() ? patch.area / patch.ribbonWidth() : std::sqrt(patch.most_area);
       const V reach = hn::Add(Splat(0.5f * kSplatReach * side), shift);
       faces |= FacesThatReach(sight.offset, {reach, reach, reach}, splatted);
     }

@@ -40,20 +40,29 @@ struct alignas(64) Patch {
   float range = 0;
   float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
   bool is_solid = true;                         // likewise
-  bool is_ribbon = false;                       // a ray traced surfel is a rectangle, not a disk
-  // From where it is seen: before its front alone; from both sides of a two-sided disk or facet;
-  // from both, though it sends light from its front alone; or as something else says.
-  enum class Seen : std::uint8_t { kFront, kBoth, kDarkBack, kAllAround };
-  Seen seen = Seen::kFront;
   std::uint32_t parts = 0;  // place in PacketCanvas::parts of what counts of the opacity; 0: all
   glm::vec3 radiosity{0};
+  // It is seen where offset . normal, from the receiver, is below this: kFrontOnly; kBothSides, of
+  // a two-sided disk or facet; kDarkBack, when it is seen from both sides and sends light from its
+  // front; or kAllAround, when something else says what it shows
+  float facing_limit = 0;
   float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
   float reach = 0;          // how far before and behind its middle it meets others of its layer
-  float soft_peak = 0;      // of the ray traced disk, softDiskPeak
-  float ribbon_width = 0;   // of the ray traced ribbon
+  // Of the ray traced disk, see softDiskPeak; or less than 0, of a ribbon: its width times -1
+  float soft_peak = 0;
 
+  static constexpr float kFrontOnly = 0;
+  static constexpr float kBothSides = std::numeric_limits<float>::infinity();
+  static constexpr float kDarkBack = std::numeric_limits<float>::max();
+  static constexpr float kAllAround = kDarkBack / 2;
   bool isRound() const { return disk_area == 0; }
-  bool showsBoth() const { return seen == Seen::kBoth || seen == Seen::kDarkBack; }
+  bool showsBoth() const { return facing_limit >= kDarkBack; }
+  bool isRibbon() const { return soft_peak < 0; }
+  float ribbonWidth() const { return -soft_peak; }
+  float nested(float ribbon_nested) const {
+    if (isRibbon() && thicket > 0) return ribbon_nested;
+    return nestedPart(is_solid && facing_limit != kBothSides, thicket);
+  }
 };
 static_assert(sizeof(Patch) == 128);
 

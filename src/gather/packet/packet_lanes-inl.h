@@ -68,7 +68,10 @@ inline V InverseSqrt(V x) {
 }
 
 // As openBehind, of coverage_rules.h.
-inline V OpenBehind(V room, V layer) { return hn::NegMulAdd(room, layer, room); }
+inline V OpenBehind(V room, V layer, V nested) {
+  const V rest = hn::Sub(Splat(1), layer), apart = hn::Mul(room, rest);
+  return hn::MulAdd(nested, hn::Sub(hn::Min(room, rest), apart), apart);
+}
 
 // As takenWeight, of coverage_rules.h; zero where nothing is open.
 inline V TakenWeight(V covered, V open, V rest, V weight) {
@@ -175,11 +178,11 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 
   // As ReceiverRaster::addSurfel: the disk must rise above the horizon of the rays
   const V cosine = Dot(receivers.normal, patch.normal);
-  const float turned = patch.seen == Patch::Seen::kFront ? canvas.turned : 1;
-  const float size = patch.is_ribbon ? patch.ribbon_width : patch.radius;
-  const float bias = canvas.bias * size;
+  const float turned = patch.facing_limit == Patch::kFrontOnly ? canvas.turned : 1;
+  const float size = patch.isRibbon() ? patch.ribbonWidth() : patch.radius;
+  const float bias = canvas.bias * size * (patch.isRibbon() ? kFidelity.ribbon_bias : 1);
   V part = hn::MulAdd(Splat(turned), cosine, one);
-  if (patch.seen == Patch::Seen::kBoth) {
+  if (patch.facing_limit == Patch::kBothSides) {
     part =
         hn::Max(zero, hn::NegMulAdd(sight.height, Splat(1 / (kFidelity.bias_height * size)), one));
   }
@@ -190,7 +193,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   sight.traced = hn::And(is_near, rises);
 
   // ... and show its front, or the sphere its outside, to where the rays begin
-  if (patch.seen == Patch::Seen::kFront) {
+  if (patch.facing_limit == Patch::kFrontOnly) {
     sight.traced =
         hn::And(sight.traced, hn::Lt(hn::NegMulAdd(sight.bias, cosine, sight.facing), zero));
   } else if (patch.isRound()) {
@@ -204,12 +207,9 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 
 // Lanes to which the patch is a patch of solid angle: the mid or the far field.
 HWY_INLINE M SeenAsPatch(const Patch& patch, const Receivers& receivers, const Sight& sight) {
-  M seen = hn::And(hn::And(hn::Lt(sight.near_part, Splat(1)), sight.in_reach),
-                   receivers.SeeAt(sight.height));
-  if (patch.seen == Patch::Seen::kFront) {
-    seen = hn::And(seen, hn::Lt(sight.facing, hn::Zero(D())));
-  }
-  return seen;
+  const M faces = hn::Lt(sight.facing, Splat(patch.facing_limit));
+  return hn::And(hn::And(hn::Lt(sight.near_part, Splat(1)), sight.in_reach),
+                 hn::And(receivers.SeeAt(sight.height), faces));
 }
 
 // From where the rays begin.

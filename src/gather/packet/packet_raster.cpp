@@ -127,7 +127,7 @@ void PacketRaster::bringToWorld(Patch& patch) const {
     *area *= square;
   }
   for (float* length : {&patch.radius, &patch.near_distance, &patch.reach}) *length *= scale;
-  patch.ribbon_width *= scale;
+  if (patch.isRibbon()) patch.soft_peak *= scale;
 }
 
 // The faces that some receiver may see some of a node's patch on, as bits.
@@ -136,7 +136,7 @@ std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
   const glm::vec3 middle = patch.position - view_.centre;
   const glm::vec3 size = glm::abs(middle);
   const float largest = std::max({size.x, size.y, size.z});
-  const float extent = std::min(1.f, patch.area / (largest * largest));
+  const float extent = std::min(kFidelity.most_extent, patch.area / (largest * largest));
   if (extent > kLargeExtent) return facesThatSeeLarge(patch, extent);
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
   const float half = std::max(0.5f * side, leastHalf(patch));
@@ -254,10 +254,10 @@ void PacketRaster::addFacet(const Facet& facet, std::uint32_t parts) {
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + local_radius_ / distance;
   if (is_rim) patch.range = range;
-  patch.seen = facet.is_two_sided ? Patch::Seen::kBoth
-               : shows_both       ? Patch::Seen::kDarkBack
-               : patch.range > 0  ? Patch::Seen::kAllAround
-                                  : Patch::Seen::kFront;
+  patch.facing_limit = facet.is_two_sided ? Patch::kBothSides
+                       : shows_both       ? Patch::kDarkBack
+                       : patch.range > 0  ? Patch::kAllAround
+                                          : Patch::kFrontOnly;
   patch.parts = parts;
   bringToWorld(patch);
   orderLastPatch(facesThatSee(patch));
@@ -270,17 +270,18 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   kernel_.seeRoughNode(node, direction, seen);
   const float round_area = shownArea(seen.facing, sides);
   if (!(round_area > kFidelity.least_visible_part * node.area)) return;
-  const glm::vec3 middle = seenMiddle(node, to_node, seen.facing, sides);
-  if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(node.position + middle))) return;
+  const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
+  if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(node.position + visible.middle))) return;
   Patch& patch = patches_.emplace_back();
-  patch.position = node.position + middle;
+  patch.position = node.position + visible.middle;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
-  patch.reach = layerReach(quadraticForm(node.covariance, direction));
+  patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   patch.shape = shapeOf(node.covariance);
   patch.thicket = thicketPart(node);
   patch.is_solid = false;
-  const RoughCover cover = roughCover(node, direction, round_area, patch.thicket);
+  const RoughCover cover =
+      roughCover(node, direction, visible.perspective * round_area, patch.thicket);
   patch.area = patch.round_area = cover.area;
   patch.most_area = cover.most;
   patch.opacity = cover.opacity;
@@ -290,7 +291,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
   patch.overlap = std::max(patch.overlap, patch.thicket);
-  patch.seen = Patch::Seen::kAllAround;
+  patch.facing_limit = Patch::kAllAround;
   bringToWorld(patch);
   orderLastPatch(facesThatSee(patch));
 }
@@ -310,16 +311,15 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
       patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
     } else {
       patch.shape = ribbon.shape();
-      patch.is_ribbon = true;
-      patch.ribbon_width = ribbon.width;
+      patch.soft_peak = -ribbon.width;
     }
     patch.area = patch.most_area = surfel.area;
     (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
     patch.radiosity = surfel.radiosity;
-    patch.seen = surfel.isSphere()                            ? Patch::Seen::kAllAround
-                 : surfel.isTwoSided()                        ? Patch::Seen::kBoth
-                 : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
-                                                              : Patch::Seen::kFront;
+    patch.facing_limit = surfel.isSphere()                            ? Patch::kAllAround
+                         : surfel.isTwoSided()                        ? Patch::kBothSides
+                         : rules_.quality.sides == GatherSides::kBoth ? Patch::kDarkBack
+                                                                      : Patch::kFrontOnly;
     const glm::vec3 to_surfel = surfel.position - local_centre_;
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());

@@ -123,12 +123,18 @@ Facet facetOf(const Node& node) {
 // (front + back) m; and when all of it faces the receiver, it is front m. So m is exact for a
 // sphere (two thirds of its radius towards the receiver), for an edge of which one face shows, and
 // for a cap.
-glm::vec3 seenMiddle(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
-                     GatherSides sides) {
-  const float both = facing.front + facing.back;
-  const glm::vec3 v = -glm::normalize(to_node);
+//
+// From a finite distance D the surfels turn: of the solid angles A_i n_i . (D v - x_i) / |D v -
+// x_i|^3 the sum is front / D^2 (1 + (3 m . v - q) / D) to first order, with q the mean of n_i .
+// x_i, which the trace of F gives like m. In the distance of m it looks 1 + 2 m . v / D as large,
+// and the rest is `perspective`: of a sphere, whose rim is behind its middle, the same less.
+SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
+                  GatherSides sides) {
+  const float both = facing.front + facing.back, distance = glm::length(to_node);
+  const glm::vec3 v = -to_node / distance;
   const auto& moment = node.rough.front_moment;
   const glm::vec3 weighted(glm::dot(moment[0], v), glm::dot(moment[1], v), glm::dot(moment[2], v));
+  const float trace = moment[0].x + moment[1].y + moment[2].z;
   float part = 1 / both;
   if (sides == GatherSides::kBack) part = -part;
   if (sides == GatherSides::kBoth) part *= (facing.front - facing.back) / both;
@@ -136,7 +142,8 @@ glm::vec3 seenMiddle(const Node& node, const glm::vec3& to_node, const FacingAre
   glm::vec3 middle = part * weighted;
   const float length = glm::length(middle);
   if (length > node.radius) middle *= node.radius / length;
-  return middle;
+  const float turn = part * (glm::dot(v, weighted) - trace) / distance;
+  return {middle, 1 + std::clamp(turn, -kFidelity.most_turn, kFidelity.most_turn)};
 }
 
 namespace {
@@ -179,22 +186,33 @@ float mostVisibleArea(const Facet& facet) {
 }
 
 float reachOf(const Facet& facet, const glm::vec3& direction) {
-  return layerReach(quadraticForm(facet.covariance, direction));
+  const float reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+  return facet.is_thicket ? kFidelity.thicket_reach * reach : reach;
 }
 
 float thicketPart(const Surfel& surfel) {
   if (!surfel.isTwoSided()) return 0;
-  const bool is_ribbon =
-      surfel.long_side != kNoLongSide
-          ? elongationOf(surfel) > kFidelity.ribbon_elongation
-          : surfel.area < kFidelity.ribbon_part * kPi * surfel.radius * surfel.radius;
+  const bool is_ribbon = surfel.long_side != kNoLongSide
+                             ? elongationOf(surfel) > kFidelity.ribbon_elongation
+                             : looksLikeRibbon(surfel.radius, surfel.area);
   return is_ribbon ? 1 : 0;
 }
 
 float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
               const glm::vec3& direction) {
-  if (!ribbon.isEmpty()) return ribbon.halfExtent(direction);
-  return layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
+  const bool is_thicket = thicketPart(surfel) > 0;
+  if (is_thicket && !ribbon.isEmpty()) {
+    return kFidelity.ribbon_reach * ribbon.halfExtent(direction) +
+           kFidelity.ribbon_depth * ribbon.width;
+  }
+  const float reach = layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
+  return is_thicket ? kFidelity.thicket_reach * reach : reach;
+}
+
+float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionRules& rules) {
+  const float thicket = thicketPart(surfel);
+  if (thicket > 0 && !ribbon.isEmpty()) return rules.ribbon_nested;
+  return nestedPart(mayTile(surfel), thicket);
 }
 
 // Spheres are a surface. Codes round: what is about none is none.
@@ -242,6 +260,7 @@ bool makeContribution(const Facet& facet, const glm::vec3& to_facet, const Contr
   contribution.spread = facet.area / distance_sq;
   contribution.overlap = contribution.thicket = facet.is_thicket ? 1 : 0;
   contribution.opacity = 1;
+  contribution.nested = nestedPart(!facet.is_two_sided, contribution.thicket);
   contribution.is_solid = 1;
   contribution.normal = facet.normal;
   contribution.shape = shapeOf(facet.covariance);
@@ -262,17 +281,20 @@ bool makeContribution(const Node& node, const glm::vec3& to_node, const Contribu
   const FacingAreas facing = facingAreas(node, -direction);
   const float area = shownArea(facing, rules.sides);
   if (!(area > kFidelity.least_visible_part * node.area)) return false;
-  const glm::vec3 to_seen = to_node + seenMiddle(node, to_node, facing, rules.sides);
+  const SeenPart seen = seenPart(node, to_node, facing, rules.sides);
+  const glm::vec3 to_seen = to_node + seen.middle;
   const float distance_sq = glm::dot(to_seen, to_seen);
   if (!(distance_sq > 0)) return false;
 
   contribution.thicket = thicketPart(node);
-  const RoughCover cover = roughCover(node, direction, area, contribution.thicket);
+  const RoughCover cover =
+      roughCover(node, direction, seen.perspective * area, contribution.thicket);
   contribution.distance_sq = distance_sq;
-  contribution.reach = layerReach(quadraticForm(node.covariance, direction));
+  contribution.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   contribution.direction = to_seen / std::sqrt(distance_sq);
   contribution.solid_angle = cover.area / distance_sq;
   contribution.opacity = cover.opacity;
+  contribution.nested = nestedPart(false, contribution.thicket);
   contribution.spread = cover.area / distance_sq;
   contribution.overlap = 0;
   if (rules.sides == GatherSides::kFront) {
@@ -311,6 +333,7 @@ bool makeContribution(const Surfel& surfel, const glm::vec3& to_surfel,
   contribution.overlap = 0;
   contribution.thicket = thicketPart(surfel);
   contribution.opacity = 1;
+  contribution.nested = nestedPart(surfel, ribbon, rules);
   contribution.is_solid = mayTile(surfel) ? 1 : 0;
   contribution.normal = surfel.normal;
   contribution.shape = ribbon.isEmpty() ? withoutDirection(surfel.normal) : ribbon.shape();

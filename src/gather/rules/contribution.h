@@ -25,17 +25,19 @@ struct Contribution {
   float thicket;          // how much of it is leaves or hair, 0..1; likewise
   float opacity;          // what it hides of its solid angle, 0..1; 1 but for thickets, and while
                           // a node fades into what is below it
+  float nested;           // how far it hides behind other layers; likewise
   float is_solid;         // 1: a tile of a surface; 0: a sphere, or a rough node; likewise
   glm::vec3 normal;       // unit length for a disk, zero for a sphere, in between when partly flat
   SymmetricMatrix shape;  // how it spreads; see RasterCube::Patch
   glm::vec3 radiosity;    // of what covers; back sides are black. Zero when color is not asked for.
 };
-static_assert(sizeof(Contribution) == 23 * sizeof(float));
+static_assert(sizeof(Contribution) == 24 * sizeof(float));
 
 // How contributions are to be made.
 struct ContributionRules {
   GatherSides sides = GatherSides::kFront;
   bool has_color = true;
+  float ribbon_nested = 0;  // coverage_rules.h
 };
 
 // The surfel as one whose front is the side that covers: with GatherSides::kBack turned round, and
@@ -75,10 +77,13 @@ Facet facetOf(const Node& node);
 // Radiosity of the fronts that face a receiver in unit direction `to_receiver` of a rough node.
 glm::vec3 seenRadiosity(const Node& node, const glm::vec3& to_receiver);
 
-// The middle of what is seen of a rough node, from the node's position, seen from `to_node` before
-// it. No longer than the node's radius.
-glm::vec3 seenMiddle(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
-                     GatherSides sides);
+// Where what is seen of a rough node is, seen from `to_node` before the node's position.
+struct SeenPart {
+  glm::vec3 middle;   // from the node's position; no longer than its radius
+  float perspective;  // what it looks like in the distance of its middle, over what it faces
+};
+SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
+                  GatherSides sides);
 
 // The largest area that a facet may show in any direction.
 float mostVisibleArea(const Facet& facet);
@@ -102,6 +107,8 @@ float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius, const gl
 inline bool mayTile(const Surfel& surfel) { return !surfel.isSphere() && !surfel.isTwoSided(); }
 // How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
 float thicketPart(const Surfel& surfel);
+// How much of what it covers hides behind the same side of a pixel as other layers, 0..1.
+float nestedPart(const Surfel& surfel, const Ribbon& ribbon, const ContributionRules& rules);
 // How much of a rough node is leaves or hair, 0..1: what of it is two-sided.
 float thicketPart(const Node& node);
 

@@ -1,10 +1,6 @@
 // Every number that decides how true a gather is, but the options of the caller: what it may leave
 // out, how patches look and how they cover pixels. docs/algorithm.md has the rules that they belong
-// to. bench/sensitivity measures what each is worth over three sets of scenes: those that errors
-// are reported for, those that no number was chosen by, and scenes by chance. Percentages below are
-// what it prints without the rule (or else with .7 and 1.4 times the number): changes of the RMSE
-// of occlusion on the three sets, at 1 M surfels. docs/decisions.md lists what was deleted because
-// it moved none of them by a twentieth.
+// to; bench/sensitivity measures what each is worth.
 #pragma once
 
 namespace surfeit {
@@ -12,23 +8,31 @@ namespace surfeit {
 struct Fidelity {
   // --- The cut (docs/algorithm.md, "Choosing the cut") ---
 
+  // Radians, 0 to .1. What rises less above the horizon is dropped: a full circle of it covers the
+  // square of this, .0001 of the hemisphere.
+  float horizon_slope = 0.01f;
+
   // Part, 0 to 1, of the max solid angle that a node may fill which is not flat. Flat nodes are
-  // tiles of a surface; of corners and thickets a receiver sees a part. (+6, +3, +11 %)
+  // tiles of a surface; of corners and thickets a receiver sees a part. (With .5, .67, .8, 1: color
+  // RMSE of the lion on a plane 1.9, 1.9, 2.0, 2.2 %; AO RMSE of spheres .0041, .0045, .0050,
+  // .0060.)
   float uneven_share = 2.f / 3;
 
-  // Times. Where directions weigh by the cosine, a node that is not flat may look larger by one
-  // over the cosine of its highest point, up to this. (1: -1, -1, -2 %, for a quarter more
-  // patches.)
-  float most_coarser = 4;
+  // Cosine, 0 to 1. What is seen at a smaller one to the normal weighs less, so nodes that are not
+  // flat may look larger by as much, up to most_coarser times and most_low_solid_angle, steradians.
+  // Of flat ones a closed shell of 200,000 disks would cover .9927 instead of .9954.
+  float whole_cosine = 0.8f;
+  float most_coarser = 4, most_low_solid_angle = 0.4f;
 
-  // Part, 0 to .5, of the greatest solid angle by which a node fades into what is below it.
-  // Without, results step from one receiver to the next, by 2 % of the light along a line in a box
-  // (bench/line_steps.sh); errors are the same.
-  float fading = 0.05f;
+  // Part, 0 to .5, of the greatest solid angle by which a node fades into what is below it, and
+  // that of leaves, the surfels of which may be ray traced. Without, results step from one receiver
+  // to the next. (Largest steps of irradiance along lines in a box: 2.2, 1.7, .5, .8, .3 % with
+  // 0; 1.1, 1.0, .2, .4, .2 with .015 to .03. bench/line_steps.sh)
+  float fading = 0.02f, leaf_fading = 0.1f;
 
   // Pixels. No node is drawn as a larger patch: its own shape would be seen. So finer pixels
-  // converge, whatever the max solid angle. (Nothing at standard quality. Covered of a closed shell
-  // of 20,000 disks at 32 and 64 pixels: .998 and .995; without .991 and .982. bench/leaks)
+  // converge, whatever the max solid angle. (Covered of a closed shell of 20,000 disks at 32 and 64
+  // pixels: .998 and .995; with .1 sr .991 and .982. bench/leaks)
   float most_node_pixels = 6.5f;
 
   // Times. A cone's max solid angle is this many times its share of the hemisphere. (light_bench,
@@ -42,67 +46,110 @@ struct Fidelity {
   // --- What nodes look like ("Contributions") ---
 
   // Part, 0 to .1, of a node's area. One that shows less shows nothing: three bands cannot tell so
-  // little from zero, and dividing power by it makes bright specks. (Color +214, +17, 0 %)
+  // little from zero, and dividing power by it would make up bright specks.
   float least_visible_part = 0.01f;
 
   // Where between the least and the greatest area that its moments allow a rough node is, 0 to 1:
-  // that of evenly spread normals, which follows from their moments. (+8, 0, 0 % with .9)
+  // that of evenly spread normals.
   float upwards = 0.64f;
 
   // Part, 0 to 1, of its outline that a rough node covers at most, the outline being an ellipse
-  // with its covariance: a ball covers 3/4 of that, a rectangle .95. (+3, -1, +8 %)
+  // with its covariance: a ball covers 3/4 of that, a rectangle .95. (AO bias with .8, .87, 1: lion
+  // on a plane -.0002, +.0017, +.0029; Sponza -.0039, -.0027, -.0023.)
   float filled_outline = 0.87f;
 
+  // Part, 0 to 1, by which a rough node may look different from close by: beyond, first order says
+  // nothing.
+  float most_turn = 0.3f;
+
   // Times. Overlap of a rough node that shows more back than front: 1 where backs are 9/5 of the
-  // fronts. (+11, -1, 0 %)
+  // fronts. (AO bias with 4 and 10: lion +.0002, -.0014; spheres +.0014, +.0008.)
   float overlap_gain = 3.5f;
 
-  // Outline of a thicket over that of its ellipse: that of a ball full of leaves. (.9: +7, +1, 0 %)
-  float thicket_outline = 1.25f;
+  // --- Layers of a pixel ("Coverage") ---
 
-  // --- Hulls ("Closing") ---
+  // How far before and behind its middle a patch meets others of its layer: this much of its radius
+  // at least, and this many times its depth by the variance along the direction. Less tears
+  // surfaces apart, more joins what is apart. (AO RMSE and bias with 1.1 and 1 times as far: bunny
+  // .0031 and
+  // -.0019, .0039 and -.0027; city .0061 and +.0034, .0058 and +.0028.)
+  float least_reach = 0.55f, depth_reach = 1.05f;
 
-  // Part of half its side by which a patch is widened in the hull. (0: +5, +27, +35 %)
+  // Times the reach. A narrower gap in depth begins a layer in part. (Largest jumps of irradiance
+  // on the wall and the back of a box without: .25, .50 %, so .10, .37. AO RMSE of spheres with 0,
+  // .5, 1: .0041, .0041, .0042.)
+  float layer_gap = 0.5f;
+
+  // Parts of a pixel. A patch moves the end of its layer in full where it covers `touch` of a
+  // pixel, or of its own area where that is smaller, down to least_touched. (Without, jumps on the
+  // wall and the back of a box are .19 and .41 %.)
+  float touch = 0.02f, least_touched = 0.05f;
+
+  // Part, 0 to 1, of a surface that hides behind other layers as if all rose from the same side of
+  // a pixel; the rest hides at random. (AO RMSE with 0, .3, 1: city .0059, .0053, .0053; lion
+  // .0044, .0038, .0046; spheres .0055, .0045, .0128.)
+  float nested = 0.3f;
+
+  // Part of half its side by which a patch is widened in the hull. (AO RMSE with .7, .75, .8, .9:
+  // bunny, scattered .0054, .0046, .0042, .0037; city .0049, .0052, .0053, .0057.)
   float hull_widening = 0.75f;
-  // Part of a pixel from which on what is ray traced is of the hull: the nearer of all and nothing.
+  // Part of a pixel from which on what is ray traced is of the hull.
   float traced_hull = 0.5f;
+
+  // --- Leaves, hair and grass ("Thickets", "Ribbons") ---
+
+  // Part, 0 to 1, of the usual reach of a layer of thickets.
+  float thicket_reach = 0.15f;
+  // Outline of a thicket over that of its ellipse. (AO bias of leaves with nodes of .05, .1, .4 sr:
+  // with 1.25 +.0024, +.0008, -.0002; with .95 .0000, -.0028, -.0084.)
+  float thicket_outline = 1.25f;
+  // Part of a disk. A two-sided surfel without a longer side that fills less is a piece of a
+  // ribbon.
+  float ribbon_part = 0.15f;
+  // Times. One with a longer side is a piece of a ribbon from this many times as long as wide.
+  float ribbon_elongation = 3;
+  // Parts of its extent and of its width that a piece of a ribbon reaches in depth. (Hair at 40
+  // pixels with .15, .5, .7, 1: color .89, .73, .70, .75 %.)
+  float ribbon_reach = 0.5f, ribbon_depth = 0.02f;
+  // Part of the bias of a disk as large as it is wide. (AO RMSE of hair .0070, with 1 .0076.)
+  float ribbon_bias = 1.f / 3;
+  // Cosine, 0 to 1. A longer side farther off the surfel's plane says nothing.
+  float least_in_plane = 0.3f;
+  // Times. Squares are taken to be as much longer than wide, so that their shape has axes.
+  float least_elongation = 1.04f;
+  // Part of its length for each radius of the near field within which it is ray traced.
+  float ribbon_radius = 0.25f;
 
   // --- The near field ("The raster cube") ---
 
-  // Times. A two-sided surfel so many times as long as wide is a piece of a ribbon: hair or grass,
-  // which lies before and behind others anywhere. (+8, -1, +1 %)
-  float ribbon_elongation = 4;
-  // Part of a disk, 0 to 1. So is one whose longer side is not known and that has less of its disk.
-  // (None in the sets. Of ribbons spread at random .78 is covered without, where .63 is right; test
-  // LeavesAndRibbonsCoverAsMuchAsWhatIsSpreadAtRandom.)
-  float ribbon_part = 0.15f;
-  // Part of its length for each radius of the near field within which a ribbon is ray traced.
-  // (0: +36, +4, +2 %)
-  float ribbon_radius = 0.25f;
-
   // Times the area of a surfel that its soft disk covers, so that disks of a surface leave no gaps;
-  // two-sided ones lie alone and cover their area. (1: +92, +85 %)
-  float soft_disk_area = 1.7f;
+  // two-sided ones lie alone. (AO RMSE with disks that cover fully, 1, 1.6, 2: lion .0164, .0115,
+  // .0108, .0110; bunny .0050, .0070, .0031, .0031.)
+  float soft_disk_area = 1.7f, two_sided_soft_disk_area = 1;
 
   // Part, 0 to 1, of the near field's distance. From there to its border a surfel is both, ray
-  // traced and a patch. (.999: +1, +3 %)
+  // traced and a patch. (Largest step on a floor below a sphere .90 % with 1, .67 % so.)
   float whole_near = 0.875f;
 
-  // Radii. A two-sided surfel whose middle is so far above the horizon has no bias: it is not of
-  // the receiver's own surface. (The exact gather of random scenes changes by .01 without.)
+  // Times the root of its area that a disk is wide at most: that of a cell 27 times as long as
+  // wide.
+  float largest_radius = 3;
+
+  // Radii. A two-sided surfel whose middle is so far above the horizon has no bias. (AO RMSE of
+  // leaves .0081, with a full bias .0110; .02 to .1 do the same.)
   float bias_height = 0.05f;
 
-  // Radii. A receiver without a normal is a sphere itself: closer spheres are its own surface, and
-  // how far each sticks out is noise of the sampling.
+  // Radii. A receiver without a normal is a sphere itself: closer spheres are its own surface.
   float sphere_clearance = 3;
 
   // --- Footprints ("The raster cube") ---
 
-  // Cosine. A face on which a direction is farther aside gets nothing of what is there. (.2: +5,
-  // +2, +3 %)
+  // Cosine. A face on which a direction is farther aside gets nothing of what is there.
   float least_axis = 0.3f;
   // Spread over area that a patch has at least on a face: seen edge-on, it is no line.
   float least_spread = 1.f / 64;
+  // Area over squared distance that second-order terms count at most.
+  float most_extent = 1;
 };
 
 // bench/sensitivity changes them; everywhere else they are constants.

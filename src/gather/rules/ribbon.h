@@ -27,10 +27,11 @@ struct Ribbon {
     const glm::vec3 side = directionOf(surfel.long_side);
     const glm::vec3 in_plane = side - glm::dot(side, surfel.normal) * surfel.normal;
     const float cosine = glm::length(in_plane);
-    if (!(cosine > kLeastInPlane)) return ribbon;
+    if (!(cosine > kFidelity.least_in_plane)) return ribbon;
     ribbon.along = in_plane / cosine;
     ribbon.across = glm::cross(surfel.normal, ribbon.along);
-    ribbon.length = std::sqrt(surfel.area * std::max(elongationOf(surfel), kLeastElongation));
+    ribbon.length =
+        std::sqrt(surfel.area * std::max(elongationOf(surfel), kFidelity.least_elongation));
     ribbon.width = surfel.area / ribbon.length;
     return ribbon;
   }
@@ -77,13 +78,12 @@ struct Ribbon {
   }
 
  private:
-  // Against rounding: a side that is a normal says nothing, and squares have no axes.
-  static constexpr float kLeastInPlane = 1e-3f, kLeastElongation = 1.01f;
+  // Squares are taken to be longer than wide, so that their shape has axes.
 };
 
 // Of the circle that a surfel is drawn within, as the ribbon that it is, if it is one.
 inline float drawnRadius(const Surfel& surfel, const Ribbon& ribbon) {
-  if (ribbon.isEmpty()) return surfel.radius;
+  if (ribbon.isEmpty()) return effectiveRadius(surfel.radius, surfel.area);
   return std::max(surfel.radius, ribbon.radius());
 }
 

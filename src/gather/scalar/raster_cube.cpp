@@ -62,20 +62,20 @@ void RasterCube::clear(const glm::vec3& up, bool weighs) {
 }
 
 // A layer with less room than `amount` ends at exactly 1, and the pixel is exactly 1 then.
-inline void RasterCube::coverPixel(std::size_t pixel, float amount, float weight,
+inline void RasterCube::coverPixel(std::size_t pixel, float amount, float touch, float weight,
                                    const Texture& texture, const DepthRange& depth,
                                    const glm::vec3& radiosity) {
   Coverage& coverage = coverage_[pixel];
   if (coverage.total >= 1) return;
 
-  const bool is_new = depth.begin > coverage.layer_end;
-  if (is_new) {
-    closeLayer(pixel);
-    beginLayer(pixel);
-    coverage.room = 1 - coverage.total;
-    coverage.layer = 0;
-  }
-  coverage.layer_end = std::max(coverage.layer_end, depth.end);
+  // A gap in depth begins a new layer, by and by
+  const float gap = newLayerPart(depth.begin - coverage.layer_end, depth.reach());
+  if (gap >= 1) closeLayer(pixel);
+  const float is_new = touch * gap;
+  if (is_new > 0) beginLayer(pixel);
+  coverage.room += is_new * (1 - coverage.total - coverage.room);
+  coverage.layer -= is_new * coverage.layer;
+  coverage.layer_end += touch * std::max(0.f, depth.end - coverage.layer_end);
 
   // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer;
   // what of a thicket hides behind itself is left out of its opacity
@@ -83,14 +83,13 @@ inline void RasterCube::coverPixel(std::size_t pixel, float amount, float weight
   const float slope = 1 - middle * texture.overlap;
   coverage.layer = std::min(1.f, coverage.layer + amount * slope);
   const float before = coverage.total;
-  coverage.total = std::max(before, 1 - openBehind(coverage.room, coverage.layer));
+  coverage.total = std::max(before, 1 - openBehind(coverage.room, coverage.layer, texture.nested));
   const float taken = takenWeight(coverage.total - before, 1 - before, coverage.rest, weight);
   coverage.rest -= taken;
   if (!radiosity_.empty()) radiosity_[pixel] += taken * radiosity;
   if (!faded_.empty()) faded_[pixel] += taken * depth.fade;
   if (recorder_ != nullptr) {
-    recorder_->add(pixel, coverage.total - before, is_new ? 1.f : 0.f,
-                   0.5f * (depth.begin + depth.end));
+    recorder_->add(pixel, coverage.total - before, is_new, 0.5f * (depth.begin + depth.end));
   }
 }
 
@@ -210,6 +209,7 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
   const float size = float(resolution), middle = 0.5f * size, scale = geometry_->pixelsPerSlope();
   const float x_middle = shape.u * scale + middle, y_middle = shape.v * scale + middle;
   const float half_x = shape.half_u * scale, half_y = shape.half_v * scale;
+  const float area = 4 * half_x * half_y;
   const float y_begin = std::max(0.f, y_middle - half_y);
   const float y_end = std::min(size, y_middle + half_y);
   if (!(y_begin < y_end)) return;
@@ -234,7 +234,7 @@ void RasterCube::coverParallelogram(int face, const Parallelogram& shape, const 
           std::max(1e-20f, weightAt(face, float(column) + 0.5f, float(row) + 0.5f));
       const float weight =
           weightAt(face, 0.5f * (left + right), 0.5f * (top + bottom)) / middle_weight;
-      coverPixel(pixel, amount, weight, texture, depth, radiosity);
+      coverPixel(pixel, amount, touchPart(amount, area), weight, texture, depth, radiosity);
     }
   }
 }
@@ -271,7 +271,7 @@ RasterCube::Parallelogram RasterCube::onFace(const Patch& patch, int axis) {
   const float shear = b / c;
   const float row_a = std::max(kFidelity.least_spread * a, a - b * shear);
 
-  const float extent = std::min(1.f, patch.spread * inverse * inverse);
+  const float extent = std::min(kFidelity.most_extent, patch.spread * inverse * inverse);
   const float bulge = 0.5f * extent * (1 - n_axis * n_axis), shift = extent / 3;
   const float half_area = 0.25f * patch.solid_angle * inverse * inverse * inverse * (1 + bulge);
   const float half_u = std::sqrt(half_area * std::sqrt(row_a / c));
@@ -317,7 +317,7 @@ void RasterCube::tracePixels(const glm::vec3& centre, float radius, const Textur
         const std::size_t pixel = row_first + std::size_t(column);
         const float amount = texture.opacity * amountOf(pixels[pixel].direction);
         if (!(amount > 0)) continue;
-        coverPixel(pixel, amount, 1, texture, depth, radiosity);
+        coverPixel(pixel, amount, touchPart(amount, 0), 1, texture, depth, radiosity);
         if (texture.thicket == 0 && amount >= kFidelity.traced_hull) {
           addHull(pixel, kHullSamples, texture.is_solid ? kHullSide / 2 : 0, depth);
         }

@@ -30,11 +30,12 @@ struct Ribbon;
 //
 // Coverage adds up within a layer and covers between layers. Neighbouring surfels of one surface
 // share a pixel without overlapping, so their coverages add until the layer is full; a surface
-// behind is hidden by the part that the layers before it cover. A contribution belongs to the layer
-// before it when their depth ranges meet. Adding everything, the memo's rule, lets the half-covered
-// silhouettes of things behind each other fill a pixel. Measured on a plane with 500 spheres, near
-// field 8: AO RMSE .0135 and bias +.007 with it, .0095 and -.004 with layers (docs/algorithm.md,
-// "Coverage").
+// behind is hidden by the part that the layers before it cover, and by more where both are likely
+// to cover the same side of the pixel (coverage_rules.h, Fidelity::nested). A contribution belongs
+// to the layer before it when their depth ranges meet, and the less, the wider the gap between them
+// (Fidelity::layer_gap). Adding everything, the memo's rule, lets the half-covered silhouettes of
+// things behind each other fill a pixel. Measured on a plane with 500 spheres, near field 8: AO
+// RMSE .0135 and bias +.007 with it, .0095 and -.004 with layers (docs/algorithm.md, "Coverage").
 class RasterCube {
  public:
   // `geometry` must outlive the cube; with that of a cone, all directions are of its frame. Without
@@ -57,6 +58,7 @@ class RasterCube {
     float overlap = 0;
     float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
     float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
+    float nested = 0;   // how far it hides behind other layers; coverage_rules.h, kFidelity.nested
     // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
     // alone.
     bool is_solid = true;
@@ -134,9 +136,10 @@ class RasterCube {
   bool isHeld(std::size_t pixel) const;
   void closeLayer(std::size_t pixel);
   void beginLayer(std::size_t pixel);
+  // `touch`: how much it says about its layer, touchPart.
   // `weight`: of the middle of what covers it, over that of its own middle.
-  void coverPixel(std::size_t pixel, float amount, float weight, const Texture& texture,
-                  const DepthRange& depth, const glm::vec3& radiosity);
+  void coverPixel(std::size_t pixel, float amount, float touch, float weight,
+                  const Texture& texture, const DepthRange& depth, const glm::vec3& radiosity);
   // Of places on a face, in pixels, by their cosine and solid angle for their area there.
   float weightAt(int face, float x, float y) const;
   void coverParallelogram(int face, const Parallelogram& shape, const Texture& texture,

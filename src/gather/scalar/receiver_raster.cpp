@@ -17,7 +17,8 @@ namespace surfeit {
 
 ReceiverRaster::ReceiverRaster(const GatherRules& rules)
     : rules_(rules),
-      contribution_rules_{rules.quality.sides, rules.hasLight()},
+      contribution_rules_{rules.quality.sides, rules.hasLight(),
+                          ribbonNested(pixelsPerSlope(rules))},
       near_disk_radii_(nearFieldRadii(rules, false)),
       near_sphere_radii_(nearFieldRadii(rules, true)),
       max_distance_sq_(maxDistanceSquared(rules)),
@@ -160,7 +161,7 @@ void ReceiverRaster::sortByDistance() {
 float ReceiverRaster::rayBias(const Surfel& surfel) const {
   const Ribbon ribbon = Ribbon::of(surfel);
   const float radius = ribbon.isEmpty() ? surfel.radius : ribbon.width;
-  float bias = rules_.quality.bias * radius;
+  float bias = rules_.quality.bias * radius * (ribbon.isEmpty() ? 1 : kFidelity.ribbon_bias);
   if (surfel.isTwoSided()) {
     const glm::vec3 to_surfel = surfel.position - receiver_.position;
     bias *= biasPart(heightAboveHorizon(receiver_, to_surfel) / radius);
@@ -176,8 +177,10 @@ void ReceiverRaster::trace(const Surfel& surfel, float part, const DepthRange& d
   const glm::vec3 centre =
       surfel.position - receiver_.position - rayBias(surfel) * receiver_.normal;
   Ribbon ribbon = Ribbon::of(surfel);
-  const RasterCube::Texture texture = {
-      .thicket = thicketPart(surfel), .opacity = part, .is_solid = mayTile(surfel)};
+  const RasterCube::Texture texture = {.thicket = thicketPart(surfel),
+                                       .opacity = part,
+                                       .nested = nestedPart(surfel, ribbon, contribution_rules_),
+                                       .is_solid = mayTile(surfel)};
   if (surfel.isSphere()) {
     cube_.traceSphere(inRaster(centre), surfel.radius, texture, depth, surfel.radiosity);
     return;
@@ -219,7 +222,7 @@ GatherResult ReceiverRaster::finish() {
                    inRaster(patch.shape),
                    patch.solid_angle,
                    patch.spread,
-                   {patch.overlap, patch.thicket, patch.opacity, patch.is_solid > 0}},
+                   {patch.overlap, patch.thicket, patch.opacity, patch.nested, patch.is_solid > 0}},
                   depth, patch.radiosity);
     }
   }
