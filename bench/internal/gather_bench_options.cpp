@@ -13,8 +13,9 @@ namespace surfeit {
 void addGatherBenchOptions(CLI::App& app, GatherBenchOptions& options) {
   options.engines = engineNames();
   std::vector<std::string> scenes = gatherSceneNames();
+  scenes.insert(scenes.end(), unseenSceneNames().begin(), unseenSceneNames().end());
   scenes.emplace_back("all");
-  app.add_option("--scene", options.scenes, "Scenes")
+  app.add_option("--scene", options.scenes, "Scenes; all: those that errors are reported for")
       ->check(CLI::IsMember(scenes))
       ->capture_default_str();
   app.add_option_function<std::vector<std::string>>(

@@ -87,9 +87,10 @@ bool isMeshScene(const std::string& name);
 std::string meshSceneFile(const std::string& name, const std::string& data);
 Result<SceneGeometry> loadMeshScene(const std::string& name, const std::string& data,
                                     Progress& progress);
-// Through the sampler of meshes, by files in `directory`. Slivers give more surfels than asked for.
-Status sendMeshSurfels(const SceneGeometry& geometry, std::uint64_t count,
-                       const std::string& directory, int threads, const SurfelSink& sink);
+// Through the sampler of meshes, by files whose names begin with `path`. Slivers give more surfels
+// than asked for.
+Status sendMeshSurfels(const SceneGeometry& geometry, std::uint64_t count, const std::string& path,
+                       int threads, const SurfelSink& sink);
 
 // Appends a sphere of 2 n^2 triangles or so, each pair about as high as wide at its equator.
 void appendSphere(const TrueSphere& sphere, int around, Mesh& mesh);

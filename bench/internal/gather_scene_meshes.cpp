@@ -110,11 +110,9 @@ Result<SceneGeometry> loadMeshScene(const std::string& name, const std::string& 
   return geometry;
 }
 
-Status sendMeshSurfels(const SceneGeometry& geometry, std::uint64_t count,
-                       const std::string& directory, int threads, const SurfelSink& sink) {
-  // Others may be made in the directory at the same time
-  const std::string name = fmt::format("{}/{:x}", directory, std::uintptr_t(&geometry));
-  const std::string mesh_path = name + "_turned.ply", cloud_path = name + "_sampled.ply";
+Status sendMeshSurfels(const SceneGeometry& geometry, std::uint64_t count, const std::string& path,
+                       int threads, const SurfelSink& sink) {
+  const std::string mesh_path = path + ".turned.ply", cloud_path = path + ".sampled.ply";
   SURFEIT_RETURN_IF_ERROR(writeMesh(geometry.mesh, mesh_path));
   Progress quiet;
   SampleOptions options;

@@ -151,7 +151,7 @@ Status GatherScene::makeOctree(std::uint64_t count, int threads, Progress& progr
   SURFEIT_ASSIGN_OR_RETURN(SurfelWriter writer, SurfelWriter::create(cloud_path, channels));
   const SurfelSink sink = [&](std::span<const Surfel> surfels) { return writer.write(surfels); };
   if (isMeshScene(name_) || isUnseenScene(name_) || name_ == "leaves") {
-    SURFEIT_RETURN_IF_ERROR(sendMeshSurfels(geometry_, count, directory_.path(), threads, sink));
+    SURFEIT_RETURN_IF_ERROR(sendMeshSurfels(geometry_, count, octree_path_, threads, sink));
   } else if (name_ == "city") {
     SURFEIT_RETURN_IF_ERROR(sendCitySurfels(geometry_, count, sink));
   } else {

@@ -161,8 +161,8 @@ class JudgedScene : public Judged {
   std::vector<GatherResult> truth_;
 };
 
-// By the scalar gather of every surfel: few surfels make what rays on the true geometry tell a
-// matter of the sampling.
+// Judged by the scalar gather of every surfel. Rays on the true geometry would measure the
+// sampling, because these scenes have few surfels.
 class JudgedSeed : public Judged {
  public:
   static Result<std::unique_ptr<Judged>> make(std::uint64_t seed,

@@ -24,17 +24,23 @@ inline float layerReachOfDisk(float radius, float cosine) {
   return layerReach(radius, 0.25f * radius * radius * (1 - cosine * cosine));
 }
 
+// What begins farther than its layer ends begins a new one, in part where the gap is narrow beside
+// its reach: else results would step from one receiver to the next.
 inline float inverseLayerGap(float reach) {
   return 1 / std::max(kFidelity.layer_gap * reach, 1e-30f);
 }
 inline float newLayerPart(float gap, float reach) {
   return std::clamp(gap * inverseLayerGap(reach), 0.f, 1.f);
 }
-// `area`: what a patch covers in all, in pixels; 0 of what is traced.
+// How much a patch says about where its layer ends: little where it barely touches the pixel.
+// `area`: what it covers in all, in pixels; 0 of what is traced.
 inline float touchPart(float amount, float area) {
   return std::min(1.f, amount / (kFidelity.touch * std::clamp(area, kFidelity.least_touched, 1.f)));
 }
 
+// Outlines of surfaces on the same ground rise from the same side of a pixel, and the smaller lies
+// behind the larger. This part of a surface does so; the rest hides at random, as leaves, hair,
+// particles and rough nodes do.
 inline float nestedPart(bool is_surface, float thicket) {
   return is_surface ? kFidelity.nested * (1 - thicket) : 0;
 }
@@ -63,6 +69,8 @@ inline float takenWeight(float covered, float open, float rest, float weight) {
 // close so; outlines stay where they are, and areas, and with them power, are not touched.
 inline constexpr int kHullSide = 4;  // samples along a pixel
 inline constexpr std::uint32_t kHullSamples = 0xffff;
+// Of a patch with these half sides, in pixels. Spheres, two-sided surfels and rough nodes may stand
+// alone, and are not widened.
 inline int hullWidening(float half_width, float half_height) {  // in samples
   const float widening =
       kFidelity.hull_widening * float(kHullSide) * std::sqrt(half_width * half_height);
@@ -117,17 +125,25 @@ inline float nearPart(float distance_sq, float border_sq) {
       (1 - distance_sq / border_sq) / (1 - kFidelity.whole_near * kFidelity.whole_near), 0.f, 1.f);
 }
 
+// What the bias of rays counts for a two-sided surfel with its middle so high above the horizon:
+// disks of the receiver's own surface have their middles in its plane or beneath.
 inline float biasPart(float height_in_radii) {
   return std::clamp(1 - height_in_radii / kFidelity.bias_height, 0.f, 1.f);
 }
 
+// The disk of a longer sliver does not tell where its surface is.
 inline float effectiveRadius(float radius, float area) {
   return std::min(radius, kFidelity.largest_radius * std::sqrt(area));
 }
 
+// Whether a two-sided surfel without a known longer side is a piece of a ribbon, hair or grass.
 inline bool looksLikeRibbon(float radius, float area) {
   return area < kFidelity.ribbon_part * kPi * radius * radius;
 }
+#ifndef SURFEIT_CHANGES_FIDELITY
+static_assert(kFidelity.ribbon_part * kPi * kFidelity.largest_radius * kFidelity.largest_radius > 1,
+              "effective radii tell the same");
+#endif
 
 // Ribbons grow in tufts, side by side: this part of them hides as if behind the same side of a
 // pixel (Fidelity::nested), the more, the larger the pixels are. (AO bias of hair at 16

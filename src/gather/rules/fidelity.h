@@ -1,6 +1,7 @@
-// Every number that decides how true a gather is, but the options of the caller: what it may leave
-// out, how patches look and how they cover pixels. docs/algorithm.md has the rules that they belong
-// to; bench/sensitivity measures what each is worth.
+// The numbers that decide how true a gather is: what it may leave out, how patches look and how
+// they cover pixels. Beside them count the options of the caller, the kinds of nodes (octree/node)
+// and what is interpolated (packet/interpolating_gatherer.cpp, local_fit.cpp). docs/algorithm.md
+// has the rules, and bench/internal/sensitivity.cpp measures the worth of each number.
 #pragma once
 
 namespace surfeit {

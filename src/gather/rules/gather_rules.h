@@ -112,6 +112,7 @@ inline float maxSolidAngle(const GatherRules& rules) {
   return std::min(rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1),
                   kFidelity.most_node_pixels * pixel * pixel);
 }
+// How many times as large what is low may look, where directions weigh by the cosine.
 inline float mostCoarser(const GatherRules& rules) {
   const bool weighs_by_cosine = !rules.isGlossy() && !rules.hasCone() &&
                                 rules.weights.distribution == GatherWeights::Distribution::kCosine;
