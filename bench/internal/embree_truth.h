@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bench/internal/gather_scenes.h"
-#include "gather/scalar/receiver_raster.h"
+#include "gather/rules/receiver.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -12,44 +12,20 @@
 #include <utility>
 
 #include "gather/packet/packet_gatherer.h"
-#include "gather/scalar/gather_point.h"
 
 namespace surfeit {
 namespace {
 
-// The definition: one receiver after the other.
-class ScalarEngine : public GatherEngine {
- public:
-  ScalarEngine(GatherMode mode, const GatherQuality& quality) : gatherer_(mode, quality) {}
-
-  Status gather(std::span<const LocalReceiver> receivers, PagedOctree::Reader& octree,
-                std::span<GatherResult> results) override {
-    for (std::size_t i = 0; i < receivers.size(); ++i) {
-      SURFEIT_RETURN_IF_ERROR(gatherer_.gather(receivers[i], octree, results[i]));
-      const PointGatherer::Work& work = gatherer_.work();
-      work_.nodes_visited += work.nodes_visited;
-      work_.surfels_visited += work.surfels_visited;
-      work_.contributions += work.contributions;
-    }
-    work_.receivers += receivers.size();
-    return {};
-  }
-  EngineWork work() const override { return work_; }
-
- private:
-  PointGatherer gatherer_;
-  EngineWork work_;
-};
-
-// Packets of neighbours, and clusters of packets.
+// So many receivers at a time: clusters of packets, or each alone.
 class PacketEngine : public GatherEngine {
  public:
-  PacketEngine(GatherMode mode, const GatherQuality& quality) : gatherer_(mode, quality) {}
+  PacketEngine(GatherMode mode, const GatherQuality& quality, std::size_t together)
+      : gatherer_(mode, quality), together_(together) {}
 
   Status gather(std::span<const LocalReceiver> receivers, PagedOctree::Reader& octree,
                 std::span<GatherResult> results) override {
-    for (std::size_t i = 0; i < receivers.size(); i += kClusterReceivers) {
-      const std::size_t count = std::min(kClusterReceivers, receivers.size() - i);
+    for (std::size_t i = 0; i < receivers.size(); i += together_) {
+      const std::size_t count = std::min(together_, receivers.size() - i);
       SURFEIT_RETURN_IF_ERROR(
           gatherer_.gather(receivers.subspan(i, count), octree, results.subspan(i, count)));
     }
@@ -71,24 +47,15 @@ class PacketEngine : public GatherEngine {
 
  private:
   PacketGatherer gatherer_;
+  const std::size_t together_;
   std::uint64_t receivers_ = 0;
 };
 
 struct EngineKind {
   const char* name;
-  std::size_t block;
-  std::unique_ptr<GatherEngine> (*make)(GatherMode mode, const GatherQuality& quality);
+  std::size_t together;
 };
-
-template <typename Engine>
-std::unique_ptr<GatherEngine> make(GatherMode mode, const GatherQuality& quality) {
-  return std::make_unique<Engine>(mode, quality);
-}
-
-constexpr EngineKind kEngines[] = {
-    {"scalar", 1, make<ScalarEngine>},
-    {"packet", kClusterReceivers, make<PacketEngine>},
-};
+constexpr EngineKind kEngines[] = {{"alone", 1}, {"packet", kClusterReceivers}};
 
 double meanOf(const glm::vec3& rgb) { return (double(rgb.x) + double(rgb.y) + double(rgb.z)) / 3; }
 
@@ -106,7 +73,10 @@ const std::vector<std::string>& engineNames() {
 Result<std::unique_ptr<GatherEngine>> makeEngine(const std::string& name, GatherMode mode,
                                                  const GatherQuality& quality) {
   for (const EngineKind& kind : kEngines) {
-    if (name == kind.name) return kind.make(mode, quality);
+    if (name == kind.name) {
+      return std::unique_ptr<GatherEngine>(
+          std::make_unique<PacketEngine>(mode, quality, kind.together));
+    }
   }
   return Status::invalidArgument(
       fmt::format("engine {}: expected one of {}", name, fmt::join(engineNames(), ", ")));
@@ -114,7 +84,7 @@ Result<std::unique_ptr<GatherEngine>> makeEngine(const std::string& name, Gather
 
 std::size_t engineBlock(const std::string& name) {
   for (const EngineKind& kind : kEngines) {
-    if (name == kind.name) return kind.block;
+    if (name == kind.name) return kind.together;
   }
   return 1;
 }

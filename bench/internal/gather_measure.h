@@ -11,7 +11,7 @@
 
 #include "bench/internal/error_summary.h"
 #include "bench/internal/gather_scenes.h"
-#include "gather/scalar/receiver_raster.h"
+#include "gather/rules/receiver.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bench/internal/gather_scene_geometry.h"
-#include "gather/scalar/receiver_raster.h"
+#include "gather/rules/receiver.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"

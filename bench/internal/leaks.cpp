@@ -185,7 +185,7 @@ int main(int argc, char** argv) {
   using namespace surfeit;
   CLI::App app("What arrives behind closed things, how closed they are, what small lights send.");
   Settings settings;
-  std::string preset, engine = "scalar";
+  std::string preset, engine = "alone";
   float max_solid_angle = -1, near_field = -1;
   int resolution = 0;
   std::vector<int> counts = {5000, 50'000}, pixels = {8, 16, 32, 64};
@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
   app.add_option("--quality", preset, "Of the gather")
       ->check(CLI::IsMember({"draft", "standard", "final"}));
   app.add_option("--engine", engine, "Receivers alone, or together")
-      ->check(CLI::IsMember({"scalar", "packet"}));
+      ->check(CLI::IsMember({"alone", "packet"}));
   app.add_option("--max-solid-angle", max_solid_angle, "Largest cluster drawn as one");
   app.add_option("--raster-resolution", resolution, "Pixels along a cube face, even");
   app.add_option("--near-field", near_field, "Reach of tracing, in surfel radii");

@@ -99,9 +99,9 @@ Status judge(const RandomScenesOptions& options, const RandomScene& scene, SeedR
                              return indexed->gatherTogether(receivers, rules);
                            }));
   SURFEIT_ASSIGN_OR_RETURN(std::vector<GatherResult> expected, timed(result.exact_seconds, [&] {
-                             return options.against == Against::kAlone
-                                        ? indexed->gatherPacketsOfOne(receivers, rules)
-                                        : indexed->gatherAlone(receivers, exact_rules);
+                             return indexed->gatherAlone(
+                                 receivers,
+                                 options.against == Against::kAlone ? rules : exact_rules);
                            }));
   if (options.against == Against::kEmbree) {
     SURFEIT_ASSIGN_OR_RETURN(const std::vector<float> truth, timed(result.truth_seconds, [&] {
@@ -287,7 +287,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--threads", options.threads, "Scenes at a time")->capture_default_str();
   app.footer(
-      "exact: the scalar gather with max solid angle 0, each receiver by itself.\n"
+      "exact: the gather with max solid angle 0, each receiver by itself.\n"
       "embree: occlusion by rays on the true triangles.\n"
       "alone: the same gather, each receiver by itself instead of with all others.\n"
       "Examples:\n"

@@ -161,7 +161,7 @@ class JudgedScene : public Judged {
   std::vector<GatherResult> truth_;
 };
 
-// Judged by the scalar gather of every surfel. Rays on the true geometry would measure the
+// Judged by the gather of every surfel. Rays on the true geometry would measure the
 // sampling, because these scenes have few surfels.
 class JudgedSeed : public Judged {
  public:

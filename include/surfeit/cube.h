@@ -81,11 +81,10 @@ struct CubeImage {
 // Gathers at one receiver and returns its raster. Pass the options of gatherCloud; they mean the
 // same. Used are mode, outputs, quality, weights, environment, groups, eye, memory and direct_io;
 // max variation, order, threads and the options for files are not. Pixels have no light without an
-// output that needs light (GatherSettings::outputs). The receiver is gathered alone, by the scalar
-// definition of the gather. In gatherCloud it is one of a packet, and its result may differ by the
-// amounts in docs/benchmarks.md. Works on one thread. Calls are independent, so threads may call at
-// once; `memory_bytes` is the budget of each call. The result depends only on scene, receiver and
-// options, bit for bit.
+// output that needs light (GatherSettings::outputs). The receiver is gathered alone. In gatherCloud
+// it is one of a packet, and its result may differ by the amounts in docs/benchmarks.md. Works on
+// one thread. Calls are independent, so threads may call at once; `memory_bytes` is the budget of
+// each call. The result depends only on scene, receiver, options and instruction set, bit for bit.
 // Errors: kInvalidArgument (options, a receiver that is not finite, kGlossy without a normal or a
 // view), kBudgetTooSmall, kIoError, kCorruption, kInterrupted.
 SURFEIT_API Result<CubeImage> gatherCube(const std::string& scene_path, const Receiver& receiver,

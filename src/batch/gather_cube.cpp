@@ -1,4 +1,4 @@
-// One receiver, gathered by the scalar definition with a recorder that keeps what the pixels got.
+// One receiver, gathered alone with a recorder that keeps what the pixels got.
 
 #include <fmt/format.h>
 
@@ -16,8 +16,9 @@
 #include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/program_memory.h"
-#include "gather/scalar/gather_point.h"
-#include "gather/scalar/pixel_record.h"
+#include "gather/packet/packet_gatherer.h"
+#include "gather/packet/pixel_record.h"
+#include "gather/rules/gather_rules.h"
 #include "octree/read/group_set.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/cube.h"
@@ -63,16 +64,15 @@ Result<LocalReceiver> checkedReceiver(const Receiver& given, const GatherOptions
 std::uint64_t fixedBytes(const SceneFile& file, const GatherRules& rules,
                          const LoadedEnvironment* environment) {
   constexpr double kLayers = 8, kPatches = 4;
-  constexpr double kBytes = 2 * (sizeof(Contribution) + sizeof(Surfel) + 4 * sizeof(std::uint64_t));
+  constexpr double kBytes = 2 * (sizeof(Patch) + 4 * sizeof(std::uint64_t));
   const double cut = kPatches * 4 * double(kPi) / double(maxSolidAngle(rules)) * kLayers;
   const double most = std::min(double(file.header().surfel_count), cut);
-  const double more = std::max(0.0, most - double(ReceiverRaster::kReservedContributions));
+  const double more = std::max(0.0, most - double(PacketRaster::kReservedPatches));
   const std::size_t pixels = RasterGeometry::pixelCount(rules.quality.raster_resolution);
   const std::uint64_t held =
       environment == nullptr ? 0 : environment->map.memoryBytes() + environment->cube.memoryBytes();
-  return programBytes(1) + PagedOctree::fixedBytes(file, 1) +
-         PointGatherer::memoryBytes(rules.quality) +
-         pixels * (sizeof(PixelRecord) + sizeof(CubePixel)) + held +
+  return programBytes(1) + PagedOctree::fixedBytes(file, 1) + PacketGatherer::memoryBytes(rules) +
+         pixels * (PixelRecorder::kPixelBytes + sizeof(PixelContent) + sizeof(CubePixel)) + held +
          static_cast<std::uint64_t>(more * kBytes);
 }
 
@@ -91,9 +91,9 @@ Result<PagedOctree::Memory> planCubeMemory(const SceneFile& file, const GatherOp
       options.cache_split < 0 ? PagedOctree::kEvenSplit : options.cache_split);
 }
 
-std::vector<CubeFace> facesOf(const ReceiverRaster& raster, const GatherRules& rules) {
+std::vector<CubeFace> facesOf(const LocalReceiver& receiver, const GatherRules& rules) {
   if (rules.hasConeRaster()) {
-    const ConeFrame& frame = raster.frame();
+    const ConeFrame frame(lobeAxis(receiver, rules));
     const float slope = std::tan(rules.weights.cone_angle);
     return {{frame.x, slope * frame.y, slope * frame.z}};
   }
@@ -107,21 +107,53 @@ std::vector<CubeFace> facesOf(const ReceiverRaster& raster, const GatherRules& r
   return faces;
 }
 
-CubePixel pixelOf(const ResultSums::Pixel& seen, const PixelRecord& record) {
-  CubePixel pixel;
-  pixel.direction = seen.direction;
-  pixel.solid_angle = seen.solid_angle;
-  pixel.weight = seen.weight;
-  pixel.coverage = seen.coverage;
-  pixel.occlusion = seen.occlusion;
-  pixel.light = seen.radiosity;
-  pixel.environment = (1 - seen.coverage) * seen.environment;
-  pixel.depth = record.depth;
-  pixel.layers = record.layers();
-  pixel.filled = std::max(0.f, seen.coverage - record.total);
-  pixel.kind = record.kind();
-  return pixel;
-}
+// The pixels of a receiver, as they weigh in its result.
+class PixelViews {
+ public:
+  PixelViews(const LocalReceiver& receiver, const GatherRules& rules,
+             const RasterGeometry& geometry)
+      : receiver_(receiver),
+        rules_(rules),
+        geometry_(geometry),
+        axis_(lobeAxis(receiver, rules)),
+        frame_(axis_),
+        weights_(rules, 1 / geometry.pixelsPerSlope()) {}
+
+  CubePixel view(std::size_t i, const PixelContent& content, const PixelRecord& record) const {
+    const RasterGeometry::Pixel& seen = geometry_.pixels()[i];
+    CubePixel pixel;
+    pixel.direction = rules_.hasConeRaster() ? frame_.toWorld(seen.direction) : seen.direction;
+    pixel.solid_angle = seen.solid_angle;
+    pixel.weight = weightOf(pixel.direction);
+    pixel.coverage = content.coverage;
+    pixel.occlusion = content.occlusion;
+    pixel.light = content.radiosity;
+    pixel.environment = (1 - content.coverage) * environment(i, pixel);
+    pixel.depth = record.depth;
+    pixel.layers = record.layers();
+    pixel.filled = std::max(0.f, content.coverage - record.total);
+    pixel.kind = record.kind();
+    return pixel;
+  }
+
+ private:
+  float weightOf(const glm::vec3& direction) const {
+    if (receiver_.isSpherical()) return 1;
+    return glm::dot(direction, receiver_.normal) > 0 ? weights_(glm::dot(direction, axis_)) : 0;
+  }
+  glm::vec3 environment(std::size_t i, const CubePixel& pixel) const {
+    if (rules_.environment == nullptr) return glm::vec3(0);
+    if (!rules_.hasConeRaster()) return rules_.environment_cube->pixels()[i];
+    return rules_.environment->lookup(pixel.direction, pixel.solid_angle);
+  }
+
+  const LocalReceiver& receiver_;
+  const GatherRules& rules_;
+  const RasterGeometry& geometry_;
+  const glm::vec3 axis_;
+  const ConeFrame frame_;
+  const DirectionWeights weights_;
+};
 
 Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const Receiver& given,
                                     const GatherOptions& given_options, Progress& progress) {
@@ -144,28 +176,31 @@ Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const Receive
   // Gather
   progress.beginPhase("gather", 1, "receivers");
   PixelRecorder recorder;
-  PointGatherer gatherer(rules);
-  gatherer.setRecorder(&recorder);
+  PacketGatherer gatherer(rules);
+  gatherer.raster().setRecorder(&recorder);
   PagedOctree::Reader reader(*octree);
   GatherResult result;
-  SURFEIT_RETURN_IF_ERROR(gatherer.gather(receiver, reader, result));
+  SURFEIT_RETURN_IF_ERROR(gatherer.gather({&receiver, 1}, reader, {&result, 1}));
   progress.advance(1);
 
   // Keep what the raster holds
-  const ReceiverRaster& raster = gatherer.raster();
+  const PacketRaster& raster = gatherer.raster();
   CubeImage image;
   image.receiver = {given.position, receiver.normal, receiver.view};
   image.resolution = raster.geometry().resolution();
-  image.faces = facesOf(raster, rules);
-  image.pixels.reserve(recorder.records().size());
-  for (std::size_t i = 0; i < recorder.records().size(); ++i) {
-    image.pixels.push_back(pixelOf(raster.pixel(i), recorder.records()[i]));
+  image.faces = facesOf(receiver, rules);
+  std::vector<PixelContent> contents(raster.geometry().pixels().size());
+  raster.readPixels(contents);
+  const PixelViews views(receiver, rules, raster.geometry());
+  image.pixels.reserve(contents.size());
+  for (std::size_t i = 0; i < contents.size(); ++i) {
+    image.pixels.push_back(views.view(i, contents[i], recorder.record(i)));
   }
   image.occlusion = result.occlusion;
   image.irradiance = result.irradiance;
   image.environment = result.environment;
-  image.contributions = gatherer.work().contributions;
-  image.traced_surfels = gatherer.work().near_surfels;
+  image.contributions = raster.patchCount();
+  image.traced_surfels = raster.tracedCount();
   return image;
 }
 

@@ -12,7 +12,7 @@
 #include "gather/rules/check_settings.h"
 #include "gather/rules/gather_outputs.h"
 #include "gather/rules/gather_rules.h"
-#include "gather/scalar/raster_cube.h"
+#include "gather/rules/raster_geometry.h"
 
 namespace surfeit {
 namespace {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <glm/geometric.hpp>
 #include <span>
 #include <string_view>
 

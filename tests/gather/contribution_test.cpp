@@ -7,7 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "gather/cut/cut.h"
+#include "gather/packet/packet_raster.h"
 #include "gather/rules/coverage_rules.h"
+#include "gather/rules/ribbon.h"
 #include "octree/node/node_sums.h"
 
 namespace surfeit {
@@ -67,59 +70,54 @@ Node makeNode(std::span<const glm::vec3> normals, const glm::vec3& radiosity) {
   return node;
 }
 
-TEST(ProjectedSum, IsExactForASingleNormal) {
-  for (const glm::vec3& normal : evenDirections(50)) {
-    const ShCoefficients lobe = projectLobes(std::span(&normal, 1), kClampedCosine);
-    for (const glm::vec3& direction : evenDirections(60)) {
-      float opposite;
-      const float facing = projectedSum(lobe, shBasis(direction), opposite);
-      const float cosine = glm::dot(normal, direction);
-      EXPECT_NEAR(facing, std::max(0.f, cosine), 2e-3);
-      EXPECT_NEAR(opposite, std::max(0.f, -cosine), 2e-3);
-    }
-  }
+// What a receiver in unit direction `to_receiver` from a rough node sees of it.
+RoughSight seenFrom(const Node& node, const glm::vec3& to_receiver) {
+  RoughSight sight;
+  fastestPacketKernel().seeRoughNode(node, -to_receiver, sight);
+  return sight;
+}
+FacingAreas facingAreasOf(const Node& node, const glm::vec3& to_receiver) {
+  return seenFrom(node, to_receiver).facing;
 }
 
-TEST(ProjectedSum, IsExactForEvenlySpreadNormalsAndForSpheres) {
+// A rough node of two colors: what faces along z is red, the other way green.
+TEST(RoughNode, SendsTheLightOfWhatFacesTheReceiver) {
   const std::vector<glm::vec3> normals = evenDirections(1000);
-  const ShCoefficients convex = projectLobes(normals, kClampedCosine);
-  const glm::vec3 any{0, 0, 1};
-  const ShCoefficients sphere = projectLobes(std::span(&any, 1), kConstant);
-  for (const glm::vec3& direction : evenDirections(60)) {
-    float opposite;
-    EXPECT_NEAR(projectedSum(convex, shBasis(direction), opposite), 250, 1);
-    EXPECT_NEAR(projectedSum(sphere, shBasis(direction), opposite), 1, 1e-4);
+  std::vector<glm::vec3> reds, greens;
+  for (const glm::vec3& normal : normals) (normal.z > 0 ? reds : greens).push_back(normal);
+  Node node = makeNode(normals, {.5f, .5f, 0});
+  const ShCoefficients red = projectLobes(reds, kClampedCosine);
+  const ShCoefficients green = projectLobes(greens, kClampedCosine);
+  for (std::size_t i = 0; i < kShCount; ++i) {
+    node.rough.sh[i][powerKind(0)] = red[i] / 1000;
+    node.rough.sh[i][powerKind(1)] = green[i] / 1000;
   }
-}
-
-TEST(ProjectedSum, ErrsByAFewPercentForABox) {
-  const glm::vec3 normals[] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
-  const ShCoefficients box = projectLobes(normals, kClampedCosine);
+  const glm::vec3 above = seenFrom(node, {0, 0, 1}).radiosity;
+  EXPECT_NEAR(above.r, 1, .05);
+  EXPECT_NEAR(above.g, 0, .05);
+  const glm::vec3 beside = seenFrom(node, {1, 0, 0}).radiosity;
+  EXPECT_NEAR(beside.r, beside.g, .02);
+  EXPECT_NEAR(beside.r + beside.g, 1, .1);
   for (const glm::vec3& d : evenDirections(60)) {
-    float opposite;
-    const float expected = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
-    EXPECT_NEAR(projectedSum(box, shBasis(d), opposite), expected, .5);  // 1.5, of 1 to 1.73
+    const glm::vec3 seen = seenFrom(node, d).radiosity;
+    EXPECT_GE(std::min(seen.r, seen.g), 0);
   }
 }
 
-TEST(ProjectedSum, IsNeverNegativeAndSidesDifferByTheMean) {
-  const std::vector<glm::vec3> all = evenDirections(97);
-  for (std::size_t count = 1; count < all.size(); count += 7) {
-    const std::span<const glm::vec3> normals(all.data(), count);  // ever wider caps around z
-    const ShCoefficients sum = projectLobes(normals, kClampedCosine);
+// Of one normal, and of spheres, every band is exact.
+TEST(RoughNode, SendsItsOwnLightWhenItHasOne) {
+  for (const glm::vec3& normal : evenDirections(50)) {
+    const Node node = makeNode(std::span(&normal, 1), {3, 2, 1});
     for (const glm::vec3& direction : evenDirections(60)) {
-      float opposite, mean = 0;
-      const float facing = projectedSum(sum, shBasis(direction), opposite);
-      for (const glm::vec3& normal : normals) mean += glm::dot(normal, direction);
-      EXPECT_GE(facing, 0);
-      EXPECT_GE(opposite, -1e-4f);
-      EXPECT_NEAR(facing - opposite, mean, 1e-3);
+      const glm::vec3 seen = seenFrom(node, direction).radiosity;
+      EXPECT_NEAR(seen.r, 3, 1e-3);
+      EXPECT_NEAR(seen.b, 1, 1e-3);
     }
   }
 }
 
 FacingAreas facingOf(std::span<const glm::vec3> normals, const glm::vec3& to_receiver) {
-  return facingAreas(makeNode(normals, {1, 1, 1}), to_receiver);
+  return facingAreasOf(makeNode(normals, {1, 1, 1}), to_receiver);
 }
 
 TEST(FacingAreas, AreExactForFacesThatAreSeenAlike) {
@@ -149,8 +147,8 @@ TEST(FacingAreas, AreExactForEvenlySpreadNormalsAndForSpheres) {
   const Node sphere = sums.toNode(.97f, 1);
   for (const glm::vec3& d : evenDirections(20)) {
     EXPECT_NEAR(facingOf(normals, d).front, .25f, 2e-3);
-    EXPECT_NEAR(facingAreas(sphere, d).front, 2, .01);
-    EXPECT_NEAR(facingAreas(sphere, d).back, 2, .01);
+    EXPECT_NEAR(facingAreasOf(sphere, d).front, 2, .01);
+    EXPECT_NEAR(facingAreasOf(sphere, d).back, 2, .01);
   }
 }
 
@@ -184,49 +182,71 @@ TEST(FacingAreas, OfDamagedMomentsAreNumbers) {
   }
 }
 
+// The solid angle that a receiver at the origin sees of what is added to its raster, and the light.
+struct Seen {
+  double solid_angle = 0;
+  glm::vec3 radiosity{0};  // mean of what covers
+};
+template <typename Add>
+Seen seenOf(const Add& add, GatherSides sides = GatherSides::kFront) {
+  GatherQuality quality;
+  quality.raster_resolution = 64;
+  quality.sides = sides;
+  quality.near_field_radii = 0;
+  const GatherRules rules(GatherMode::kBleeding, quality);
+  const LocalReceiver receiver;  // without a normal, all directions weigh alike
+  PacketRaster raster(rules);
+  raster.begin({&receiver, 1}, viewPacket({&receiver, 1}, rules));
+  add(raster);
+  raster.sort();
+  raster.draw();
+  GatherResult result;
+  raster.integrate({&result, 1});
+  const float covered = result.occlusion;
+  return {4 * double(kPi) * double(covered),
+          covered > 0 ? result.irradiance / covered : glm::vec3(0)};
+}
+// At `place`, as seen from the origin.
+Seen seenOf(Node node, const glm::vec3& place, GatherSides sides = GatherSides::kFront) {
+  node.position = place;
+  return seenOf([&](PacketRaster& raster) { raster.addNode(node); }, sides);
+}
+Seen seenOf(const Surfel& surfel, GatherSides sides = GatherSides::kFront) {
+  return seenOf([&](PacketRaster& raster) { raster.addSurfels({&surfel, 1}); }, sides);
+}
+
 TEST(NodeContribution, FlatNodeIsADisk) {
   const glm::vec3 normal{0, 0, -1};
   Node node = makeNode(std::span(&normal, 1), {3, 2, 1});
   node.flags = kNodeFlat;
   node.rough.sh = {};
-  Contribution patch;
-  ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
-  EXPECT_FLOAT_EQ(patch.solid_angle, .25f);
-  EXPECT_FLOAT_EQ(patch.distance_sq, 4);
-  EXPECT_FLOAT_EQ(patch.direction.z, 1);
-  EXPECT_FLOAT_EQ(patch.radiosity.x, 3);
+  node.covariance = (1 / 8.f) * withoutDirection(normal);
+  const Seen front = seenOf(node, {0, 0, 4});
+  EXPECT_NEAR(front.solid_angle, 1 / 16., .002);
+  EXPECT_NEAR(front.radiosity.x, 3, 1e-3);
 
   // From behind: nothing, or black
-  EXPECT_FALSE(makeContribution(node, -node.position, {}, patch));
-  ASSERT_TRUE(makeContribution(node, -node.position, {GatherSides::kBoth, true}, patch));
-  EXPECT_FLOAT_EQ(patch.solid_angle, .25f);
-  EXPECT_EQ(patch.radiosity, glm::vec3(0));
+  EXPECT_EQ(seenOf(node, {0, 0, -4}).solid_angle, 0);
+  const Seen both = seenOf(node, {0, 0, -4}, GatherSides::kBoth);
+  EXPECT_NEAR(both.solid_angle, 1 / 16., .002);
+  EXPECT_EQ(both.radiosity, glm::vec3(0));
 }
 
 TEST(NodeContribution, RoughNodeShowsAQuarterOfItsAreaOnAverage) {
   const Node node = makeNode(evenDirections(500), {3, 2, 1});
-  Contribution patch;
-  ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
-  EXPECT_NEAR(patch.solid_angle, 1.f / 16, 1e-3);
-  EXPECT_NEAR(patch.radiosity.x, 3, .02);
-  ASSERT_TRUE(makeContribution(node, node.position, {GatherSides::kBoth, true}, patch));
-  EXPECT_NEAR(patch.solid_angle, 2.f / 16, 1e-3);
-  EXPECT_NEAR(patch.radiosity.x, 1.5, .02);  // half of what covers is black
+  const Seen fronts = seenOf(node, {0, 0, 4});
+  EXPECT_NEAR(fronts.solid_angle, 1. / 64, 1e-3);
+  EXPECT_NEAR(fronts.radiosity.x, 3, .02);
+  const Seen both = seenOf(node, {0, 0, 4}, GatherSides::kBoth);
+  EXPECT_NEAR(both.solid_angle, 2. / 64, 2e-3);
+  EXPECT_NEAR(both.radiosity.x, 1.5, .02);  // half of what covers is black
 }
 
 TEST(NodeContribution, FrontsOverlapWhereBacksPrevail) {
-  std::vector<glm::vec3> normals;  // of a bumpy sheet that faces +z
-  for (const glm::vec3& direction : evenDirections(500)) {
-    normals.push_back(glm::normalize(direction + glm::vec3(0, 0, .4f)));
-  }
-  const Node node = makeNode(normals, {1, 1, 1});
-  Contribution patch;
-  ASSERT_TRUE(makeContribution(node, {0, 0, 2}, {}, patch));  // from behind
-  EXPECT_EQ(patch.overlap, 1);
-  ASSERT_TRUE(makeContribution(node, {0, 0, -2}, {}, patch));
-  EXPECT_EQ(patch.overlap, 0);
-  ASSERT_TRUE(makeContribution(node, {0, 0, 2}, {GatherSides::kBoth, true}, patch));
-  EXPECT_EQ(patch.overlap, 0);
+  EXPECT_EQ(overlapOf(1, 2), 1);
+  EXPECT_EQ(overlapOf(1, 1), 0);
+  EXPECT_EQ(overlapOf(2, 1), 0);
+  EXPECT_NEAR(overlapOf(1, 1.2f), .5f * kFidelity.overlap_gain * .4f / 2.2f, .05f);
 }
 
 TEST(NodeContribution, NeverExceedsTheOutlineOfItsSphere) {
@@ -234,10 +254,9 @@ TEST(NodeContribution, NeverExceedsTheOutlineOfItsSphere) {
   node.radius = .1f;
   node.forgetBounds();
   node.covariance = .01f * node.covariance;
-  Contribution patch;
-  ASSERT_TRUE(makeContribution(node, node.position, {}, patch));
-  EXPECT_FLOAT_EQ(patch.solid_angle, kPi * .01f / 4);
-  EXPECT_NEAR(patch.radiosity.x, 1, .01);
+  const Seen seen = seenOf(node, {0, 0, 2});
+  EXPECT_NEAR(seen.solid_angle, double(kPi) * .01 / 4, 1e-4);
+  EXPECT_NEAR(seen.radiosity.x, 1, .01);
 }
 
 // A rough node of small surfels at these places with these normals.
@@ -260,7 +279,7 @@ Node nodeOf(std::span<const glm::vec3> positions, std::span<const glm::vec3> nor
 
 // The middle of what is seen of a node, along v from its position towards the receiver.
 glm::vec3 middleOfSeen(const Node& node, const glm::vec3& v, GatherSides sides) {
-  return seenPart(node, -100.f * v, facingAreas(node, v), sides).middle;
+  return seenPart(node, -100.f * v, facingAreasOf(node, v), sides).middle;
 }
 
 TEST(RoughNode, OfASphereTheCapTowardsTheReceiverIsSeen) {
@@ -296,9 +315,11 @@ TEST(RoughNode, OfAnEdgeTheFaceThatShowsIsSeen) {
 
 // What a node looks like from `distance` of its position, over its projected area.
 float perspectiveOf(const Node& node, const glm::vec3& v, float distance) {
-  Contribution patch;
-  EXPECT_TRUE(makeContribution(node, -distance * v, {}, patch));
-  return patch.solid_angle * distance * distance / facingAreas(node, v).front;
+  const FacingAreas facing = facingAreasOf(node, v);
+  const SeenPart seen = seenPart(node, -distance * v, facing, GatherSides::kFront);
+  const float middle = glm::length(seen.middle - distance * v);
+  const float area = roughCover(node, -v, seen.perspective * facing.front, 0).area;
+  return area * (distance * distance) / (middle * middle) / facing.front;
 }
 
 TEST(RoughNode, IsAsLargeFromCloseByAsItLooks) {
@@ -328,46 +349,47 @@ TEST(Facet, ThatCurvesShowsWhatOfItFacesTheReceiver) {
   }
   glm::vec3 mean(0);
   for (const glm::vec3& normal : cap) mean += normal / float(cap.size());
-  Facet facet{};
-  facet.normal = mean;
-  facet.area = 1;
-  for (float angle = 0; angle < 3; angle += .05f) {
+  Node node{};
+  node.radius = 1;
+  node.forgetBounds();
+  node.flatness = glm::length(mean);
+  node.normal = glm::normalize(mean);
+  node.flags = kNodeFlat;
+  node.area = 1;
+  node.covariance = (1 / 6.f) * withoutDirection(glm::vec3(0));
+  node.radiosity = {1, 1, 1};
+  constexpr float kDistance = 12;
+  for (float angle = 0; angle < 3; angle += .1f) {
     const glm::vec3 d(std::sin(angle), 0, std::cos(angle));
     float front = 0;
-    for (const glm::vec3& normal : cap) front += std::max(0.f, glm::dot(normal, d));
-    const FacingAreas facing = facingAreas(facet, d);
-    EXPECT_NEAR(facing.front, front / float(cap.size()), .012f) << angle;
-    EXPECT_NEAR(facing.front - facing.back, glm::dot(mean, d), 1e-5f);
+    for (const glm::vec3& normal : cap) {
+      front += std::max(0.f, glm::dot(normal, d)) / float(cap.size());
+    }
+    const Seen seen = seenOf(node, -kDistance * d);
+    EXPECT_NEAR(seen.solid_angle * double(kDistance * kDistance), double(front), .03) << angle;
   }
   // With one normal there is nothing between front and back
-  facet.normal = {0, 0, 1};
-  EXPECT_EQ(facingAreas(facet, glm::normalize(glm::vec3(1, 0, -.01f))).front, 0);
+  node.flatness = 1;
+  EXPECT_EQ(seenOf(node, -kDistance * glm::normalize(glm::vec3(1, 0, -.01f))).solid_angle, 0);
 }
 
 TEST(Facet, OfTwoSidedSurfelsShowsAndLightsBothSides) {
-  Facet facet{};
-  facet.normal = {0, 0, 1};
-  facet.area = facet.radius = 1;
-  facet.covariance = withoutDirection(facet.normal);
-  facet.radiosity = {1, 2, 3};
-  facet.is_two_sided = true;
-  Contribution front, back, thicket;
-  ASSERT_TRUE(makeContribution(facet, {0, 0, -10}, {}, front));
-  ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {}, back));
-  EXPECT_EQ(front.solid_angle, .01f);
-  EXPECT_EQ(back.solid_angle, .01f);
-  EXPECT_EQ(back.radiosity, facet.radiosity);
-  EXPECT_EQ(back.thicket, 0);
-  // Backs alone cover as much, and are dark
-  ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {.sides = GatherSides::kBack}, back));
-  EXPECT_EQ(back.solid_angle, .01f);
-  EXPECT_EQ(back.radiosity, glm::vec3(0));
-  // One of several stands apart from what is before and behind it
-  facet.is_thicket = true;
-  ASSERT_TRUE(makeContribution(facet, {0, 0, 10}, {}, thicket));
-  EXPECT_EQ(thicket.thicket, 1);
-  EXPECT_EQ(thicket.overlap, 1);
-  EXPECT_LT(thicket.reach, .2f * front.reach);
+  Node node{};
+  node.radius = node.area = node.flatness = 1;
+  node.forgetBounds();
+  node.normal = {0, 0, 1};
+  node.flags = kNodeFlat | kNodeTwoSided;
+  node.covariance = (1 / 8.f) * withoutDirection(node.normal);
+  node.radiosity = {1, 2, 3};
+  for (const float place : {-10.f, 10.f}) {
+    const Seen seen = seenOf(node, {0, 0, place});
+    EXPECT_NEAR(seen.solid_angle, .01, 1e-3);
+    EXPECT_NEAR(seen.radiosity.z, 3, 1e-3);
+    // Backs alone cover as much, and are dark
+    const Seen back = seenOf(node, {0, 0, place}, GatherSides::kBack);
+    EXPECT_NEAR(back.solid_angle, .01, 1e-3);
+    EXPECT_EQ(back.radiosity, glm::vec3(0));
+  }
 }
 
 TEST(RoughNode, TheMiddleOfWhatIsSeenStaysWithinTheRadius) {
@@ -436,39 +458,34 @@ TEST(SurfelContribution, IsItsProjectedArea) {
   surfel.radius = .2f;
   surfel.area = .1f;
   surfel.radiosity = {3, 2, 1};
-  Contribution patch;
-  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, patch));
-  EXPECT_FLOAT_EQ(patch.solid_angle, .1f / 4 * std::sqrt(.5f));
-  EXPECT_EQ(patch.radiosity, surfel.radiosity);
+  const double expected = .1 / 4 * std::sqrt(.5);
+  EXPECT_NEAR(seenOf(surfel).solid_angle, expected, .02 * expected);
+  EXPECT_NEAR(seenOf(surfel).radiosity.x, 3, 1e-3);
 
   // The back side: nothing, black, or the same when two-sided
-  EXPECT_FALSE(makeContribution(surfel, -surfel.position, {}, patch));
-  ASSERT_TRUE(makeContribution(surfel, -surfel.position, {GatherSides::kBoth, true}, patch));
-  EXPECT_EQ(patch.radiosity, glm::vec3(0));
+  surfel.position = {0, 0, -2};
+  EXPECT_EQ(seenOf(surfel).solid_angle, 0);
+  EXPECT_GT(seenOf(surfel, GatherSides::kBoth).solid_angle, 0);
+  EXPECT_EQ(seenOf(surfel, GatherSides::kBoth).radiosity, glm::vec3(0));
   surfel.flags = kSurfelTwoSided;
-  ASSERT_TRUE(makeContribution(surfel, -surfel.position, {}, patch));
-  EXPECT_EQ(patch.radiosity, surfel.radiosity);
+  EXPECT_NEAR(seenOf(surfel).radiosity.x, 3, 1e-3);
 }
 
 // A two-sided surfel that has little of its disk is of hair or grass.
 TEST(SurfelContribution, PiecesOfRibbonsAreThickets) {
   Surfel surfel;
-  surfel.position = {0, 0, 2};
   surfel.normal = {0, 0, -1};
   surfel.radius = .2f;
   surfel.area = .1f * kPi * surfel.radius * surfel.radius;
-  Contribution surface, ribbon, leaf;
-  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, surface));
-  EXPECT_EQ(surface.thicket, 0);
+  const auto reach = [&] { return reachOf(surfel, Ribbon::of(surfel), surfel.radius, {0, 0, 1}); };
+  EXPECT_EQ(thicketPart(surfel), 0);
+  const float surface = reach();
   surfel.flags = kSurfelTwoSided;
-  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, ribbon));
-  EXPECT_EQ(ribbon.thicket, 1);
-  EXPECT_EQ(ribbon.overlap, 0);
-  EXPECT_LT(ribbon.reach, .2f * surface.reach);
+  EXPECT_EQ(thicketPart(surfel), 1);
+  EXPECT_LT(reach(), .2f * surface);
   surfel.area *= 2;
-  ASSERT_TRUE(makeContribution(surfel, surfel.position, {}, leaf));
-  EXPECT_EQ(leaf.thicket, 0);
-  EXPECT_EQ(leaf.reach, surface.reach);
+  EXPECT_EQ(thicketPart(surfel), 0);
+  EXPECT_EQ(reach(), surface);
 }
 
 TEST(SurfelContribution, SphereLooksTheSameFromEverywhere) {
@@ -478,20 +495,18 @@ TEST(SurfelContribution, SphereLooksTheSameFromEverywhere) {
   surfel.radiosity = {3, 2, 1};
   surfel.flags = kSurfelSphere;
   for (const glm::vec3& direction : evenDirections(20)) {
-    Contribution patch;
-    ASSERT_TRUE(makeContribution(surfel, 2.f * direction, {}, patch));
-    EXPECT_NEAR(patch.solid_angle, .1f / 4, 1e-6);
-    EXPECT_EQ(patch.radiosity, surfel.radiosity);
+    surfel.position = 2.f * direction;
+    EXPECT_NEAR(seenOf(surfel).solid_angle, .1 / 4, .1 * .1 / 4);
+    EXPECT_NEAR(seenOf(surfel).radiosity.x, 3, 1e-3);
   }
 }
 
-TEST(SurfelContribution, NothingIsSeenOfASurfelAtTheReceiver) {
+TEST(SurfelContribution, ASurfelAtTheReceiverLeavesNumbers) {
   Surfel surfel;
   surfel.radius = surfel.area = 1;
   surfel.normal = {0, 0, 1};
   surfel.flags = kSurfelTwoSided;
-  Contribution patch;
-  EXPECT_FALSE(makeContribution(surfel, glm::vec3(0), {GatherSides::kBoth, true}, patch));
+  EXPECT_TRUE(std::isfinite(seenOf(surfel, GatherSides::kBoth).solid_angle));
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "gather/scalar/gather_point.h"
+#include "gather/packet/packet_gatherer.h"
 #include "io/test_directory.h"
 #include "octree/build/scene_writer.h"
 #include "octree/node/node_sums.h"
@@ -76,9 +76,10 @@ TEST_F(HostileScene, SharedChildrenAreRefusedSoon) {
   const auto octree = PagedOctree::create(std::move(*file), *memory);
   ASSERT_TRUE(octree.ok());
   PagedOctree::Reader reader(**octree);
-  PointGatherer gatherer(GatherMode::kOcclusion, GatherQuality());
+  PacketGatherer gatherer(GatherMode::kOcclusion, GatherQuality());
+  const LocalReceiver receiver = {{0.5f, 0.5f, 0}, {0, 0, 1}};
   GatherResult result;
-  const Status status = gatherer.gather({{0.5f, 0.5f, 0}, {0, 0, 1}}, reader, result);
+  const Status status = gatherer.gather({&receiver, 1}, reader, {&result, 1});
   EXPECT_EQ(status.code(), StatusCode::kCorruption);
   EXPECT_THAT(status.message(), testing::HasSubstr("no tree"));
   EXPECT_LT(gatherer.work().nodes_visited, 100u);

@@ -1,4 +1,4 @@
-// What the lanes of a packet see is what the raster of each receiver alone sees.
+// What the lanes of a packet see is what a packet of each receiver alone sees.
 #include "gather/packet/packet_raster.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "gather/rules/gather_rules.h"
-#include "gather/scalar/receiver_raster.h"
 
 namespace surfeit {
 namespace {
@@ -33,6 +32,19 @@ Node bentNode() {
   return node;
 }
 
+// Results of a packet, of what is added to it.
+template <typename Add>
+std::vector<GatherResult> gathered(PacketRaster& raster, std::span<const LocalReceiver> receivers,
+                                   const Add& add) {
+  raster.begin(receivers, viewPacket(receivers));
+  add(raster);
+  raster.sort();
+  raster.draw();
+  std::vector<GatherResult> results(receivers.size());
+  raster.integrate(results);
+  return results;
+}
+
 // From where the node faces them to where it turns away.
 std::vector<LocalReceiver> receiversAlongTheRim() {
   std::vector<LocalReceiver> receivers;
@@ -49,20 +61,12 @@ TEST(PacketRaster, EveryReceiverSeesItsOwnPartOfWhatIsBent) {
     GatherQuality quality;
     quality.sides = sides;
     const GatherRules rules(GatherMode::kBleeding, quality);
-    PacketRaster packet(rules);
-    packet.begin(receivers, viewPacket(receivers));
-    packet.addNode(node);
-    packet.sort();
-    packet.draw();
-    std::vector<GatherResult> results(receivers.size());
-    packet.integrate(results);
-
-    ReceiverRaster alone(rules);
+    PacketRaster packet(rules), alone(rules);
+    const auto add = [&](PacketRaster& raster) { raster.addNode(node); };
+    const std::vector<GatherResult> results = gathered(packet, receivers, add);
     float least = 1, most = 0;
     for (std::size_t i = 0; i < receivers.size(); ++i) {
-      alone.begin(receivers[i]);
-      alone.addNode(node);
-      const GatherResult expected = alone.finish();
+      const GatherResult expected = gathered(alone, std::span(receivers).subspan(i, 1), add)[0];
       EXPECT_NEAR(results[i].occlusion, expected.occlusion, 1e-5) << i << ' ' << int(sides);
       EXPECT_NEAR(results[i].irradiance.x, expected.irradiance.x, 1e-5) << i << ' ' << int(sides);
       least = std::min(least, expected.occlusion);
@@ -134,24 +138,18 @@ TEST(PacketRaster, SurfelsAreKeptForTheFacesThatSeeThem) {
       if (has_normals) receivers.back().normal = {std::sin(turn), 0, std::cos(turn)};
     }
     const GatherRules rules(GatherMode::kBleeding, {});
-    PacketRaster packet(rules);
-    ReceiverRaster alone(rules);
+    PacketRaster packet(rules), alone(rules);
     std::mt19937 random(5);
     int kept = 0, seen = 0;
     for (int i = 0; i < 1000; ++i) {
       const Surfel surfel = surfelAround(random);
-      packet.begin(receivers, viewPacket(receivers));
-      packet.addSurfels({&surfel, 1});
+      const auto add = [&](PacketRaster& raster) { raster.addSurfels({&surfel, 1}); };
+      const std::vector<GatherResult> results = gathered(packet, receivers, add);
       kept += int(packet.patchCount());
-      packet.sort();
-      packet.draw();
-      std::vector<GatherResult> results(receivers.size());
-      packet.integrate(results);
       bool is_seen = false;
       for (std::size_t lane = 0; lane < receivers.size(); ++lane) {
-        alone.begin(receivers[lane]);
-        alone.addSurfel(surfel);
-        const GatherResult expected = alone.finish();
+        const GatherResult expected =
+            gathered(alone, std::span(receivers).subspan(lane, 1), add)[0];
         is_seen |= expected.occlusion > 0;
         ASSERT_NEAR(results[lane].occlusion, expected.occlusion, 1e-5) << i << ' ' << lane;
       }
@@ -177,21 +175,15 @@ TEST(PacketRaster, ThinDisksMakeNoStepAtTheBorderOfTheNearField) {
     const float distance = border * (.8f + .3f * float(i) / float(kPlaces - 1));
     receivers[i] = {{-.5f / 8 * distance, -.5f / 8 * distance, -distance}, {0, 0, 1}};
   }
-  ReceiverRaster alone(rules);
-  PacketRaster packet(rules);
+  PacketRaster packet(rules), alone(rules);
+  const auto add = [&](PacketRaster& raster) { raster.addSurfels({&surfel, 1}); };
   std::vector<float> occlusion;
   for (std::size_t i = 0; i < kPlaces; i += kPacketReceivers) {
     const std::span<const LocalReceiver> lanes = std::span(receivers).subspan(i, kPacketReceivers);
-    packet.begin(lanes, viewPacket(lanes));
-    packet.addSurfels({&surfel, 1});
-    packet.sort();
-    packet.draw();
-    std::vector<GatherResult> results(lanes.size());
-    packet.integrate(results);
+    const std::vector<GatherResult> results = gathered(packet, lanes, add);
     for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
-      alone.begin(lanes[lane]);
-      alone.addSurfel(surfel);
-      EXPECT_NEAR(results[lane].occlusion, alone.finish().occlusion, 1e-5f);
+      const GatherResult expected = gathered(alone, lanes.subspan(lane, 1), add)[0];
+      EXPECT_NEAR(results[lane].occlusion, expected.occlusion, 1e-5f);
       occlusion.push_back(results[lane].occlusion);
     }
   }

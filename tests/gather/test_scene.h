@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/long_side.h"
-#include "gather/scalar/gather_point.h"
+#include "gather/packet/packet_gatherer.h"
 #include "gather/test_clouds.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
@@ -59,9 +59,9 @@ class TestScene {
     return gather(receiver, GatherRules(mode, quality));
   }
   GatherResult gather(const LocalReceiver& receiver, const GatherRules& rules) {
-    PointGatherer gatherer(rules);
+    PacketGatherer gatherer(rules);
     GatherResult result;
-    expectOk(gatherer.gather(receiver, *reader_, result));
+    expectOk(gatherer.gather({&receiver, 1}, *reader_, {&result, 1}));
     work_ = gatherer.work();
     return result;
   }
@@ -69,7 +69,7 @@ class TestScene {
   std::string path() const { return directory_.file("c.sft"); }
   // The surfels as they are read: with normals normalized once more, in their last bits.
   const std::vector<Surfel>& cloud() const { return cloud_; }
-  const PointGatherer::Work& work() const { return work_; }
+  const PacketGatherer::Work& work() const { return work_; }
 
  private:
   static void expectOk(const Status& status) { ASSERT_TRUE(status.ok()) << status.message(); }
@@ -90,7 +90,7 @@ class TestScene {
   std::vector<Surfel> cloud_;
   std::unique_ptr<PagedOctree> octree_;
   std::unique_ptr<PagedOctree::Reader> reader_;
-  PointGatherer::Work work_;
+  PacketGatherer::Work work_;
 };
 
 }  // namespace surfeit

@@ -26,8 +26,7 @@ expect_refusal() {
   fi
   cp "$work/kept" "$work/$1"
 }
-expect_refusal src/gather/packet/packet_raster.cpp '#include "gather/scalar/raster_cube.h"'
-expect_refusal src/gather/scalar/raster_cube.cpp '#include "gather/packet/packet_raster.h"'
+expect_refusal src/gather/cut/cut.cpp '#include "gather/packet/packet_raster.h"'
 expect_refusal src/gather/cut/cut.cpp '#include "storage/file.h"'
 expect_refusal src/gather/rules/gather_rules.h '#include "batch/gather_memory.h"'
 expect_refusal src/octree/read/scene_file.cpp '#include "cloud/row_reader.h"'

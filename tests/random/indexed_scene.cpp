@@ -11,7 +11,6 @@
 
 #include "core/curve_key.h"
 #include "gather/packet/packet_gatherer.h"
-#include "gather/scalar/gather_point.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
 #include "surfels/surfel_writer.h"
@@ -125,16 +124,6 @@ Result<std::unique_ptr<IndexedScene>> IndexedScene::makeBounced(std::span<const 
 }
 
 Result<std::vector<GatherResult>> IndexedScene::gatherAlone(
-    std::span<const LocalReceiver> receivers, const GatherRules& rules) {
-  PointGatherer gatherer(rules);
-  std::vector<GatherResult> results(receivers.size());
-  for (std::size_t i = 0; i < receivers.size(); ++i) {
-    SURFEIT_RETURN_IF_ERROR(gatherer.gather(receivers[i], *reader_, results[i]));
-  }
-  return results;
-}
-
-Result<std::vector<GatherResult>> IndexedScene::gatherPacketsOfOne(
     std::span<const LocalReceiver> receivers, const GatherRules& rules) {
   PacketGatherer gatherer(rules);
   std::vector<GatherResult> results(receivers.size());

@@ -34,15 +34,12 @@ class IndexedScene {
                                                            const BounceOptions& bounce);
   static Result<std::unique_ptr<IndexedScene>> open(const std::string& path);
 
-  // Each by itself, by the scalar gather; and together as gatherCloud does, along the curve. In the
+  // Each by itself; and together as gatherCloud does, along the curve. In the
   // order of the receivers.
   Result<std::vector<GatherResult>> gatherAlone(std::span<const LocalReceiver> receivers,
                                                 const GatherRules& rules);
   Result<std::vector<GatherResult>> gatherTogether(std::span<const LocalReceiver> receivers,
                                                    const GatherRules& rules);
-  // Each by itself, by the gather of packets.
-  Result<std::vector<GatherResult>> gatherPacketsOfOne(std::span<const LocalReceiver> receivers,
-                                                       const GatherRules& rules);
 
   PagedOctree::Reader& reader() { return *reader_; }
 

@@ -140,7 +140,7 @@ TEST_P(RandomScenes, CompanyChangesLittle) {
     ASSERT_NE(cloud, nullptr);
     const GatherRules rules(bleeding(seed % 3 == 0 ? GatherSides::kBoth : GatherSides::kFront));
     const auto together = valueOf(cloud->gatherTogether(scene.plainReceivers(), rules));
-    const auto alone = valueOf(cloud->gatherPacketsOfOne(scene.plainReceivers(), rules));
+    const auto alone = valueOf(cloud->gatherAlone(scene.plainReceivers(), rules));
     ASSERT_EQ(together.size(), alone.size());
     for (std::size_t i = 0; i < alone.size(); ++i) {
       steps.push_back(std::abs(double(together[i].occlusion) - double(alone[i].occlusion)));

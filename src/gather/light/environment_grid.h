@@ -53,7 +53,7 @@ class LatLongGrid final : public SphereGrid {
   std::vector<double> row_ends_;
 };
 
-// The pixels of a raster cube (gather/scalar/raster_cube.h), of any resolution. Areas are exact up
+// The pixels of a raster cube (gather/rules/raster_geometry.h), of any resolution. Areas are exact up
 // to kExactResolution; above, slices are too wide for borders that cross, to some thousandths of
 // cells.
 class CubeGrid final : public SphereGrid {

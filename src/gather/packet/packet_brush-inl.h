@@ -50,7 +50,8 @@ class Brush {
     face_ = face;
     seen_ = &canvas_.seen->faces[std::size_t(face)];
     pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
-    hull_ = Hull(pixels_, *seen_, resolution_);
+    recorder_ = FaceRecorder(canvas_, std::size_t(face), lane_);
+    hull_ = Hull(pixels_, *seen_, resolution_, recorder_);
     open_.Begin(*seen_);
     if constexpr (!Kind::kFrame) weights_ = FaceWeights(canvas_, receivers_, face);
     ClearFace();
@@ -66,11 +67,24 @@ class Brush {
       seen = hn::And(seen, counts);
       sight.traced = hn::And(sight.traced, counts);
     }
-    if (!hn::AllFalse(D(), sight.traced)) Trace(patch, sight);
-    if (!hn::AllFalse(D(), seen)) SplatPatch(patch, sight, seen);
+    if (!hn::AllFalse(D(), sight.traced)) {
+      Trace(patch, sight);
+      if (recorder_) Record(CubeKind::kTraced, sight);
+    }
+    if (!hn::AllFalse(D(), seen)) {
+      SplatPatch(patch, sight, seen);
+      if (recorder_) Record(patch.kind, sight);
+    }
   }
 
  private:
+  void Record(CubeKind kind, const Sight& sight) const {
+    const V distance = hn::Sqrt(sight.distance_sq);
+    seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
+      recorder_.Look(pixel, kind, distance, pixels_.at(pixel));
+    });
+  }
+
   using Hull = FaceHull<Kind::kChannels>;
   static constexpr std::size_t kChannels = Hull::kAll;
   // Of a patch, in the frame of the raster.
@@ -127,6 +141,7 @@ class Brush {
         hn::Store(open, d, at + i * kStep);
       }
       hn::Store(Splat(-kInfinity), d, at + Hull::kEnd * kStep);
+      if (recorder_) recorder_.Clear(pixel, open);
     });
   }
 
@@ -139,7 +154,7 @@ class Brush {
     cover.depth_end = hn::Add(distance, reach);
     cover.inverse_gap = inverseLayerGap(patch.reach);
     cover.inverse_touch = inverse_touch;
-    cover.is_all_lit = patch.facing_limit != Patch::kDarkBack;
+    cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
     cover.overlap = patch.overlap;
     cover.has_hull = patch.thicket == 0;
     cover.is_solid = patch.is_solid;
@@ -158,7 +173,7 @@ class Brush {
     return hn::Mul(Splat(patch.opacity), LoadLanes(canvas_.parts[patch.parts].of, lane_));
   }
 
-  // As fadeAt.
+  // How occlusion at a distance counts.
   V FadeAt(V distance) const {
     const D d;
     const GatherWeights& weights = canvas_.rules->weights;
@@ -171,7 +186,9 @@ class Brush {
     return hn::IfThenElseZero(hn::Gt(rest, Splat(1e-30f)), hn::Exp(d, power));
   }
 
-  // As RasterCube::splat, onto face_.
+  // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
+  // image, to first order, of a parallelogram that spreads as the patch does and whose sides follow
+  // the rows. Onto face_.
   HWY_INLINE void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
     const V3 offset = InRaster(sight.offset);
     const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(offset, face_ / 2));
@@ -198,14 +215,16 @@ class Brush {
     if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
   }
 
-  // As touchPart.
+  // How much a patch says about where its layer ends: little where it barely touches the pixel.
   static V InverseTouch(const Parallelogram& shape) {
     const V area = hn::Mul(Splat(4), hn::Mul(shape.half_x, shape.half_y));
     const V counts = hn::Min(Splat(1), hn::Max(Splat(kFidelity.least_touched), area));
     return Reciprocal(hn::Mul(Splat(kFidelity.touch), counts));
   }
 
-  // As facingAreas of a facet; all times the distance.
+  // At the rim of a curved thing, a part of a piece faces the receiver whose mean normal does not:
+  // as SeeRoughNode has it, with normals spread evenly. (Without it, AO RMSE and bias of the bunny
+  // on a plane .0047 and -.0038, instead of .0037 and -.0020.) All times the distance.
   static V RimCosine(V facing, V range) {
     const V sum = hn::Max(hn::Zero(D()), hn::Sub(range, facing));
     const V rim = hn::Div(hn::Mul(sum, sum), hn::Mul(Splat(4), range));
@@ -218,7 +237,21 @@ class Brush {
     return hn::IfThenElse(hn::Lt(cosine, range), rim, cosine);
   }
 
-  // As RasterCube::onFace; `area` is the visible area times the distance.
+  // The shape of a patch on the plane of the face; it may lie outside the face. `area`: the visible
+  // area times the distance.
+  //
+  // A patch spreads by its shape (a disk with normal n by I - n n^T), and on the face by the
+  // gradients of u and v, which are (e_u - u e_axis) / |d[axis]| and the same with v. With a, b, c
+  // the entries of that spread on the face, a row is shifted by b / c for each unit of v and as
+  // wide as what is left of a. For a rectangle on a plane of the world, as cells of the octree cut
+  // it, that is its exact image to first order, so neighbours tile. (With I - n n^T for nodes, too:
+  // AO RMSE .0037 instead of .0031 for the bunny, and 1.9 % instead of 1 % missing at the worst
+  // place of a closed shell.)
+  //
+  // The area on the face is du dv = solid angle / |d[axis]|^3 for something small. Distances along
+  // the axis vary by area (1 - n[axis]^2) / 12 over a square, and the mean of 1 / w^3 is greater
+  // than that of its middle by 6 times that over w^2. For the same reason the middle of the image
+  // lies farther out than the image of the middle, by 4 times the covariance of u and w over w.
   HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse) const {
     const V one = Splat(1), least = Splat(kFidelity.least_spread);
     const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
@@ -308,7 +341,8 @@ class Brush {
     }
   }
 
-  // As RasterCube::traceDisk, traceSphere and traceRibbon.
+  // Covers the pixels whose rays hit the surfel: the near field (memo 3.4.1). Coverage of a disk
+  // falls off from its middle as peak (1 - (distance / radius)^2), limited to 1.
   void Trace(const Patch& patch, const Sight& sight) {
     const V3 to_centre = RayStartTo(sight, receivers_);
     Sight from_ray = sight;
@@ -338,9 +372,9 @@ class Brush {
         return SphereAmount(patch, ray, centre, centre_sq);
       });
     }
-    if (patch.isRibbon()) {
+    if (patch.is_ribbon) {
       const Ribbon ribbon =
-          Ribbon::ofShape(patch.shape, patch.normal, patch.area, patch.ribbonWidth());
+          Ribbon::ofShape(patch.shape, patch.normal, patch.area, patch.ribbon_width);
       const RibbonRays<Normal> rays(centre, c_n, normal, InRaster(ribbon.along),
                                     InRaster(ribbon.across), ribbon, 0.5f / scale_);
       return TracePixels(traced, range, cover,
@@ -384,7 +418,7 @@ class Brush {
     // What lies there is seen from the middle of a pixel, of ribbons the parts of all; and some to
     // spare
     constexpr float kSpare = 0.02f;
-    const float inset = (patch.isRibbon() ? -0.5f : 0.5f) - kSpare;
+    const float inset = (patch.is_ribbon ? -0.5f : 0.5f) - kSpare;
     const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
     begin = hn::Add(hn::MulAdd(low, scale, middle), Splat(inset));
     end = hn::Sub(hn::MulAdd(high, scale, middle), Splat(inset));
@@ -471,6 +505,7 @@ class Brush {
   FaceLanes pixels_;  // of the face
   OpenPixels open_;
   FaceWeights weights_;
+  FaceRecorder recorder_;
   Hull hull_;
 };
 

@@ -50,9 +50,10 @@ struct BrushKind {
   static constexpr std::size_t kChannels = (kColor ? 3 : 0) + (kFade ? 1 : 0);
 };
 
-// As RasterCube::coverPixel, where `amount` is positive. Without kOverlaps, nothing hides behind
-// its own layer. `place`: that of the pixel, which the hull is asked about; `weight`: of the middle
-// of what covers it, over that of its own. False: the pixel was open to nobody.
+// Covers so much of a pixel where `amount` is positive. A layer with less room ends at exactly 1,
+// and the pixel is exactly full then. Without kOverlaps, nothing hides behind its own layer.
+// `place`: that of the pixel, which the hull is asked about; `weight`: of the middle of what covers
+// it, over that of its own. False: the pixel was open to nobody.
 template <typename Kind, bool kOverlaps>
 HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, const Cover& cover,
                            const FaceHull<Kind::kChannels>& hull) {
@@ -83,6 +84,8 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
   hn::Store(room, d, room_at);
   hn::Store(hn::MulAdd(touch, hn::Max(zero, hn::Sub(cover.depth_end, end)), end), d, end_at);
 
+  // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer;
+  // what of a thicket hides behind itself is left out of its opacity
   V counts = amount;
   if constexpr (kOverlaps) {
     const V middle = hn::Min(one, hn::MulAdd(Splat(cover.own), amount, before));

@@ -22,13 +22,14 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-// As RasterCube::Parallelogram, in pixels.
+// On a face, in pixels: rows of width 2 half_x around the line x + shear (row - y).
 struct Parallelogram {
   V x, y, half_x, half_y, shear;
 };
 
-// As RasterCube::weightAt, over what the middles of the pixels weigh; 1 unless directions weigh by
-// the plain cosine. Of one face.
+// What places on a face weigh, their cosine and solid angle for their area there, over what the
+// middles of their pixels weigh; 1 unless directions weigh by the plain cosine. With q = (u, v, 1),
+// the cosine over du dv / solid angle is q.n / |q| / |q|^3.
 class FaceWeights {
  public:
   FaceWeights() = default;
@@ -86,7 +87,7 @@ class FaceWeights {
 };
 
 // The samples of rows, or columns, of a face that lie between `low` and `high`, in pixels; half
-// open. As HullRun, but of all pixels at once.
+// open.
 struct SampleRun {
   using VI = hn::Vec<DI>;
   VI begin, end;
@@ -118,7 +119,8 @@ struct SampleRun {
   }
 };
 
-// As hullWidening, in samples.
+// Of the hull of a patch, in samples. Spheres, two-sided surfels and rough nodes may stand alone,
+// and are not widened.
 inline VU Widening(const Parallelogram& shape, bool is_solid) {
   if (!is_solid) return hn::Zero(DU());
   const V side = hn::Sqrt(hn::Mul(shape.half_x, shape.half_y));
@@ -128,7 +130,8 @@ inline VU Widening(const Parallelogram& shape, bool is_solid) {
   return hn::BitCast(DU(), hn::ConvertTo(DI(), within));
 }
 
-// As RasterCube::addHull, in lanes of `seen`.
+// Adds the samples of the widened shape to the hull in lanes of `seen`, with the same shift for all
+// of a row of pixels.
 template <typename Hull>
 HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, const Cover& cover,
                         int resolution, const SeenPixels::Face& face, OpenPixels& open) {
@@ -136,6 +139,8 @@ HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, co
   const V zero = hn::Zero(d), size = Splat(float(resolution));
   const VU widening = Widening(shape, cover.is_solid);
   const V in_samples = hn::ConvertTo(d, hn::BitCast(DI(), widening));
+  // Samples are of the hull as a whole or not at all: half of one is to spare, or else rounding
+  // would tear tiles apart. (What stands alone has none: small balls would grow.)
   const V wider = cover.is_solid ? hn::MulAdd(in_samples, Splat(1 / float(kHullSide)),
                                               Splat(0.5f / float(kHullSide)))
                                  : hn::Zero(d);

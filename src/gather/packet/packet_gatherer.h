@@ -21,7 +21,7 @@ namespace surfeit {
 // One thread at a time; make one per thread. For its memory see PacketRaster.
 class PacketGatherer {
  public:
-  // `rules` must be valid, as for PointGatherer.
+  // `rules` must be valid, as for PacketRaster.
   explicit PacketGatherer(const GatherRules& rules,
                           const PacketKernel& kernel = fastestPacketKernel());
   PacketGatherer(GatherMode mode, const GatherQuality& quality,
@@ -49,6 +49,8 @@ class PacketGatherer {
     double walk_seconds = 0, sort_seconds = 0, draw_seconds = 0, integrate_seconds = 0;
   };
   const Work& work() const { return work_; }
+  // What was drawn last, and who is told of it.
+  PacketRaster& raster() { return raster_; }
   void measurePhases(bool measures) { measures_phases_ = measures; }
 
   // Bytes that a gatherer holds from the start.

@@ -1,6 +1,5 @@
 // The hulls of what is drawn, and the closing of layers by them, in the rasters of a packet; for
-// one instruction set (see packet_kernel-inl.h). RasterCube is the definition: addHull,
-// missingSamples, closeLayer and beginLayer.
+// one instruction set (see packet_kernel-inl.h).
 #if defined(SURFEIT_PACKET_HULL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SURFEIT_PACKET_HULL_INL_H_
 #undef SURFEIT_PACKET_HULL_INL_H_
@@ -16,6 +15,7 @@
 
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
+#include "gather/packet/pixel_record.h"
 #include "gather/rules/coverage_rules.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -34,6 +34,33 @@ inline VU InEveryColumn(VU column) {
   return hn::Or(column, hn::ShiftLeft<2 * kHullSide>(column));
 }
 
+// What the first receiver of a vector sees on a face, told to a recorder if there is one.
+class FaceRecorder {
+ public:
+  FaceRecorder() = default;
+  FaceRecorder(const PacketCanvas& canvas, std::size_t face, std::size_t lane)
+      : recorder_(lane == 0 ? canvas.recorder : nullptr),
+        first_pixel_(face * canvas.geometry->facePixels()) {}
+  explicit operator bool() const { return recorder_ != nullptr; }
+
+  void Clear(std::size_t pixel, V open) const {
+    recorder_->clear(first_pixel_ + pixel, hn::GetLane(open));
+  }
+  void Look(std::size_t pixel, CubeKind kind, V distance, const float* lanes) const {
+    recorder_->look(first_pixel_ + pixel, kind, hn::GetLane(distance),
+                    lanes[PacketCanvas::kRoom * kStep], lanes[PacketCanvas::kOpen * kStep]);
+  }
+  void Close(std::size_t pixel, M lanes, V begin, V end) const {
+    const D d;
+    if (!(hn::GetLane(hn::VecFromMask(d, hn::RebindMask(d, lanes))) != 0)) return;
+    recorder_->close(first_pixel_ + pixel, 0.5f * (hn::GetLane(begin) + hn::GetLane(end)));
+  }
+
+ private:
+  PixelRecorder* recorder_ = nullptr;
+  std::size_t first_pixel_ = 0;
+};
+
 // Of one face. `kChannels` values of color and fade follow those of coverage in a pixel.
 template <std::size_t kChannels>
 class FaceHull {
@@ -47,8 +74,9 @@ class FaceHull {
                 PacketCanvas::kCoverageChannels + PacketCanvas::kHullChannels + 2 * kChannels);
 
   FaceHull() = default;
-  FaceHull(const FaceLanes& pixels, const SeenPixels::Face& seen, int resolution)
-      : pixels_(pixels), seen_(&seen), resolution_(resolution) {}
+  FaceHull(const FaceLanes& pixels, const SeenPixels::Face& seen, int resolution,
+           FaceRecorder recorder)
+      : pixels_(pixels), seen_(&seen), resolution_(resolution), recorder_(recorder) {}
 
   // Adds samples of lanes that have some. `widening` in samples. False: the pixel is open to
   // nobody.
@@ -125,7 +153,10 @@ class FaceHull {
     return hn::IfThenElse(hn::RebindMask(du, all), hn::Or(before, hull), before);
   }
 
-  // As RasterCube::isHeld, of these lanes.
+  // Those of these lanes where the hull of what was drawn up to the end of the pixel's last layer,
+  // narrowed again, holds the pixel: all of its own samples are of the hull, and those of its
+  // neighbours that are as near as the hull was widened. What is not looked at lacks none, nor what
+  // is covered.
   M Held(std::size_t at, M lanes) const {
     const D d;
     const DU du;
@@ -160,7 +191,7 @@ class FaceHull {
     return hn::RebindMask(D(), hn::Eq(hn::AndNot(hull, samples), hn::Zero(du)));
   }
 
-  // As hullBorder, of all neighbours.
+  // Samples of the neighbour in direction (x, y) that lie within `widening` samples of the pixel.
   struct Borders {
     VU columns[3], rows[3];
 
@@ -176,7 +207,8 @@ class FaceHull {
     VU Of(int x, int y) const { return hn::And(columns[x + 1], rows[y + 1]); }
   };
 
-  // Of the lanes whose layers cover something.
+  // Of the lanes whose layers cover something. What is closed belongs to what its layer has
+  // brought.
   void Close(std::size_t at, M lanes) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
@@ -188,6 +220,9 @@ class FaceHull {
     if (hn::AllFalse(d, lanes)) return;
     const V layer = hn::IfThenElse(lanes, hn::Sub(before, rest), one);
     const V scale = hn::Div(hn::IfThenElseZero(lanes, rest), layer);
+    if (recorder_)
+      recorder_.Close(at, lanes, hn::Load(d, pixel + kBegin * kStep),
+                      hn::Load(d, pixel + PacketCanvas::kEnd * kStep));
     for (const std::size_t i : {PacketCanvas::kOpen, PacketCanvas::kRest}) {
       float* const left = pixel + i * kStep;
       hn::Store(hn::IfThenElse(lanes, zero, hn::Load(d, left)), d, left);
@@ -202,6 +237,7 @@ class FaceHull {
   FaceLanes pixels_;
   const SeenPixels::Face* seen_ = nullptr;
   int resolution_ = 0;
+  FaceRecorder recorder_;
 };
 
 }  // namespace

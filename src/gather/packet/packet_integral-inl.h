@@ -10,6 +10,7 @@
 // Needs the instruction set that the former chose
 #include <hwy/contrib/math/math-inl.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -18,6 +19,7 @@
 #include "gather/light/environment_map.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
+#include "gather/packet/pixel_record.h"
 #include "gather/rules/result_sums.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -31,7 +33,7 @@ struct PixelSight {
   V3 radiosity;  // times the coverage
 };
 
-// Sums over the pixels for some of the receivers, as ResultSums.
+// Sums over the pixels for some of the receivers.
 class Integral {
  public:
   Integral(const PacketCanvas& canvas, std::size_t lane)
@@ -59,12 +61,27 @@ class Integral {
       const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
       weight_sum_ = hn::Add(weight_sum_, weight);
       if (!has_near && !has_more) return;
-      const PixelSight sight = has_near ? Look(in_face) : NothingSeen();
+      const PixelSight sight = has_near ? Look(near_.at(in_face)) : NothingSeen();
       covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
       radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
       radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
       radiosity_.z = hn::MulAdd(weight, sight.radiosity.z, radiosity_.z);
       if (has_more) AddMore(i, direction_weight, weight, sight);
+    });
+  }
+
+  // What the first of the receivers has in the pixels of a face.
+  void ReadFace(std::size_t face, std::span<PixelContent> pixels) const {
+    if (!(*canvas_.is_face_used)[face]) return;
+    const FaceLanes lanes(canvas_.pixels, canvas_, face, lane_, channels_);
+    const auto size = std::size_t(canvas_.geometry->resolution());
+    canvas_.seen->faces[face].forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
+      const PixelSight sight = Look(lanes.at(in_face));
+      pixels[face * size * size + in_face] = {
+          hn::GetLane(sight.coverage),
+          hn::GetLane(sight.occlusion),
+          {hn::GetLane(sight.radiosity.x), hn::GetLane(sight.radiosity.y),
+           hn::GetLane(sight.radiosity.z)}};
     });
   }
 
@@ -139,9 +156,8 @@ class Integral {
     return pixel + (PacketCanvas::kCoverageChannels + rules_.channels() - 1) * kStep;
   }
 
-  PixelSight Look(std::size_t in_face) const {
+  PixelSight Look(const float* pixel) const {
     const D d;
-    const float* const pixel = near_.at(in_face);
     const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
     PixelSight sight = NothingSeen();
     sight.coverage = hn::Sub(Splat(1), rest);
@@ -228,7 +244,13 @@ class Integral {
   std::array<Sum, kMore> more_;
 };
 
-// As ReceiverRaster::integrate.
+void ReadPixels(const PacketCanvas& canvas, std::span<PixelContent> pixels) {
+  std::fill(pixels.begin(), pixels.end(), PixelContent{});
+  const Integral integral(canvas, 0);
+  const auto faces = static_cast<std::size_t>(canvas.geometry->faceCount());
+  for (std::size_t face = 0; face < faces; ++face) integral.ReadFace(face, pixels);
+}
+
 void Integrate(const PacketCanvas& canvas, std::span<GatherResult> results) {
   const auto faces = static_cast<std::size_t>(canvas.geometry->faceCount());
   std::array<float, kPacketReceivers> weights;

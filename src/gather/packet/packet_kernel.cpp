@@ -20,7 +20,8 @@ PacketKernel Kernel() {
           .facesThatSee = FacesThatSee,
           .seeRoughNode = SeeRoughNode,
           .draw = Draw,
-          .integrate = Integrate};
+          .integrate = Integrate,
+          .readPixels = ReadPixels};
 }
 
 }  // namespace HWY_NAMESPACE

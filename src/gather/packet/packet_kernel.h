@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <limits>
 #include <span>
 
 #include "core/symmetric_matrix.h"
@@ -20,48 +19,55 @@
 #include "gather/rules/raster_geometry.h"
 #include "gather/rules/receiver.h"
 #include "octree/node/node.h"
+#include "surfeit/cube.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
+
+class PixelRecorder;
+struct PixelContent;
 
 // A node or surfel of the cut, ready for the lanes. Two lines of a cache: they are drawn in another
 // order than they are made in.
 struct alignas(64) Patch {
   glm::vec3 position{0};
   float radius = 0;
-  glm::vec3 normal{0};      // of a node: times its flatness; zero: looks round
-  SymmetricMatrix shape{};  // how it spreads; RasterCube::Patch
-  float area = 0;           // all of it, whatever shows
+  glm::vec3 normal{0};  // of a node: times its flatness; zero: looks round
+  // How it spreads, a covariance of trace 2: of a disk I - n n^T, of a sphere the identity
+  SymmetricMatrix shape{};
+  float area = 0;  // all of it, whatever shows
   // The area that it shows: disk_area times the cosine, plus round_area, which everyone sees
   float disk_area = 0, round_area = 0;
   float most_area = 0;  // and no more than this
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
-  float overlap = 0, thicket = 0, opacity = 1;  // RasterCube::Patch
-  bool is_solid = true;                         // likewise
+  // How far it hides behind its own layer, 0..1: 0 for a tile beside the others, 1 for what lies
+  // anywhere before or behind them
+  float overlap = 0;
+  float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
+  float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
+  // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
+  // alone
+  bool is_solid = true;
+  bool is_ribbon = false;  // a ray traced surfel is a rectangle, not a disk
+  // From where it is seen: before its front alone; from both sides of a two-sided disk or facet;
+  // from both, though it sends light from its front alone; or as something else says
+  enum class Seen : std::uint8_t { kFront, kBoth, kDarkBack, kAllAround };
+  Seen seen = Seen::kFront;
+  CubeKind kind = CubeKind::kPatch;  // of what it stands for
   std::uint32_t parts = 0;  // place in PacketCanvas::parts of what counts of the opacity; 0: all
   glm::vec3 radiosity{0};
-  // It is seen where offset . normal, from the receiver, is below this: kFrontOnly; kBothSides, of
-  // a two-sided disk or facet; kDarkBack, when it is seen from both sides and sends light from its
-  // front; or kAllAround, when something else says what it shows
-  float facing_limit = 0;
   float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
   float reach = 0;          // how far before and behind its middle it meets others of its layer
-  // Of the ray traced disk, see softDiskPeak; or less than 0, of a ribbon: its width times -1
-  float soft_peak = 0;
+  float soft_peak = 0;      // of the ray traced disk, softDiskPeak
+  float ribbon_width = 0;   // of the ray traced ribbon
 
-  static constexpr float kFrontOnly = 0;
-  static constexpr float kBothSides = std::numeric_limits<float>::infinity();
-  static constexpr float kDarkBack = std::numeric_limits<float>::max();
-  static constexpr float kAllAround = kDarkBack / 2;
   bool isRound() const { return disk_area == 0; }
-  bool showsBoth() const { return facing_limit >= kDarkBack; }
-  bool isRibbon() const { return soft_peak < 0; }
-  float ribbonWidth() const { return -soft_peak; }
+  bool showsBoth() const { return seen == Seen::kBoth || seen == Seen::kDarkBack; }
   float nested(float ribbon_nested) const {
-    if (isRibbon() && thicket > 0) return ribbon_nested;
-    return nestedPart(is_solid && facing_limit != kBothSides, thicket);
+    if (is_ribbon && thicket > 0) return ribbon_nested;
+    return nestedPart(is_solid && seen != Seen::kBoth, thicket);
   }
 };
 static_assert(sizeof(Patch) == 128);
@@ -102,11 +108,13 @@ struct SeenPixels {
 };
 
 // Where a packet is drawn: 16 rasters, interleaved by pixel as many at a time as a vector holds
-// (FaceLanes). A pixel has room, layer and the layer's end (RasterCube::Coverage), what is open of
-// it and of its weight; with color red, green and blue; the faded coverage, when occlusion fades;
-// then the hull (FaceHull), and what was left and seen before the last layer.
+// (FaceLanes). A pixel has room, layer, the layer's end, what is open of it and of its weight; with
+// color red, green and blue; the faded coverage, when occlusion fades; then the hull (FaceHull),
+// and what was left and seen before the last layer.
 struct PacketCanvas {
-  static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3, kRest = 4;  // places
+  // Places: what the layers before the last one leave open; what the last one covers by itself, and
+  // where its depth ranges end; what is open; and what is open of the weight
+  static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3, kRest = 4;
   static constexpr std::size_t kCoverageChannels = 5, kHullChannels = 4;
   static std::size_t channels(const GatherRules& rules) {
     return kCoverageChannels + kHullChannels + 2 * rules.channels();
@@ -127,11 +135,12 @@ struct PacketCanvas {
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
   const SeenPixels* seen;
   const PacketParts* parts;  // of the patches
+  PixelRecorder* recorder;   // of what the first receiver sees; null: nobody's
 };
 
 struct RoughSight {
   FacingAreas facing;
-  glm::vec3 radiosity;
+  glm::vec3 radiosity;  // of the fronts that face the receivers
 };
 
 // An entry of the order: one patch on one face of the cube, [ face : 3 | distance : 29 | index of
@@ -159,13 +168,14 @@ struct PacketKernel {
   // The faces on which some receiver may see something of the patch, which stands for a surfel, as
   // bits; of a cone's raster the first.
   std::uint32_t (*facesThatSee)(const PacketCanvas& canvas, const Patch& patch);
-  // What the receivers see of a rough node in unit direction `direction` from them; as facingAreas
-  // and seenRadiosity.
+  // What the receivers see of a rough node in unit direction `direction` from them.
   void (*seeRoughNode)(const Node& node, const glm::vec3& direction, RoughSight& sight);
   // Draws patches in this order, all of one face after those of another.
   void (*draw)(const PacketCanvas& canvas, const Patch* patches,
                std::span<const std::uint64_t> order);
   void (*integrate)(const PacketCanvas& canvas, std::span<GatherResult> results);
+  // What the first receiver has in its pixels.
+  void (*readPixels)(const PacketCanvas& canvas, std::span<PixelContent> pixels);
 };
 
 // For the fastest instruction set of this machine.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
 #include "gather/rules/coverage_rules.h"
 #include "gather/rules/ribbon.h"
@@ -24,10 +25,9 @@ constexpr float kMostSpread = 24;
 // A parallelogram may reach farther than the rectangle with its spread.
 constexpr float kShear = 1.3f;
 constexpr float kDiagonal = 1.415f;
-// Areas over the square of the distance from where on patches are large. (16 times the same
-// receiver against the scalar gather, which looks at every face: with .2 occlusion is off by up to
-// .0016 at .11 sr and by .019 at .4, in a hollow sphere; with .02 by .0001 and .0006, for 3 % of
-// the time.)
+// Areas over the square of the distance from where on patches are large. (Against patches
+// on every face: with .2 occlusion is off by up to .0016 at .11 sr and by .019 at .4, in a hollow
+// sphere; with .02 by .0001 and .0006, for 3 % of the time.)
 constexpr float kLargeExtent = 0.02f;
 
 // Thickets fill their outlines however long these are.
@@ -104,6 +104,7 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
     seen_faces_ |= (seen_.faces[i].isEmpty() ? 0u : 1u) << i;
   }
   is_face_used_.fill(false);
+  if (recorder_ != nullptr) recorder_->begin(geometry_.pixels().size());
   patches_.clear();
   parts_.resize(1);  // that of what counts wholly
   order_count_ = 0;
@@ -127,7 +128,7 @@ void PacketRaster::bringToWorld(Patch& patch) const {
     *area *= square;
   }
   for (float* length : {&patch.radius, &patch.near_distance, &patch.reach}) *length *= scale;
-  if (patch.isRibbon()) patch.soft_peak *= scale;
+  patch.ribbon_width *= scale;
 }
 
 // The faces that some receiver may see some of a node's patch on, as bits.
@@ -155,7 +156,7 @@ std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
 }
 
 // Of a patch so large that it matters how long it is and what perspective makes of it
-// (RasterCube::onFace), which takes longer to find out.
+// (Brush::OnFace), which takes longer to find out.
 std::uint32_t PacketRaster::facesThatSeeLarge(const Patch& patch, float extent) const {
   const glm::vec3 middle = patch.position - view_.centre;
   const glm::vec3 size = glm::abs(middle);
@@ -213,12 +214,13 @@ std::uint32_t PacketRaster::keepParts(const LaneParts* parts) {
 void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts) {
   const std::uint32_t parts = keepParts(lane_parts);
   if (node.isRough()) return addRoughNode(node, parts);
-  if (node.isFlat()) return addFacet(facetOf(node), parts);
+  if (node.isFlat()) return addFacet(facetOf(node), CubeKind::kFlatNode, parts);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
-    if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal()))
-      addFacet(node.facet(i), parts);
+    if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
+      addFacet(node.facet(i), CubeKind::kFacet, parts);
+    }
   }
 }
 
@@ -231,7 +233,7 @@ bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal)
   return away > normalRange(normal) * glm::length(to_facet) + local_radius_;
 }
 
-void PacketRaster::addFacet(const Facet& facet, std::uint32_t parts) {
+void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts) {
   if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(facet.position))) return;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - local_centre_;
@@ -254,10 +256,11 @@ void PacketRaster::addFacet(const Facet& facet, std::uint32_t parts) {
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + local_radius_ / distance;
   if (is_rim) patch.range = range;
-  patch.facing_limit = facet.is_two_sided ? Patch::kBothSides
-                       : shows_both       ? Patch::kDarkBack
-                       : patch.range > 0  ? Patch::kAllAround
-                                          : Patch::kFrontOnly;
+  patch.seen = facet.is_two_sided ? Patch::Seen::kBoth
+               : shows_both       ? Patch::Seen::kDarkBack
+               : patch.range > 0  ? Patch::Seen::kAllAround
+                                  : Patch::Seen::kFront;
+  patch.kind = kind;
   patch.parts = parts;
   bringToWorld(patch);
   orderLastPatch(facesThatSee(patch));
@@ -291,7 +294,8 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
   patch.overlap = std::max(patch.overlap, patch.thicket);
-  patch.facing_limit = Patch::kAllAround;
+  patch.seen = Patch::Seen::kAllAround;
+  patch.kind = CubeKind::kRoughNode;
   bringToWorld(patch);
   orderLastPatch(facesThatSee(patch));
 }
@@ -311,15 +315,16 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
       patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
     } else {
       patch.shape = ribbon.shape();
-      patch.soft_peak = -ribbon.width;
+      patch.is_ribbon = true;
+      patch.ribbon_width = ribbon.width;
     }
     patch.area = patch.most_area = surfel.area;
     (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
     patch.radiosity = surfel.radiosity;
-    patch.facing_limit = surfel.isSphere()                            ? Patch::kAllAround
-                         : surfel.isTwoSided()                        ? Patch::kBothSides
-                         : rules_.quality.sides == GatherSides::kBoth ? Patch::kDarkBack
-                                                                      : Patch::kFrontOnly;
+    patch.seen = surfel.isSphere()                            ? Patch::Seen::kAllAround
+                 : surfel.isTwoSided()                        ? Patch::Seen::kBoth
+                 : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
+                                                              : Patch::Seen::kFront;
     const glm::vec3 to_surfel = surfel.position - local_centre_;
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
@@ -336,6 +341,12 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
   }
 }
 
+void PacketRaster::addPatch(const Patch& patch) {
+  patches_.push_back(patch);
+  orderLastPatch(patch.near_distance > 0 ? kernel_.facesThatSee(canvas(), patch)
+                                         : facesThatSee(patch));
+}
+
 PacketCanvas PacketRaster::canvas() const {
   return {.lanes = &lanes_,
           .receiver_count = receiver_count_,
@@ -350,13 +361,20 @@ PacketCanvas PacketRaster::canvas() const {
           .pixels = pixels_.get(),
           .is_face_used = &is_face_used_,
           .seen = &seen_,
-          .parts = parts_.data()};
+          .parts = parts_.data(),
+          .recorder = recorder_};
 }
 
 void PacketRaster::sort() { sortByUpperHalf(order_, order_count_, order_scratch_); }
 
 void PacketRaster::draw() {
   kernel_.draw(canvas(), patches_.data(), std::span(order_).first(order_count_));
+}
+
+std::size_t PacketRaster::tracedCount() const {
+  return std::size_t(std::count_if(patches_.begin(), patches_.end(), [&](const Patch& patch) {
+    return glm::length(patch.position - view_.centre) < patch.near_distance;
+  }));
 }
 
 void PacketRaster::integrate(std::span<GatherResult> results) {

@@ -3,8 +3,19 @@
 // the packet's cut gives, sorts it by distance from the packet's centre, draws it front to back and
 // integrates (memo 3.4 and 3.5).
 //
-// Each lane is the raster of one receiver by the rules of ReceiverRaster, which is the definition;
-// what the lanes share is the cut and the order. A rough node is seen from the packet's centre.
+// Each lane is the raster of one receiver; what the lanes share is the cut and the order. A rough
+// node is seen from the packet's centre. A packet of one receiver is the definition.
+//
+// Contributions come front to back, in the order of the middles of their depth ranges. Coverage
+// adds up within a layer and covers between layers: neighbouring surfels of one surface share a
+// pixel without overlapping, so their coverages add until the layer is full; a surface behind is
+// hidden by the part that the layers before it cover, and by more where both are likely to cover
+// the same side of the pixel (Fidelity::nested). A contribution belongs to the layer before it when
+// their depth ranges meet, and the less, the wider the gap between them (Fidelity::layer_gap).
+// Adding everything, the memo's rule, lets the half-covered silhouettes of things behind each other
+// fill a pixel. (On a plane with 500 spheres, near field 8: AO RMSE .0135 and bias +.007 with it,
+// .0095 and
+// -.004 with layers. docs/algorithm.md, "Coverage")
 #pragma once
 
 #include <hwy/aligned_allocator.h>
@@ -27,15 +38,18 @@
 
 namespace surfeit {
 
-// One thread at a time. Has room for kReservedPatches from the start; for what grows beyond, see
-// ReceiverRaster.
+// One thread at a time. Room for kReservedPatches is there from the start, far more than cuts with
+// a sensible max solid angle have. It grows for the most demanding packet so far and is kept, so
+// that a steady state does not allocate. With a max solid angle of 0 every surfel above the horizon
+// contributes, and that memory is the caller's to budget.
 class PacketRaster {
  public:
   static constexpr std::size_t kReservedPatches = 4096;
   static constexpr std::size_t kReservedParts = 1024;    // of what fades
   static constexpr std::size_t kReservedEntries = 8192;  // of the order
 
-  // `rules` must be valid, as for PointGatherer.
+  // `rules` must be valid, as gatherCloud checks them: even resolution within its limits, the rest
+  // neither negative nor NaN.
   explicit PacketRaster(const GatherRules& rules,
                         const PacketKernel& kernel = fastestPacketKernel());
   PacketRaster(const PacketRaster&) = delete;
@@ -48,6 +62,8 @@ class PacketRaster {
   // Adds a node as a whole. All receivers must lie outside its radius.
   // `parts`: how much it counts for each receiver; null: wholly.
   void addNode(const Node& node, const LaneParts* parts = nullptr);
+  // Adds a patch as it is, in the frame of the receivers.
+  void addPatch(const Patch& patch);
   // Adds those of the surfels that some receiver may see.
   void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr);
 
@@ -60,13 +76,22 @@ class PacketRaster {
 
   std::size_t patchCount() const { return patches_.size(); }
 
+  // Tells it from now on what every pixel of the first receiver gets; null, as at first: nobody. It
+  // must outlive the drawing.
+  void setRecorder(PixelRecorder* recorder) { recorder_ = recorder; }
+  const RasterGeometry& geometry() const { return geometry_; }
+  // After drawing, what the first receiver has in its pixels, as many as the geometry has.
+  void readPixels(std::span<PixelContent> pixels) const { kernel_.readPixels(canvas(), pixels); }
+  // Patches of surfels so near to the packet's centre that they are ray traced at least in part.
+  std::size_t tracedCount() const;
+
   // Bytes that a raster of this quality holds from the start.
   static std::size_t memoryBytes(const GatherRules& rules);
 
  private:
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   std::uint32_t keepParts(const LaneParts* parts);
-  void addFacet(const Facet& facet, std::uint32_t parts);
+  void addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts);
   void addRoughNode(const Node& node, std::uint32_t parts);
   std::uint32_t facesThatSee(const Patch& patch) const;
   std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
@@ -91,6 +116,7 @@ class PacketRaster {
   SeenPixels seen_;
   std::uint32_t seen_faces_ = 0;  // set of those with pixels that count
   PacketView view_;
+  PixelRecorder* recorder_ = nullptr;
   const InstanceFrame* frame_ = nullptr;
   glm::vec3 local_centre_{0};  // of the view, in the frame of what is added
   float local_radius_ = 0;

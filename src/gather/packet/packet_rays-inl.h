@@ -51,9 +51,12 @@ V DiskAmount(const Patch& patch, const Vector& normal, const glm::vec3& ray, con
   return hn::IfThenElseZero(hn::Gt(t, hn::Zero(D())), hn::Max(amount, hn::Zero(D())));
 }
 
-// As RasterCube::traceRibbon. Axes are vectors of the world, or in the frames of the lanes.
+// The rectangle of a ribbon: pixels by the part of them that lies within. Axes are vectors of the
+// world, or in the frames of the lanes.
 template <typename Vector>
 class RibbonRays {
+  static constexpr float kLeastSineSq = 1e-6f;
+
  public:
   // `centre`: from where rays begin; `c_n`: it times the normal.
   RibbonRays(const V3& centre, V c_n, const Vector& normal, const Vector& along,
@@ -82,7 +85,8 @@ class RibbonRays {
   }
   static V Cosine(const V3& axis, const glm::vec3& ray) { return Dot(axis, ray); }
 
-  // As partWithin and ribbonFoot.
+  // How much of a pixel lies within a side. What covers `size` across a ray reaches the farther
+  // along the side, the smaller its angle to the ray.
   static V Part(const Side& side, const glm::vec3& ray, V t, V size) {
     const V one = Splat(1), cosine = Cosine(side.axis, ray);
     const V sine_sq = hn::Max(hn::NegMulAdd(cosine, cosine, one), Splat(kLeastSineSq));

@@ -1,5 +1,5 @@
 // Numbers that say how contributions cover pixels; docs/algorithm.md, "Coverage" and "The raster
-// cube", has their measured effect. The scalar rasters and the packet kernel share them.
+// cube", has their measured effect.
 #pragma once
 
 #include <algorithm>
@@ -29,36 +29,11 @@ inline float layerReachOfDisk(float radius, float cosine) {
 inline float inverseLayerGap(float reach) {
   return 1 / std::max(kFidelity.layer_gap * reach, 1e-30f);
 }
-inline float newLayerPart(float gap, float reach) {
-  return std::clamp(gap * inverseLayerGap(reach), 0.f, 1.f);
-}
-// How much a patch says about where its layer ends: little where it barely touches the pixel.
-// `area`: what it covers in all, in pixels; 0 of what is traced.
-inline float touchPart(float amount, float area) {
-  return std::min(1.f, amount / (kFidelity.touch * std::clamp(area, kFidelity.least_touched, 1.f)));
-}
-
 // Outlines of surfaces on the same ground rise from the same side of a pixel, and the smaller lies
 // behind the larger. This part of a surface does so; the rest hides at random, as leaves, hair,
 // particles and rough nodes do.
 inline float nestedPart(bool is_surface, float thicket) {
   return is_surface ? kFidelity.nested * (1 - thicket) : 0;
-}
-
-// What a layer leaves open that covers `layer` of a pixel, of which `room` was open before it.
-inline float openBehind(float room, float layer, float nested) {
-  const float rest = 1 - layer, apart = room * rest;
-  return apart + nested * (std::min(room, rest) - apart);
-}
-
-// What lies where in a pixel counts by its own weight there. Of what was open, and of the weight
-// that was left, this part of the weight goes to what covers `covered`, the middle of which weighs
-// `weight` beside the middle of the pixel. What lies by itself takes its own; what takes all that
-// is open, all that is left: that tells what the middle of a patch that is half hidden does not.
-inline float takenWeight(float covered, float open, float rest, float weight) {
-  if (!(covered > 0)) return 0;
-  const float part = covered / open;
-  return std::clamp(covered * (1 - part) * weight + part * part * rest, 0.f, rest);
 }
 
 // What hides, hides: patches have exact areas, and these scatter around what a pixel of a surface
@@ -69,48 +44,6 @@ inline float takenWeight(float covered, float open, float rest, float weight) {
 // close so; outlines stay where they are, and areas, and with them power, are not touched.
 inline constexpr int kHullSide = 4;  // samples along a pixel
 inline constexpr std::uint32_t kHullSamples = 0xffff;
-// Of a patch with these half sides, in pixels. Spheres, two-sided surfels and rough nodes may stand
-// alone, and are not widened.
-inline int hullWidening(float half_width, float half_height) {  // in samples
-  const float widening =
-      kFidelity.hull_widening * float(kHullSide) * std::sqrt(half_width * half_height);
-  return int(std::clamp(widening + 0.5f, 1.f, float(kHullSide)));
-}
-// In pixels. Samples are of the hull as a whole or not at all: half of one is to spare, or else
-// rounding would tear tiles apart. (What stands alone has none: small balls would grow.)
-inline float hullWider(float widening) { return (widening + 0.5f) / float(kHullSide); }
-
-// Samples are bits, column by column: 4 column + row.
-constexpr std::uint32_t hullSample(int column, int row) { return 1u << (kHullSide * column + row); }
-
-// Samples of the neighbour in direction (x, y) that lie within `widening` samples of the pixel.
-constexpr std::uint32_t hullBorder(int x, int y, int widening) {
-  std::uint32_t samples = 0;
-  for (int row = 0; row < kHullSide; ++row) {
-    for (int column = 0; column < kHullSide; ++column) {
-      const int dx = x < 0 ? kHullSide - column : x > 0 ? column + 1 : 0;
-      const int dy = y < 0 ? kHullSide - row : y > 0 ? row + 1 : 0;
-      if (dx <= widening && dy <= widening) samples |= hullSample(column, row);
-    }
-  }
-  return samples;
-}
-
-// The samples [begin, end) of 4 in a row or column that starts at `at`, of what reaches from `low`
-// to `high`; all in pixels.
-struct HullRun {
-  int begin, end;
-  static HullRun of(float low, float high, float at) {
-    const float scale = float(kHullSide);
-    return {int(std::clamp(std::ceil(scale * (low - at)), 0.f, scale)),
-            int(std::clamp(std::floor(scale * (high - at)), 0.f, scale))};
-  }
-  std::uint32_t columns() const {
-    return begin < end ? (1u << kHullSide * end) - (1u << kHullSide * begin) : 0u;
-  }
-  std::uint32_t rows() const { return begin < end ? ((1u << end) - (1u << begin)) * 0x1111u : 0u; }
-};
-
 // What things of this area hide of an outline, spread in it at random (Beer and Lambert).
 inline float thicketOpacity(float area, float outline) { return 1 - std::exp(-area / outline); }
 
@@ -119,18 +52,6 @@ inline float nearBorderSq(float near_distance) {
   return std::clamp(near_distance * near_distance, std::numeric_limits<float>::min(),
                     std::numeric_limits<float>::max());
 }
-// How much of what is so far away is ray traced; `border_sq`: nearBorderSq.
-inline float nearPart(float distance_sq, float border_sq) {
-  return std::clamp(
-      (1 - distance_sq / border_sq) / (1 - kFidelity.whole_near * kFidelity.whole_near), 0.f, 1.f);
-}
-
-// What the bias of rays counts for a two-sided surfel with its middle so high above the horizon:
-// disks of the receiver's own surface have their middles in its plane or beneath.
-inline float biasPart(float height_in_radii) {
-  return std::clamp(1 - height_in_radii / kFidelity.bias_height, 0.f, 1.f);
-}
-
 // The disk of a longer sliver does not tell where its surface is.
 inline float effectiveRadius(float radius, float area) {
   return std::min(radius, kFidelity.largest_radius * std::sqrt(area));

@@ -143,15 +143,6 @@ inline glm::vec3 lobeAxis(const LocalReceiver& receiver, const GatherRules& rule
   return mirrored / glm::length(mirrored);
 }
 
-// How occlusion at a distance counts.
-inline float fadeAt(float distance, const GatherRules& rules) {
-  const GatherWeights& weights = rules.weights;
-  if (weights.falloff_mode == GatherWeights::FalloffMode::kExponential) {
-    return std::exp(-weights.falloff * distance);
-  }
-  return std::pow(std::max(0.f, 1 - distance / rules.quality.max_distance), weights.falloff);
-}
-
 // How directions weigh by the cosine of their angle to an axis, the normal or the reflection.
 class DirectionWeights {
  public:

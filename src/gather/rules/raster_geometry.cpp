@@ -50,14 +50,4 @@ ConeFrame::ConeFrame(const glm::vec3& axis) : x(axis) {
   z = frame.bitangent;
 }
 
-SymmetricMatrix ConeFrame::toLocal(const SymmetricMatrix& m) const {
-  const glm::vec3 axes[3] = {x, y, z};
-  SymmetricMatrix local;
-  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
-    local.entries[i] =
-        glm::dot(axes[SymmetricMatrix::kRow[i]], m * axes[SymmetricMatrix::kColumn[i]]);
-  }
-  return local;
-}
-
 }  // namespace surfeit

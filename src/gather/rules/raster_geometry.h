@@ -15,8 +15,6 @@
 #include <span>
 #include <vector>
 
-#include "core/symmetric_matrix.h"
-
 namespace surfeit {
 
 // Directions and solid angles of the pixels for one resolution. Immutable, so threads may share it.
@@ -59,13 +57,6 @@ class RasterGeometry {
   std::vector<Pixel> pixels_;
 };
 
-// Distances from the receiver between which something lies.
-struct DepthRange {
-  float begin, end;
-  float fade = 1;  // what its occlusion counts
-  float reach() const { return 0.5f * (end - begin); }
-};
-
 // Axes of a cone's frame: local coordinates are dot products with them.
 struct ConeFrame {
   glm::vec3 x, y, z;
@@ -75,7 +66,6 @@ struct ConeFrame {
     return {glm::dot(x, v), glm::dot(y, v), glm::dot(z, v)};
   }
   glm::vec3 toWorld(const glm::vec3& v) const { return v.x * x + v.y * y + v.z * z; }
-  SymmetricMatrix toLocal(const SymmetricMatrix& m) const;
 };
 
 }  // namespace surfeit

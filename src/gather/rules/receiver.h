@@ -2,9 +2,7 @@
 #pragma once
 
 #include <cstddef>
-#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <limits>
 
 #include "core/spherical_harmonics.h"
 #include "surfeit/gather.h"
@@ -25,13 +23,6 @@ struct LocalReceiver {
 
   bool isSpherical() const { return normal == glm::vec3(0); }
 };
-
-// Height of a point above the receiver's horizon; infinite for a spherical receiver, which has
-// none. `offset` leads from the receiver to the point.
-inline float heightAboveHorizon(const LocalReceiver& receiver, const glm::vec3& offset) {
-  return receiver.isSpherical() ? std::numeric_limits<float>::infinity()
-                                : glm::dot(offset, receiver.normal);
-}
 
 // Results are plain floats, so that they can be stored and mixed as such.
 inline constexpr std::size_t kResultFloats = 16 + 3 * kShCount;

@@ -38,42 +38,4 @@ inline GatherResult resultOf(const GatherResult& sums, float weight, const Gathe
   return result;
 }
 
-// Adds up in the order of the calls.
-class ResultSums {
- public:
-  struct Pixel {
-    glm::vec3 direction;  // unit, of the world
-    float solid_angle;
-    float weight;  // of the direction, without the solid angle
-    float coverage, occlusion;
-    glm::vec3 radiosity;    // of surfels, times the coverage
-    glm::vec3 environment;  // of the whole pixel
-  };
-  void add(const Pixel& pixel) {
-    const float weight = pixel.weight * pixel.solid_angle, open = 1 - pixel.coverage;
-    const glm::vec3 environment = open * pixel.environment;
-    const glm::vec3 light = pixel.radiosity + environment;
-    weight_ += weight;
-    sums_.occlusion += weight * pixel.occlusion;
-    sums_.irradiance += weight * pixel.radiosity;
-    sums_.bent_normal += weight * open * pixel.direction;
-    sums_.illumination_direction += weight * glm::dot(light, kLuminance) * pixel.direction;
-    sums_.environment += weight * environment;
-    if (!(pixel.weight > 0)) return;
-    sums_.fluence += pixel.solid_angle * light;
-    const ShCoefficients basis = shBasis(pixel.direction);
-    for (std::size_t i = 0; i < basis.size(); ++i) {
-      sums_.radiance_sh[i] += pixel.solid_angle * basis[i] * light;
-    }
-  }
-
-  GatherResult result(const GatherRules& rules, bool is_spherical) const {
-    return resultOf(sums_, weight_, rules, is_spherical);
-  }
-
- private:
-  float weight_ = 0;
-  GatherResult sums_;
-};
-
 }  // namespace surfeit

@@ -30,6 +30,7 @@ struct Ribbon {
     if (!(cosine > kFidelity.least_in_plane)) return ribbon;
     ribbon.along = in_plane / cosine;
     ribbon.across = glm::cross(surfel.normal, ribbon.along);
+    // Squares are taken to be longer than wide, so that their shape has axes
     ribbon.length =
         std::sqrt(surfel.area * std::max(elongationOf(surfel), kFidelity.least_elongation));
     ribbon.width = surfel.area / ribbon.length;
@@ -45,7 +46,7 @@ struct Ribbon {
                    width * std::abs(glm::dot(direction, across)));
   }
 
-  // How it spreads, as RasterCube::Patch has it.
+  // How it spreads, as Patch::shape.
   SymmetricMatrix shape() const {
     const float scale = 2 / (length * length + width * width);
     const float u = scale * length * length, v = scale * width * width;
@@ -76,9 +77,6 @@ struct Ribbon {
     ribbon.across = glm::cross(normal, ribbon.along);
     return ribbon;
   }
-
- private:
-  // Squares are taken to be longer than wide, so that their shape has axes.
 };
 
 // Of the circle that a surfel is drawn within, as the ribbon that it is, if it is one.
@@ -90,18 +88,6 @@ inline float drawnRadius(const Surfel& surfel, const Ribbon& ribbon) {
 // Closer than this, for each radius of the near field, it is ray traced.
 inline float nearFieldSize(float drawn_radius, const Ribbon& ribbon) {
   return ribbon.isEmpty() ? drawn_radius : kFidelity.ribbon_radius * ribbon.length;
-}
-
-// How much of a pixel lies between -half and half, which reaches from x - foot to x + foot.
-inline float partWithin(float x, float foot, float half) {
-  const float within = std::min(x + foot, half) - std::max(x - foot, -half);
-  return std::clamp(within / (2 * foot), 0.f, 1.f);
-}
-
-// What covers `size` across a ray reaches so far along an axis with this cosine to the ray.
-inline constexpr float kLeastSineSq = 1e-6f;
-inline float ribbonFoot(float size, float cosine) {
-  return size / std::sqrt(std::max(1 - cosine * cosine, kLeastSineSq));
 }
 
 }  // namespace surfeit

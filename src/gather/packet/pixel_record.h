@@ -1,0 +1,77 @@
+// What the pixels of one receiver got, and from what, beside what the raster integrates: for those
+// who look at it (surfeit/cube.h). Gathers run without it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "surfeit/cube.h"
+
+namespace surfeit {
+
+// What is in a pixel of a raster.
+struct PixelContent {
+  float coverage = 0, occlusion = 0;  // occlusion: with falloff
+  glm::vec3 radiosity{0};             // times the coverage; zero without light
+};
+
+struct PixelRecord {
+  std::array<float, kCubeKinds> covered{};  // by what it was drawn as; gaps are not filled yet
+  float total = 0;                          // the sum of these
+  float depth = std::numeric_limits<float>::infinity();  // CubePixel::depth
+  float new_layers = 0;                                  // sum of what each began of a new layer
+
+  float layers() const { return total > 0 ? std::max(1.f, new_layers) : 0; }
+  CubeKind kind() const {
+    const auto most = std::max_element(covered.begin(), covered.end());
+    return *most > 0 ? CubeKind(most - covered.begin()) : CubeKind::kNothing;
+  }
+};
+
+// Looks at the pixels after each thing is drawn. One thread at a time.
+class PixelRecorder {
+ public:
+  // Forgets everything; so many pixels follow.
+  void begin(std::size_t pixels) { pixels_.assign(pixels, {}); }
+  // A pixel before anything is drawn: so much of it is open.
+  void clear(std::size_t pixel, float open) { pixels_[pixel].open = pixels_[pixel].room = open; }
+  // Something of this kind, at this distance, was drawn: now so much of the pixel is open, and so
+  // much was before its last layer.
+  void look(std::size_t pixel, CubeKind kind, float distance, float room, float open) {
+    Pixel& was = pixels_[pixel];
+    if (!(open < was.open)) return;
+    PixelRecord& record = was.record;
+    const float before = was.open - was.room;  // the last layer
+    record.new_layers += before < 0         ? std::clamp((room - was.room) / before, 0.f, 1.f)
+                         : record.total > 0 ? 0.f
+                                            : 1.f;
+    record.covered[std::size_t(kind)] += was.open - open;
+    record.total += was.open - open;
+    if (record.total >= kCubeFirstPart) record.depth = std::min(record.depth, distance);
+    was.open = open;
+    was.room = room;
+  }
+  // A layer at this distance is closed: it covers the pixel.
+  void close(std::size_t pixel, float distance) {
+    PixelRecord& record = pixels_[pixel].record;
+    record.depth = std::min(record.depth, distance);
+    pixels_[pixel].open = 0;
+  }
+
+  const PixelRecord& record(std::size_t pixel) const { return pixels_[pixel].record; }
+  static constexpr std::size_t kPixelBytes = sizeof(PixelRecord) + 2 * sizeof(float);
+
+ private:
+  struct Pixel {
+    PixelRecord record;
+    float room = 0, open = 0;
+  };
+  std::vector<Pixel> pixels_;
+};
+
+}  // namespace surfeit

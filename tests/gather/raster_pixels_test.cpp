@@ -1,0 +1,543 @@
+// What the pixels of a receiver's raster hold of patches and ray-traced surfels.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <random>
+#include <vector>
+
+#include "core/spherical_harmonics.h"
+#include "gather/cut/cut.h"
+#include "gather/packet/packet_raster.h"
+#include "gather/packet/pixel_record.h"
+#include "gather/rules/coverage_rules.h"
+
+namespace surfeit {
+namespace {
+
+constexpr glm::vec3 kRound{0};  // the normal of what looks the same from everywhere
+constexpr glm::vec3 kWhite{1};
+
+// A patch that shows the same solid angle from everywhere, and lies between two distances.
+// `spread`: its area over its squared distance.
+Patch patchAt(const glm::vec3& direction, const glm::vec3& normal, float solid_angle,
+              float spread = 0, float begin = .9f, float end = 1.1f) {
+  const float distance = .5f * (begin + end), square = distance * distance;
+  Patch patch;
+  patch.position = distance * direction;
+  patch.radius = std::sqrt(solid_angle) * distance;
+  patch.normal = normal;
+  patch.shape = withoutDirection(normal);
+  patch.area = spread * square;
+  patch.round_area = patch.most_area = solid_angle * square;
+  patch.reach = .5f * (end - begin);
+  patch.radiosity = kWhite;
+  patch.seen = Patch::Seen::kAllAround;
+  return patch;
+}
+
+// Of the near field.
+Patch tracedSphere(const glm::vec3& centre, float radius) {
+  Patch patch;
+  patch.position = centre;
+  patch.radius = radius;
+  patch.shape = withoutDirection(kRound);
+  patch.area = patch.most_area = patch.round_area = kPi * radius * radius;
+  patch.near_distance = 1e9f;
+  patch.seen = Patch::Seen::kAllAround;
+  return patch;
+}
+constexpr float kHardDisk = 1e6f;  // the peak of a disk that covers all its pixels fully
+Patch tracedDisk(const glm::vec3& centre, const glm::vec3& normal, float radius, float peak) {
+  Patch patch;
+  patch.position = centre;
+  patch.radius = radius;
+  patch.normal = normal;
+  patch.shape = withoutDirection(normal);
+  patch.area = patch.most_area = patch.disk_area = kPi * radius * radius;
+  patch.near_distance = 1e9f;
+  patch.soft_peak = peak;
+  patch.seen = Patch::Seen::kBoth;
+  return patch;
+}
+
+// The raster of a receiver at the origin, with all directions alike.
+class OneRaster {
+ public:
+  explicit OneRaster(int resolution, const glm::vec3& normal = kRound)
+      : rules_(rulesOf(resolution)), raster_(rules_), receiver_{glm::vec3(0), normal} {
+    clear();
+  }
+
+  void clear() {
+    raster_.begin({&receiver_, 1}, viewPacket({&receiver_, 1}, rules_));
+    pixels_.clear();
+  }
+  void add(const Patch& patch) {
+    raster_.addPatch(patch);
+    pixels_.clear();
+  }
+  std::size_t size() const { return raster_.geometry().pixels().size(); }
+  float solidAngle(std::size_t pixel) const {
+    return raster_.geometry().pixels()[pixel].solid_angle;
+  }
+  float coverage(std::size_t pixel) { return pixels()[pixel].coverage; }
+  glm::vec3 radiosity(std::size_t pixel) { return pixels()[pixel].radiosity; }
+  const RasterGeometry& geometry() const { return raster_.geometry(); }
+
+  // Covered solid angle of the whole cube.
+  double coveredSolidAngle() {
+    double sum = 0;
+    for (std::size_t i = 0; i < size(); ++i) sum += double(coverage(i)) * double(solidAngle(i));
+    return sum;
+  }
+
+ private:
+  static GatherRules rulesOf(int resolution) {
+    GatherQuality quality;
+    quality.raster_resolution = resolution;
+    quality.bias = 0;
+    GatherRules rules(GatherMode::kBleeding, quality);
+    rules.weights.distribution = GatherWeights::Distribution::kUniform;
+    return rules;
+  }
+  // Drawn when it is looked at.
+  const std::vector<PixelContent>& pixels() {
+    if (!pixels_.empty()) return pixels_;
+    pixels_.resize(size());
+    raster_.sort();
+    raster_.draw();
+    raster_.readPixels(pixels_);
+    return pixels_;
+  }
+
+  GatherRules rules_;
+  PacketRaster raster_;
+  LocalReceiver receiver_;
+  std::vector<PixelContent> pixels_;
+};
+
+// Directions all around, with some on edges and corners of the cube and some close to them.
+std::vector<glm::vec3> testDirections() {
+  std::vector<glm::vec3> directions = {{1, 1, 0},   {1, 0, -1},   {0, -1, 1},      {1, 1, 1},
+                                       {-1, 1, -1}, {1, .98f, 0}, {.97f, 1, -.9f}, {0, 0, 1}};
+  constexpr int kCount = 400;
+  for (int i = 0; i < kCount; ++i) {
+    const float z = 1 - float(2 * i + 1) / kCount, phi = float(i) * 2.39996323f;
+    const float rho = std::sqrt(1 - z * z);
+    directions.push_back({rho * std::cos(phi), rho * std::sin(phi), z});
+  }
+  for (glm::vec3& direction : directions) direction = glm::normalize(direction);
+  return directions;
+}
+
+TEST(RasterGeometry, SolidAnglesSumToTheSphere) {
+  for (int resolution = 2; resolution <= 64; resolution += 2) {
+    const RasterGeometry geometry(resolution);
+    ASSERT_EQ(geometry.pixels().size(), RasterGeometry::pixelCount(resolution));
+    double sum = 0;
+    for (const RasterGeometry::Pixel& pixel : geometry.pixels()) sum += double(pixel.solid_angle);
+    EXPECT_NEAR(sum, 4 * double(kPi), 1e-5) << resolution;
+  }
+}
+
+TEST(RasterGeometry, DirectionsAreUnitAndBalanced) {
+  const RasterGeometry geometry(12);
+  glm::vec3 sum(0);
+  for (const RasterGeometry::Pixel& pixel : geometry.pixels()) {
+    EXPECT_NEAR(glm::length(pixel.direction), 1, 1e-6);
+    sum += pixel.solid_angle * pixel.direction;
+  }
+  EXPECT_LT(glm::length(sum), 1e-5f);
+}
+
+TEST(RasterGeometry, OnlyEvenResolutionsWithinLimitsAreValid) {
+  EXPECT_TRUE(RasterGeometry::isValidResolution(2));
+  EXPECT_TRUE(RasterGeometry::isValidResolution(64));
+  for (const int resolution : {-2, 0, 1, 13, 66}) {
+    EXPECT_FALSE(RasterGeometry::isValidResolution(resolution)) << resolution;
+  }
+}
+
+TEST(RasterPixels, PatchesKeepTheirSolidAngleEverywhere) {
+  for (const int resolution : {12, 32, 64}) {
+    OneRaster raster(resolution);
+    for (const glm::vec3& direction : testDirections()) {
+      for (const float solid_angle : {1e-4f, .01f, .05f}) {
+        raster.clear();
+        Patch patch = patchAt(direction, kRound, solid_angle, solid_angle);
+        patch.thicket = 1;  // nothing is closed
+        raster.add(patch);
+        // What spills over an edge is drawn as a rectangle instead of a trapezoid, and the part
+        // of a pixel that is covered is measured on the face
+        const double tolerance = resolution == 12 ? .18 : .10;
+        EXPECT_NEAR(raster.coveredSolidAngle() / double(solid_angle), 1, tolerance)
+            << resolution << ": " << direction.x << " " << direction.y << " " << direction.z;
+      }
+    }
+  }
+}
+
+TEST(RasterPixels, PatchesOfAllDirectionsConserveSolidAngleOnAverage) {
+  OneRaster raster(12);
+  double ratio = 0;
+  for (const glm::vec3& direction : testDirections()) {
+    raster.clear();
+    raster.add(patchAt(direction, kRound, 2e-4f));
+    ratio += raster.coveredSolidAngle() / 2e-4;
+  }
+  EXPECT_NEAR(ratio / double(testDirections().size()), 1, .01);
+}
+
+TEST(RasterPixels, SlantedDisksFollowTheirShape) {
+  OneRaster raster(64);
+  // Seen from straight below, a disk leaning in z is narrow in z and wide in y on the +x face
+  raster.add(patchAt({1, 0, 0}, glm::normalize(glm::vec3(-.3f, 0, 1)), .01f));
+  int columns = 0, rows = 0;
+  for (std::size_t i = 0; i < 64; ++i) {
+    columns += raster.coverage(32 * 64 + i) > 0;
+    rows += raster.coverage(i * 64 + 32) > 0;
+  }
+  EXPECT_GT(columns, 2 * rows);
+}
+
+TEST(RasterPixels, TracedDisksHaveTheirAnalyticSolidAngle) {
+  OneRaster raster(64);
+  for (const glm::vec3& direction : testDirections()) {
+    for (const float distance : {.2f, 1.f, 3.f}) {
+      raster.clear();
+      raster.add(tracedDisk(distance * direction, direction, 1, kHardDisk));
+      const double expected =
+          2 * double(kPi) *
+          (1 - double(distance) / std::sqrt(1 + double(distance) * double(distance)));
+      EXPECT_NEAR(raster.coveredSolidAngle() / expected, 1, .035);
+    }
+  }
+}
+
+TEST(RasterPixels, ATracedDiskAcrossTheOriginCoversHalfTheSphere) {
+  OneRaster raster(16);
+  const glm::vec3 normal = glm::normalize(glm::vec3(1, 2, 3));
+  raster.add(tracedDisk(1e-4f * normal, normal, 100, kHardDisk));
+  EXPECT_NEAR(raster.coveredSolidAngle(), 2 * double(kPi), .06);
+}
+
+// Of a receiver that faces it: without a normal it would be a sphere itself.
+TEST(RasterPixels, TracedSpheresHaveTheirAnalyticSolidAngle) {
+  for (const glm::vec3& direction : testDirections()) {
+    OneRaster raster(64, direction);
+    for (const float distance : {1.001f, 1.5f, 4.f}) {
+      raster.clear();
+      raster.add(tracedSphere(distance * direction, 1));
+      const double sine = 1 / double(distance);
+      const double expected = 2 * double(kPi) * (1 - std::sqrt(1 - sine * sine));
+      EXPECT_NEAR(raster.coveredSolidAngle() / expected, 1, .035);
+    }
+  }
+}
+
+TEST(RasterPixels, CoverageAddsWithinALayerAndNeverExceedsOne) {
+  OneRaster raster(12);
+  for (int i = 0; i < 100; ++i) {
+    for (const glm::vec3& direction : testDirections()) {
+      raster.add(patchAt(direction, kRound, .06f, 0, 1 + float(i) / 10, 1 + float(i + 7) / 10));
+    }
+  }
+  for (std::size_t i = 0; i < raster.size(); ++i) {
+    ASSERT_EQ(raster.coverage(i), 1) << i;
+    ASSERT_NEAR(raster.radiosity(i).x, 1, 1e-5);
+  }
+}
+
+// Of two pixels along a face, one is a quarter of it: what covers so much of the one in direction
+// (1, .5, .5).
+constexpr std::size_t kQuarter = 3;
+Patch quarterPatch(float amount, float begin, float end, const glm::vec3& radiosity = kWhite) {
+  const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f, .5f));
+  Patch patch =
+      patchAt(direction, kRound, amount * direction.x * direction.x * direction.x, 0, begin, end);
+  patch.is_solid = false;
+  patch.radiosity = radiosity;
+  return patch;
+}
+
+TEST(RasterPixels, LayersCoverEachOtherInsteadOfAdding) {
+  OneRaster raster(2);
+  raster.add(quarterPatch(.5f, 1, 2, {1, 0, 0}));
+  EXPECT_NEAR(raster.coverage(kQuarter), .5f, 1e-5);
+  raster.add(quarterPatch(.5f, 3, 4, {0, 1, 0}));  // half of what is left
+  EXPECT_NEAR(raster.coverage(kQuarter), .75f, 1e-5);
+  EXPECT_NEAR(raster.radiosity(kQuarter).x, .5f, 1e-5);
+  EXPECT_NEAR(raster.radiosity(kQuarter).y, .25f, 1e-5);
+
+  raster.clear();
+  raster.add(quarterPatch(.5f, 1, 2, {1, 0, 0}));
+  raster.add(quarterPatch(.5f, 1.5f, 2.5f, {0, 1, 0}));  // the same layer
+  EXPECT_NEAR(raster.coverage(kQuarter), 1, 1e-5);
+  EXPECT_NEAR(raster.radiosity(kQuarter).y, .5f, 1e-5);
+}
+
+TEST(RasterPixels, LayersBeginByAndBy) {
+  OneRaster raster(2);
+  const auto covered = [&](float gap) {
+    raster.clear();
+    raster.add(quarterPatch(.5f, 1, 2));
+    raster.add(quarterPatch(.5f, 2 + gap, 3 + gap));
+    return raster.coverage(kQuarter);
+  };
+  EXPECT_NEAR(covered(-.1f), 1, 1e-5);
+  EXPECT_NEAR(covered(.5f * kFidelity.layer_gap), .75f, 1e-5);  // half of the range is its reach
+  float before = 1;
+  for (float gap = 0; gap < .6f * kFidelity.layer_gap; gap += .01f * kFidelity.layer_gap) {
+    const float now = covered(gap);
+    EXPECT_LE(now, before + 1e-5f) << gap;
+    EXPECT_GT(now, before - .02f) << gap;
+    before = now;
+  }
+}
+
+TEST(RasterPixels, WhatHardlyTouchesAPixelHardlyChangesIt) {
+  OneRaster raster(4);
+  // All in pixels of the face +x
+  const auto square = [&](float column, float row, float side, float begin, float end) {
+    const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f * column - 1, .5f * row - 1));
+    const float area = .25f * side * side;
+    Patch patch = patchAt(direction, {-1, 0, 0}, area * direction.x * direction.x * direction.x, 0,
+                          begin, end);
+    patch.is_solid = false;
+    raster.add(patch);
+  };
+  // Something deep beside the pixel laps over it, between two of different layers
+  const auto covered = [&](float lap) {
+    raster.clear();
+    square(1.5f, 1.5f, .7f, 1, 2);
+    square(2.5f - lap, 1.5f, 1, 1.5f, 5);
+    square(1.5f, 1.5f, .7f, 3.5f, 4.5f);
+    return raster.coverage(1 * 4 + 1);
+  };
+  const float apart = covered(0);
+  EXPECT_NEAR(apart, .49f + .51f * .49f, 1e-4);
+  EXPECT_NEAR(covered(1e-4f), apart, .005f);
+  EXPECT_NEAR(covered(1e-3f), apart, .05f);
+  EXPECT_GT(covered(.1f), .97f) << "now they are of one layer";
+}
+
+TEST(RasterPixels, WhatIsNestedHidesBehindTheLargerLayer) {
+  OneRaster raster(2);
+  const auto covered = [&](float first, float second, bool is_solid) {
+    raster.clear();
+    for (Patch patch : {quarterPatch(first, 1, 1.5f), quarterPatch(second, 2, 2.5f)}) {
+      patch.is_solid = is_solid;
+      raster.add(patch);
+    }
+    return double(raster.coverage(kQuarter));
+  };
+  for (const bool is_solid : {false, true}) {
+    const double apart = 1 - (is_solid ? double(kFidelity.nested) : 0);
+    EXPECT_NEAR(covered(.5f, .3f, is_solid), .5 + apart * .15, 1e-5) << "the smaller lies behind";
+    EXPECT_NEAR(covered(.3f, .5f, is_solid), .5 + apart * .15, 1e-5) << "the larger rises above";
+    EXPECT_NEAR(covered(.5f, 1.5f, is_solid), 1, 1e-6) << "what fills the pixel fills all of it";
+  }
+}
+
+// A sheet of disks that face the cube at x = `distance`, on the face +x of 16 pixels: squares of
+// `side` pixels, scattered by a part of that, within a square of `half` pixels around the middle.
+struct SheetOfDisks {
+  float distance = 1, side = .8f, scatter = .3f, half = 8;
+  bool is_solid = true;
+  float thicket = 0;
+
+  void drawTo(OneRaster& raster, const glm::vec3& radiosity) const {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    const float step = side * distance / 8;
+    const int count = int(2 * half / side);
+    for (int i = 0; i < count * count; ++i) {
+      const float u =
+          (float(i % count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const float v =
+          (float(i / count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const glm::vec3 to(distance, u, v), direction = glm::normalize(to);
+      Patch patch = patchAt(direction, {-1, 0, 0}, step * step * direction.x / glm::dot(to, to), 0,
+                            .99f * distance, 1.01f * distance);
+      patch.is_solid = is_solid;
+      patch.thicket = thicket;
+      patch.radiosity = radiosity;
+      raster.add(patch);
+    }
+  }
+};
+
+class Closing : public ::testing::Test {
+ protected:
+  // Mean of the light, and of what is covered, of pixels in the middle of the face.
+  glm::vec2 seen(int half) {
+    glm::vec2 sum(0);
+    for (int row = 8 - half; row < 8 + half; ++row) {
+      for (int column = 8 - half; column < 8 + half; ++column) {
+        const auto pixel = std::size_t(row * 16 + column);
+        sum += glm::vec2(raster_.radiosity(pixel).x, raster_.coverage(pixel));
+      }
+    }
+    return sum / float(4 * half * half);
+  }
+  const glm::vec3 dark_{0};
+  OneRaster raster_{16};
+};
+
+// Between leaves nothing is closed: a sheet of them shows what gaps there are.
+TEST_F(Closing, NothingShinesThroughTheGapsOfASheet) {
+  for (const float side : {.1f, .3f, .8f, 1.7f}) {
+    raster_.clear();
+    SheetOfDisks{.side = side, .thicket = 1}.drawTo(raster_, dark_);
+    ASSERT_LT(seen(4).y, .999f) << side;
+    raster_.clear();
+    SheetOfDisks{.side = side}.drawTo(raster_, dark_);
+    SheetOfDisks{.distance = 3}.drawTo(raster_, kWhite);
+    EXPECT_LT(seen(4).x, .003f) << side;
+    EXPECT_NEAR(seen(4).y, 1, .003f) << side;
+  }
+}
+
+TEST_F(Closing, WhatIsClosedShinesAsItsOwnLayerDoes) {
+  SheetOfDisks{}.drawTo(raster_, kWhite);
+  SheetOfDisks{.distance = 3}.drawTo(raster_, dark_);
+  EXPECT_NEAR(seen(4).x, 1, .003f);
+}
+
+// The sheet covers a square of 6 by 6 pixels, and a part of those around.
+TEST_F(Closing, OutlinesStayWhereTheyAre) {
+  SheetOfDisks{.side = .5f, .scatter = 0, .half = 3.25f}.drawTo(raster_, dark_);
+  EXPECT_NEAR(seen(8).y * 256, 6.5f * 6.5f, .8f);
+}
+
+TEST_F(Closing, GapsBetweenSpheresStayOpen) {
+  SheetOfDisks{.scatter = 1.5f, .thicket = 1}.drawTo(raster_, kWhite);
+  const float open = 1 - seen(8).y;
+  ASSERT_GT(open, .1f);
+  raster_.clear();
+  SheetOfDisks{.scatter = 1.5f, .is_solid = false}.drawTo(raster_, kWhite);
+  EXPECT_NEAR(1 - seen(8).y, open, .02f);
+}
+
+// Of less than a pixel, before a wall: it sends what its area says, wherever it is.
+TEST_F(Closing, SmallThingsKeepTheirPower) {
+  const SheetOfDisks wall{.distance = 3};
+  double sum = 0;
+  constexpr int kPlaces = 400;
+  for (int i = 0; i < kPlaces; ++i) {
+    raster_.clear();
+    const glm::vec3 direction =
+        glm::normalize(glm::vec3(1, .013f * float(i % 20), .017f * float(i / 20)));
+    const float solid_angle = .1f * 4 / 256;
+    Patch lamp = patchAt(direction, kRound, solid_angle, 0, .999f, 1.001f);
+    lamp.is_solid = false;
+    raster_.add(lamp);
+    wall.drawTo(raster_, dark_);
+    double power = 0;
+    for (std::size_t pixel = 0; pixel < 256; ++pixel) {
+      power += double(raster_.radiosity(pixel).x * raster_.solidAngle(pixel));
+    }
+    sum += power / double(solid_angle) / kPlaces;
+  }
+  EXPECT_NEAR(sum, 1, .01);
+}
+
+TEST(RasterPixels, WhatOverlapsHidesBehindItsOwnLayer) {
+  OneRaster raster(2);
+  const auto covered = [&](float overlap) {
+    raster.clear();
+    for (int i = 0; i < 10; ++i) {
+      Patch patch = quarterPatch(.1f, 1, 2);
+      patch.overlap = overlap;
+      raster.add(patch);
+    }
+    return double(raster.coverage(kQuarter));
+  };
+  EXPECT_GT(covered(0), .99);
+  EXPECT_NEAR(covered(1), 1 - std::exp(-1.), .06);  // as anything spread at random
+}
+
+// What is left open of a floor of rectangles with these sides, on the side faces and across the
+// edges of the cube, too; as a part of the whole. Nothing is closed of thickets.
+double gapsOfFloor(float side_x, float side_y, const SymmetricMatrix& shape) {
+  OneRaster raster(12);
+  for (float x = -20 + side_x / 2; x < 20; x += side_x) {
+    for (float y = -20 + side_y / 2; y < 20; y += side_y) {
+      const glm::vec3 to_middle(x, y, -1);
+      const float distance_sq = glm::dot(to_middle, to_middle);
+      const glm::vec3 direction = to_middle / std::sqrt(distance_sq);
+      const float spread = side_x * side_y / distance_sq;
+      Patch patch = patchAt(direction, {0, 0, 1}, spread * -direction.z, spread);
+      patch.shape = shape;
+      patch.is_solid = false;
+      patch.thicket = 1;
+      raster.add(patch);
+    }
+  }
+  double error = 0, weight = 0;
+  for (std::size_t i = 0; i < raster.size(); ++i) {
+    if (raster.geometry().pixels()[i].direction.z > -.15f) continue;  // the end of the floor
+    error += double(1 - raster.coverage(i)) * double(raster.solidAngle(i));
+    weight += double(raster.solidAngle(i));
+  }
+  return error / weight;
+}
+
+TEST(RasterPixels, NeighboursOfASlantedPlaneTile) {
+  // Squares, as octree cells cut it
+  EXPECT_LT(gapsOfFloor(.2f, .2f, withoutDirection({0, 0, 1})), .0025);
+}
+
+TEST(RasterPixels, OblongNeighboursTileWhenTheyAreDrawnByTheirShape) {
+  const float sides_sq = .1f * .1f + .3f * .3f;
+  const SymmetricMatrix shape = {{2 * .1f * .1f / sides_sq, 2 * .3f * .3f / sides_sq, 0, 0, 0, 0}};
+  EXPECT_LT(gapsOfFloor(.1f, .3f, shape), .008);
+  EXPECT_GT(gapsOfFloor(.1f, .3f, withoutDirection({0, 0, 1})), .1);
+}
+
+TEST(RasterPixels, SoftDisksCoverTheirShare) {
+  OneRaster raster(64);
+  raster.add(tracedDisk({0, 0, 20}, {0, 0, -1}, 2, 1));
+  EXPECT_NEAR(raster.coveredSolidAngle() / double(kPi / 100), .5, .03);
+}
+
+// Of such pixels the middle weighs nothing, or what rounding leaves of it.
+TEST(RasterPixels, HorizonsThroughTheMiddlesOfPixelsLeaveNumbers) {
+  GatherQuality quality;
+  quality.raster_resolution = 12;
+  const GatherRules rules(GatherMode::kBleeding, quality);
+  PacketRaster raster(rules);
+  const auto pixels = raster.geometry().pixels();
+  std::vector<PixelContent> contents(pixels.size());
+  for (std::size_t i = 0; i + 131 < pixels.size(); i += 7) {
+    const LocalReceiver receiver = {
+        glm::vec3(0), glm::normalize(glm::cross(pixels[i].direction, pixels[i + 131].direction))};
+    raster.begin({&receiver, 1}, viewPacket({&receiver, 1}, rules));
+    for (const float solid_angle : {.004f, .4f}) {
+      for (const std::size_t at : {i, i + 131}) {
+        raster.addPatch(patchAt(pixels[at].direction, kRound, solid_angle, solid_angle));
+      }
+    }
+    raster.sort();
+    raster.draw();
+    raster.readPixels(contents);
+    for (std::size_t at = 0; at < pixels.size(); ++at) {
+      ASSERT_GE(contents[at].coverage, 0) << i << ' ' << at;
+      ASSERT_LE(contents[at].coverage, 1) << i << ' ' << at;
+      ASSERT_LE(contents[at].radiosity.x, kWhite.x * 1.001f) << i << ' ' << at;
+    }
+  }
+}
+
+TEST(RasterPixels, ClearForgetsEverything) {
+  OneRaster raster(4);
+  raster.add(tracedDisk({0, 0, 1}, {0, 0, -1}, 10, kHardDisk));
+  EXPECT_GT(raster.coveredSolidAngle(), 1);
+  raster.clear();
+  EXPECT_EQ(raster.coveredSolidAngle(), 0);
+}
+
+}  // namespace
+}  // namespace surfeit
