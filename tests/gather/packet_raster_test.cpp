@@ -196,5 +196,29 @@ TEST(PacketRaster, ThinDisksMakeNoStepAtTheBorderOfTheNearField) {
   EXPECT_LT(largest, .1f * change);
 }
 
+// A disk beside which a receiver stands, however close, hides what is on its side: half of what is
+// above the horizon.
+TEST(PacketRaster, AWallThatIsTouchedCoversHalf) {
+  for (const glm::vec3& across :
+       {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::normalize(glm::vec3(.6f, -.8f, 0))}) {
+    for (const float gap : {1e-2f, 1e-4f, 1e-6f, 1e-8f}) {
+      Surfel wall;
+      wall.radius = 100;
+      wall.area = kPi * wall.radius * wall.radius;
+      wall.normal = -across;
+      wall.position = gap * across;
+      GatherQuality quality;
+      quality.raster_resolution = 32;
+      const GatherRules rules(GatherMode::kOcclusion, quality);
+      PacketRaster raster(rules);
+      const LocalReceiver receiver = {{0, 0, 0}, {0, 0, 1}};
+      const GatherResult result = gathered(raster, {&receiver, 1}, [&](PacketRaster& to) {
+        to.addSurfels({&wall, 1});
+      })[0];
+      EXPECT_NEAR(result.occlusion, .5f, .01f) << gap << ' ' << across.x;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace surfeit

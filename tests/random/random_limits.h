@@ -31,7 +31,7 @@ inline constexpr double kMostBounceLight = .03;
 
 // A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
 // by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.
-inline constexpr double kUsualStep = .004, kMostStep = .4;
+inline constexpr double kUsualStep = .004, kMostStep = .015;
 inline constexpr double kUnusualSteps = 200;
 
 // The same scene moved, turned by quarters, and twice as large. Results of the exact gather differ

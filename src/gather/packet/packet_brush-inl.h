@@ -32,6 +32,8 @@ namespace {
 // What begins closer than this part of its distance, measured across the face, is taken to reach
 // behind the receiver.
 constexpr float kLeastInFront = 1e-3f;
+// Parts of how far it extends by which the box around such a thing is widened, for rounding.
+constexpr float kBoxSlack = 1e-6f;
 
 template <typename Kind>
 class Brush {
@@ -406,8 +408,10 @@ class Brush {
     V low = hn::Mul(hn::Sub(b, root), inverse), high = hn::Mul(hn::Add(b, root), inverse);
     if (!hn::AllTrue(D(), in_front)) {
       const V inverse_far = Reciprocal(hn::Max(far, Splat(1e-30f)));
-      const V inverse_near = hn::Mul(inverse_far, Splat(1 / kLeastInFront));
-      const V left = hn::Sub(u, half_u), right = hn::Add(u, half_u);
+      const V inverse_near = Reciprocal(hn::Max(near, Splat(1e-30f)));
+      const V slack = hn::Mul(Splat(kBoxSlack), far);
+      const V left = hn::Sub(hn::Sub(u, half_u), slack);
+      const V right = hn::Add(hn::Add(u, half_u), slack);
       const V box_low =
           hn::Mul(left, hn::IfThenElse(hn::Lt(left, zero), inverse_near, inverse_far));
       const V box_high =
