@@ -40,13 +40,9 @@ const std::vector<Number>& allNumbers() {
   using F = Fidelity;
   constexpr float kNever = 1e9f;
   static const std::vector<Number> numbers = {
-      {"horizon_slope", &F::horizon_slope, 0},
       {"uneven_share", &F::uneven_share, 1},
-      {"whole_cosine", &F::whole_cosine},
       {"most_coarser", &F::most_coarser},
-      {"most_low_solid_angle", &F::most_low_solid_angle, 0.1f},
       {"fading", &F::fading, 1e-4f},
-      {"leaf_fading", &F::leaf_fading, 0.02f},
       {"most_node_pixels", &F::most_node_pixels, kNever},
       {"least_visible_part", &F::least_visible_part, 0},
       {"upwards", &F::upwards},
@@ -61,25 +57,17 @@ const std::vector<Number>& allNumbers() {
       {"nested", &F::nested, 0},
       {"hull_widening", &F::hull_widening, 0},
       {"traced_hull", &F::traced_hull},
-      {"thicket_reach", &F::thicket_reach, 1},
       {"thicket_outline", &F::thicket_outline, 1},
       {"ribbon_part", &F::ribbon_part, 0},
       {"ribbon_elongation", &F::ribbon_elongation, kNever},
-      {"ribbon_reach", &F::ribbon_reach, 1},
-      {"ribbon_depth", &F::ribbon_depth, 0},
-      {"ribbon_bias", &F::ribbon_bias, 1},
-      {"least_in_plane", &F::least_in_plane, 0},
-      {"least_elongation", &F::least_elongation, 1.0001f},
       {"ribbon_radius", &F::ribbon_radius, 0},
       {"soft_disk_area", &F::soft_disk_area, 1},
-      {"two_sided_soft_disk_area", &F::two_sided_soft_disk_area},
       {"whole_near", &F::whole_near, 0.999f},
       {"largest_radius", &F::largest_radius, kNever},
       {"bias_height", &F::bias_height, kNever},
       {"sphere_clearance", &F::sphere_clearance, 0},
       {"least_axis", &F::least_axis, 0.01f},
       {"least_spread", &F::least_spread, 1e-6f},
-      {"most_extent", &F::most_extent, 0},
   };
   return numbers;
 }

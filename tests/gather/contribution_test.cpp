@@ -477,15 +477,11 @@ TEST(SurfelContribution, PiecesOfRibbonsAreThickets) {
   surfel.normal = {0, 0, -1};
   surfel.radius = .2f;
   surfel.area = .1f * kPi * surfel.radius * surfel.radius;
-  const auto reach = [&] { return reachOf(surfel, Ribbon::of(surfel), surfel.radius, {0, 0, 1}); };
   EXPECT_EQ(thicketPart(surfel), 0);
-  const float surface = reach();
   surfel.flags = kSurfelTwoSided;
   EXPECT_EQ(thicketPart(surfel), 1);
-  EXPECT_LT(reach(), .2f * surface);
   surfel.area *= 2;
   EXPECT_EQ(thicketPart(surfel), 0);
-  EXPECT_EQ(reach(), surface);
 }
 
 TEST(SurfelContribution, SphereLooksTheSameFromEverywhere) {

@@ -76,9 +76,9 @@ std::vector<LocalReceiver> randomPacket(std::mt19937& random, std::size_t count)
   return receivers;
 }
 
-TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
+TEST(Cut, ClassesOfSiblingsHoldForEveryReceiver) {
   std::mt19937 random(5);
-  int differing = 0, far = 0, open = 0, mixed = 0, dropped = 0;
+  int far = 0, open = 0, mixed = 0, dropped = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     std::vector<Node> siblings;
     for (int i = 0; i < 1 + trial % 8; ++i) siblings.push_back(randomNode(random));
@@ -90,14 +90,12 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
     GatherRules gather(GatherMode::kBleeding, {});
     if (trial % 4 == 0) gather.weights.cone_angle = .1f + .001f * float(trial % 1000);
     const PacketView view = viewPacket(receivers, gather);
-    const std::uint32_t seen = classifySiblings(siblings, view, rules).mixed;
     const SiblingClasses found = fastestSiblingClassifier()(siblings, view, rules);
     EXPECT_EQ(found.far & found.open, 0u);
     EXPECT_EQ((found.far | found.open) & found.mixed, 0u);
     for (std::size_t i = 0; i < siblings.size(); ++i) {
       const auto bit = [i](std::uint32_t bits) { return (bits >> i & 1) != 0; };
       const bool is_seen = bit(found.far | found.open | found.mixed);
-      differing += bit(seen) != is_seen;
       dropped += !is_seen;
       far += bit(found.far);
       open += bit(found.open);
@@ -110,7 +108,6 @@ TEST(Cut, EightSiblingsAtOnceAreClassifiedLikeOneByOne) {
       }
     }
   }
-  EXPECT_LE(differing, 3);  // where rounding decides
   EXPECT_GT(far, 500);
   EXPECT_GT(open, 500);
   EXPECT_GT(mixed, 30);
@@ -141,8 +138,7 @@ std::vector<Surfel> randomSurfels(std::mt19937& random, Node& node) {
   return surfels;
 }
 
-// Whether a receiver sees any place of a disk, tried at its middle and around its rim, that lies
-// higher above the horizon than what may be dropped.
+// Whether a receiver sees any place of a disk, tried at its middle and around its rim.
 bool seesSome(const Surfel& surfel, const LocalReceiver& receiver) {
   const glm::vec3 aside = glm::normalize(glm::cross(surfel.normal, glm::vec3(.3f, .5f, .8f)));
   const glm::vec3 across = glm::cross(surfel.normal, aside);
@@ -150,7 +146,7 @@ bool seesSome(const Surfel& surfel, const LocalReceiver& receiver) {
     const float angle = .2f * float(i), reach = i == 0 ? 0 : surfel.radius;
     const glm::vec3 to = surfel.position + reach * std::cos(angle) * aside +
                          reach * std::sin(angle) * across - receiver.position;
-    const bool is_above = glm::dot(to, receiver.normal) > .0101f * glm::length(to);
+    const bool is_above = glm::dot(to, receiver.normal) > 1e-5f * glm::length(to);
     if (is_above && glm::dot(to, surfel.normal) < -1e-5f) return true;
   }
   return false;
@@ -203,12 +199,11 @@ TEST(Cut, AStackOfSheetsIsAsHighAsItIs) {
   stack.groups = 1;
   const LocalReceiver receiver = {{0, 0, 0}, {0, 0, 1}};
   const CutRules rules = {.1f, 1e30f, 1, kAllGroups, 1, .125f};
-  for (const SiblingClassifier classify : {&classifySiblings, fastestSiblingClassifier()}) {
-    for (const float thickness : {12.f, 9.9f}) {
-      stack.thickness = thickness;
-      const SiblingClasses found = classify({&stack, 1}, viewPacket({&receiver, 1}), rules);
-      EXPECT_EQ((found.far | found.open | found.mixed) != 0, thickness > 10) << thickness;
-    }
+  for (const float thickness : {12.f, 9.9f}) {
+    stack.thickness = thickness;
+    const SiblingClasses found =
+        fastestSiblingClassifier()({&stack, 1}, viewPacket({&receiver, 1}), rules);
+    EXPECT_EQ((found.far | found.open | found.mixed) != 0, thickness > 10) << thickness;
   }
 }
 
@@ -278,23 +273,20 @@ TEST(Cut, NodesFadeIntoWhatIsBelowThem) {
   GatherQuality quality;
   quality.sides = GatherSides::kBoth;  // and no horizon: nothing is dropped
   const GatherRules rules(GatherMode::kBleeding, quality);
-  for (const SiblingClassifier classify : {&classifySiblings, fastestSiblingClassifier()}) {
-    CutWalk walk(rules, classify);
-    double before = 0, largest = 0, least = 1e9, most = -1e9;
-    for (int i = 0; i < 4000; ++i) {
-      const LocalReceiver receiver = {{1 + .00005f * float(i), .3f, -1}, {0, 0, 0}};
-      SumOfHeights found;
-      ASSERT_TRUE(
-          walk.walk(viewPacket({&receiver, 1}), {&receiver, 1}, scene.reader(), found).ok());
-      const double sum = found.sum[0];
-      if (i > 0) largest = std::max(largest, std::abs(sum - before));
-      least = std::min(least, sum);
-      most = std::max(most, sum);
-      before = sum;
-    }
-    EXPECT_GT(most - least, 10);
-    EXPECT_LT(largest, .1);
+  CutWalk walk(rules);
+  double before = 0, largest = 0, least = 1e9, most = -1e9;
+  for (int i = 0; i < 4000; ++i) {
+    const LocalReceiver receiver = {{1 + .00005f * float(i), .3f, -1}, {0, 0, 0}};
+    SumOfHeights found;
+    ASSERT_TRUE(walk.walk(viewPacket({&receiver, 1}), {&receiver, 1}, scene.reader(), found).ok());
+    const double sum = found.sum[0];
+    if (i > 0) largest = std::max(largest, std::abs(sum - before));
+    least = std::min(least, sum);
+    most = std::max(most, sum);
+    before = sum;
   }
+  EXPECT_GT(most - least, 10);
+  EXPECT_LT(largest, .1);
 }
 
 // However wide the packet is: what it takes for others does not count.
@@ -336,13 +328,11 @@ TEST(Cut, NodesOfWhichFewAreSeenAreOpenedAndTurnedAwayByProofAlone) {
   EXPECT_EQ(openPart(wall, receiver, rules), 0);
   rules.groups = 0b10;
   EXPECT_EQ(openPart(wall, receiver, rules), 1);
-  for (const SiblingClassifier classify : {&classifySiblings, fastestSiblingClassifier()}) {
-    for (const float side : {-1.f, 1.f}) {
-      wall.normal = {0, 0, side};
-      const SiblingClasses found = classify({&wall, 1}, view, rules);
-      EXPECT_EQ(found.far, 0u);
-      EXPECT_EQ(found.open | found.mixed, side < 0 ? 1u : 0u);
-    }
+  for (const float side : {-1.f, 1.f}) {
+    wall.normal = {0, 0, side};
+    const SiblingClasses found = fastestSiblingClassifier()({&wall, 1}, view, rules);
+    EXPECT_EQ(found.far, 0u);
+    EXPECT_EQ(found.open | found.mixed, side < 0 ? 1u : 0u);
   }
 }
 

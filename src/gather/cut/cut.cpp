@@ -25,9 +25,6 @@ namespace {
 // more on the way.
 constexpr float kRoundingSlack = 1e-4f;
 
-float fadingOf(const Node& node) {
-  return node.isLeaf() ? kFidelity.leaf_fading : kFidelity.fading;
-}
 float shareOf(const Node& node) { return node.isFlat() ? 1 : kFidelity.uneven_share; }
 float mostCoarserOf(const Node& node, const CutRules& rules) {
   return node.isFlat() ? 1 : rules.most_coarser;
@@ -37,10 +34,6 @@ float mostCoarserOf(const Node& node, const CutRules& rules) {
 // differ from place to place by .065 of their power, without by .080; half a pixel makes nothing
 // better but the city, AO RMSE .0053 instead of .0056, at .6 of its rate.)
 float inverseOffPlane(const CutRules& rules) { return 1 / rules.pixel; }
-
-float horizonSlope(const CutRules& rules) {
-  return rules.approximates() ? kFidelity.horizon_slope : 0;
-}
 
 }  // namespace
 }  // namespace surfeit
@@ -62,7 +55,6 @@ struct alignas(64) Columns {
   float share[kMostSiblings] = {};         // what it may look like, of the max solid angle; 0: open
   float most_coarser[kMostSiblings] = {};  // CutRules
   float off_plane[kMostSiblings] = {};
-  float fading[kMostSiblings] = {};
 };
 
 Columns ColumnsOf(std::span<const Node> siblings, const CutRules& rules) {
@@ -81,7 +73,6 @@ Columns ColumnsOf(std::span<const Node> siblings, const CutRules& rules) {
     columns.share[i] = rules.isMixed(node) ? 0 : shareOf(node);
     columns.most_coarser[i] = mostCoarserOf(node, rules);
     columns.off_plane[i] = node.off_plane;
-    columns.fading[i] = fadingOf(node);
   }
   return columns;
 }
@@ -131,7 +122,9 @@ struct Places {
   }
 
  private:
-  // As highestPoint.
+  // Height of the middle for the normal in the cone that comes closest to it. The rise, as riseOf,
+  // falls with the cosine of the angle between the normals: that of the one in the cone that is
+  // farthest from the node's.
   V HighestPoint(const PacketView& from, const Nodes& nodes) const {
     const V zero = hn::Zero(D()), one = Splat(1);
     const V height = Dot(offset, from.axis);
@@ -159,7 +152,13 @@ M IsOutsideCones(const PacketView& view, const Nodes& nodes, const Places& place
   return hn::Gt(outside, hn::Add(nodes.radius, Splat(view.radius)));
 }
 
-// As turnsAway.
+// Whether every surfel below shows its back to every receiver. With m the normal of one, at an
+// angle b to the node's normal n, x its place and q that of a receiver,
+//
+//   m . (q - x) <= cos b n . (q - x) + sin b |(q - x) across n|,
+//
+// of which the first factor is at most -depth, the second at most aside: below zero for all b up
+// to the angle of the cone if depth cos > aside sin there.
 M TurnsAway(const PacketView& view, const Nodes& nodes, const Places& places, float facing) {
   const V along = hn::Mul(Splat(facing), Dot(places.offset, nodes.normal));
   const V slack = hn::Mul(Splat(kRoundingSlack), places.distance);
@@ -181,7 +180,7 @@ Bounds BoundsOf(const Columns& columns, std::size_t at, const PacketView& view, 
   const D d;
   const V one = Splat(1), tiny = Splat(std::numeric_limits<float>::min());
   const V share = hn::Load(d, columns.share + at), most = hn::Load(d, columns.most_coarser + at);
-  const V fading = hn::Load(d, columns.fading + at);
+  const V fading = Splat(kFidelity.fading);
   const V off_plane =
       Square(hn::Mul(hn::Load(d, columns.off_plane + at), Splat(inverseOffPlane(rules))));
   const V area = hn::Mul(Splat(kPi), Square(nodes.radius));
@@ -189,8 +188,7 @@ Bounds BoundsOf(const Columns& columns, std::size_t at, const PacketView& view, 
   const V farthest = hn::Add(places.distance, Splat(view.radius));
   V gain = one;
   if (view.has_horizon) {
-    const V low = hn::Div(hn::Mul(Splat(kFidelity.whole_cosine), places.nearest),
-                          hn::Max(places.highest, tiny));
+    const V low = hn::Div(places.nearest, hn::Max(places.highest, tiny));
     gain = hn::Min(most, hn::Max(one, low));
   }
   const V near_sq = hn::Max(Square(places.nearest), tiny);
@@ -217,10 +215,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     const Nodes nodes(columns, at);
     const Places places(view, nodes);
     M seen = hn::Lt(places.nearest, hn::Add(nodes.radius, Splat(rules.max_distance)));
-    if (view.has_horizon) {
-      const V reach = hn::Max(hn::Zero(d), hn::Sub(places.nearest, nodes.radius));
-      seen = hn::And(seen, hn::Gt(places.highest, hn::Mul(reach, Splat(horizonSlope(rules)))));
-    }
+    if (view.has_horizon) seen = hn::And(seen, hn::Gt(places.highest, hn::Zero(d)));
     if (view.has_cone) seen = hn::AndNot(IsOutsideCones(view, nodes, places), seen);
     if (rules.facing != 0 && rules.approximates()) {
       seen = hn::AndNot(TurnsAway(view, nodes, places, rules.facing), seen);
@@ -267,56 +262,6 @@ float riseAt(const Node& node, float cosine) {
   return node.thickness * cosine + across * other(1, cosine);
 }
 
-// The highest that a node may rise above the horizon of a receiver of the packet.
-float highestPoint(const Node& node, const glm::vec3& to_node, float distance,
-                   const PacketView& view) {
-  // Height of the middle for the normal in the cone that comes closest to it
-  const float height = glm::dot(to_node, view.axis);
-  const float top =
-      height >= distance * view.cone_cosine
-          ? distance
-          : height * view.cone_cosine + other(distance * distance, height) * view.cone_sine;
-  // The rise falls with the cosine of the angle between the normals: that of the one in the cone
-  // that is farthest from the node's
-  const float k = std::min(1.f, std::abs(glm::dot(node.normal, view.axis)));
-  const float least = std::max(0.f, k * view.cone_cosine - other(1, k) * view.cone_sine);
-  return top + riseAt(node, least) + view.lift;
-}
-
-// Whether every surfel below shows its back to every receiver. With m the normal of one, at an
-// angle b to the node's normal n, x its place and q that of a receiver,
-//
-//   m . (q - x) <= cos b n . (q - x) + sin b |(q - x) across n|,
-//
-// of which the first factor is at most -depth, the second at most aside: below zero for all b up
-// to the angle of the cone if depth cos > aside sin there.
-bool turnsAway(const Node& node, const glm::vec3& to_node, float distance, const PacketView& view,
-               float facing) {
-  const float along = facing * glm::dot(to_node, node.normal);
-  const float depth = along - view.radius - node.thickness - kRoundingSlack * distance;
-  const float aside = other(distance * distance, along) + node.radius + view.radius;
-  return depth > 0 && depth * node.normal_cosine > aside * other(1, node.normal_cosine);
-}
-
-// Whether no receiver sees anything of a node, or less of it than Fidelity::horizon_slope says.
-bool isHidden(const Node& node, const PacketView& view, const CutRules& rules) {
-  const glm::vec3 to_node = node.position - view.centre;
-  const float distance = glm::length(to_node), nearest = distance - view.radius;
-  if (!rules.sees(node.groups)) return true;
-  if (!(nearest < rules.max_distance + node.radius)) return true;
-  if (view.has_horizon) {
-    const float least_height = horizonSlope(rules) * std::max(0.f, nearest - node.radius);
-    if (!(highestPoint(node, to_node, distance, view) > least_height)) return true;
-  }
-  if (view.has_cone) {
-    const float along = glm::dot(to_node, view.lobe_axis);
-    const float aside = other(distance * distance, along);
-    if (aside * view.lobe_cosine - along * view.lobe_sine > node.radius + view.radius) return true;
-  }
-  return rules.facing != 0 && rules.approximates() &&
-         turnsAway(node, to_node, distance, view, rules.facing);
-}
-
 }  // namespace
 
 float riseOf(const Node& node, const glm::vec3& up) {
@@ -337,25 +282,15 @@ float openPart(const Node& node, const LocalReceiver& receiver, const CutRules& 
   const float most_coarser = mostCoarserOf(node, rules);
   if (most_coarser > 1 && !receiver.isSpherical()) {
     const float highest = glm::dot(to_node, receiver.normal) + riseOf(node, receiver.normal);
-    gain = std::clamp(
-        kFidelity.whole_cosine * distance / std::max(highest, std::numeric_limits<float>::min()),
-        1.f, most_coarser);
+    gain = std::clamp(distance / std::max(highest, std::numeric_limits<float>::min()), 1.f,
+                      most_coarser);
   }
   const float limit = 2 * shareOf(node) * gain * rules.max_solid_angle;
   const float off_plane = node.off_plane * inverseOffPlane(rules);
   const float looks =
       std::max(kPi * node.radius * node.radius / limit, off_plane * off_plane) / distance_sq;
-  const float fading = fadingOf(node);
+  const float fading = kFidelity.fading;
   return std::clamp((looks - (1 - fading)) / (2 * fading), 0.f, 1.f);
-}
-
-SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView& view,
-                                const CutRules& rules) {
-  SiblingClasses classes;
-  for (std::size_t i = 0; i < siblings.size(); ++i) {
-    if (!isHidden(siblings[i], view, rules)) classes.mixed |= 1u << i;
-  }
-  return classes;
 }
 
 HWY_EXPORT(Classifier);

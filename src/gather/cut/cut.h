@@ -81,12 +81,8 @@ struct SiblingClasses {
   std::uint32_t mixed = 0;  // neither is known
 };
 
-// Which nodes no receiver of the packet sees anything of, and how the rest stands.
-SiblingClasses classifySiblings(std::span<const Node> siblings, const PacketView& view,
-                                const CutRules& rules);
-
-// The same, eight at once, for this machine. Results may differ where rounding decides, and more
-// may be mixed.
+// Which nodes no receiver of the packet sees anything of, and how the rest stands: eight at once,
+// for this machine. Results of others may differ where rounding decides.
 using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const PacketView&,
                                              const CutRules&);
 SiblingClassifier fastestSiblingClassifier();
@@ -100,11 +96,10 @@ SiblingClassifier fastestSiblingClassifier();
 // leaves that some receiver may see by that alone (InstanceTree). One thread at a time.
 class CutWalk {
  public:
-  explicit CutWalk(const GatherRules& rules,
-                   SiblingClassifier classify = fastestSiblingClassifier())
+  explicit CutWalk(const GatherRules& rules)
       : rules_{maxSolidAngle(rules), rules.quality.max_distance, facingOf(rules.quality.sides),
                rules.groups,         mostCoarser(rules),         1 / pixelsPerSlope(rules)},
-        classify_(classify) {}
+        classify_(fastestSiblingClassifier()) {}
 
   // The octree's units are this many of the world's, in which the rules are.
   void setScale(float scale) { rules_.max_distance = max_distance_ / scale; }

@@ -43,7 +43,6 @@ class Brush {
         lane_(lane),
         resolution_(canvas.geometry->resolution()),
         scale_(canvas.geometry->pixelsPerSlope()),
-        ribbon_nested_(ribbonNested(scale_)),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane) {}
 
@@ -160,7 +159,7 @@ class Brush {
     cover.overlap = patch.overlap;
     cover.has_hull = patch.thicket == 0;
     cover.is_solid = patch.is_solid;
-    cover.nested = patch.nested(ribbon_nested_);
+    cover.nested = patch.nested();
     cover.opacity = hn::Mul(part, Opacity(patch));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
@@ -278,7 +277,7 @@ class Brush {
 
     // Area on the face: du dv = area / distance^2 * (distance / w)^3, and more for large ones
     const V inverse_sq = hn::Mul(inverse, inverse);
-    const V extent = hn::Min(Splat(kFidelity.most_extent), hn::Mul(Splat(patch.area), inverse_sq));
+    const V extent = hn::Min(one, hn::Mul(Splat(patch.area), inverse_sq));
     const V depth = hn::NegMulAdd(n_axis, n_axis, one);
     const V bulge = hn::MulAdd(extent, hn::Mul(Splat(0.5f), depth), one);
     const V half_area =
@@ -501,7 +500,6 @@ class Brush {
   const std::size_t lane_;
   const int resolution_;
   const float scale_;  // pixels for a slope of 1
-  const float ribbon_nested_;
   const Receivers receivers_;
   const Frames frames_;
   int face_ = 0;

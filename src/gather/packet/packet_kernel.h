@@ -64,11 +64,12 @@ struct alignas(64) Patch {
   float ribbon_width = 0;   // of the ray traced ribbon
 
   bool isRound() const { return disk_area == 0; }
-  bool showsBoth() const { return seen == Seen::kBoth || seen == Seen::kDarkBack; }
-  float nested(float ribbon_nested) const {
-    if (is_ribbon && thicket > 0) return ribbon_nested;
-    return nestedPart(is_solid && seen != Seen::kBoth, thicket);
+  // Outlines of surfaces on the same ground rise from the same side of a pixel, and the smaller
+  // lies behind the larger: how much of the patch does so.
+  float nested() const {
+    return is_solid && seen != Seen::kBoth ? kFidelity.nested * (1 - thicket) : 0;
   }
+  bool showsBoth() const { return seen == Seen::kBoth || seen == Seen::kDarkBack; }
 };
 static_assert(sizeof(Patch) == 128);
 

@@ -191,7 +191,7 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const V cosine = Dot(receivers.normal, patch.normal);
   const float turned = patch.seen == Patch::Seen::kFront ? canvas.turned : 1;
   const float size = patch.is_ribbon ? patch.ribbon_width : patch.radius;
-  const float bias = canvas.bias * size * (patch.is_ribbon ? kFidelity.ribbon_bias : 1);
+  const float bias = canvas.bias * size;
   V part = hn::MulAdd(Splat(turned), cosine, one);
   if (patch.seen == Patch::Seen::kBoth) {
     part =

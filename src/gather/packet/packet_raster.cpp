@@ -137,7 +137,7 @@ std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
   const glm::vec3 middle = patch.position - view_.centre;
   const glm::vec3 size = glm::abs(middle);
   const float largest = std::max({size.x, size.y, size.z});
-  const float extent = std::min(kFidelity.most_extent, patch.area / (largest * largest));
+  const float extent = std::min(1.f, patch.area / (largest * largest));
   if (extent > kLargeExtent) return facesThatSeeLarge(patch, extent);
   const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
   const float half = std::max(0.5f * side, leastHalf(patch));

@@ -133,8 +133,9 @@ float mostVisibleArea(const Facet& facet) {
 }
 
 float reachOf(const Facet& facet, const glm::vec3& direction) {
-  const float reach = layerReach(facet.radius, quadraticForm(facet.covariance, direction));
-  return facet.is_thicket ? kFidelity.thicket_reach * reach : reach;
+  // What overlaps hides behind its own layer as behind others: it needs none
+  if (facet.is_thicket) return 0;
+  return layerReach(facet.radius, quadraticForm(facet.covariance, direction));
 }
 
 float thicketPart(const Surfel& surfel) {
@@ -147,13 +148,9 @@ float thicketPart(const Surfel& surfel) {
 
 float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
               const glm::vec3& direction) {
-  const bool is_thicket = thicketPart(surfel) > 0;
-  if (is_thicket && !ribbon.isEmpty()) {
-    return kFidelity.ribbon_reach * ribbon.halfExtent(direction) +
-           kFidelity.ribbon_depth * ribbon.width;
-  }
-  const float reach = layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
-  return is_thicket ? kFidelity.thicket_reach * reach : reach;
+  if (!ribbon.isEmpty()) return ribbon.halfExtent(direction);
+  if (thicketPart(surfel) > 0) return 0.25f * surfel.area / radius;  // half its width
+  return layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
 }
 
 // Spheres are a surface. Codes round: what is about none is none.

@@ -29,13 +29,6 @@ inline float layerReachOfDisk(float radius, float cosine) {
 inline float inverseLayerGap(float reach) {
   return 1 / std::max(kFidelity.layer_gap * reach, 1e-30f);
 }
-// Outlines of surfaces on the same ground rise from the same side of a pixel, and the smaller lies
-// behind the larger. This part of a surface does so; the rest hides at random, as leaves, hair,
-// particles and rough nodes do.
-inline float nestedPart(bool is_surface, float thicket) {
-  return is_surface ? kFidelity.nested * (1 - thicket) : 0;
-}
-
 // What hides, hides: patches have exact areas, and these scatter around what a pixel of a surface
 // holds, so sums alone would let through what lies behind. So a pixel also knows which of its 4 by
 // 4 samples lie within the hull, the union of the patches, each widened (docs/algorithm.md,
@@ -66,18 +59,10 @@ static_assert(kFidelity.ribbon_part * kPi * kFidelity.largest_radius * kFidelity
               "effective radii tell the same");
 #endif
 
-// Ribbons grow in tufts, side by side: this part of them hides as if behind the same side of a
-// pixel (Fidelity::nested), the more, the larger the pixels are. (AO bias of hair at 16
-// pixels with 0, .04, .12: +.0034, +.0027, +.0012; at 40 pixels +.0026, and +.0009 with .05.)
-inline float ribbonNested(float pixels_per_slope) {
-  return std::min(kFidelity.nested, 1 / std::max(pixels_per_slope, 1.f));
-}
-
 // Coverage in the middle of a soft disk, which falls off as 1 - (distance / radius)^2 and is
 // limited to 1, such that the whole disk covers that many times `area`.
 inline float softDiskPeak(float radius, float area, bool is_two_sided) {
-  const float covered =
-      (is_two_sided ? kFidelity.two_sided_soft_disk_area : kFidelity.soft_disk_area) * area;
+  const float covered = (is_two_sided ? 1 : kFidelity.soft_disk_area) * area;
   const float share = std::min(0.95f, covered / (kPi * radius * radius));
   return share < 0.5f ? 2 * share : 1 / (2 * (1 - share));
 }

@@ -9,27 +9,21 @@ namespace surfeit {
 struct Fidelity {
   // --- The cut (docs/algorithm.md, "Choosing the cut") ---
 
-  // Radians, 0 to .1. What rises less above the horizon is dropped: a full circle of it covers the
-  // square of this, .0001 of the hemisphere.
-  float horizon_slope = 0.01f;
-
   // Part, 0 to 1, of the max solid angle that a node may fill which is not flat. Flat nodes are
   // tiles of a surface; of corners and thickets a receiver sees a part. (With .5, .67, .8, 1: color
   // RMSE of the lion on a plane 1.9, 1.9, 2.0, 2.2 %; AO RMSE of spheres .0041, .0045, .0050,
   // .0060.)
   float uneven_share = 2.f / 3;
 
-  // Cosine, 0 to 1. What is seen at a smaller one to the normal weighs less, so nodes that are not
-  // flat may look larger by as much, up to most_coarser times and most_low_solid_angle, steradians.
-  // Of flat ones a closed shell of 200,000 disks would cover .9927 instead of .9954.
-  float whole_cosine = 0.8f;
-  float most_coarser = 4, most_low_solid_angle = 0.4f;
+  // Times. Where directions weigh by the cosine, a node that is not flat may look larger by one
+  // over the cosine of its highest point, up to this. (1: -1, -1, -2 %, for a quarter more
+  // patches.)
+  float most_coarser = 4;
 
-  // Part, 0 to .5, of the greatest solid angle by which a node fades into what is below it, and
-  // that of leaves, the surfels of which may be ray traced. Without, results step from one receiver
-  // to the next. (Largest steps of irradiance along lines in a box: 2.2, 1.7, .5, .8, .3 % with
-  // 0; 1.1, 1.0, .2, .4, .2 with .015 to .03. bench/line_steps.sh)
-  float fading = 0.02f, leaf_fading = 0.1f;
+  // Part, 0 to .5, of the greatest solid angle by which a node fades into what is below it.
+  // Without, results step from one receiver to the next, by 2 % of the light along a line in a box
+  // (bench/line_steps.sh); errors are the same.
+  float fading = 0.05f;
 
   // Pixels. No node is drawn as a larger patch: its own shape would be seen. So finer pixels
   // converge, whatever the max solid angle. (Covered of a closed shell of 20,000 disks at 32 and 64
@@ -87,8 +81,9 @@ struct Fidelity {
   float touch = 0.02f, least_touched = 0.05f;
 
   // Part, 0 to 1, of a surface that hides behind other layers as if all rose from the same side of
-  // a pixel; the rest hides at random. (AO RMSE with 0, .3, 1: city .0059, .0053, .0053; lion
-  // .0044, .0038, .0046; spheres .0055, .0045, .0128.)
+  // a pixel; the rest hides at random, as leaves, hair, particles and rough nodes do. (0: +4, -2,
+  // 0 %, and .39 % of the light behind a ball of 5,000 disks leaks at draft quality, with it less
+  // than .3. 1: AO RMSE of spheres .0128 instead of .0045.)
   float nested = 0.3f;
 
   // Part of half its side by which a patch is widened in the hull. (AO RMSE with .7, .75, .8, .9:
@@ -99,8 +94,6 @@ struct Fidelity {
 
   // --- Leaves, hair and grass ("Thickets", "Ribbons") ---
 
-  // Part, 0 to 1, of the usual reach of a layer of thickets.
-  float thicket_reach = 0.15f;
   // Outline of a thicket over that of its ellipse. (AO bias of leaves with nodes of .05, .1, .4 sr:
   // with 1.25 +.0024, +.0008, -.0002; with .95 .0000, -.0028, -.0084.)
   float thicket_outline = 1.25f;
@@ -109,15 +102,6 @@ struct Fidelity {
   float ribbon_part = 0.15f;
   // Times. One with a longer side is a piece of a ribbon from this many times as long as wide.
   float ribbon_elongation = 3;
-  // Parts of its extent and of its width that a piece of a ribbon reaches in depth. (Hair at 40
-  // pixels with .15, .5, .7, 1: color .89, .73, .70, .75 %.)
-  float ribbon_reach = 0.5f, ribbon_depth = 0.02f;
-  // Part of the bias of a disk as large as it is wide. (AO RMSE of hair .0070, with 1 .0076.)
-  float ribbon_bias = 1.f / 3;
-  // Cosine, 0 to 1. A longer side farther off the surfel's plane says nothing.
-  float least_in_plane = 0.3f;
-  // Times. Squares are taken to be as much longer than wide, so that their shape has axes.
-  float least_elongation = 1.04f;
   // Part of its length for each radius of the near field within which it is ray traced.
   float ribbon_radius = 0.25f;
 
@@ -126,7 +110,7 @@ struct Fidelity {
   // Times the area of a surfel that its soft disk covers, so that disks of a surface leave no gaps;
   // two-sided ones lie alone. (AO RMSE with disks that cover fully, 1, 1.6, 2: lion .0164, .0115,
   // .0108, .0110; bunny .0050, .0070, .0031, .0031.)
-  float soft_disk_area = 1.7f, two_sided_soft_disk_area = 1;
+  float soft_disk_area = 1.7f;
 
   // Part, 0 to 1, of the near field's distance. From there to its border a surfel is both, ray
   // traced and a patch. (Largest step on a floor below a sphere .90 % with 1, .67 % so.)
@@ -149,8 +133,6 @@ struct Fidelity {
   float least_axis = 0.3f;
   // Spread over area that a patch has at least on a face: seen edge-on, it is no line.
   float least_spread = 1.f / 64;
-  // Area over squared distance that second-order terms count at most.
-  float most_extent = 1;
 };
 
 // bench/sensitivity changes them; everywhere else they are constants.

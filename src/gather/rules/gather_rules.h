@@ -116,9 +116,7 @@ inline float maxSolidAngle(const GatherRules& rules) {
 inline float mostCoarser(const GatherRules& rules) {
   const bool weighs_by_cosine = !rules.isGlossy() && !rules.hasCone() &&
                                 rules.weights.distribution == GatherWeights::Distribution::kCosine;
-  const float whole =
-      std::max(maxSolidAngle(rules), kFidelity.most_low_solid_angle / kFidelity.most_coarser);
-  return weighs_by_cosine ? std::max(1.f, kFidelity.most_low_solid_angle / whole) : 1;
+  return weighs_by_cosine ? kFidelity.most_coarser : 1;
 }
 // In radii of a surfel. Disks more than two pixels wide are ray traced in any case, unless nothing
 // is: between such patches the widest hull leaves gaps. Spheres stand alone, and rays through the

@@ -27,12 +27,10 @@ struct Ribbon {
     const glm::vec3 side = directionOf(surfel.long_side);
     const glm::vec3 in_plane = side - glm::dot(side, surfel.normal) * surfel.normal;
     const float cosine = glm::length(in_plane);
-    if (!(cosine > kFidelity.least_in_plane)) return ribbon;
+    if (!(cosine > kLeastInPlane)) return ribbon;
     ribbon.along = in_plane / cosine;
     ribbon.across = glm::cross(surfel.normal, ribbon.along);
-    // Squares are taken to be longer than wide, so that their shape has axes
-    ribbon.length =
-        std::sqrt(surfel.area * std::max(elongationOf(surfel), kFidelity.least_elongation));
+    ribbon.length = std::sqrt(surfel.area * std::max(elongationOf(surfel), kLeastElongation));
     ribbon.width = surfel.area / ribbon.length;
     return ribbon;
   }
@@ -77,6 +75,10 @@ struct Ribbon {
     ribbon.across = glm::cross(normal, ribbon.along);
     return ribbon;
   }
+
+ private:
+  // Against rounding: a side that is a normal says nothing, and squares have no axes.
+  static constexpr float kLeastInPlane = 1e-3f, kLeastElongation = 1.01f;
 };
 
 // Of the circle that a surfel is drawn within, as the ribbon that it is, if it is one.
