@@ -297,32 +297,6 @@ TEST(RasterPixels, LayersBeginByAndBy) {
   }
 }
 
-TEST(RasterPixels, WhatHardlyTouchesAPixelHardlyChangesIt) {
-  OneRaster raster(4);
-  // All in pixels of the face +x
-  const auto square = [&](float column, float row, float side, float begin, float end) {
-    const glm::vec3 direction = glm::normalize(glm::vec3(1, .5f * column - 1, .5f * row - 1));
-    const float area = .25f * side * side;
-    Patch patch = patchAt(direction, {-1, 0, 0}, area * direction.x * direction.x * direction.x, 0,
-                          begin, end);
-    patch.is_solid = false;
-    raster.add(patch);
-  };
-  // Something deep beside the pixel laps over it, between two of different layers
-  const auto covered = [&](float lap) {
-    raster.clear();
-    square(1.5f, 1.5f, .7f, 1, 2);
-    square(2.5f - lap, 1.5f, 1, 1.5f, 5);
-    square(1.5f, 1.5f, .7f, 3.5f, 4.5f);
-    return raster.coverage(1 * 4 + 1);
-  };
-  const float apart = covered(0);
-  EXPECT_NEAR(apart, .49f + .51f * .49f, 1e-4);
-  EXPECT_NEAR(covered(1e-4f), apart, .005f);
-  EXPECT_NEAR(covered(1e-3f), apart, .05f);
-  EXPECT_GT(covered(.1f), .97f) << "now they are of one layer";
-}
-
 TEST(RasterPixels, WhatIsNestedHidesBehindTheLargerLayer) {
   OneRaster raster(2);
   const auto covered = [&](float first, float second, bool is_solid) {

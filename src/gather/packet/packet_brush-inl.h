@@ -147,14 +147,12 @@ class Brush {
   }
 
   // Of this part of it.
-  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part,
-                  V inverse_touch) const {
+  Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
     const V reach = Splat(patch.reach);
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
     cover.depth_end = hn::Add(distance, reach);
     cover.inverse_gap = inverseLayerGap(patch.reach);
-    cover.inverse_touch = inverse_touch;
     cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
     cover.overlap = patch.overlap;
     cover.has_hull = patch.thicket == 0;
@@ -210,17 +208,9 @@ class Brush {
         hn::Mul(Splat(patch.most_area), distance));
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
     const Parallelogram shape = OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w);
-    const Cover cover =
-        MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part), InverseTouch(shape));
+    const Cover cover = MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part));
     CoverParallelogram(shape, seen, cover);
     if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
-  }
-
-  // How much a patch says about where its layer ends: little where it barely touches the pixel.
-  static V InverseTouch(const Parallelogram& shape) {
-    const V area = hn::Mul(Splat(4), hn::Mul(shape.half_x, shape.half_y));
-    const V counts = hn::Min(Splat(1), hn::Max(Splat(kFidelity.least_touched), area));
-    return Reciprocal(hn::Mul(Splat(kFidelity.touch), counts));
   }
 
   // At the rim of a curved thing, a part of a piece faces the receiver whose mean normal does not:
@@ -349,8 +339,7 @@ class Brush {
     Sight from_ray = sight;
     from_ray.facing = Dot(to_centre, patch.normal);
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
-             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part,
-                       Splat(1 / (kFidelity.touch * kFidelity.least_touched))));
+             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part));
   }
 
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
@@ -434,7 +423,7 @@ class Brush {
     const bool is_open =
         CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, Splat(1), cover, hull_);
     if (!is_open || !cover.has_hull) return is_open;
-    const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(kFidelity.traced_hull)));
+    const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(0.5f)));
     hull_.Add(pixel, hn::IfThenElseZero(is_hull, SplatU(kHullSamples)),
               SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.depth_begin, cover.depth_end);
     return true;

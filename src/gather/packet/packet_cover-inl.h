@@ -30,7 +30,6 @@ namespace {
 struct Cover {
   V depth_begin, depth_end;
   float inverse_gap;  // inverseLayerGap
-  V inverse_touch;    // of touchPart
   M is_lit;
   bool is_all_lit;
   float overlap, nested;
@@ -71,9 +70,8 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
   // A gap in depth begins a new layer, by and by
-  const V touch = hn::Min(one, hn::Mul(amount, cover.inverse_touch));
   const V gap = hn::Mul(hn::Sub(cover.depth_begin, end), Splat(cover.inverse_gap));
-  const V is_new = hn::Mul(touch, hn::Min(one, hn::Max(zero, gap)));
+  const V is_new = hn::IfThenElseZero(is_drawn, hn::Min(one, hn::Max(zero, gap)));
   const M ends = hn::And(is_drawn, hn::Ge(gap, one));
   if (!hn::AllFalse(d, hn::Gt(is_new, zero))) {
     hull.Turn(place, ends, hn::And(is_drawn, hn::Gt(is_new, zero)));
@@ -82,7 +80,7 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
   room = hn::MulAdd(is_new, hn::Sub(open, room), room);
   before = hn::NegMulAdd(is_new, before, before);
   hn::Store(room, d, room_at);
-  hn::Store(hn::MulAdd(touch, hn::Max(zero, hn::Sub(cover.depth_end, end)), end), d, end_at);
+  hn::Store(hn::IfThenElse(is_drawn, hn::Max(end, cover.depth_end), end), d, end_at);
 
   // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer;
   // what of a thicket hides behind itself is left out of its opacity

@@ -16,8 +16,7 @@ namespace surfeit {
 // it extends, by its variance along the direction, so that tiles of one surface meet whether they
 // are seen head-on or aslant, and no rounding decides; and at least a part of its radius.
 inline float layerReach(float radius, float variance) {
-  return std::max(kFidelity.least_reach * radius,
-                  kFidelity.depth_reach * std::sqrt(std::max(0.f, 3 * variance)));
+  return std::max(kFidelity.least_reach * radius, std::sqrt(std::max(0.f, 3 * variance)));
 }
 // Of a disk, seen at an angle with this cosine; of a sphere that of a disk along the direction.
 inline float layerReachOfDisk(float radius, float cosine) {
