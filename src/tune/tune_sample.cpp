@@ -1,6 +1,6 @@
 // Half of the sample are stretches of neighbours, which tell how caches do that hold what
 // neighbours share; the other half are single receivers spread evenly over the order, which tell
-// what the gather as a whole comes back to. docs/algorithm.md, "Predicting misses from a sample".
+// what the gather as a whole comes back to. docs/tune.md.
 
 #include "tune/tune_sample.h"
 

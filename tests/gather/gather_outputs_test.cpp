@@ -310,9 +310,9 @@ TEST(GatherGlossy, RastersAgreeWhereTheyMeet) {
   rules.quality.raster_resolution = 32;
   rules.quality.max_solid_angle = .02f;
   for (const glm::vec3 at : {glm::vec3(1, 0, 0), glm::vec3(-2, 1.5f, 0), glm::vec3(0, -2, 0)}) {
-    rules.weights.cone_angle = kFidelity.widest_cone_raster;
+    rules.weights.cone_angle = kWidestConeRaster;
     const GatherResult cone = gatherAt(scene, {at, {0, 0, 1}}, rules);
-    rules.weights.cone_angle = std::nextafter(kFidelity.widest_cone_raster, 2.f);
+    rules.weights.cone_angle = std::nextafter(kWidestConeRaster, 2.f);
     const GatherResult cube = gatherAt(scene, {at, {0, 0, 1}}, rules);
     EXPECT_NEAR(cone.occlusion, cube.occlusion, .02f);
     EXPECT_NEAR(cone.irradiance.g, cube.irradiance.g, .02f);

@@ -40,6 +40,8 @@ Surfel withSides(const Surfel& surfel, GatherSides sides) {
 // mean, where two moments give 7.7 % too little and are off by 10.8 %.)
 FacingAreas facingAreas(float total, float mean, float second, float fourth) {
   constexpr float kTiny = 1e-9f;
+  // With s = 1/3, q = 1/5 and E |x| = 1/2 of evenly spread normals
+  constexpr float kUpwards = 0.64f;
   const float inverse = 1 / total;
   const float p2 = second * inverse, p4 = fourth * inverse;
   const float m = mean * inverse, s = std::clamp((1 + 2 * p2) / 3, 0.f, 1.f);
@@ -48,7 +50,7 @@ FacingAreas facingAreas(float total, float mean, float second, float fourth) {
   const float at_one = (q - s * s) / std::max(1 - 2 * s + q, kTiny);
   const float rest_sq = (s - q) / std::max(1 - s, kTiny);
   const float greatest = at_one + (1 - at_one) * std::sqrt(rest_sq);
-  const float both = std::max(std::abs(m), least + kFidelity.upwards * (greatest - least));
+  const float both = std::max(std::abs(m), least + kUpwards * (greatest - least));
   return {0.5f * total * (both + m), 0.5f * total * (both - m)};
 }
 
@@ -116,12 +118,15 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
 // A surface covers no more than the outline of the sphere that holds all disks, and than a part of
 // its ellipse: what exceeds that hides behind the rest. (Spheres and two-sided surfels count twice
 // in front plus back, which the limit of the area takes back head-on.)
+// The outline of a thicket is that of a ball full of leaves, pi r^2, which has a covariance of r^2
+// / 5 along every axis, so an ellipse of 4 pi r^2 / 5.
 RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket) {
   const float ellipse = ellipseArea(node, direction), sphere = kPi * node.radius * node.radius;
   const float filled = kFidelity.filled_outline + spherePart(node) * (1 - kFidelity.filled_outline);
   const float most = std::min({node.area, sphere, filled * ellipse});
   const float surface = std::min(shown, most);
-  const float outline = std::min(sphere, kFidelity.thicket_outline * ellipse);
+  constexpr float kThicketOutline = 5.f / 4;
+  const float outline = std::min(sphere, kThicketOutline * ellipse);
   if (!(thicket > 0 && outline > 0)) return {surface, 1, most};
   const float hidden = outline * thicketOpacity(std::min(shown, node.area), outline);
   const float area = surface + thicket * (outline - surface);

@@ -23,6 +23,10 @@ class EnvironmentMap;
 // Half angle of the cone that is all above a receiver.
 inline constexpr float kHemisphere = kPi / 2;
 
+// Half angle of the widest cone with a raster of its own (surfeit/cube.h): the outermost pixels of
+// wider ones would be too narrow.
+inline constexpr float kWidestConeRaster = kPi / 3;
+
 // Of the cosine, as Blinn-Phong lobes of a Beckmann roughness have it.
 inline float lobeExponent(float roughness) { return 2 / (roughness * roughness) - 2; }
 
@@ -80,7 +84,7 @@ struct GatherRules {
   bool isGlossy() const { return mode == GatherMode::kGlossy; }
   // Whether only a cone is looked at, and drawn to a raster of its own.
   bool hasCone() const { return weights.cone_angle < kHemisphere; }
-  bool hasConeRaster() const { return weights.cone_angle <= kFidelity.widest_cone_raster; }
+  bool hasConeRaster() const { return weights.cone_angle <= kWidestConeRaster; }
   std::uint32_t channels() const { return (hasLight() ? 3u : 0u) + (fades() ? 1u : 0u); }
 };
 

@@ -1,5 +1,5 @@
 // Turns normals that point to either side of their surface so that neighbours agree, over the whole
-// cloud and out of core (docs/algorithm.md, "Normals from the neighbourhood"):
+// cloud and out of core (docs/surfels.md, "Normals from the neighbourhood"):
 //
 //   chunks along the curve --spanning trees--> pieces --votes of pairs--> components --> sides
 #pragma once

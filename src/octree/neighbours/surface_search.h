@@ -1,5 +1,5 @@
 // Surfaces through the places of an octree: what the neighbours of a place tell of area and normal
-// (docs/algorithm.md, "Sizes from the neighbourhood").
+// (docs/surfels.md, "Sizes from the neighbourhood").
 #pragma once
 
 #include <cstddef>
