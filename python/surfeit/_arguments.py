@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -99,10 +99,10 @@ def _plain(array: np.ndarray) -> np.ndarray:
         return array  # refused by the binding, which names it
     if dtype.itemsize <= 4:
         return array.astype(dtype.newbyteorder("="), copy=False)
-    for wanted in (np.int32, np.uint32):
-        limits = np.iinfo(wanted)
+    for integer in ("int32", "uint32"):
+        limits = np.iinfo(integer)
         if array.size == 0 or (array.min() >= limits.min and array.max() <= limits.max):
-            return array.astype(wanted)
+            return array.astype(integer)
     return array.astype(np.float64)
 
 
@@ -166,8 +166,9 @@ def flat(vectors: Any) -> Optional[np.ndarray]:
     return array if array.ndim == 2 else array.reshape(-1, array.shape[-1] if array.ndim else 1)
 
 
-def chunks_of(source: Iterable[Mapping[str, Any]]) -> Iterable[List[Tuple[str, np.ndarray]]]:
-    for chunk in source:
+def chunks_of(source: Any) -> Iterator[List[Tuple[str, np.ndarray]]]:
+    """The columns of each dict of an iterable, or of the one dict."""
+    for chunk in [source] if isinstance(source, Mapping) else source:
         if not isinstance(chunk, Mapping):
             raise TypeError(f"found a chunk of type {type(chunk).__name__}, expected a dict of arrays")
         yield columns_of(chunk)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import sys
 import warnings
-from typing import Callable, Optional, Union
+from types import FrameType
+from typing import Callable, Optional, Tuple, Union
 
 from ._errors import DataWarning
 
@@ -53,7 +54,7 @@ def _callback(progress: ProgressLike) -> Optional[ProgressCallback]:
 def _level_of_caller() -> int:
     """The stack level of the first frame outside this package, for warnings."""
     level = 1
-    frame = sys._getframe(1)
+    frame: Optional[FrameType] = sys._getframe(1)
     while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] == "surfeit":
         frame = frame.f_back
         level += 1
@@ -66,7 +67,7 @@ class Watcher:
     def __init__(self, progress: ProgressLike = None, strict: bool = False):
         self._call = _callback(progress)
         self.strict = strict
-        self._told = None
+        self._told: Optional[Tuple[str, int, int, str]] = None
 
     def update(self, phase: str, done: int, total: int, unit: str) -> None:
         now = (phase, done, total, unit)

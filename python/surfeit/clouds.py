@@ -108,7 +108,7 @@ def write(path: PathLike, arrays: Union[Mapping[str, Any], Iterable[Mapping[str,
     Returns the number of rows.
     """
     is_whole = isinstance(arrays, Mapping)
-    chunks = chunks_of([arrays] if is_whole else arrays)
+    chunks = chunks_of(arrays)
     first = next(chunks, None)
     if first is None:
         raise ValueError(f"{path_of(path)}: found no chunk, expected one or more")

@@ -71,7 +71,7 @@ def _index_arrays(arrays: Mapping[str, Any], output: str, options: Stats,
         raise ValueError(str(damage)) from None
 
 
-def _index_chunks(chunks: Iterable[Mapping[str, Any]], output: str, options: Stats,
+def _index_chunks(chunks: Any, output: str, options: Stats,
                   watcher: Watcher) -> Stats:
     """The indexer reads its input twice, and an iterator cannot be read again."""
     directory = options.get("temporary_directory") or os.environ.get("SLURM_TMPDIR") or \

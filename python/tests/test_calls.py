@@ -95,6 +95,25 @@ def test_threads_gather_at_once_and_alike(engine, scene, receivers):
     gatherer.pause()
 
 
+def test_python_runs_on_while_a_gather_runs(scene, receivers):
+    ticks = []
+    has_ended = threading.Event()
+
+    def tick():
+        while not has_ended.wait(0.005):
+            ticks.append(time.perf_counter())
+
+    ticker = threading.Thread(target=tick)
+    ticker.start()
+    begin = time.perf_counter()
+    scene.gather(*receivers, max_solid_angle=0.005)
+    seconds = time.perf_counter() - begin
+    has_ended.set()
+    ticker.join()
+    # 200 a second on an idle machine
+    assert len(ticks) > 10 * seconds
+
+
 def test_two_threads_do_more_than_one(scene, receivers):
     """The GIL is released: a second thread adds its processor. Prints the ratio."""
     positions, normals = np.tile(receivers[0], (4, 1)), np.tile(receivers[1], (4, 1))
