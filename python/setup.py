@@ -36,9 +36,9 @@ def build_with_cmake(build_dir: Path) -> None:
     }
     definitions = [f"-D{name}={value}" for name, value in options.items()]
     subprocess.run(["cmake", "-S", ROOT, "-B", build_dir, *definitions], check=True)
-    subprocess.run(
-        ["cmake", "--build", build_dir, "--target", "surfeit_python", "--parallel"], check=True
-    )
+    jobs = str(os.cpu_count() or 1)
+    build = ["cmake", "--build", build_dir, "--target", "surfeit_python", "--parallel", jobs]
+    subprocess.run(build, check=True)
 
 
 class CMakeModule(build_ext):

@@ -127,7 +127,7 @@ void run(const py::object& watcher, const std::function<Status(Progress&)>& work
     try {
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
       if (raised == nullptr) progress.tell(watcher);
-    } catch (const py::error_already_set&) {
+    } catch (...) {
       raised = std::current_exception();
       progress.cancel();
     }
