@@ -109,25 +109,22 @@ def print_threads(memory):
     positions, normals = hills(40_000, 4)
     scene = surfeit.Engine(memory=memory, threads=2).open("scene.sft")
 
-    def seconds(count):
+    def gather(count):
         threads = [threading.Thread(target=lambda: scene.gather(positions, normals, threads=1))
                    for _ in range(count)]
-        begin = time.perf_counter()
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-        return time.perf_counter() - begin
 
-    def seconds_of_library(count):
-        return seconds_of(lambda: scene.gather(positions, normals, threads=count))
-
-    seconds(2)
-    rounds = [(seconds(1), seconds(2), seconds_of_library(2)) for _ in range(3)]
-    of_python = max(2 * one / two for one, two, _ in rounds)
-    of_library = max(one / two for one, _, two in rounds)
-    print(f"two threads of Python gather {of_python:.2f} x one, the library's {of_library:.2f} x "
-          "(best of 3)")
+    gather(2)
+    one, two, library = zip(*(
+        (both_seconds_of(lambda: gather(1)), both_seconds_of(lambda: gather(2)),
+         both_seconds_of(lambda: scene.gather(positions, normals, threads=2))) for _ in range(3)))
+    one, two, library = (np.median(times, axis=0) for times in (one, two, library))
+    print(f"two threads of Python gather {2 * one[0] / two[0]:.2f} x one, the library's "
+          f"{one[0] / library[0]:.2f} x (medians of 3); by processor time, if both have one of "
+          f"their own, {4 * one[1] / two[1]:.2f} x and {2 * one[1] / library[1]:.2f} x")
 
 
 def main():
