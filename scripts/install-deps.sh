@@ -11,8 +11,10 @@ packages=(
   libopenexr-dev libeigen3-dev libnanoflann-dev
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
   libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev
-  # Pictures of docs/gallery.md
-  python3
+  # Python package, its tests and examples, and pictures of docs/gallery.md
+  python3 python3-dev python3-numpy pybind11-dev python3-pytest python3-matplotlib
+  # Its wheel
+  python3-setuptools python3-wheel python3-pip python3-venv
   # Tests
   libgtest-dev libgmock-dev
   # OpenVDB itself, against which our reader and writer of .vdb are tested

@@ -89,6 +89,20 @@ struct EnvironmentPixels : EnvironmentPlacement {
   const glm::vec3* pixels = nullptr;  // width * height, copied
 };
 
+// Receivers and results where the caller has them: columns, chunks, fields of own structs. The
+// functions are called from several threads at once; results of different receivers are set at the
+// same time. They must not throw.
+class SURFEIT_API ReceiverArray {
+ public:
+  virtual ~ReceiverArray() = default;
+  virtual std::size_t count() const = 0;
+  // The receiver number `index`, below count(); each is asked for more than once, and must be the
+  // same each time.
+  virtual Receiver receiver(std::size_t index) const = 0;
+  // Called once for each receiver, with NaN for a receiver that is not valid.
+  virtual void setResult(std::size_t index, const GatherResult& result) = 0;
+};
+
 // Gathers for one thread at a time. Calls on one gatherer must not overlap; different gatherers are
 // independent. A gatherer keeps its scenes and its engine alive, even after their handles are gone.
 class SURFEIT_API Gatherer {
@@ -109,6 +123,15 @@ class SURFEIT_API Gatherer {
   // kInvalidArgument while another call of this gatherer runs.
   Status gather(const Receiver* receivers, std::size_t count, GatherResult* results,
                 const Progress* progress = nullptr);
+
+  // Gathers at all receivers along a Hilbert curve: the scene's, if the world is one scene in its
+  // own coordinates, else a curve within the bounds of the receivers. Works on `threads` threads
+  // (0: EngineOptions::threads), this one among them, with this gatherer and others made for the
+  // call, as far as the budget has room for them. Holds 12 bytes per receiver meanwhile, beside the
+  // budget. At most 4 billion receivers. Results depend only on world, settings and receivers. For
+  // one scene in its own coordinates they have the bits of gatherCloud (surfeit/bake.h) without
+  // interpolation. Errors: as gather.
+  Status gatherAll(ReceiverArray& receivers, Progress& progress, int threads = 1);
 
   // A gatherer of the same world for another thread; the two share data where they can. Errors:
   // kBudgetTooSmall with the least budget that works.
@@ -157,11 +180,8 @@ class SURFEIT_API Engine {
   Result<Gatherer> gatherer(const std::vector<Instance>& instances, const GatherSettings& settings,
                             const EnvironmentPixels* environment = nullptr);
 
-  // Gathers at all receivers, along the Hilbert curve of the world, on `threads` threads (0:
-  // EngineOptions::threads) with a gatherer each. It holds 12 bytes per receiver meanwhile, beside
-  // the budget. At most 4 billion receivers. The result depends only on instances, settings,
-  // environment and receivers.
-  // Errors: as gatherer and gather.
+  // Makes a gatherer and calls its gatherAll with arrays of structs, on `threads` threads (0:
+  // EngineOptions::threads). Errors: as gatherer and gather.
   Status gatherAll(const std::vector<Instance>& instances, const GatherSettings& settings,
                    const Receiver* receivers, std::size_t count, GatherResult* results,
                    Progress& progress, int threads = 0,

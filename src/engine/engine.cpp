@@ -2,20 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <atomic>
-#include <limits>
-#include <numeric>
 #include <utility>
 
-#include "core/bounds.h"
-#include "core/curve_key.h"
-#include "core/first_failure.h"
 #include "core/guard.h"
 #include "core/job_limits.h"
-#include "core/parallel.h"
-#include "core/worker_threads.h"
-#include "engine/gatherer_state.h"
 #include "engine/world.h"
 #include "octree/page/page_limits.h"
 #include "octree/read/scene_info.h"
@@ -57,61 +47,22 @@ Access accessOf(const EngineOptions& options) {
   return options.direct_io ? Access::kDirect : Access::kCached;
 }
 
-// Receivers in an order in which neighbours follow each other.
-std::vector<std::uint32_t> curveOrder(const Receiver* receivers, std::size_t count) {
-  Bounds3d bounds;
-  const auto isFinite = [](const glm::dvec3& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-  };
-  for (std::size_t i = 0; i < count; ++i) {
-    if (isFinite(receivers[i].position)) bounds.add(receivers[i].position);
-  }
-  const glm::dvec3 middle = bounds.centre();
-  const glm::dvec3 half = 0.5 * bounds.extent();
-  const RootCube cube = rootCube(Bounds3d{-half, half});
-  std::vector<CurveKey> keys(count, ~CurveKey{0});
-  for (std::size_t i = 0; i < count; ++i) {
-    if (isFinite(receivers[i].position)) {
-      keys[i] = curveKey(glm::vec3(receivers[i].position - middle), cube);
-    }
-  }
-  std::vector<std::uint32_t> order(count);
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
-  });
-  return order;
-}
-
-// Hands out whole groups of receivers in order.
-class GroupedReceivers {
+// Arrays of structs.
+class StructArrays : public ReceiverArray {
  public:
-  GroupedReceivers(const Receiver* receivers, std::size_t count, GatherResult* results)
-      : receivers_(receivers), results_(results), order_(curveOrder(receivers, count)) {}
+  StructArrays(const Receiver* receivers, std::size_t count, GatherResult* results)
+      : receivers_(receivers), count_(count), results_(results) {}
 
-  // Gathers until none is left, or something has failed.
-  Status gatherAll(Gatherer& gatherer, const FirstFailure& failure, Progress& progress) {
-    constexpr std::size_t kRun = kGroupReceivers;
-    std::vector<Receiver> run;
-    std::vector<GatherResult> found(kRun);
-    while (!failure.happened()) {
-      const std::size_t begin = next_.fetch_add(kRun);
-      if (begin >= order_.size()) return {};
-      const std::size_t end = std::min(order_.size(), begin + kRun);
-      run.clear();
-      for (std::size_t i = begin; i < end; ++i) run.push_back(receivers_[order_[i]]);
-      SURFEIT_RETURN_IF_ERROR(gatherer.gather(run.data(), run.size(), found.data(), &progress));
-      for (std::size_t i = begin; i < end; ++i) results_[order_[i]] = found[i - begin];
-      progress.advance(end - begin);
-    }
-    return {};
+  std::size_t count() const override { return count_; }
+  Receiver receiver(std::size_t index) const override { return receivers_[index]; }
+  void setResult(std::size_t index, const GatherResult& result) override {
+    results_[index] = result;
   }
 
  private:
   const Receiver* const receivers_;
+  const std::size_t count_;
   GatherResult* const results_;
-  const std::vector<std::uint32_t> order_;
-  std::atomic<std::size_t> next_{0};
 };
 
 }  // namespace
@@ -184,34 +135,10 @@ Result<Gatherer> Engine::gatherer(const std::vector<Instance>& instances,
 Status Engine::gatherAll(const std::vector<Instance>& instances, const GatherSettings& settings,
                          const Receiver* receivers, std::size_t count, GatherResult* results,
                          Progress& progress, int threads, const EnvironmentPixels* environment) {
-  return guarded("gather", [&]() -> Status {
-    const std::size_t runs = (count + kGroupReceivers - 1) / kGroupReceivers;
-    const std::size_t wanted =
-        std::min(runs, static_cast<std::size_t>(threads > 0 ? threads : state_->options.threads));
-    if (count == 0) return {};
-    if (count > std::numeric_limits<std::uint32_t>::max()) {
-      return Status::invalidArgument(
-          fmt::format("{} receivers at once, expected less than 2^32: call it for parts", count));
-    }
-    std::vector<Gatherer> gatherers;
-    SURFEIT_ASSIGN_OR_RETURN(Gatherer first, gatherer(instances, settings, environment));
-    gatherers.push_back(std::move(first));
-    while (gatherers.size() < wanted) {
-      Result<Gatherer> more = gatherers.front().another();
-      if (!more.ok()) break;  // fewer do the same in a longer time
-      gatherers.push_back(std::move(*more));
-    }
-    progress.beginPhase("gather", count, "receivers");
-    GroupedReceivers groups(receivers, count, results);
-    std::atomic<std::size_t> taken{0};
-    FirstFailure failure;
-    return runOnThreads(int(gatherers.size()), failure, "gather", [&] {
-      Gatherer& own = gatherers[taken.fetch_add(1)];
-      const Status status = groups.gatherAll(own, failure, progress);
-      own.pause();
-      return status;
-    });
-  });
+  if (count == 0) return {};
+  SURFEIT_ASSIGN_OR_RETURN(Gatherer first, gatherer(instances, settings, environment));
+  StructArrays arrays(receivers, count, results);
+  return first.gatherAll(arrays, progress, threads);
 }
 
 EngineStatistics Engine::statistics() const {

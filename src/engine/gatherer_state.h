@@ -25,6 +25,8 @@ struct Gatherer::State {
   // False for one that is not valid.
   bool toLocal(const Receiver& receiver, LocalReceiver& result) const;
   Status gatherGroup(std::span<const Receiver> receivers, std::span<GatherResult> results);
+  // Indices of the receivers along a curve.
+  std::vector<std::uint32_t> curveOrder(const ReceiverArray& receivers) const;
 
   const std::shared_ptr<const World> world;
   PagedOctree::Reader reader;

@@ -67,6 +67,31 @@ inline std::vector<GatherResult> gatherAt(Gatherer& gatherer,
   return results;
 }
 
+// The same along the curve of the scene, from and to vectors.
+inline std::vector<GatherResult> gatherAlong(Gatherer& gatherer,
+                                             const std::vector<Receiver>& receivers,
+                                             int threads = 2) {
+  class Vectors : public ReceiverArray {
+   public:
+    explicit Vectors(const std::vector<Receiver>& receivers)
+        : results(receivers.size()), receivers_(receivers) {}
+    std::size_t count() const override { return receivers_.size(); }
+    Receiver receiver(std::size_t index) const override { return receivers_[index]; }
+    void setResult(std::size_t index, const GatherResult& result) override {
+      results[index] = result;
+    }
+    std::vector<GatherResult> results;
+
+   private:
+    const std::vector<Receiver>& receivers_;
+  };
+  Vectors vectors(receivers);
+  Progress progress;
+  const Status status = gatherer.gatherAll(vectors, progress, threads);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return vectors.results;
+}
+
 inline bool haveSameBytes(const std::vector<GatherResult>& a, const std::vector<GatherResult>& b) {
   return a.size() == b.size() &&
          std::memcmp(a.data(), b.data(), a.size() * sizeof(GatherResult)) == 0;

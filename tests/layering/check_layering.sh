@@ -89,4 +89,5 @@ includes_only "public headers" 'surfeit/' include/surfeit/*.h
 includes_only "tools/" 'surfeit/|tools/' tools/*.h tools/*.cpp
 includes_only "bench/, but for bench/internal," 'surfeit/|bench/[a-z_]*\.h' bench/*.h bench/*.cpp
 includes_only "examples/" 'surfeit/|[a-z_]*\.h' examples/*.h examples/*.cpp
+includes_only "python/" 'surfeit/|[a-z_]*\.h' python/src/*.h python/src/*.cpp
 exit $bad

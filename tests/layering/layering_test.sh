@@ -12,7 +12,7 @@ trap 'rm -rf "$work"' EXIT
 mkdir -p "$work/src" "$work/include" "$work/bench"
 cp -r "$source_dir/include/surfeit" "$work/include/"
 cp -r "$source_dir/src/." "$work/src/"
-cp -r "$source_dir/tools" "$source_dir/examples" "$work/"
+cp -r "$source_dir/tools" "$source_dir/examples" "$source_dir/python" "$work/"
 cp "$source_dir"/bench/*.h "$source_dir"/bench/*.cpp "$work/bench/"
 "$here/check_layering.sh" "$work"
 
@@ -45,3 +45,4 @@ expect_refusal bench/engine_bench.cpp '#include "gather/cut/cut.h"'
 expect_refusal bench/engine_bench.cpp '#include "bench/internal/error_summary.h"'
 expect_refusal bench/or_exit.h '#include "storage/file.h"'
 expect_refusal examples/renderer.cpp '#include "engine/engine_state.h"'
+expect_refusal python/src/engine.cpp '#include "engine/engine_state.h"'

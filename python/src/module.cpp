@@ -1,0 +1,18 @@
+// The module surfeit._surfeit: the library as plainly as Python can call it. The package surfeit
+// stands on it and is what users see.
+#include <pybind11/pybind11.h>
+
+#include "bindings.h"
+#include "surfeit/process.h"
+#include "surfeit/version.h"
+
+PYBIND11_MODULE(_surfeit, module) {
+  module.doc() = "The surfeit library. Use the package surfeit instead.";
+  module.attr("__version__") = surfeit::kVersion;
+  module.def("memory_limit", &surfeit::memoryLimitBytes);
+  module.def("peak_resident", &surfeit::peakResidentBytes);
+  module.def("default_threads", &surfeit::defaultThreadCount);
+  surfeit::python::addClouds(module);
+  surfeit::python::addEngine(module);
+  surfeit::python::addJobs(module);
+}

@@ -1,0 +1,36 @@
+// Statistics and descriptions of the library as dicts, under the names of the structs' members.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <vector>
+
+#include "surfeit/bake.h"
+#include "surfeit/bounce.h"
+#include "surfeit/cloud_info.h"
+#include "surfeit/convert.h"
+#include "surfeit/engine.h"
+#include "surfeit/index.h"
+#include "surfeit/normals.h"
+#include "surfeit/scene.h"
+#include "surfeit/tune.h"
+
+namespace surfeit::python {
+
+namespace py = pybind11;
+
+py::dict record(const GatherCacheStats& stats);
+py::list record(const std::vector<GatherWindow>& windows);
+py::dict record(const EngineStatistics& statistics);
+py::dict record(const SceneInfo& info);
+py::dict record(const CloudInfo& info);
+py::dict record(const CloudDensity& density);
+py::dict record(const IndexStats& stats);
+py::dict record(const GatherStats& stats);
+py::dict record(const ConvertStats& stats);
+py::dict record(const NormalsStats& stats);
+py::dict record(const BounceStats& stats);
+py::dict record(const TuneReport& report);
+py::dict record(const VerifyReport& report);
+
+}  // namespace surfeit::python

@@ -1,0 +1,174 @@
+"""Arguments of Python in the form that the binding takes."""
+
+from __future__ import annotations
+
+import os
+import re
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _surfeit
+
+PathLike = Union[str, "os.PathLike[str]"]
+Memory = Union[int, str, None]
+
+_SIZE = re.compile(r"\s*([0-9]*\.?[0-9]+)\s*(?:([KMGT])i?B?|B)?\s*", re.IGNORECASE)
+_UNITS = {"K": 1, "M": 2, "G": 3, "T": 4}
+
+# Columns of channels of three values whose names are not the channel's with _x, _y, _z.
+_COLUMNS = {
+    "position": ("x", "y", "z"),
+    "normal": ("nx", "ny", "nz"),
+    "color": ("red", "green", "blue"),
+}
+_COLORS = frozenset(
+    "radiosity albedo power irradiance reflection environment fluence indirectdiffuse".split()
+)
+
+
+def path_of(path: PathLike) -> str:
+    return os.fsdecode(os.fspath(path))
+
+
+def memory_bytes(memory: Memory) -> int:
+    """Bytes of a budget: 512 << 20, "512M" (powers of 1024), "80%" of what the job may hold."""
+    if memory is None:
+        return 0
+    if not isinstance(memory, str):
+        if memory < 1:
+            raise ValueError(f"memory: found {memory}, expected 1 byte or more, or \"512M\"")
+        return int(memory)
+    text = memory.strip()
+    if text.endswith("%"):
+        try:
+            percent = float(text[:-1])
+        except ValueError:
+            percent = 0
+        if not 0 < percent <= 100:
+            raise ValueError(f'memory: found "{memory}", expected more than 0% and at most 100%')
+        return int(_surfeit.memory_limit() * percent / 100)
+    match = _SIZE.fullmatch(text)
+    size = int(float(match[1]) * 1024 ** _UNITS.get((match[2] or "").upper(), 0)) if match else 0
+    if size < 1:
+        raise ValueError(f'memory: found "{memory}", expected a size such as 512M or 2G, or 80%')
+    return size
+
+
+def matrix_of(transform: Any) -> Tuple[float, ...]:
+    """The 12 numbers of a 3x4 matrix, or of a 4x4 one whose last row is 0 0 0 1."""
+    if transform is None:
+        return (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    matrix = np.asarray(transform, dtype=np.float64)
+    if matrix.shape == (4, 4) and np.array_equal(matrix[3], (0, 0, 0, 1)):
+        matrix = matrix[:3]
+    if matrix.shape != (3, 4):
+        raise ValueError(
+            f"transform: found shape {matrix.shape}, expected (3, 4), or (4, 4) with 0 0 0 1 last"
+        )
+    return tuple(float(value) for value in matrix.ravel())
+
+
+def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
+    """Options for the binding: without None, paths as text, arrays of few numbers as lists."""
+    taken = {**options, **more}
+    if "memory" in taken:
+        taken["memory"] = memory_bytes(taken["memory"])
+    if taken.get("transform") is not None:
+        taken["transform"] = matrix_of(taken["transform"])
+    for name in ("temporary_directory", "trajectory", "like"):
+        if taken.get(name) is not None:
+            taken[name] = path_of(taken[name])
+    for name in ("origin", "eye", "sensor", "crop"):
+        if isinstance(taken.get(name), np.ndarray):
+            taken[name] = taken[name].tolist()
+    if isinstance(taken.get("environment"), os.PathLike):
+        taken["environment"] = path_of(taken["environment"])
+    return {name: value for name, value in taken.items() if value is not None}
+
+
+def _plain(array: np.ndarray) -> np.ndarray:
+    """The same numbers in a type that clouds have; a copy only where they have another one."""
+    dtype = array.dtype
+    if dtype == np.bool_:
+        return array.view(np.uint8)
+    if dtype.kind == "f":
+        wanted = np.float32 if dtype.itemsize <= 4 else np.float64
+        return array.astype(wanted, copy=False)
+    if dtype.kind not in "iu":
+        return array  # refused by the binding, which names it
+    if dtype.itemsize <= 4:
+        return array.astype(dtype.newbyteorder("="), copy=False)
+    for integer in ("int32", "uint32"):
+        limits = np.iinfo(integer)
+        if array.size == 0 or (array.min() >= limits.min and array.max() <= limits.max):
+            return array.astype(integer)
+    return array.astype(np.float64)
+
+
+def columns_of_channel(name: str, values: int) -> Sequence[str]:
+    """Names of the columns of a channel: "normal" and 3 values are nx, ny, nz."""
+    if values == 3 and name in _COLUMNS:
+        return _COLUMNS[name]
+    if values == 3:
+        return [f"{name}_{letter}" for letter in ("rgb" if name in _COLORS else "xyz")]
+    return [f"{name}_{i}" for i in range(values)]
+
+
+def _sh_columns(coefficients: int) -> List[str]:
+    return [f"sh{i}_{letter}" for i in range(coefficients) for letter in "rgb"]
+
+
+def columns_of(arrays: Mapping[str, Any]) -> List[Tuple[str, np.ndarray]]:
+    """Columns of one dimension, from channels (n,), (n, k) or, for radiance_sh, (n, 9, 3)."""
+    columns: List[Tuple[str, np.ndarray]] = []
+    for name, value in arrays.items():
+        array = _plain(np.asarray(value))
+        if array.ndim == 1:
+            columns.append((name, array))
+            continue
+        if array.ndim == 3 and name == "radiance_sh":
+            names: Sequence[str] = _sh_columns(array.shape[1])
+            array = array.reshape(len(array), -1)
+        elif array.ndim == 2:
+            names = columns_of_channel(name, array.shape[1])
+        else:
+            raise ValueError(f"{name}: found shape {array.shape}, expected (n,) or (n, values)")
+        columns += [(column, array[:, i]) for i, column in enumerate(names)]
+    return columns
+
+
+def is_path(source: Any) -> bool:
+    return isinstance(source, (str, os.PathLike))
+
+
+def paths_of(source: Any) -> Optional[List[str]]:
+    """The paths where `source` is a path or a list of paths, else None."""
+    if is_path(source):
+        return [path_of(source)]
+    if isinstance(source, (list, tuple)) and source and all(is_path(each) for each in source):
+        return [path_of(each) for each in source]
+    return None
+
+
+def leading_shape(positions: Any) -> Tuple[np.ndarray, Tuple[int, ...]]:
+    """Positions (..., 3) as (n, 3), and what stood in place of n."""
+    array = np.asarray(positions)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise ValueError(f"positions: found shape {array.shape}, expected (..., 3)")
+    return array.reshape(-1, 3), array.shape[:-1]
+
+
+def flat(vectors: Any) -> Optional[np.ndarray]:
+    if vectors is None:
+        return None
+    array = np.asarray(vectors)
+    return array if array.ndim == 2 else array.reshape(-1, array.shape[-1] if array.ndim else 1)
+
+
+def chunks_of(source: Any) -> Iterator[List[Tuple[str, np.ndarray]]]:
+    """The columns of each dict of an iterable, or of the one dict."""
+    for chunk in [source] if isinstance(source, Mapping) else source:
+        if not isinstance(chunk, Mapping):
+            raise TypeError(f"found a chunk of type {type(chunk).__name__}, expected a dict of arrays")
+        yield columns_of(chunk)

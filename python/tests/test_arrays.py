@@ -1,0 +1,145 @@
+"""Arrays of any shape and type in and out, without copies where they fit."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import surfeit
+
+
+def test_strides_types_and_shapes_change_nothing(scene, receivers):
+    positions, normals = receivers[0][:600], receivers[1][:600]
+    expected = scene.gather(positions, normals, mode="bleeding", quality="draft")
+    record = np.zeros(600, [("id", "u1"), ("P", "f4", 3), ("N", "f8", 3)])
+    record["P"], record["N"] = positions, normals
+    for given in [
+        (record["P"], record["N"]),
+        (np.asfortranarray(positions), np.asfortranarray(normals)),
+        (positions.astype(">f4"), normals.astype(np.longdouble)),
+        (positions.tolist(), normals.tolist()),
+        (positions.reshape(20, 30, 3), normals.reshape(20, 30, 3)),
+    ]:
+        found = scene.gather(*given, mode="bleeding", quality="draft")
+        for word, array in expected.items():
+            assert np.array_equal(found[word].reshape(array.shape), array), word
+    picture = scene.gather(positions.reshape(20, 30, 3), normals.reshape(20, 30, 3),
+                           outputs="occlusion,bent_normal,radiance_sh", mode="bleeding")
+    assert [picture[word].shape for word in sorted(picture)] == [
+        (20, 30, 3), (20, 30), (20, 30, 9, 3)]
+
+
+def test_results_go_into_arrays_of_the_caller(scene, receivers):
+    out = {"occlusion": np.zeros(5000, np.float32)}
+    found = scene.gather(*receivers, out=out)
+    assert np.shares_memory(found["occlusion"], out["occlusion"])
+    assert out["occlusion"].any()
+    for wrong in (np.zeros(5000), np.zeros(4999, np.float32), np.zeros(10000, np.float32)[::2]):
+        with pytest.raises(ValueError, match="occlusion"):
+            scene.gather(*receivers, out={"occlusion": wrong})
+    with pytest.raises(ValueError, match="irradiance"):
+        scene.gather(*receivers, out={"irradiance": np.zeros((5000, 3), np.float32)})
+
+
+def test_order_of_a_gatherer_is_the_curve_or_the_input(engine, scene, receivers):
+    gatherer = engine.gatherer(scene, quality="draft")
+    along = gatherer.gather(*receivers)["occlusion"]
+    assert np.array_equal(along, scene.gather(*receivers, quality="draft")["occlusion"])
+    as_given = gatherer.gather(*receivers, order="input")["occlusion"]
+    assert np.abs(along - as_given).max() < 0.02 and np.abs(along - as_given).mean() < 0.002
+    one = gatherer.gather(receivers[0][0], receivers[1][0])
+    assert one["occlusion"].shape == ()
+    assert gatherer.gather(receivers[0][:0])["occlusion"].shape == (0,)
+
+
+def test_invalid_receivers_get_nan(scene, receivers):
+    positions = receivers[0].copy()
+    positions[7, 1] = np.nan
+    occlusion = scene.gather(positions, receivers[1])["occlusion"]
+    assert np.isnan(occlusion[7]) and np.isnan(occlusion).sum() == 1
+
+
+def test_transforms_and_instances(engine, scene, receivers):
+    turn = np.array([[0.0, 0, 2, 10], [0, 2, 0, 20], [-2, 0, 0, 30]])
+    positions, normals = receivers
+    moved = scene.placed(turn)
+    assert np.array_equal(moved.transform, turn)
+    there = moved.gather(positions @ turn[:, :3].T + turn[:, 3], normals @ (turn[:, :3].T / 2))
+    here = scene.gather(positions, normals)
+    assert np.abs(there["occlusion"] - here["occlusion"]).mean() < 0.003
+    far = engine.open(scene.path, transform=turn).gather(positions)
+    assert far["occlusion"].max() < 0.01
+
+    world = engine.gatherer([scene, scene.placed(np.eye(4)), moved], mode="bleeding")
+    both = world.gather(positions[:300], normals[:300])
+    assert both["irradiance"].shape == (300, 3)
+    assert world.receivers == 300 and world.invalid_receivers == 0
+    with pytest.raises(ValueError, match="shear"):
+        scene.placed(np.diag([1, 2, 1, 1.0])).gather(positions)
+
+
+def test_environment_is_an_array(scene, receivers):
+    sky = np.ones((8, 16, 3), np.float32)
+    found = scene.gather(*receivers, environment=sky, quality="draft")
+    assert set(found) == {"occlusion", "environment"}
+    # Open directions are as bright as the sky, whose radiance is 1: pi (1 - occlusion)
+    open_part = np.pi * (1 - found["occlusion"])
+    assert np.abs(found["environment"][:, 0] - open_part).max() < 0.05
+
+
+def test_clouds_come_back(tmp_path, cloud):
+    count = len(cloud["position"])
+    arrays = {
+        **cloud,
+        "place": cloud["position"].astype(np.float64),
+        "two_sided": np.arange(count) % 3 == 0,
+        "tag": np.arange(count),
+        "pair": np.zeros((count, 2), np.float16),
+        "color": np.full((count, 3), 17, np.uint8),
+    }
+    assert surfeit.write(tmp_path / "a.ply", arrays, comments=["made of arrays"], up="z") == count
+    whole = surfeit.read(tmp_path / "a.ply")
+    for name in ("position", "normal", "radiosity", "color", "place", "tag"):
+        assert np.array_equal(whole[name], arrays[name]), name
+    assert whole["place"].dtype == np.float64 and whole["tag"].dtype == np.int32
+    assert whole["color"].dtype == np.uint8
+    chunks = list(surfeit.read_chunks(tmp_path / "a.ply", rows=9000, only=["position", "tag"]))
+    assert [len(chunk["tag"]) for chunk in chunks[:2]] == [9000, 9000]
+    assert np.array_equal(np.concatenate([chunk["tag"] for chunk in chunks]), arrays["tag"])
+    assert surfeit.write(tmp_path / "b.ply", surfeit.read_chunks(tmp_path / "a.ply", 9000)) == count
+    assert np.array_equal(surfeit.read(tmp_path / "b.ply")["normal"], cloud["normal"])
+    kept = surfeit.read(tmp_path / "a.ply", filter="number < 10", channels="tag=number")
+    assert kept["number"].tolist() == list(range(10))
+
+
+@pytest.mark.parametrize("name", ["a.ply", "a.bgeo", "a.vdb", "a.prt", "a.pdb", "a.xyz"])
+def test_formats_of_all_kinds_come_back(tmp_path, name, cloud):
+    arrays = {"position": cloud["position"][:1000], "normal": cloud["normal"][:1000]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", surfeit.DataWarning)
+        surfeit.write(tmp_path / name, arrays)
+    found = surfeit.read(tmp_path / name)
+    order = np.lexsort(found["position"].T)
+    expected = np.lexsort(arrays["position"].T)
+    assert np.allclose(found["position"][order], arrays["position"][expected], atol=1e-5)
+
+
+def test_a_scene_reads_as_a_cloud(scene_path, cloud):
+    surfels = surfeit.read(scene_path)
+    assert surfels["position"].shape == cloud["position"].shape
+    assert {"normal", "radius", "area", "radiosity", "albedo"} <= set(surfels)
+
+
+def test_a_scene_opens_from_bytes(engine, scene, scene_path, receivers):
+    held = engine.open_bytes(scene_path.read_bytes(), "held")
+    assert np.array_equal(held.gather(*receivers)["occlusion"],
+                          scene.gather(*receivers)["occlusion"])
+
+
+def test_stats_and_windows_tell_of_the_caches(engine, scene, receivers):
+    scene.gather(*receivers)
+    stats = engine.stats
+    assert stats["scenes"] >= 1 and stats["memory_bytes"] == 256 << 20
+    assert stats["node_cache"]["requests"] >= stats["node_cache"]["hits"] > 0
+    assert engine.windows[-1]["receivers"] >= 0
+    assert "surfels" in repr(scene) and "256" not in str(surfeit.__version__)
