@@ -40,6 +40,7 @@ const std::vector<Number>& allNumbers() {
   using F = Fidelity;
   constexpr float kNever = 1e9f;
   static const std::vector<Number> numbers = {
+      {"horizon_slope", &F::horizon_slope, 0},
       {"uneven_share", &F::uneven_share, 1},
       {"most_coarser", &F::most_coarser},
       {"fading", &F::fading, 1e-4f},

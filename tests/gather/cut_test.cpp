@@ -138,7 +138,8 @@ std::vector<Surfel> randomSurfels(std::mt19937& random, Node& node) {
   return surfels;
 }
 
-// Whether a receiver sees any place of a disk, tried at its middle and around its rim.
+// Whether a receiver sees any place of a disk, tried at its middle and around its rim, that lies
+// higher above the horizon than what may be dropped.
 bool seesSome(const Surfel& surfel, const LocalReceiver& receiver) {
   const glm::vec3 aside = glm::normalize(glm::cross(surfel.normal, glm::vec3(.3f, .5f, .8f)));
   const glm::vec3 across = glm::cross(surfel.normal, aside);
@@ -146,7 +147,8 @@ bool seesSome(const Surfel& surfel, const LocalReceiver& receiver) {
     const float angle = .2f * float(i), reach = i == 0 ? 0 : surfel.radius;
     const glm::vec3 to = surfel.position + reach * std::cos(angle) * aside +
                          reach * std::sin(angle) * across - receiver.position;
-    const bool is_above = glm::dot(to, receiver.normal) > 1e-5f * glm::length(to);
+    const bool is_above =
+        glm::dot(to, receiver.normal) > 1.01f * kFidelity.horizon_slope * glm::length(to);
     if (is_above && glm::dot(to, surfel.normal) < -1e-5f) return true;
   }
   return false;

@@ -215,7 +215,11 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     const Nodes nodes(columns, at);
     const Places places(view, nodes);
     M seen = hn::Lt(places.nearest, hn::Add(nodes.radius, Splat(rules.max_distance)));
-    if (view.has_horizon) seen = hn::And(seen, hn::Gt(places.highest, hn::Zero(d)));
+    if (view.has_horizon) {
+      const float slope = rules.approximates() ? kFidelity.horizon_slope : 0;
+      const V reach = hn::Max(hn::Zero(d), hn::Sub(places.nearest, nodes.radius));
+      seen = hn::And(seen, hn::Gt(places.highest, hn::Mul(reach, Splat(slope))));
+    }
     if (view.has_cone) seen = hn::AndNot(IsOutsideCones(view, nodes, places), seen);
     if (rules.facing != 0 && rules.approximates()) {
       seen = hn::AndNot(TurnsAway(view, nodes, places, rules.facing), seen);

@@ -9,6 +9,11 @@ namespace surfeit {
 struct Fidelity {
   // --- The cut (docs/algorithm.md, "Choosing the cut") ---
 
+  // Radians, 0 to .1. What rises less above the horizon is dropped: a full circle of it covers the
+  // square of this, .0001 of the hemisphere. (0: errors are the same, but a third more nodes are
+  // visited, for .79 and .94 of the rate at dense and scattered receivers of the bunny.)
+  float horizon_slope = 0.01f;
+
   // Part, 0 to 1, of the max solid angle that a node may fill which is not flat. Flat nodes are
   // tiles of a surface; of corners and thickets a receiver sees a part. (With .5, .67, .8, 1: color
   // RMSE of the lion on a plane 1.9, 1.9, 2.0, 2.2 %; AO RMSE of spheres .0041, .0045, .0050,
