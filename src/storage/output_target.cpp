@@ -99,7 +99,9 @@ Result<FileDescriptor> openStream(const OutputTarget& target) {
 Result<OutputTarget> resolveOutput(const std::string& path) {
   OutputTarget target;
   if (const int descriptor = descriptorNamed(path); descriptor >= 0) {
-    if (::fcntl(descriptor, F_GETFD) < 0) return systemError(path, "write");
+    const int flags = ::fcntl(descriptor, F_GETFL);
+    if (flags >= 0 && (flags & O_ACCMODE) == O_RDONLY) errno = EBADF;
+    if (flags < 0 || (flags & O_ACCMODE) == O_RDONLY) return systemError(path, "write");
     target.path = path;
     target.is_stream = true;
     return target;
