@@ -16,7 +16,7 @@ namespace {
 Result<std::unique_ptr<PagedOctree>> openOctree(SceneFile scene, const NeighbourBuild& how,
                                                 std::uint64_t beside) {
   // The directory of what is written is another one of the same size
-  beside += scene.pages().pageCount() * sizeof(PageEntry);
+  beside += scene.pages().memoryBytes();
   const std::uint64_t cache_bytes =
       std::min<std::uint64_t>(how.memory_bytes - std::min(how.memory_bytes, beside),
                               PagedOctree::unlimitedCacheBytes(scene));

@@ -95,7 +95,7 @@ std::size_t PagedOctree::fixedBytes(const SceneFile& file, int threads) {
   const PageFile& pages = file.pages();
   const std::size_t per_thread =
       pages.maxStoredBytes() + 2 * kDirectAlignment + pages.maxPayloadBytes() + kDecoderBytes;
-  return pages.pageCount() * sizeof(PageEntry) + static_cast<std::size_t>(threads) * per_thread;
+  return pages.memoryBytes() + static_cast<std::size_t>(threads) * per_thread;
 }
 
 std::size_t PagedOctree::unlimitedCacheBytes(const SceneFile& file) {
