@@ -65,6 +65,11 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
           "--strict", common.strict,
           "Fail where data is guessed, skipped, narrowed or left out, instead of reporting it")
       ->group(kGroup);
+  command
+      .add_option("--read-retries", common.read_retries,
+                  "Tries again so many times a read that fails with EIO (networked file systems)")
+      ->check(CLI::Range(0, 100))
+      ->group(kGroup);
   command.add_flag("-q,--quiet", common.quiet, "Say nothing but errors")->group(kGroup);
   command.add_flag("-v,--verbose", common.verbose, "Say which phase begins")->group(kGroup);
 }
@@ -74,6 +79,7 @@ void CommandContext::run(const std::function<Status()>& body) {
   progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
                                                 common.strict);
   limitProcess(common.memory_bytes);
+  setReadRetries(common.read_retries);
   try {
     status = checkParsed();
     if (status.ok()) status = body();
@@ -133,6 +139,7 @@ Status CommandContext::writeStats(nlohmann::json fields) {
   fields["cpu_seconds"] = processCpuSeconds();
   fields["peak_resident_bytes"] = peakResidentBytes();
   fields["threads"] = threads();
+  if (common.read_retries > 0) fields["reads_retried"] = readsRetried();
   return writeOutput(common.stats_path, jsonText(fields) + "\n");
 }
 

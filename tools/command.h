@@ -27,6 +27,7 @@ struct CommonOptions {
   bool quiet = false;
   bool strict = false;  // what would be told as a note ends the command
   bool verbose = false;
+  int read_retries = 0;
 };
 
 // Which common options a command takes beside --quiet, --verbose and --progress.

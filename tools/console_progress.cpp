@@ -7,6 +7,7 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
+#include "surfeit/process.h"
 #include "tools/console.h"
 
 namespace surfeit {
@@ -46,6 +47,7 @@ ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose, bool str
   action.sa_handler = onCancelSignal;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  setProcessCancelled([] { return g_cancel_signal != 0; });
 }
 
 ConsoleProgress::~ConsoleProgress() { clear(); }
