@@ -101,7 +101,7 @@ std::string cacheTable(const GatherStats& stats) {
 
 Status writeCacheSeries(const std::string& path, const std::vector<GatherWindow>& windows) {
   return writeOutput(
-      path, path.ends_with(".json") ? windowsJson(windows).dump(2) + "\n" : seriesCsv(windows));
+      path, path.ends_with(".json") ? jsonText(windowsJson(windows)) + "\n" : seriesCsv(windows));
 }
 
 }  // namespace surfeit

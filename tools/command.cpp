@@ -5,13 +5,13 @@
 
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <exception>
 #include <limits>
 #include <new>
 
 #include "surfeit/output.h"
 #include "surfeit/process.h"
+#include "tools/console.h"
 #include "tools/output_check.h"
 
 namespace surfeit {
@@ -65,6 +65,11 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
           "--strict", common.strict,
           "Fail where data is guessed, skipped, narrowed or left out, instead of reporting it")
       ->group(kGroup);
+  command
+      .add_option("--read-retries", common.read_retries,
+                  "Tries again so many times a read that fails with EIO (networked file systems)")
+      ->check(CLI::Range(0, 100))
+      ->group(kGroup);
   command.add_flag("-q,--quiet", common.quiet, "Say nothing but errors")->group(kGroup);
   command.add_flag("-v,--verbose", common.verbose, "Say which phase begins")->group(kGroup);
 }
@@ -74,13 +79,14 @@ void CommandContext::run(const std::function<Status()>& body) {
   progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
                                                 common.strict);
   limitProcess(common.memory_bytes);
+  setReadRetries(common.read_retries);
   try {
     status = checkParsed();
     if (status.ok()) status = body();
   } catch (const std::bad_alloc&) {
     // Told without a Status, whose text would take some
     progress_->clear();
-    std::fputs("surfeit: out of memory; give the job more, or --memory a smaller budget\n", stderr);
+    tellRaw("surfeit: out of memory; give the job more, or --memory a smaller budget\n");
     exit_status = exitStatus(StatusCode::kFailed);
     return;
   } catch (const CLI::Error&) {
@@ -93,8 +99,12 @@ void CommandContext::run(const std::function<Status()>& body) {
   if (!refused.empty()) {
     status = Status::corruption(refused + " (refused by --strict)");
   }
+  end(status.ok() ? answered_ : std::move(status));
+}
+
+void CommandContext::end(Status status) {
   if (status.ok()) return;
-  fmt::print(stderr, "surfeit: {}\n", status.message());
+  tell(fmt::format("surfeit: {}\n", status.message()));
   exit_status = exitStatus(status.code());
   if (status.code() == StatusCode::kInterrupted && ConsoleProgress::cancelSignal() != 0) {
     exit_status = 128 + ConsoleProgress::cancelSignal();
@@ -112,13 +122,14 @@ Progress& CommandContext::progress() { return *progress_; }
 
 void CommandContext::answer(const std::string& text) {
   progress_->clear();
-  fmt::print("{}\n", text);
+  Status written = writeAnswer(text.ends_with('\n') ? text : text + "\n");
+  if (answered_.ok()) answered_ = std::move(written);
 }
 
 void CommandContext::say(const std::string& line) {
   if (common.quiet) return;
   progress_->clear();
-  fmt::print(stderr, "{}\n", line);
+  tell(line + "\n");
 }
 
 Status CommandContext::writeStats(nlohmann::json fields) {
@@ -128,7 +139,8 @@ Status CommandContext::writeStats(nlohmann::json fields) {
   fields["cpu_seconds"] = processCpuSeconds();
   fields["peak_resident_bytes"] = peakResidentBytes();
   fields["threads"] = threads();
-  return writeOutput(common.stats_path, fields.dump(2) + "\n");
+  if (common.read_retries > 0) fields["reads_retried"] = readsRetried();
+  return writeOutput(common.stats_path, jsonText(fields) + "\n");
 }
 
 double CommandContext::wallSeconds() const {
@@ -191,6 +203,10 @@ CLI::Option* addTemporaryOption(CLI::App& command, std::string& directory) {
       .add_option("--temp", directory,
                   "Directory of temporary files (default: SLURM_TMPDIR, TMPDIR, beside the output)")
       ->type_name("DIRECTORY");
+}
+
+std::string jsonText(const nlohmann::json& json) {
+  return json.dump(2, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 
 std::string formatPhases(const PhaseSeconds& phases) {

@@ -27,6 +27,7 @@ struct CommonOptions {
   bool quiet = false;
   bool strict = false;  // what would be told as a note ends the command
   bool verbose = false;
+  int read_retries = 0;
 };
 
 // Which common options a command takes beside --quiet, --verbose and --progress.
@@ -54,7 +55,8 @@ class CommandContext {
   // Progress of the running command; cancelled by SIGINT and SIGTERM.
   Progress& progress();
 
-  // What the command was asked for, on stdout, --quiet or not.
+  // What the command was asked for, on stdout, --quiet or not. Where it cannot be written the
+  // command fails when its body has ended.
   void answer(const std::string& text);
 
   // A line for people, on stderr; not with --quiet.
@@ -71,6 +73,7 @@ class CommandContext {
 
  private:
   Status checkParsed() const;
+  void end(Status status);
 
   struct Command {
     const CLI::App* app;
@@ -78,6 +81,7 @@ class CommandContext {
   };
   std::vector<Command> commands_;
   std::unique_ptr<ConsoleProgress> progress_;
+  Status answered_;
   std::chrono::steady_clock::time_point start_;
 };
 
@@ -92,6 +96,9 @@ std::string formatCount(std::uint64_t count);
 
 // --temp; without it files lie where the job wants them, else beside the output.
 CLI::Option* addTemporaryOption(CLI::App& command, std::string& directory);
+
+// JSON of several lines, in ASCII: what is no UTF-8 in it, as names of files may be, is replaced.
+std::string jsonText(const nlohmann::json& json);
 
 // Seconds by phase, for people, "read 1.2 s, sort 0.3 s", and for statistics.
 using PhaseSeconds = std::vector<std::pair<std::string, double>>;

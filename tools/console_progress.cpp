@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "surfeit/process.h"
+#include "tools/console.h"
 
 namespace surfeit {
 namespace {
@@ -45,6 +47,7 @@ ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose, bool str
   action.sa_handler = onCancelSignal;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  setProcessCancelled([] { return g_cancel_signal != 0; });
 }
 
 ConsoleProgress::~ConsoleProgress() { clear(); }
@@ -89,23 +92,22 @@ void ConsoleProgress::draw() {
   const int percent = static_cast<int>(part * 100);
   if (style_ == Style::kBar) {
     const auto filled = static_cast<std::size_t>(part * 30);
-    fmt::print(stderr, "\r\x1b[K{:>8} [{}{}] {:3}%  {} {}{}  {} left", phase_,
-               std::string(filled, '#'), std::string(30 - filled, '.'), percent, formatRate(rate),
-               unit_, bytes, formatSeconds(left));
+    tellRaw(fmt::format("\r\x1b[K{:>8} [{}{}] {:3}%  {} {}{}  {} left", phase_,
+                        std::string(filled, '#'), std::string(30 - filled, '.'), percent,
+                        formatRate(rate), unit_, bytes, formatSeconds(left)));
     bar_shown_ = true;
   } else if (style_ == Style::kPercent) {
     if (percent == last_percent_) return;
-    fmt::print(stderr, "{} {}% {} {}{}, {} left\n", phase_, percent, formatRate(rate), unit_, bytes,
-               formatSeconds(left));
+    tell(fmt::format("{} {}% {} {}{}, {} left\n", phase_, percent, formatRate(rate), unit_, bytes,
+                     formatSeconds(left)));
   } else if (style_ == Style::kJson) {
     const nlohmann::json line = {{"phase", phase_},     {"done", done},
                                  {"total", total_},     {"unit", unit_},
                                  {"per_second", rate},  {"bytes_per_second", byte_rate},
                                  {"seconds_left", left}};
-    fmt::print(stderr, "{}\n", line.dump());
+    tell(line.dump() + "\n");
   }
   last_percent_ = percent;
-  std::fflush(stderr);
 }
 
 void ConsoleProgress::note(const std::string& message) {
@@ -118,12 +120,12 @@ void ConsoleProgress::note(const std::string& message) {
 void ConsoleProgress::inform(const std::string& message) {
   if (quiet_) return;
   clear();
-  fmt::print(stderr, "surfeit: {}\n", message);
+  tell(fmt::format("surfeit: {}\n", message));
 }
 
 void ConsoleProgress::clear() {
   const std::lock_guard lock(mutex_);
-  if (bar_shown_) fmt::print(stderr, "\r\x1b[K");
+  if (bar_shown_) tellRaw("\r\x1b[K");
   bar_shown_ = false;
 }
 

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -140,7 +139,7 @@ Status runCube(CubeArguments& arguments, CommandContext& context) {
     fields["coverage_rms"] = error;
   }
   if (format == PictureFormat::kPng && !context.common.quiet) {
-    fmt::print("{}", cubeLegend(cubes, arguments.drawing));
+    context.answer(cubeLegend(cubes, arguments.drawing));
   }
   return context.writeStats(fields);
 }

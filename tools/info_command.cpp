@@ -305,7 +305,7 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
   }
   json["path"] = arguments.path;
   if (arguments.json) {
-    context.answer(json.dump(2));
+    context.answer(jsonText(json));
   } else {
     context.answer(text);
   }

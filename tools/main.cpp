@@ -2,12 +2,13 @@
 #include <malloc.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "surfeit/version.h"
 #include "tools/command.h"
+#include "tools/console.h"
 #include "tools/suggestion.h"
 
 namespace surfeit {
@@ -31,6 +32,16 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addCubeCommand(app, context);
 }
 
+// --help and --version.
+int answerHelp(const CLI::App& app, const CLI::Success& success) {
+  std::ostringstream text;
+  const int exit_status = app.exit(success, text, text);
+  const Status written = writeAnswer(text.str());
+  if (written.ok()) return exit_status;
+  tell("surfeit: " + written.message() + "\n");
+  return exitStatus(written.code());
+}
+
 int parseAndRun(int argc, char** argv) {
   CommandContext context;
   CLI::App app("Surfeit: gathers over huge surfel clouds inside a memory budget", "surfeit");
@@ -41,11 +52,11 @@ int parseAndRun(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
-    return app.exit(success);  // --help and --version
+    return answerHelp(app, success);
   } catch (const CLI::ParseError& error) {
     const std::string suggestion =
         suggestOption(app, std::vector<std::string>(argv + 1, argv + argc));
-    std::fprintf(stderr, "surfeit: %s%s\n", error.what(), suggestion.c_str());
+    tell(std::string("surfeit: ") + error.what() + suggestion + "\n");
     return exitStatus(StatusCode::kInvalidArgument);
   }
   return context.exit_status;
@@ -55,6 +66,7 @@ int parseAndRun(int argc, char** argv) {
 }  // namespace surfeit
 
 int main(int argc, char** argv) {
+  surfeit::prepareStreams();
   // Few arenas, and large buffers given back when freed: the memory budget counts what is in use
   mallopt(M_ARENA_MAX, 2);
   mallopt(M_MMAP_THRESHOLD, 256 << 10);

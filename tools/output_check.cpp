@@ -4,9 +4,11 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "surfeit/output.h"
@@ -14,10 +16,11 @@
 namespace surfeit {
 namespace {
 
-constexpr std::string_view kOutputs[] = {"output", "passes", "plot", "stats"};
+constexpr std::string_view kOutputs[] = {"output", "passes", "plot", "stats", "cache-series"};
 
 struct Output {
   std::string option, path;
+  std::string place;  // of what is not there: its directory and name
   struct ::stat info {};
   bool is_file = false;  // there is a file that would be replaced
 };
@@ -27,6 +30,15 @@ bool isOutput(const CLI::Option& option) {
   return std::any_of(names.begin(), names.end(), [](const std::string& name) {
     return std::find(std::begin(kOutputs), std::end(kOutputs), name) != std::end(kOutputs);
   });
+}
+
+// The same for all paths that lead there.
+std::string placeOf(const std::string& path) {
+  const std::filesystem::path file(path);
+  std::error_code error;
+  const std::filesystem::path directory = std::filesystem::canonical(
+      file.has_parent_path() ? file.parent_path() : std::filesystem::path("."), error);
+  return error ? path : (directory / file.filename()).string();
 }
 
 Status checkAgainst(const Output& output, const std::string& other, std::string_view what) {
@@ -44,11 +56,12 @@ Status checkOutputs(const CLI::App& command, bool works_in_place) {
   std::vector<Output> outputs;
   for (const CLI::Option* const option : command.get_options()) {
     if (option->count() == 0 || !isOutput(*option)) continue;
-    Output output{"--" + option->get_lnames().front(), option->results().back(), {}, false};
+    Output output{"--" + option->get_lnames().front(), option->results().back(), {}, {}, false};
     SURFEIT_ASSIGN_OR_RETURN(const OutputPlace target, findOutput(output.path));
     output.is_file = !target.is_stream && ::stat(target.path.c_str(), &output.info) == 0;
+    if (!target.is_stream) output.place = placeOf(target.path);
     for (const Output& earlier : outputs) {
-      const bool is_same = output.path == earlier.path && !target.is_stream;
+      const bool is_same = !output.place.empty() && output.place == earlier.place;
       if (is_same) {
         return Status::invalidArgument(fmt::format("{}: {} and {} would write the same file",
                                                    output.path, earlier.option, output.option));

@@ -8,10 +8,10 @@
 
 namespace surfeit {
 
-// Of a parsed command: its outputs are the options --output, --passes, --plot and --stats, all
-// others may name inputs. kInvalidArgument when an output is the same file as an input, by whatever
-// name, or as another output, or is a directory; kIoError when it cannot be written.
-// `works_in_place`: the file of --output may be one of the inputs given by position.
+// Of a parsed command: its outputs are the options --output, --passes, --plot, --stats and
+// --cache-series, all others may name inputs. kInvalidArgument when an output is the same file as
+// an input, by whatever name, or as another output, or is a directory; kIoError when it cannot be
+// written. `works_in_place`: the file of --output may be one of the inputs given by position.
 Status checkOutputs(const CLI::App& command, bool works_in_place);
 
 }  // namespace surfeit

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <utility>
@@ -179,7 +178,7 @@ Status runTune(TuneArguments& arguments, CommandContext& context) {
       advice(arguments, report)));
   if (!arguments.plot.empty()) SURFEIT_RETURN_IF_ERROR(writePlot(arguments, report));
   nlohmann::json fields = reportJson(report);
-  if (arguments.json) std::printf("%s\n", fields.dump(2).c_str());
+  if (arguments.json) context.answer(jsonText(fields));
   return context.writeStats(std::move(fields));
 }
 

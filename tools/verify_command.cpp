@@ -6,6 +6,7 @@
 
 #include "surfeit/scene.h"
 #include "tools/command.h"
+#include "tools/console.h"
 
 namespace surfeit {
 namespace {
@@ -27,11 +28,11 @@ Status runVerify(const std::string& path, CommandContext& context) {
   }
   // All findings but the last; the last is the command's error
   for (std::size_t i = 0; i + 1 < report.findings.size(); ++i) {
-    fmt::print(stderr, "surfeit: {}\n", report.findings[i]);
+    tell(fmt::format("surfeit: {}\n", report.findings[i]));
   }
   if (report.finding_count > report.findings.size()) {
-    fmt::print(stderr, "surfeit: {}: {} more findings\n", path,
-               report.finding_count - report.findings.size());
+    tell(fmt::format("surfeit: {}: {} more findings\n", path,
+                     report.finding_count - report.findings.size()));
   }
   return Status::corruption(report.findings.back());
 }

@@ -32,4 +32,16 @@ SURFEIT_API double processCpuSeconds();
 // nothing under sanitizers, which multiply what a process takes. Call before the jobs begin.
 SURFEIT_API void limitProcess(std::uint64_t memory_bytes);
 
+// For such a program, too: whatever reads an input asks this before every block, from any thread,
+// and ends with kInterrupted when it is true. So an input that takes long to look into, before any
+// Progress has a say, stops as well. nullptr, as at first: nobody is asked.
+SURFEIT_API void setProcessCancelled(bool (*is_cancelled)());
+
+// Reads of files that fail with EIO, as those of networked file systems may for a moment, are tried
+// again up to so many times each, after 10 ms, 20 ms and so on, in this process. 0, as at first: a
+// failed read is an error. What is read is checked as always.
+SURFEIT_API void setReadRetries(int retries);
+// How many reads were tried again so far.
+SURFEIT_API std::uint64_t readsRetried();
+
 }  // namespace surfeit

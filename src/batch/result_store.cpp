@@ -131,9 +131,15 @@ Status ResultStore::put(std::span<const Entry> entries) {
     }
     return {};
   }
-  const std::size_t block_records = blockRecords();
   // One lock for all buckets: what is done under it takes nanoseconds, a gather microseconds
   const std::lock_guard lock(mutex_);
+  if (failure_.ok()) failure_ = putAll(entries);
+  return failure_;
+}
+
+// Into open blocks, which are written when they are full.
+Status ResultStore::putAll(std::span<const Entry> entries) {
+  const std::size_t block_records = blockRecords();
   for (const Entry& entry : entries) {
     SURFEIT_CHECK(entry.index < options_.count);
     const std::size_t b = static_cast<std::size_t>(entry.index / bucket_indices_);
@@ -172,21 +178,25 @@ Status ResultStore::writeBlock(std::size_t bucket, std::size_t records) {
 
 Status ResultStore::finish() {
   if (block_bytes_ == 0) return {};
-  for (std::size_t b = 0; b < buckets_.size(); ++b) {
+  for (std::size_t b = 0; b < buckets_.size() && failure_.ok(); ++b) {
     const std::size_t open = buckets_[b].entries % blockRecords();
-    if (open > 0) SURFEIT_RETURN_IF_ERROR(writeBlock(b, open));
+    if (open > 0) failure_ = writeBlock(b, open);
   }
+  SURFEIT_RETURN_IF_ERROR(failure_);
   blocks_ = {};
   results_.reserve(static_cast<std::size_t>(bucket_indices_) * floats_);
-  return file_ != nullptr ? file_->flush() : Status();
+  if (file_ != nullptr) failure_ = file_->flush();
+  return failure_;
 }
 
 Status ResultStore::take(std::span<GatherResult> results) {
   SURFEIT_CHECK(results.size() <= options_.count - taken_);
+  SURFEIT_RETURN_IF_ERROR(failure_);
   while (!results.empty()) {
     const std::uint64_t begin = taken_ % bucket_indices_;
     if (begin == 0 && block_bytes_ > 0) {
-      SURFEIT_RETURN_IF_ERROR(loadBucket(static_cast<std::size_t>(taken_ / bucket_indices_)));
+      failure_ = loadBucket(static_cast<std::size_t>(taken_ / bucket_indices_));
+      SURFEIT_RETURN_IF_ERROR(failure_);
     }
     const std::size_t count = std::min(results.size(), results_.size() / floats_ - begin);
     for (std::size_t i = 0; i < count; ++i) {

@@ -19,7 +19,7 @@
 
 namespace surfeit {
 
-// Throws std::bad_alloc. After a failure or an exception it is of no further use.
+// Throws std::bad_alloc. The first failure is final: every later call returns it.
 //
 // Memory, all included but for the stack of the thread that writes the file: a result per index
 // where these fit, at 4 bytes per float of the outputs. Else 2.125 MiB for the file, 16 bytes per
@@ -76,6 +76,7 @@ class ResultStore {
   std::byte* openBlock(std::size_t bucket) const;
   std::size_t blockRecords() const;
   std::size_t recordBytes() const { return sizeof(std::uint32_t) + floats_ * sizeof(float); }
+  Status putAll(std::span<const Entry> entries);
   Status writeBlock(std::size_t bucket, std::size_t records);
   Status loadBucket(std::size_t bucket);
 
@@ -89,6 +90,7 @@ class ResultStore {
   std::vector<Bucket> buckets_;
   AlignedBuffer blocks_;  // the open blocks of all buckets; later the one being read
   std::unique_ptr<TemporaryFile> file_;
+  Status failure_;
 
   std::vector<float> results_;  // packed; all, or those of the bucket being taken
 };

@@ -186,7 +186,7 @@ GatherWork Bouncer::gatherWork() const {
 // What gathering and rewriting take beside what a gather of no receivers takes.
 std::uint64_t Bouncer::bytesBesideGather() const {
   const auto threads = static_cast<std::uint64_t>(gather_options_.threads);
-  const std::uint64_t directory = scene_->pages().pageCount() * sizeof(PageEntry);
+  const std::uint64_t directory = scene_->pages().memoryBytes();
   return 2 * directory + BounceRadiosity::memoryBytes(scene_->surfelPageCount()) +
          threads * BounceCrew::threadBytes(*scene_, options_.surfels_per_receiver) +
          BlockWriter::kDefaultBlocks * BlockWriter::kBlockBytes +

@@ -34,6 +34,7 @@
 #include "cloud/vdb/vdb_writer.h"
 #include "core/up_comment.h"
 #include "storage/byte_output.h"
+#include "storage/output_target.h"
 
 namespace surfeit {
 namespace {
@@ -219,6 +220,15 @@ void noteLostUpAxis(const std::string& path, const CloudFormat& format,
                   is_csv ? "CSV" : format.name, upAxisName(up), upAxisName(up)));
 }
 
+// Of a PLY.
+std::uint64_t rowBytesOf(const RowWriterOptions& writing) {
+  std::uint64_t bytes = 0;
+  for (const RowProperty& property : writing.properties) {
+    bytes += writing.ply_encoding == PlyEncoding::kAscii ? 2 : valueTypeBytes(property.type);
+  }
+  return bytes;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
@@ -230,6 +240,9 @@ Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
   for (const CloudFormat& format : kFormats) {
     if (format.create != nullptr && hasExtension(name, format.extensions)) {
       noteLostUpAxis(path, format, writing);
+      if (writing.count && name == path && format.extensions == ".ply") {
+        SURFEIT_RETURN_IF_ERROR(checkOutputRoom(path, *writing.count * rowBytesOf(writing)));
+      }
       SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> writer, format.create(path, writing));
       return format.has(CloudFormat::kFloatPositions) ? watchPositions(std::move(writer))
                                                       : std::move(writer);

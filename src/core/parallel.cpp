@@ -4,6 +4,7 @@
 
 #include "core/assert.h"
 #include "core/tbb_tasks.h"
+#include "core/thread_check.h"
 
 #ifdef __SANITIZE_THREAD__
 #include <sanitizer/tsan_interface.h>
@@ -130,6 +131,7 @@ void workOnItem(void* context, std::size_t stage, std::size_t item) {
 }  // namespace
 
 void withThreads(int threads, const std::function<void()>& work) {
+  requireThreads(threads);
   Job job{{}, work};
   const CallerScope caller(job.group);
   tbb_tasks::withThreads(threads, doJob, &job);

@@ -27,9 +27,7 @@ Status catchAll(const char* doing, const std::function<Status()>& work) noexcept
 
 Status runOnThreads(int threads, FirstFailure& failure, const char* doing,
                     const std::function<Status()>& work) {
-  const auto workOrNote = [&] {
-    failure.note(catchAll(doing, work));
-  };
+  const auto workOrNote = [&] { failure.note(catchAll(doing, work)); };
   {
     std::vector<std::jthread> others;
     try {

@@ -39,7 +39,7 @@ std::uint64_t emptyEngineBytes() {
 }
 
 std::uint64_t sceneBytes(const SceneFile& file) {
-  return PagedOctree::fixedBytes(file, 0) + file.provenance().size() +
+  return PagedOctree::fixedBytes(file, 0) +
          kPageTableBytes * (std::uint64_t{file.nodePageCount()} + file.surfelPageCount());
 }
 

@@ -11,6 +11,7 @@
 #include "core/bounds.h"
 #include "core/guard.h"
 #include "index/cloud_density.h"
+#include "index/stray_note.h"
 #include "octree/read/scene_file.h"
 #include "storage/byte_input.h"
 #include "surfels/surfel_source.h"
@@ -41,6 +42,7 @@ Result<std::string> firstBytes(const std::string& path) {
 
 // What a pass over a cloud finds.
 struct CloudScan {
+  glm::dvec3 origin;  // of the sample
   Bounds3d bounds;
   std::uint64_t spheres = 0;
   PlaceSample sample;
@@ -50,7 +52,7 @@ struct CloudScan {
 Result<CloudScan> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(source.rewind());
   source.setOrigin(origin);
-  CloudScan scan{{}, 0, PlaceSample(source.recordCount())};
+  CloudScan scan{origin, {}, 0, PlaceSample(source.recordCount())};
   std::vector<Surfel> batch(kBatchSurfels);
   progress.beginPhase("scan", source.recordCount(), "surfels");
   for (;;) {
@@ -86,6 +88,10 @@ Status addSurfels(const std::string& path, const RowReaderOptions& options, Clou
   if (!scan.bounds.isEmpty()) {
     surfels.min = scan.bounds.min;
     surfels.max = scan.bounds.max;
+    const std::span<const glm::vec3> places = scan.sample.places();
+    const std::string strays =
+        strayNote({places.begin(), places.end()}, scan.sample.bounds(), scan.origin);
+    if (!strays.empty()) info.notes.push_back(strays);
     SURFEIT_ASSIGN_OR_RETURN(surfels.density, measureDensity(**source, scan.sample, progress));
   }
   info.surfels = std::move(surfels);

@@ -16,7 +16,7 @@ namespace {
 Result<std::unique_ptr<PagedOctree>> openOctree(SceneFile scene, const NeighbourBuild& how,
                                                 std::uint64_t beside) {
   // The directory of what is written is another one of the same size
-  beside += scene.pages().pageCount() * sizeof(PageEntry);
+  beside += scene.pages().memoryBytes() + PagedOctree::leafRunBytes(scene);
   const std::uint64_t cache_bytes =
       std::min<std::uint64_t>(how.memory_bytes - std::min(how.memory_bytes, beside),
                               PagedOctree::unlimitedCacheBytes(scene));
@@ -28,11 +28,11 @@ Result<std::unique_ptr<PagedOctree>> openOctree(SceneFile scene, const Neighbour
 // The scene with normals that point to either side, where these are asked for; else the real one is
 // built, and there is none.
 Result<std::optional<SceneFile>> buildFound(SceneFile places, const NeighbourBuild& how,
-                                            IndexStats& stats) {
+                                            IndexStats& stats, const Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(
       const std::unique_ptr<PagedOctree> octree,
       openOctree(std::move(places), how, SizedSurfelStream::searcherBytes(how.threads)));
-  SizedSurfelStream found(*octree, how.disk_overlap, how.normals, how.threads);
+  SizedSurfelStream found(*octree, how.disk_overlap, how.normals, how.threads, progress);
   SURFEIT_RETURN_IF_ERROR(found.prepare());
   std::optional<SceneFile> unoriented;
   if (how.normals && how.normals->needsSides()) {
@@ -75,7 +75,7 @@ std::uint64_t leastNeighbourBytes(const NormalEstimation& estimation, int thread
 Status buildFromNeighbours(SceneFile places, const NeighbourBuild& how, IndexStats& stats,
                            PhaseClock& clock, Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(std::optional<SceneFile> unoriented,
-                           buildFound(std::move(places), how, stats));
+                           buildFound(std::move(places), how, stats, progress));
   if (!unoriented) return {};
   return buildOriented(std::move(*unoriented), how, stats, clock, progress);
 }

@@ -3,12 +3,20 @@
 #include <fmt/format.h>
 
 #include <string>
+#include <utility>
+#include <vector>
+
+#include "index/stray_note.h"
 
 namespace surfeit {
 
 void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
                     const IndexOptions& options, Progress& progress) {
   for (const std::string& note : reader.notesOfFloats(totals)) progress.note(note);
+  std::vector<glm::vec3> places;
+  for (const Surfel& surfel : totals.sample) places.push_back(surfel.position);
+  const std::string strays = strayNote(std::move(places), totals.bounds, reader.origin());
+  if (!strays.empty()) progress.inform(strays);
   if (totals.missing_both > 0) {
     progress.note(
         fmt::format("{} surfels have neither radius nor area: both follow from the "

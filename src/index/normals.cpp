@@ -179,7 +179,8 @@ class NormalsJob {
     const int wanted = threads_;
     for (;; --threads_) {
       const std::uint64_t beside =
-          programBytes(threads_) + PagedOctree::fixedBytes(scene, threads_) + rows +
+          programBytes(threads_) + PagedOctree::fixedBytes(scene, threads_) +
+          PagedOctree::leafRunBytes(scene) + rows +
           std::uint64_t(threads_) * (SurfaceSearch::memoryBytes() + kPlacesPerThread * kPlaceBytes);
       const std::uint64_t least = beside + 3 * ExternalSorter::kLeastMemory;
       if (stats_.memory_bytes >= least) {
@@ -259,7 +260,8 @@ class NormalsJob {
       found.resize(batch.size());
       SURFEIT_RETURN_IF_ERROR(findOnThreads(
           searches, surfels, [](std::size_t) { return true; },
-          [&](std::size_t i, const SurfaceAt& surface) { found[i] = foundAt(batch[i], surface); }));
+          [&](std::size_t i, const SurfaceAt& surface) { found[i] = foundAt(batch[i], surface); },
+          progress_));
       for (const FoundRow& row : found) {
         SURFEIT_RETURN_IF_ERROR(found_rows_->add(row));
       }

@@ -32,6 +32,7 @@
 #include "core/spherical_harmonics.h"
 #include "core/split_mix.h"
 #include "core/tangent_frame.h"
+#include "core/thread_check.h"
 #include "core/up_comment.h"
 #include "sample/direct_light.h"
 #include "sample/ray_scene.h"
@@ -350,6 +351,7 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   std::size_t(stats.threads));
   try {
+    requireThreads(stats.threads);
     auto start = std::chrono::steady_clock::now();
     progress.beginPhase("load", 0, "triangles");
     SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh, loadScene(meshes, options.surroundings, progress));

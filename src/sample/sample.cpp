@@ -19,6 +19,7 @@
 #include "core/long_side.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
+#include "core/thread_check.h"
 #include "core/up_comment.h"
 #include "sample/dice.h"
 #include "sample/direct_light.h"
@@ -284,6 +285,7 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   std::size_t(stats.threads));
   try {
+    requireThreads(stats.threads);
     auto start = std::chrono::steady_clock::now();
     progress.beginPhase("load", 0, "triangles");
     SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh, loadScene(meshes, options.surroundings, progress));

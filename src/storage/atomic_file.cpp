@@ -105,7 +105,11 @@ Status AtomicFile::State::publish() {
   // The new name itself must survive a power loss too. File systems that do not sync directories
   // say so by EINVAL
   if (system_calls::fsync(directory.get()) != 0 && errno != EINVAL) {
-    return file.systemError("sync the directory of the finished file");
+    const Status status = file.systemError("sync the directory of the finished file");
+    return Status(status.code(),
+                  status.message() +
+                      ": the file is complete and has its name, but a power loss may "
+                      "still undo that");
   }
   return {};
 }

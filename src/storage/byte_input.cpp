@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/process_cancelled.h"
 #include "storage/compression.h"
 
 namespace surfeit {
@@ -51,6 +52,7 @@ struct ByteInput::State {
   Result<std::size_t> decode(std::span<std::byte> bytes) {
     const std::span<std::byte> all = bytes;
     while (!bytes.empty()) {
+      if (isProcessCancelled()) return Status::interrupted();
       // A decompressor may hold decoded bytes after its last input, but then it is inside a part
       if (packed.empty()) {
         const std::size_t room = bytes.size();
@@ -135,6 +137,7 @@ std::optional<std::uint64_t> ByteInput::size() const {
 }
 
 Result<std::size_t> ByteInput::readSome(std::uint64_t offset, std::span<std::byte> bytes) {
+  if (isProcessCancelled()) return Status::interrupted();
   if (!isCompressed()) return state_->file.readSome(offset, bytes);
   return state_->readCompressed(offset, bytes);
 }
@@ -148,6 +151,7 @@ Status ByteInput::readAt(std::uint64_t offset, std::span<std::byte> bytes) {
 }
 
 Result<Bytes> ByteInput::readView(std::uint64_t offset, std::size_t size, AlignedBuffer& buffer) {
+  if (isProcessCancelled()) return Status::interrupted();
   if (!isCompressed()) return state_->file.readView(offset, size, buffer);
   buffer.reserve(size);
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t got,

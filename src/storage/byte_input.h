@@ -31,7 +31,8 @@ class ByteInput {
 
   // Reads up to bytes.size() bytes at `offset`; fewer only at the end. A compressed file is decoded
   // forward, and from its start when `offset` lies before the last read's end. kCorruption when
-  // compressed bytes are damaged or end early. Several gzip members or zstd frames in a row are one
+  // compressed bytes are damaged or end early; kInterrupted, of all reads, when the process is
+  // cancelled (core/process_cancelled.h). Several gzip members or zstd frames in a row are one
   // file.
   Result<std::size_t> readSome(std::uint64_t offset, std::span<std::byte> bytes);
   // Reads exactly bytes.size() bytes; kCorruption when the file ends before that, naming `offset`

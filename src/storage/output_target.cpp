@@ -68,6 +68,12 @@ Status checkDirectory(const std::string& path, const std::string& real_path) {
         "{}: cannot write in the directory {}: {}: write elsewhere, or change its permissions",
         path, directory, std::strerror(errno)));
   }
+  const std::size_t name_bytes = real_path.size() - (real_path.rfind('/') + 1);
+  const long most_bytes = ::pathconf(directory.c_str(), _PC_NAME_MAX);
+  if (most_bytes > 0 && name_bytes > static_cast<std::size_t>(most_bytes)) {
+    return Status::ioError(fmt::format("{}: a name of {} bytes, expected at most {}: shorten it",
+                                       path, name_bytes, most_bytes));
+  }
   return {};
 }
 
@@ -99,7 +105,9 @@ Result<FileDescriptor> openStream(const OutputTarget& target) {
 Result<OutputTarget> resolveOutput(const std::string& path) {
   OutputTarget target;
   if (const int descriptor = descriptorNamed(path); descriptor >= 0) {
-    if (::fcntl(descriptor, F_GETFD) < 0) return systemError(path, "write");
+    const int flags = ::fcntl(descriptor, F_GETFL);
+    if (flags >= 0 && (flags & O_ACCMODE) == O_RDONLY) errno = EBADF;
+    if (flags < 0 || (flags & O_ACCMODE) == O_RDONLY) return systemError(path, "write");
     target.path = path;
     target.is_stream = true;
     return target;
@@ -123,6 +131,18 @@ Result<OutputTarget> resolveOutput(const std::string& path) {
   }
   SURFEIT_RETURN_IF_ERROR(checkDirectory(path, target.path));
   return target;
+}
+
+Status checkOutputRoom(const std::string& path, std::uint64_t least_bytes) {
+  SURFEIT_ASSIGN_OR_RETURN(const OutputTarget target, resolveOutput(path));
+  if (target.is_stream) return {};
+  const std::string directory = directoryOf(target.path);
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t available, availableBytes(directory));
+  if (available >= least_bytes) return {};
+  return Status::ioError(fmt::format(
+      "{}: {:.1f} MiB are free in {}, expected at least {:.1f} MiB: make room, or write "
+      "elsewhere",
+      path, double(available) / (1 << 20), directory, double(least_bytes) / (1 << 20)));
 }
 
 Status writeToStream(const OutputTarget& target, int from, std::uint64_t size) {

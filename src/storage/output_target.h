@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -22,6 +23,9 @@ struct OutputTarget {
 // directory; kIoError where the directory is missing or not to be written to, or a device, FIFO or
 // socket may not be.
 Result<OutputTarget> resolveOutput(const std::string& path);
+
+// kIoError when the file system of an output has less room; none is needed for a stream.
+Status checkOutputRoom(const std::string& path, std::uint64_t least_bytes);
 
 // Writes the first `size` bytes of the open file `from` to a stream.
 Status writeToStream(const OutputTarget& target, int from, std::uint64_t size);

@@ -1,11 +1,12 @@
 #include "storage/page_codec.h"
 
-// For ZSTD_c_literalCompressionMode
+// For ZSTD_c_literalCompressionMode and ZSTD_MAGICNUMBER
 #define ZSTD_STATIC_LINKING_ONLY
 
 #include <fmt/format.h>
 #include <zstd.h>
 
+#include <bit>
 #include <cstring>
 #include <memory>
 #include <utility>
@@ -51,6 +52,10 @@ struct Decompression {
 
 }  // namespace
 
+std::uint64_t mostStoredBytes(std::uint64_t payload_bytes) {
+  return payload_bytes + (payload_bytes >> 8) + kStoredSurplus;
+}
+
 Status compressPage(Bytes payload, std::size_t packed_bytes, std::vector<std::byte>& stored) {
   const auto& context = threadScratch<Compression>([] {}).context;
   if (context == nullptr) return Status::failed("zstd: no memory for a compression context");
@@ -67,6 +72,14 @@ Status compressPage(Bytes payload, std::size_t packed_bytes, std::vector<std::by
 Status decompressPage(Bytes stored, std::span<std::byte> payload) {
   const auto& context = threadScratch<Decompression>([] {}).context;
   if (context == nullptr) return Status::failed("zstd: no memory for a decompression context");
+  // A frame of data: one to skip would hold nothing, and any number of bytes
+  std::uint32_t magic = 0;
+  if (stored.size() >= sizeof magic) std::memcpy(&magic, stored.data(), sizeof magic);
+  static_assert(std::endian::native == std::endian::little);
+  if (magic != ZSTD_MAGICNUMBER) {
+    return Status::corruption(
+        fmt::format("zstd: begins with {:08x}, expected {:08x}", magic, ZSTD_MAGICNUMBER));
+  }
   // The frame tells how much of the payload it holds; the rest follows it
   const unsigned long long packed_bytes = ZSTD_getFrameContentSize(stored.data(), stored.size());
   if (packed_bytes == ZSTD_CONTENTSIZE_ERROR || packed_bytes == ZSTD_CONTENTSIZE_UNKNOWN) {
@@ -78,6 +91,11 @@ Status decompressPage(Bytes stored, std::span<std::byte> payload) {
   }
   const std::span<std::byte> plain = payload.subspan(packed_bytes);
   const Bytes frame = stored.first(stored.size() - plain.size());
+  const std::size_t frame_bytes = ZSTD_findFrameCompressedSize(frame.data(), frame.size());
+  if (!ZSTD_isError(frame_bytes) && frame_bytes != frame.size()) {
+    return Status::corruption(
+        fmt::format("zstd: a frame of {} bytes, expected {}", frame_bytes, frame.size()));
+  }
   const std::size_t bytes =
       ZSTD_decompressDCtx(context.get(), payload.data(), packed_bytes, frame.data(), frame.size());
   if (ZSTD_isError(bytes)) {

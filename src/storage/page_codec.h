@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,12 @@
 #include "surfeit/status.h"
 
 namespace surfeit {
+
+// Bytes of a stored page (docs/format.md, "Container"): no frame is shorter, and what cannot be
+// compressed grows by no more than this beside a 256th.
+inline constexpr std::uint64_t kLeastStoredBytes = 9;
+inline constexpr std::uint64_t kStoredSurplus = 64;
+std::uint64_t mostStoredBytes(std::uint64_t payload_bytes);
 
 // Compresses the first `packed_bytes` of `payload` into `stored` (replaced); what follows looks
 // like noise and is appended. Safe from any thread.

@@ -29,7 +29,8 @@ std::string checksumMismatch(std::uint64_t found, std::uint64_t expected) {
   return fmt::format("checksum {:016x}, expected {:016x}", found, expected);
 }
 
-Bytes bytesOf(const std::vector<PageEntry>& entries) { return std::as_bytes(std::span(entries)); }
+// Entries that are read and checked at a time.
+constexpr std::uint64_t kEntriesAtATime = 4096;
 
 }  // namespace
 
@@ -67,23 +68,77 @@ Result<PageFile> PageFile::open(InputFile file) {
   SURFEIT_RETURN_IF_ERROR(
       pages.readFooter(directory_offset, provenance_offset, provenance_checksum));
 
-  // Provenance and directory: sizes follow from offsets that readFooter has checked
-  pages.provenance_.resize(directory_offset - provenance_offset);
-  const std::span<std::byte> text = std::as_writable_bytes(std::span(pages.provenance_));
-  SURFEIT_RETURN_IF_ERROR(pages.file_.readAt(provenance_offset, text));
-  if (const std::uint64_t found = hash(text, pages.identity_); found != provenance_checksum) {
-    return pages.partError("provenance", checksumMismatch(found, provenance_checksum));
-  }
-  const std::uint64_t directory_bytes = pages.fileBytes() - kFileFooterBytes - directory_offset;
-  pages.directory_.resize(directory_bytes / sizeof(PageEntry));
+  // Sizes follow from offsets that readFooter has checked
   SURFEIT_RETURN_IF_ERROR(
-      pages.file_.readAt(directory_offset, std::as_writable_bytes(std::span(pages.directory_))));
-  if (const std::uint64_t found = hash(bytesOf(pages.directory_), pages.identity_);
-      found != pages.directory_checksum_) {
-    return pages.partError("directory", checksumMismatch(found, pages.directory_checksum_));
-  }
-  SURFEIT_RETURN_IF_ERROR(pages.checkDirectory(provenance_offset));
+      pages.readProvenance(provenance_offset, directory_offset, provenance_checksum));
+  SURFEIT_RETURN_IF_ERROR(pages.readDirectory(directory_offset, provenance_offset));
   return pages;
+}
+
+Status PageFile::readProvenance(std::uint64_t begin, std::uint64_t end, std::uint64_t checksum) {
+  provenance_.resize(end - begin);
+  const std::span<std::byte> text = std::as_writable_bytes(std::span(provenance_));
+  SURFEIT_RETURN_IF_ERROR(file_.readAt(begin, text));
+  const std::uint64_t found = hash(text, identity_);
+  if (found != checksum) return partError("provenance", checksumMismatch(found, checksum));
+  return {};
+}
+
+// A part at a time, so that a directory of which the file system stores nothing, a hole, is refused
+// before it takes memory. Pages lie between header and provenance, and take as many bytes as there
+// are.
+Status PageFile::readDirectory(std::uint64_t begin, std::uint64_t pages_end) {
+  PageEntry first;
+  if (page_count_ > 0) {
+    SURFEIT_RETURN_IF_ERROR(file_.readAt(begin, std::as_writable_bytes(std::span(&first, 1))));
+    SURFEIT_RETURN_IF_ERROR(checkEntry(0, first, pages_end));
+  }
+  directory_.reserve(page_count_ * sizeof(PageEntry));
+  std::uint64_t bytes = 0;
+  Status implausible;
+  for (std::uint64_t done = 0; done < page_count_ && implausible.ok(); done += kEntriesAtATime) {
+    const std::uint64_t count = std::min(kEntriesAtATime, page_count_ - done);
+    const std::span<PageEntry> entries(directory() + done, count);
+    SURFEIT_RETURN_IF_ERROR(
+        file_.readAt(begin + done * sizeof(PageEntry), std::as_writable_bytes(entries)));
+    for (std::uint64_t i = 0; i < count && implausible.ok(); ++i) {
+      implausible = checkEntry(static_cast<std::uint32_t>(done + i), entries[i], pages_end);
+      bytes += entries[i].stored_bytes;
+      max_stored_bytes_ = std::max(max_stored_bytes_, entries[i].stored_bytes);
+      max_payload_bytes_ = std::max(max_payload_bytes_, entries[i].payload_bytes);
+    }
+  }
+  SURFEIT_RETURN_IF_ERROR(implausible);
+  const Bytes all(directory_.data(), page_count_ * sizeof(PageEntry));
+  if (const std::uint64_t found = hash(all, identity_); found != directory_checksum_) {
+    return partError("directory", checksumMismatch(found, directory_checksum_));
+  }
+  if (bytes != pages_end - kFileHeaderBytes) {
+    return partError("directory", fmt::format("pages of {} bytes, expected {}", bytes,
+                                              pages_end - kFileHeaderBytes));
+  }
+  return {};
+}
+
+Status PageFile::checkEntry(std::uint32_t page, const PageEntry& entry,
+                            std::uint64_t pages_end) const {
+  if (entry.offset < kFileHeaderBytes || entry.offset > pages_end ||
+      entry.stored_bytes > pages_end - entry.offset) {
+    return partError("directory",
+                     fmt::format("page {} at {} with {} bytes, expected between {} and {}", page,
+                                 entry.offset, entry.stored_bytes, kFileHeaderBytes, pages_end));
+  }
+  if (entry.payload_bytes > kMaxPayloadBytes) {
+    return partError("directory", fmt::format("page {} decodes to {} bytes, expected at most {}",
+                                              page, entry.payload_bytes, kMaxPayloadBytes));
+  }
+  const std::uint64_t most = mostStoredBytes(entry.payload_bytes);
+  if (entry.stored_bytes < kLeastStoredBytes || entry.stored_bytes > most) {
+    return partError("directory",
+                     fmt::format("page {} of {} bytes, which decode to {}, expected {} to {}", page,
+                                 entry.stored_bytes, entry.payload_bytes, kLeastStoredBytes, most));
+  }
+  return {};
 }
 
 Status PageFile::readHeader() {
@@ -159,6 +214,11 @@ Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& prov
                                            "of {} bytes",
                                            provenance_offset, directory_offset, fileBytes()));
   }
+  if (directory_offset - provenance_offset > kMaxProvenanceBytes) {
+    return partError("footer",
+                     fmt::format("provenance of {} bytes, expected at most {}",
+                                 directory_offset - provenance_offset, kMaxProvenanceBytes));
+  }
   const std::uint64_t directory_bytes = directory_end - directory_offset;
   const std::uint64_t pages = directory_bytes / sizeof(PageEntry);
   if (directory_bytes % sizeof(PageEntry) != 0 || pages > kMaxPages || node_pages > pages) {
@@ -166,33 +226,14 @@ Status PageFile::readFooter(std::uint64_t& directory_offset, std::uint64_t& prov
                                            "number of entries",
                                            directory_bytes, node_pages));
   }
+  const std::uint64_t most_pages = (provenance_offset - kFileHeaderBytes) / kLeastStoredBytes;
+  if (pages > most_pages) {
+    return partError("footer",
+                     fmt::format("directory of {} pages, expected at most {} in {} bytes", pages,
+                                 most_pages, provenance_offset - kFileHeaderBytes));
+  }
+  page_count_ = static_cast<std::uint32_t>(pages);
   node_page_count_ = static_cast<std::uint32_t>(node_pages);
-  return {};
-}
-
-// Pages lie between header and provenance, and take as many bytes as there are.
-Status PageFile::checkDirectory(std::uint64_t pages_end) {
-  std::uint64_t bytes = 0;
-  for (std::uint32_t page = 0; page < pageCount(); ++page) {
-    const PageEntry& at = directory_[page];
-    if (at.offset < kFileHeaderBytes || at.offset > pages_end ||
-        at.stored_bytes > pages_end - at.offset) {
-      return partError("directory",
-                       fmt::format("page {} at {} with {} bytes, expected between {} and {}", page,
-                                   at.offset, at.stored_bytes, kFileHeaderBytes, pages_end));
-    }
-    if (at.payload_bytes > kMaxPayloadBytes) {
-      return partError("directory", fmt::format("page {} decodes to {} bytes, expected at most {}",
-                                                page, at.payload_bytes, kMaxPayloadBytes));
-    }
-    bytes += at.stored_bytes;
-    max_stored_bytes_ = std::max(max_stored_bytes_, at.stored_bytes);
-    max_payload_bytes_ = std::max(max_payload_bytes_, at.payload_bytes);
-  }
-  if (bytes != pages_end - kFileHeaderBytes) {
-    return partError("directory", fmt::format("pages of {} bytes, expected {}", bytes,
-                                              pages_end - kFileHeaderBytes));
-  }
   return {};
 }
 
@@ -300,6 +341,11 @@ Result<PageFile> PageFileWriter::finishUnnamed(Bytes scene_fields, const std::st
 // Writes all that follows the pages, and the header.
 Status PageFileWriter::complete(Bytes scene_fields, const std::string& provenance) {
   SURFEIT_CHECK(scene_fields.size() <= kSceneFieldsBytes);
+  if (provenance.size() > kMaxProvenanceBytes) {
+    return Status::invalidArgument(fmt::format("{}: provenance of {} bytes, expected at most {}",
+                                               file_.path(), provenance.size(),
+                                               kMaxProvenanceBytes));
+  }
   // Provenance and directory
   const std::uint64_t provenance_offset = file_.size();
   const Bytes text = std::as_bytes(std::span(provenance));

@@ -29,6 +29,8 @@ inline constexpr std::size_t kSceneFieldsOffset = 64;
 inline constexpr std::size_t kSceneFieldsBytes = kFileHeaderBytes - kSceneFieldsOffset - 8;
 // No page decodes to more than this; what declares more is refused before anything is allocated.
 inline constexpr std::uint32_t kMaxPayloadBytes = 4 << 20;
+// Nor is a longer provenance written or read.
+inline constexpr std::uint64_t kMaxProvenanceBytes = 64 << 10;
 
 // Where a page lies and what it must hash to.
 struct PageEntry {
@@ -46,8 +48,9 @@ std::uint64_t pageSeed(std::uint64_t file_identity, std::uint64_t offset);
 class PageFile {
  public:
   // Checks everything but the pages. kCorruption names file, part, found and expected; a newer
-  // version is refused with its number. Allocates no more than the file's own directory. `access`
-  // is how readPage reads; all else is cached.
+  // version is refused with its number. Memory is what memoryBytes() says; of a directory or
+  // provenance that cannot be true no more is read than shows that. `access` is how readPage reads;
+  // all else is cached.
   static Result<PageFile> open(const std::string& path, Access access = Access::kCached);
   static Result<PageFile> open(InputFile file);
 
@@ -58,10 +61,15 @@ class PageFile {
   Bytes sceneFields() const { return scene_fields_; }
   const std::string& provenance() const { return provenance_; }
 
+  // Bytes of the directory and the provenance.
+  std::uint64_t memoryBytes() const {
+    return page_count_ * sizeof(PageEntry) + provenance_.capacity();
+  }
+
   // Pages are numbered through: node pages first, then surfel pages.
-  std::uint32_t pageCount() const { return static_cast<std::uint32_t>(directory_.size()); }
+  std::uint32_t pageCount() const { return page_count_; }
   std::uint32_t nodePageCount() const { return node_page_count_; }
-  const PageEntry& entry(std::uint32_t page) const { return directory_[page]; }
+  const PageEntry& entry(std::uint32_t page) const { return directory()[page]; }
   // Differs between two files unless identity and the bytes and places of all pages are the same.
   std::uint64_t directoryChecksum() const { return directory_checksum_; }
   // Most stored and decoded bytes of any page.
@@ -82,17 +90,22 @@ class PageFile {
   Status readHeader();
   Status readFooter(std::uint64_t& directory_offset, std::uint64_t& provenance_offset,
                     std::uint64_t& provenance_checksum);
-  Status checkDirectory(std::uint64_t pages_end);
+  Status readProvenance(std::uint64_t begin, std::uint64_t end, std::uint64_t checksum);
+  Status readDirectory(std::uint64_t begin, std::uint64_t pages_end);
+  Status checkEntry(std::uint32_t page, const PageEntry& entry, std::uint64_t pages_end) const;
   Status readError(std::uint32_t page, const Status& status) const;
   Status partError(const char* part, const std::string& message) const;
+
+  PageEntry* directory() const { return reinterpret_cast<PageEntry*>(directory_.data()); }
 
   InputFile file_;
   std::uint32_t format_version_ = 0;
   std::uint64_t identity_ = 0;
+  std::uint32_t page_count_ = 0;
   std::uint32_t node_page_count_ = 0;
   std::vector<std::byte> scene_fields_;
   std::string provenance_;
-  std::vector<PageEntry> directory_;
+  AlignedBuffer directory_;  // entries; touched as they are read
   std::uint64_t directory_checksum_ = 0;
   std::uint32_t max_stored_bytes_ = 0;
   std::uint32_t max_payload_bytes_ = 0;
@@ -116,7 +129,8 @@ class PageFileWriter {
   std::uint64_t surfelPageCount() const { return surfel_pages_.size(); }
   std::uint64_t nodePageCount(std::size_t level) const { return node_pages_[level].size(); }
 
-  // Writes what remains. scene_fields: at most kSceneFieldsBytes.
+  // Writes what remains. scene_fields: at most kSceneFieldsBytes. kInvalidArgument when the
+  // provenance is longer than kMaxProvenanceBytes.
   Status finish(Bytes scene_fields, const std::string& provenance);
   // The same, but the file gets no name: it is returned, opened and checked, and goes with its last
   // reader.

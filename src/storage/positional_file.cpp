@@ -189,6 +189,11 @@ Status PositionalFile::writeError(std::uint64_t offset, std::size_t size) const 
     }
     if (!full_disk_advice_.empty()) message += "; " + full_disk_advice_;
   }
+  if (error == EFBIG) {
+    message +=
+        "; files of this process may be no larger: raise the limit (ulimit -f), or that of "
+        "the file system";
+  }
   return Status::ioError(std::move(message));
 }
 

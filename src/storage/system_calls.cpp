@@ -6,7 +6,24 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
+#include <thread>
+
+#include "surfeit/process.h"
+
+namespace surfeit {
+namespace {
+
+std::atomic<int> read_retries{0};
+std::atomic<std::uint64_t> reads_retried{0};
+
+}  // namespace
+
+void setReadRetries(int retries) { read_retries = retries; }
+std::uint64_t readsRetried() { return reads_retried; }
+
+}  // namespace surfeit
 
 namespace surfeit::system_calls {
 namespace {
@@ -48,10 +65,20 @@ int open(const char* path, int flags, mode_t mode) {
 }
 
 ssize_t pread(int descriptor, void* bytes, std::size_t size, std::uint64_t offset) {
-  return make({.call = Call::kPread, .descriptor = descriptor, .bytes = size, .offset = offset},
-              [&](std::size_t allowed) {
-                return ::pread(descriptor, bytes, allowed, static_cast<off_t>(offset));
-              });
+  for (int retry = 0;; ++retry) {
+    const ssize_t got =
+        make({.call = Call::kPread,
+              .descriptor = descriptor,
+              .bytes = size,
+              .offset = offset,
+              .data = bytes},
+             [&](std::size_t allowed) {
+               return ::pread(descriptor, bytes, allowed, static_cast<off_t>(offset));
+             });
+    if (got >= 0 || errno != EIO || retry >= read_retries) return got;
+    ++reads_retried;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10) * (retry + 1));
+  }
 }
 
 ssize_t pwrite(int descriptor, const void* bytes, std::size_t size, std::uint64_t offset) {

@@ -36,6 +36,7 @@ struct CallInfo {
   int flags = 0;                   // of kOpen and kFlock
   std::size_t bytes = 0;           // of kPread and kPwrite
   std::uint64_t offset = 0;        // of kPread, kPwrite, kFtruncate and kFallocate
+  void* data = nullptr;            // of kPread: where the bytes come
 };
 
 // Called around every system call, from the thread that makes it.
@@ -54,6 +55,7 @@ class FaultInjector {
 FaultInjector* installFaultInjector(FaultInjector* injector);
 
 int open(const char* path, int flags, mode_t mode = 0);
+// Tried again after EIO as often as setReadRetries (surfeit/process.h) says.
 ssize_t pread(int descriptor, void* bytes, std::size_t size, std::uint64_t offset);
 ssize_t pwrite(int descriptor, const void* bytes, std::size_t size, std::uint64_t offset);
 int fsync(int descriptor);

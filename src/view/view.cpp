@@ -14,6 +14,7 @@
 #include "cloud/cloud_formats.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
+#include "core/thread_check.h"
 #include "view/brick_rows.h"
 #include "view/camera.h"
 #include "view/channel.h"
@@ -278,6 +279,7 @@ Result<ViewStats> viewCloud(const std::string& input, const std::string& picture
   const auto start = std::chrono::steady_clock::now();
   const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
   try {
+    requireThreads(threads);
     tbb::task_arena arena(threads);
     Result<ViewStats> result =
         arena.execute([&] { return draw(input, picture, options, progress); });

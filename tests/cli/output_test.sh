@@ -21,6 +21,14 @@ inputsAreNoOutputs() {
   run 2 gather city.sft city.ply -o city.sft
   run 2 convert before.ply -o out.ply --stats before.ply
   run 2 tune city.sft city.ply --plot city.sft
+  run 2 gather city.sft city.ply -o out.ply --stats out.ply
+  run 2 gather city.sft city.ply -o out.ply --stats ./out.ply
+  says "would write the same file"
+  run 2 gather city.sft city.ply -o out.ply --cache-series city.sft
+  says "--cache-series would replace its input"
+  run 2 gather city.sft city.ply -o out.ply --cache-series "$PWD/out.ply"
+  run 2 gather city.sft city.ply -o out.ply --stats s.json --cache-series s.json
+  [[ ! -e out.ply ]] || fail "worked before it looked at its outputs"
   sameBytes city.ply before.ply
   run 0 verify city.sft
   run 0 convert city.ply -o city.ply # works in place
@@ -99,11 +107,32 @@ badPlacesAreRefusedFirst() {
   run 74 index city.ply -o city.sft --stats nowhere/stats.json
   [[ ! -e city.sft ]] || fail "worked before it looked at its outputs"
   run 74 index city.ply -o city.ply/city.sft
+  local long
+  long=$(printf 'x%.0s' {1..260}).ply
+  run 74 convert city.ply -o "$long"
+  says "shorten it"
+  run 74 convert city.ply -o out.ply --stats "$long"
+  [[ ! -e out.ply ]] || fail "worked before it looked at its outputs"
   if [[ $(id -u) != 0 ]]; then
     mkdir -m 555 closed
     run 74 index city.ply -o closed/city.sft
     says "cannot write in the directory"
   fi
+}
+
+resultsThatWillNotFitAreRefusedFirst() {
+  generate city.ply --surfels 300k
+  "$surfeit" index -q city.ply -o city.sft
+  mkdir small
+  mount -t tmpfs -o size=2m none small 2> /dev/null || exit 77
+  trap 'umount small' EXIT
+  local began
+  began=$(date +%s)
+  run 74 gather city.sft city.ply -o small/out.ply --quality final
+  says "MiB are free in small" "write elsewhere"
+  run 74 convert city.ply -o small/out.ply
+  (($(date +%s) - began < 20)) || fail "gathered before it looked whether the result will fit"
+  [[ -z $(ls small) ]] || fail "left behind: $(ls small)"
 }
 
 answersGoToStandardOutput() {

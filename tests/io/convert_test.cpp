@@ -41,6 +41,29 @@ TEST_F(ConvertTest, MergedCloudsHaveThePropertiesOfAll) {
                                   path("b.ply") + ": not there, 0 is written: radius"));
 }
 
+// Names that are numbers, or differ by their case alone.
+TEST_F(ConvertTest, OddNamesOfColumnsComeBack) {
+  for (const char* file : {"odd.csv", "odd.xyz", "odd.ply"}) {
+    for (const std::vector<const char*>& odd :
+         {std::vector{"nan", "inf", "Infinity"}, std::vector{"X", "Y", "Z"}}) {
+      Table table;
+      for (const char* name : odd)
+        table.properties.push_back(tableOf({{name, kFloat}}).properties[0]);
+      for (const char* name : {"x", "y", "z"}) {
+        table.properties.push_back(tableOf({{name, kFloat}}).properties[0]);
+      }
+      table.rows = {{1, 2, 3, 4, 5, 6}, {.5, .25, .125, 7, 8, 9.5}};
+      writeTable(file, table);
+      const Table read = readTable(file);
+      ASSERT_EQ(read.properties.size(), 6u) << file;
+      for (std::size_t i = 0; i < 6; ++i) {
+        EXPECT_EQ(read.properties[i].name, table.properties[i].name) << file;
+      }
+      EXPECT_EQ(read.rows, table.rows) << file;
+    }
+  }
+}
+
 TEST_F(ConvertTest, MergedColorsKeepTheirShade) {
   const auto colors = [](ValueType type) {
     return tableOf({{"x", kFloat},

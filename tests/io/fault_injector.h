@@ -107,6 +107,23 @@ class FailCall : public FaultInjector {
   std::atomic<Call> failed_call_{Call::kOpen};
 };
 
+// Damages what read `number` (from 1) of those that pass the filter has brought: one bit, in the
+// middle.
+class FlipBit : public FaultInjector {
+ public:
+  FlipBit(int number, CallFilter filter) : number_(number), filter_(std::move(filter)) {}
+  int before(CallInfo&) override { return 0; }
+  void after(const CallInfo& info, int error) override {
+    if (info.call != Call::kPread || error != 0 || !filter_(info) || ++count_ != number_) return;
+    static_cast<std::byte*>(info.data)[info.bytes / 2] ^= std::byte{4};
+  }
+
+ private:
+  const int number_;
+  CallFilter filter_;
+  std::atomic<int> count_{0};
+};
+
 // Does something at the first call that passes the filter, before it is made; the calls of what it
 // does are not looked at.
 class ActAtCall : public FaultInjector {

@@ -14,6 +14,7 @@
 #include "storage/byte_coding.h"
 #include "storage/byte_output.h"
 #include "storage/file.h"
+#include "storage/temporary_bytes.h"
 
 namespace surfeit {
 namespace {
@@ -34,7 +35,7 @@ struct PdbColumn {
 
 class PdbWriter final : public RowWriter {
  public:
-  PdbWriter(ByteOutput output, TemporaryFile blocks, const RowWriterOptions& options)
+  PdbWriter(ByteOutput output, TemporaryBytes blocks, const RowWriterOptions& options)
       : output_(std::move(output)), blocks_(std::move(blocks)) {
     element_.name = "vertex";
     element_.properties = options.properties;
@@ -91,6 +92,7 @@ class PdbWriter final : public RowWriter {
   Status finish() override {
     SURFEIT_RETURN_IF_ERROR(failure_);
     if (open_rows_ > 0) SURFEIT_RETURN_IF_ERROR(endBlock());
+    SURFEIT_RETURN_IF_ERROR(blocks_.flush());
     SURFEIT_RETURN_IF_ERROR(writeHeader());
     for (const PdbColumn& column : columns_) SURFEIT_RETURN_IF_ERROR(writeColumn(column));
     return output_.commit();
@@ -111,7 +113,7 @@ class PdbWriter final : public RowWriter {
   // A block is a whole one, whatever it holds, so that columns are found by arithmetic.
   Status endBlock() {
     open_rows_ = 0;
-    return blocks_.append(block_).status();
+    return blocks_.append(block_);
   }
 
   Status writeHeader() {
@@ -150,16 +152,16 @@ class PdbWriter final : public RowWriter {
     for (std::uint64_t begin = 0; begin < count_; begin += kBlockRows) {
       const std::size_t rows =
           static_cast<std::size_t>(std::min<std::uint64_t>(kBlockRows, count_ - begin));
-      SURFEIT_ASSIGN_OR_RETURN(const Bytes values,
-                               blocks_.readView(begin * bytes_per_row_ + column.offset * kBlockRows,
-                                                rows * value_bytes, buffer_));
-      SURFEIT_RETURN_IF_ERROR(output_.append(values));
+      block_.resize(rows * value_bytes);
+      SURFEIT_RETURN_IF_ERROR(
+          blocks_.readAt(begin * bytes_per_row_ + column.offset * kBlockRows, block_));
+      SURFEIT_RETURN_IF_ERROR(output_.append(block_));
     }
     return {};
   }
 
   ByteOutput output_;
-  TemporaryFile blocks_;
+  TemporaryBytes blocks_;
   RowLayout element_;
   std::vector<std::string> notes_;
   std::vector<PdbColumn> columns_;
@@ -167,7 +169,6 @@ class PdbWriter final : public RowWriter {
   std::vector<std::byte> block_;
   std::size_t open_rows_ = 0;  // in block_
   std::uint64_t count_ = 0;
-  AlignedBuffer buffer_;
   Status failure_;
 };
 
@@ -176,7 +177,7 @@ class PdbWriter final : public RowWriter {
 Result<std::unique_ptr<RowWriter>> createPdb(const std::string& path,
                                              const RowWriterOptions& options) {
   SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path, options.progress));
-  SURFEIT_ASSIGN_OR_RETURN(TemporaryFile blocks, TemporaryFile::create(spoolDirectory()));
+  SURFEIT_ASSIGN_OR_RETURN(TemporaryBytes blocks, TemporaryBytes::create(spoolDirectory()));
   auto writer = std::make_unique<PdbWriter>(std::move(output), std::move(blocks), options);
   SURFEIT_RETURN_IF_ERROR(writer->open(options));
   return std::unique_ptr<RowWriter>(std::move(writer));

@@ -19,12 +19,12 @@ Result<SpooledInput> SpooledInput::open(const std::string& path, Access access) 
 }
 
 Status SpooledInput::spool() {
-  SURFEIT_ASSIGN_OR_RETURN(TemporaryFile file, TemporaryFile::create(spoolDirectory()));
+  SURFEIT_ASSIGN_OR_RETURN(TemporaryBytes file, TemporaryBytes::create(spoolDirectory()));
   std::vector<std::byte> buffer(256 << 10);
   while (true) {
     SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, input_.readSome(size_, buffer));
     if (got == 0) break;
-    SURFEIT_RETURN_IF_ERROR(file.append(Bytes(buffer).first(got)).status());
+    SURFEIT_RETURN_IF_ERROR(file.append(Bytes(buffer).first(got)));
     size_ += got;
   }
   SURFEIT_RETURN_IF_ERROR(file.flush());
@@ -46,7 +46,11 @@ Result<Bytes> SpooledInput::readView(std::uint64_t offset, std::size_t size,
     return Status::corruption(fmt::format("{}: file ends early: {} bytes, expected {} at {}",
                                           path(), size_, size, offset));
   }
-  if (spooled_) return spooled_->readView(offset, size, buffer);
+  if (spooled_) {
+    buffer.reserve(size);
+    SURFEIT_RETURN_IF_ERROR(spooled_->readAt(offset, {buffer.data(), size}));
+    return Bytes(buffer.data(), size);
+  }
   SURFEIT_ASSIGN_OR_RETURN(const Bytes view, input_.readView(offset, size, buffer));
   if (view.size() == size) return view;
   return Status::corruption(fmt::format("{}: file ends early: {} bytes at {}, expected {}", path(),

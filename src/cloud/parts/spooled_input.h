@@ -10,6 +10,7 @@
 #include "storage/byte_input.h"
 #include "storage/file.h"
 #include "storage/output_target.h"
+#include "storage/temporary_bytes.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -33,7 +34,7 @@ class SpooledInput {
 
   ByteInput input_;
   std::uint64_t size_ = 0;
-  std::optional<TemporaryFile> spooled_;  // when the file is compressed
+  std::optional<TemporaryBytes> spooled_;  // when the file is compressed
 };
 
 }  // namespace surfeit

@@ -19,6 +19,7 @@
 #include "storage/byte_coding.h"
 #include "storage/byte_output.h"
 #include "storage/file.h"
+#include "storage/temporary_bytes.h"
 
 namespace surfeit {
 namespace {
@@ -72,7 +73,7 @@ class LasWriter final : public RowWriter {
     }
     doubts_ = std::move(plan);
     is_doubted_.resize(doubts_->doubtful.size(), false);
-    SURFEIT_ASSIGN_OR_RETURN(TemporaryFile rows, TemporaryFile::create(spoolDirectory()));
+    SURFEIT_ASSIGN_OR_RETURN(TemporaryBytes rows, TemporaryBytes::create(spoolDirectory()));
     rows_.emplace(std::move(rows));
     least_.fill(std::numeric_limits<double>::infinity());
     most_.fill(-std::numeric_limits<double>::infinity());
@@ -100,7 +101,7 @@ class LasWriter final : public RowWriter {
     }
     if (!rows_) return encode(rows);
     look(rows);
-    return rows_->append(rows).status();
+    return rows_->append(rows);
   }
 
   Status finish() override {
@@ -154,6 +155,7 @@ class LasWriter final : public RowWriter {
     for (std::size_t i = 0; i < is_doubted_.size(); ++i) {
       if (is_doubted_[i]) wish_.misfits.push_back(doubts_->columns[doubts_->doubtful[i]].property);
     }
+    SURFEIT_RETURN_IF_ERROR(rows_->flush());
     const std::uint64_t bytes = rows_->size();
     wish_.count = bytes / element_.row_bytes;
     SURFEIT_ASSIGN_OR_RETURN(LasPlan plan, planLas(wish_, output_.path()));
@@ -170,10 +172,11 @@ class LasWriter final : public RowWriter {
 
     const std::size_t block =
         std::max<std::size_t>(1, kBlockBytes / element_.row_bytes) * element_.row_bytes;
-    AlignedBuffer buffer;
+    std::vector<std::byte> buffer(block);
     for (std::uint64_t at = 0; at < bytes; at += block) {
       const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(block, bytes - at));
-      SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, rows_->readView(at, size, buffer));
+      const std::span<std::byte> rows = std::span(buffer).first(size);
+      SURFEIT_RETURN_IF_ERROR(rows_->readAt(at, rows));
       SURFEIT_RETURN_IF_ERROR(encode(rows));
     }
     return {};
@@ -352,7 +355,7 @@ class LasWriter final : public RowWriter {
   std::optional<LasCrsRecord> crs_;
 
   // Rows that wait, and what is found out meanwhile
-  std::optional<TemporaryFile> rows_;
+  std::optional<TemporaryBytes> rows_;
   std::optional<LasPlan> doubts_;
   std::vector<bool> is_doubted_;
   std::array<double, 3> least_{}, most_{};

@@ -17,6 +17,13 @@ bool beginsWithNumbers(std::span<const std::string_view> words) {
   return words.size() >= 3 && std::all_of(words.begin(), words.begin() + 3, isTextNumber);
 }
 
+// Whether the line names columns nan, inf and the like, which are numbers elsewhere.
+bool namesNumbers(std::string_view line) {
+  const bool has_digits =
+      std::any_of(line.begin(), line.end(), [](char c) { return c >= '0' && c <= '9'; });
+  return !has_digits && !parseXyzHeader(line).file_names.empty();
+}
+
 std::string textOfComment(std::string_view line) {
   line = line.substr(0, kMaxCommentChars);
   while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
@@ -63,7 +70,7 @@ XyzHead::Line XyzHead::take(std::string_view line) {
     header_ = parseXyzHeader(line);
     return Line::kHead;
   }
-  if (isData(line)) return Line::kData;
+  if (isData(line) && !namesNumbers(line)) return Line::kData;
   if (isTextCount(line) && !has_count_) {
     has_count_ = true;
     for (const char c : line) count_ = count_ * 10 + static_cast<std::uint64_t>(c - '0');

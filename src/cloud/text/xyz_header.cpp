@@ -217,6 +217,10 @@ bool hasFellows(std::string_view letter, const Words& plain) {
 XyzHeader headerOf(Words words) {
   Words plain;
   for (const std::string& word : words) plain.push_back(plainName(word));
+  // Beside an x, an X is another column
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] != plain[i] && contains(words, plain[i])) plain[i] = words[i];
+  }
 
   // Names that we know
   Words names(words.size());

@@ -19,6 +19,8 @@ namespace surfeit {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+// The first row, or names of columns, come before.
+constexpr std::uint64_t kMostHeadBytes = 1 << 20;
 
 bool hasCommasInAndOutOfQuotes(std::string_view line) {
   bool is_quoted = false, has_inner = false, has_outer = false;
@@ -65,6 +67,11 @@ class XyzReader final : public CountedRowReader {
   Status readHead() {
     for (;;) {
       SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source_.lines());
+      if (source_.offset() > kMostHeadBytes) {
+        return Status::corruption(
+            fmt::format("{}: found no line of numbers in {} bytes, expected one in the first {}",
+                        path_, source_.offset(), kMostHeadBytes));
+      }
       const std::size_t end = std::min(lines.find('\n'), lines.size());
       std::string_view line = lines.substr(0, end);
       if (source_.offset() == 0 && line.starts_with(kByteOrderMark)) {

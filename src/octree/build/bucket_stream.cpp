@@ -17,7 +17,6 @@ namespace {
 // Threads that read the blocks of a bucket: blocks of 100 to 400 KiB need several to keep the
 // device busy.
 constexpr std::size_t kReaders = 4;
-constexpr int kContentWords = sizeof(Surfel) / sizeof(SortWord);
 // Words that splitters are chosen from, when a bucket is distributed again.
 constexpr std::size_t kSampleWords = 65536;
 constexpr std::size_t kMaxFinerBuckets = 1024;
@@ -181,12 +180,7 @@ void BucketStream::sort(SortedBatch& batch) {
 
 SortWord BucketStream::wordOf(const Surfel& surfel, int word) const {
   if (word == 0) return curveKey(surfel.position, options_.cube);
-  // Bytes compare from the front, as contentLess does
-  SortWord content;
-  std::memcpy(&content,
-              reinterpret_cast<const std::byte*>(&surfel) + sizeof content * std::size_t(word - 1),
-              sizeof content);
-  return __builtin_bswap64(content);
+  return contentWord(surfel, word - 1);
 }
 
 // Splitters for a bucket that is too large, and the word in which its surfels differ: one more than

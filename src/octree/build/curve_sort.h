@@ -15,8 +15,16 @@ struct Ticket {
   std::uint64_t index = 0;
 };
 
-// Order of surfels with one key: by their bytes, so that the order of the input does not show.
+// Order of surfels with one key: by a finer key, then by their bytes, so that the order of the
+// input does not show. The finer key takes the bits of the coordinates by turns, as floats rise,
+// from the highest on: neighbours follow each other however many surfels lie in one cell, as all
+// but a few do where a stray is far away.
 bool contentLess(const Surfel& a, const Surfel& b);
+
+// Words that compare as contentLess does, one after the other; `word` is below kContentWords.
+inline constexpr int kFinerWords = 2;
+inline constexpr int kContentWords = kFinerWords + int(sizeof(Surfel) / sizeof(std::uint64_t));
+std::uint64_t contentWord(const Surfel& surfel, int word);
 
 // Sorts tickets by key with all threads of the current arena; `scratch` has the same size. Within a
 // key the order stays as it was. A pass from the top splits the tickets until they fit the

@@ -21,8 +21,9 @@ bool needsSize(const Surfel& surfel) { return (surfel.flags & kSurfelNeedsSize) 
 }  // namespace
 
 SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap,
-                                     std::optional<NormalRule> normals, int threads)
-    : octree_(octree), overlap_(overlap), normals_(std::move(normals)) {
+                                     std::optional<NormalRule> normals, int threads,
+                                     const Progress& progress)
+    : octree_(octree), overlap_(overlap), normals_(std::move(normals)), progress_(progress) {
   for (int i = 0; i < threads; ++i) searchers_.emplace_back(octree);
 }
 
@@ -43,6 +44,7 @@ Status SizedSurfelStream::prepare() {
     SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
                              file.decodeSurfels(page, scratch, surfels_));
     for (std::uint32_t i = 0; i < count; i += 16) {
+      if (progress_.isCancelled()) return Status::interrupted();
       SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, searchers_[0].at(surfels_[i]));
       if (surface.area > 0) radii.push_back(surface.radius);
     }
@@ -130,7 +132,8 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
         Surfel& surfel = surfels_[i];
         if (needsSize(surfel)) applySize(surfel, surface);
         if (needsNormal(surfel)) applyNormal(surfel, surface);
-      }));
+      },
+      progress_));
 
   const auto batch = std::make_shared<SortedBatch>();
   batch->resize(surfels_.size());

@@ -29,7 +29,7 @@ namespace surfeit {
 class SizedSurfelStream : public SortedSurfelStream {
  public:
   SizedSurfelStream(PagedOctree& octree, float overlap, std::optional<NormalRule> normals,
-                    int threads);
+                    int threads, const Progress& progress);
   ~SizedSurfelStream() override;
 
   // What searches of so many threads take, besides the octree's own readers.
@@ -56,6 +56,7 @@ class SizedSurfelStream : public SortedSurfelStream {
   PagedOctree& octree_;
   float overlap_;
   std::optional<NormalRule> normals_;
+  const Progress& progress_;
   std::vector<SurfaceSearch> searchers_;
   float largest_radius_ = 0;
   std::uint32_t next_page_ = 0;

@@ -203,7 +203,7 @@ class Chunk {
 
 class SideSearch {
  public:
-  SideSearch(PagedOctree& octree, const OrientationOptions& options, TemporaryFile labels,
+  SideSearch(PagedOctree& octree, const OrientationOptions& options, TemporaryBytes labels,
              Progress& progress)
       : octree_(octree),
         options_(options),
@@ -221,7 +221,7 @@ class SideSearch {
     return {};
   }
 
-  TemporaryFile takeLabels() { return std::move(labels_); }
+  TemporaryBytes takeLabels() { return std::move(labels_); }
   std::vector<bool> takeTurned() { return std::move(is_turned_); }
 
  private:
@@ -261,7 +261,7 @@ class SideSearch {
     if (pieces_.size() >= kNoLabel >> 1) return Status::failed("orient: too many pieces");
     numbered_.assign(chunk.labels().begin(), chunk.labels().end());
     for (std::uint32_t& label : numbered_) label += label == kNoLabel ? 0 : first << 1;
-    SURFEIT_RETURN_IF_ERROR(labels_.append(std::as_bytes(std::span(numbered_))).status());
+    SURFEIT_RETURN_IF_ERROR(labels_.append(std::as_bytes(std::span(numbered_))));
     return chunk.visitVotes(
         [&](std::uint32_t a, std::uint32_t b, float agreed) { vote(first + a, first + b, agreed); },
         [&](OuterEdge edge) {
@@ -339,7 +339,7 @@ class SideSearch {
   PagedOctree& octree_;
   const OrientationOptions& options_;
   Progress& progress_;
-  TemporaryFile labels_;
+  TemporaryBytes labels_;
   ExternalSorter edges_;
   std::vector<PieceSums> pieces_;
   std::vector<std::uint32_t> numbered_;
@@ -352,8 +352,8 @@ class SideSearch {
 
 Result<Sides> Sides::find(PagedOctree& octree, const OrientationOptions& options,
                           Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(TemporaryFile labels,
-                           TemporaryFile::create(options.temporary_directory));
+  SURFEIT_ASSIGN_OR_RETURN(TemporaryBytes labels,
+                           TemporaryBytes::create(options.temporary_directory));
   SideSearch search(octree, options, std::move(labels), progress);
   SURFEIT_RETURN_IF_ERROR(search.run());
   return Sides(search.takeLabels(), search.takeTurned(),

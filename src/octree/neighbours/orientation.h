@@ -12,7 +12,7 @@
 
 #include "octree/build/sorted_surfels.h"
 #include "octree/read/paged_octree.h"
-#include "storage/file.h"
+#include "storage/temporary_bytes.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/up_axis.h"
@@ -42,12 +42,12 @@ class Sides {
   std::uint64_t temporaryBytes() const { return labels_.size(); }
 
  private:
-  Sides(TemporaryFile labels, std::vector<bool> is_turned, std::size_t page_capacity)
+  Sides(TemporaryBytes labels, std::vector<bool> is_turned, std::size_t page_capacity)
       : labels_(std::move(labels)),
         is_turned_(std::move(is_turned)),
         page_capacity_(page_capacity) {}
 
-  TemporaryFile labels_;         // by surfelId
+  TemporaryBytes labels_;        // by surfelId
   std::vector<bool> is_turned_;  // by piece
   std::size_t page_capacity_ = 0;
   std::vector<std::uint32_t> buffer_;

@@ -63,6 +63,61 @@ Status visitLeaf(const Node& leaf, const SceneFile& file, PagedOctree::Reader& r
   return {};
 }
 
+// Calls visit(surfel, id) for the surfels of a leaf: of a large one for those of the runs alone of
+// which not isBeyond(distanceTo(position, radius)), the nearest first.
+template <typename DistanceTo, typename IsBeyond, typename Visit>
+class LeafVisit {
+ public:
+  LeafVisit(const Node& leaf, PagedOctree::Reader& reader, const DistanceTo& distanceTo,
+            const IsBeyond& isBeyond, const Visit& visit)
+      : leaf_(leaf), reader_(reader), distanceTo_(distanceTo), isBeyond_(isBeyond), visit_(visit) {}
+
+  Status run() {
+    if (leaf_.surfel_count <= reader_.file().header().surfel_group_capacity) {
+      return visitLeaf(leaf_, reader_.file(), reader_, visit_);
+    }
+    SURFEIT_ASSIGN_OR_RETURN(runs_, reader_.leafRuns(leaf_));
+    return visitSpheres(runs_->levels.size() - 1, 0);
+  }
+
+ private:
+  // The spheres of a level that lie in one of the level above, from `begin` on.
+  Status visitSpheres(std::size_t level, std::size_t begin) {
+    const std::vector<LeafRuns::Sphere>& spheres = runs_->levels[level];
+    const std::size_t count = std::min(LeafRuns::kFanOut, spheres.size() - begin);
+    std::array<std::pair<float, std::size_t>, LeafRuns::kFanOut> candidates;
+    for (std::size_t i = 0; i < count; ++i) {
+      const LeafRuns::Sphere& sphere = spheres[begin + i];
+      candidates[i] = {distanceTo_(sphere.position, sphere.radius), begin + i};
+    }
+    const auto order = std::span(candidates).first(count);
+    std::sort(order.begin(), order.end());
+    for (const auto& [distance, sphere] : order) {
+      if (isBeyond_(distance)) break;
+      SURFEIT_RETURN_IF_ERROR(level > 0 ? visitSpheres(level - 1, sphere * LeafRuns::kFanOut)
+                                        : visitRun(sphere));
+    }
+    return {};
+  }
+
+  Status visitRun(std::size_t run) {
+    const std::uint32_t page = leaf_.page + std::uint32_t(run), first = run == 0 ? leaf_.first : 0;
+    SURFEIT_ASSIGN_OR_RETURN(const std::span<const Surfel> surfels,
+                             reader_.surfels(page, first, runs_->surfels[run]));
+    for (std::size_t i = 0; i < surfels.size(); ++i) {
+      visit_(surfels[i], surfelId(reader_.file(), page, first + std::uint32_t(i)));
+    }
+    return {};
+  }
+
+  const Node& leaf_;
+  PagedOctree::Reader& reader_;
+  const DistanceTo& distanceTo_;
+  const IsBeyond& isBeyond_;
+  const Visit& visit_;
+  std::shared_ptr<const LeafRuns> runs_;
+};
+
 float distanceSq(const glm::vec3& d) { return glm::dot(d, d); }
 
 bool isBefore(const Neighbour& a, const Neighbour& b) {
@@ -159,14 +214,20 @@ struct PlaceIndex::State {
     // The reader may drop their page
     std::array<Node, 8> copies;
     std::copy(nodes.begin(), nodes.end(), copies.begin());
+    const auto distanceTo = [&](const glm::vec3& position, float radius) {
+      return distanceToBox(position, box) - radius * 1.000001f;
+    };
+    const auto isBeyond = [&](float distance) {
+      return distance > 0 || points.places.size() > most;
+    };
+    const auto visit = [&](const Surfel& surfel, std::uint64_t id) {
+      if (isInside(surfel.position, box)) set.add(surfel, id);
+    };
     for (const Node& node : std::span(copies).first(nodes.size())) {
-      if (distanceToBox(node.position, box) > node.radius * 1.000001f) continue;
+      if (isBeyond(distanceTo(node.position, node.radius))) continue;
       bool fits = true;
       if (node.isLeaf()) {
-        SURFEIT_RETURN_IF_ERROR(
-            visitLeaf(node, reader.file(), reader, [&](const Surfel& surfel, std::uint64_t id) {
-              if (isInside(surfel.position, box)) set.add(surfel, id);
-            }));
+        SURFEIT_RETURN_IF_ERROR(LeafVisit(node, reader, distanceTo, isBeyond, visit).run());
         fits = points.places.size() <= most;
       } else {
         SURFEIT_ASSIGN_OR_RETURN(fits, addRange(childrenOf(node), most, reader));
@@ -269,22 +330,24 @@ std::size_t PlaceIndex::memoryBytes() {
 
 namespace {
 
-// Calls visit(surfel, id), depth first and the nearest child first: distanceTo(node) tells, and
-// what isBeyond(distance) is left out. Nodes are copied because the reader may drop their page.
+// Calls visit(surfel, id), depth first and the nearest child first: distanceTo(position, radius)
+// tells, and what isBeyond(distance) is left out. Nodes are copied because the reader may drop
+// their page.
 template <typename DistanceTo, typename IsBeyond, typename Visit>
 Status visitNearestFirst(const NodeRange& range, PagedOctree::Reader& reader,
                          const DistanceTo& distanceTo, const IsBeyond& isBeyond,
                          const Visit& visit) {
   SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(range));
   std::array<std::pair<float, Node>, 8> candidates;
-  for (std::size_t i = 0; i < nodes.size(); ++i) candidates[i] = {distanceTo(nodes[i]), nodes[i]};
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    candidates[i] = {distanceTo(nodes[i].position, nodes[i].radius), nodes[i]};
   const auto order = std::span(candidates).first(nodes.size());
   std::sort(order.begin(), order.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [distance, node] : order) {
     if (isBeyond(distance)) break;
     if (node.isLeaf()) {
-      SURFEIT_RETURN_IF_ERROR(visitLeaf(node, reader.file(), reader, visit));
+      SURFEIT_RETURN_IF_ERROR(LeafVisit(node, reader, distanceTo, isBeyond, visit).run());
     } else {
       SURFEIT_RETURN_IF_ERROR(
           visitNearestFirst(childrenOf(node), reader, distanceTo, isBeyond, visit));
@@ -303,8 +366,8 @@ class PlaceSearch {
   Status run() {
     SURFEIT_RETURN_IF_ERROR(visitNearestFirst(
         kRootRange, reader_,
-        [&](const Node& node) {
-          return std::max(0.f, glm::length(node.position - position_) - node.radius);
+        [&](const glm::vec3& position, float radius) {
+          return std::max(0.f, glm::length(position - position_) - radius);
         },
         // Positions count, not disks; a slack of one part in a million covers rounding
         [&](float distance) { return distance * distance > limit_sq_ * 1.000001f; },
@@ -366,9 +429,9 @@ class WantedSearch {
   Status run() {
     return visitNearestFirst(
         kRootRange, reader_,
-        [&](const Node& node) {
-          const glm::vec3 offset = node.position - position_;
-          const float radius = node.radius * 1.000001f;
+        [&](const glm::vec3& position, float node_radius) {
+          const glm::vec3 offset = position - position_;
+          const float radius = node_radius * 1.000001f;
           return mayHold_(offset, radius) ? glm::length(offset) - radius : kInfinity;
         },
         [&](float distance) { return distance > limit_; },

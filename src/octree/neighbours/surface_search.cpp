@@ -36,8 +36,10 @@ SurfaceSearch::SurfaceSearch(PagedOctree& octree)
 
 std::size_t SurfaceSearch::memoryBytes() { return PlaceIndex::memoryBytes(); }
 
-Status SurfaceSearch::find(std::span<const Surfel> places, const Wants& wants, const Take& take) {
+Status SurfaceSearch::find(std::span<const Surfel> places, const Wants& wants, const Take& take,
+                           const Progress& progress) {
   return index_.serve(places, *reader_, [&](std::size_t i) -> Status {
+    if (progress.isCancelled()) return Status::interrupted();
     if (!wants(i)) return {};
     SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, at(places[i]));
     take(i, surface);
@@ -98,7 +100,8 @@ Status SurfaceSearch::cutByFarther(const glm::vec3& position) {
 }
 
 Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,
-                     const SurfaceSearch::Wants& wants, const SurfaceSearch::Take& take) {
+                     const SurfaceSearch::Wants& wants, const SurfaceSearch::Take& take,
+                     const Progress& progress) {
   std::atomic<std::size_t> next{0};
   FirstFailure failure;
   // Threads for a batch, which takes them tens of milliseconds
@@ -108,7 +111,7 @@ Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> 
     const std::size_t end = places.size() * (t + 1) / searches.size();
     return searches[t].find(
         places.subspan(begin, end - begin), [&](std::size_t i) { return wants(begin + i); },
-        [&](std::size_t i, const SurfaceAt& surface) { take(begin + i, surface); });
+        [&](std::size_t i, const SurfaceAt& surface) { take(begin + i, surface); }, progress);
   });
 }
 

@@ -12,6 +12,7 @@
 #include "octree/neighbours/places.h"
 #include "octree/neighbours/surface_cell.h"
 #include "octree/read/paged_octree.h"
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 
@@ -38,7 +39,9 @@ class SurfaceSearch {
   // to each other, or it takes long. They need not be in the octree.
   using Wants = std::function<bool(std::size_t)>;
   using Take = std::function<void(std::size_t, const SurfaceAt&)>;
-  Status find(std::span<const Surfel> places, const Wants& wants, const Take& take);
+  // kInterrupted as soon as `progress` is cancelled.
+  Status find(std::span<const Surfel> places, const Wants& wants, const Take& take,
+              const Progress& progress);
   // The same at one place.
   Result<SurfaceAt> at(const Surfel& place);
 
@@ -69,6 +72,7 @@ class SurfaceSearch {
 // The same by a thread for each search, in slices of the places; wants and take are called by all
 // at once.
 Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,
-                     const SurfaceSearch::Wants& wants, const SurfaceSearch::Take& take);
+                     const SurfaceSearch::Wants& wants, const SurfaceSearch::Take& take,
+                     const Progress& progress);
 
 }  // namespace surfeit

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/surfel_limits.h"
 #include "octree/node/moment_codes.h"
 
 namespace surfeit {
@@ -355,6 +356,16 @@ bool getColors(PayloadReader& reader, const MutableAxes& values) {
     if (!allFinite(axis)) return false;
   }
   return true;
+}
+
+bool getRadiosity(PayloadReader& reader, const MutableAxes& values) {
+  constexpr float kLargest = kLargestColor * (1 + 0x1p-10f);
+  if (!getColors(reader, values)) return false;
+  return std::all_of(values.begin(), values.end(), [](std::span<const float> axis) {
+    float largest = 0;
+    for (const float value : axis) largest = std::max(largest, value);
+    return largest <= kLargest;
+  });
 }
 
 void putReflectances(PayloadWriter& writer, const Axes& values, bool full_precision) {

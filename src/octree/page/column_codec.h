@@ -45,6 +45,9 @@ bool getNormals(PayloadReader& reader, const MutableAxes& values);
 // Colors >= 0: three half floats under a common power of two, or floats; one byte when all are 0.
 void putColors(PayloadWriter& writer, const Axes& values, bool full_precision);
 bool getColors(PayloadReader& reader, const MutableAxes& values);
+// The same, but none may be larger than kLargestColor (docs/format.md, "Limits") and what rounding
+// adds.
+bool getRadiosity(PayloadReader& reader, const MutableAxes& values);
 
 // Reflectances in 0..1: three bytes holding square roots, or floats. Larger ones become 1.
 void putReflectances(PayloadWriter& writer, const Axes& values, bool full_precision);

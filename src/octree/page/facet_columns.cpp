@@ -115,7 +115,7 @@ bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes) {
 
 bool FacetColumns::getRadiosity(PayloadReader& reader, std::span<Node> nodes) {
   const MutableAxes columns = colorColumns(countFacets(nodes));
-  if (!getColors(reader, columns)) return false;
+  if (!surfeit::getRadiosity(reader, columns)) return false;
   std::size_t next = 0;
   for (Node& node : nodes) {
     for (std::size_t k = 0; k < node.facet_count; ++k, ++next) {

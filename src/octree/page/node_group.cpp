@@ -423,7 +423,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
   const Columns columns(count);
   const std::span<Node> out = nodes.first(count);
   SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, form, columns));
-  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
   SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
   columns.scatter(form, out);
   SURFEIT_RETURN_IF_ERROR(checkNodes(out));
@@ -456,7 +456,7 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
   const PayloadReader begin = reader;
   SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, form, columns));
   copyTaken(begin, reader, writer);
-  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       columns.radiosity[c][i] = nodes[i].radiosity[static_cast<int>(c)];

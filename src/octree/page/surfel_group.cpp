@@ -184,7 +184,7 @@ Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
   }
   const Columns columns(count);
   SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, columns));
-  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
   SURFEIT_RETURN_IF_ERROR(decodeOptional(reader, form, columns));
   if (reader.remaining() != 0) {
     return Status::corruption(
@@ -205,7 +205,7 @@ Result<std::size_t> replaceSurfelRadiosity(Bytes payload, const PageForm& form,
   const PayloadReader begin = reader;
   SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, columns));
   copyTaken(begin, reader, writer);
-  if (!getColors(reader, columns.radiosity)) return damaged("radiosity");
+  if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
   for (std::size_t i = 0; i < radiosity.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) columns.radiosity[c][i] = radiosity[i][static_cast<int>(c)];
   }

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <glm/geometric.hpp>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -59,6 +62,28 @@ Status noSuchPage(PageNumber page, std::uint32_t pages) {
       fmt::format("page {} does not exist: expected less than {}", page, pages));
 }
 
+// A sphere around a box, and rounding.
+LeafRuns::Sphere sphereAround(const Bounds3& box) {
+  return {box.centre(), 0.5f * glm::length(box.extent()) * 1.00001f};
+}
+
+// Spheres around spheres, until there is one.
+void addUpperLevels(LeafRuns& runs) {
+  while (runs.levels.back().size() > 1) {
+    const std::vector<LeafRuns::Sphere>& lower = runs.levels.back();
+    std::vector<LeafRuns::Sphere> upper;
+    for (std::size_t begin = 0; begin < lower.size(); begin += LeafRuns::kFanOut) {
+      Bounds3 box;
+      for (std::size_t i = begin; i < std::min(begin + LeafRuns::kFanOut, lower.size()); ++i) {
+        box.add(lower[i].position - lower[i].radius);
+        box.add(lower[i].position + lower[i].radius);
+      }
+      upper.push_back(sphereAround(box));
+    }
+    runs.levels.push_back(std::move(upper));
+  }
+}
+
 // Pages of whole levels that may stay resident in so many frames.
 PageNumber residentPages(const SceneHeader& header, std::size_t frames) {
   const std::size_t most = std::min(frames / kResidentPart, kMostResidentPages);
@@ -78,6 +103,8 @@ struct PagedOctree::State {
   std::shared_ptr<OctreeCaches> caches;
   OctreeCaches::Place place;
   Memory memory;
+  std::mutex runs_mutex;                                          // guards runs
+  std::map<std::uint64_t, std::shared_ptr<const LeafRuns>> runs;  // by the leaf's first surfel
 };
 
 struct PagedOctree::Reader::State {
@@ -86,8 +113,12 @@ struct PagedOctree::Reader::State {
     nodes.yieldTo(surfels);
   }
   const SceneFile* file = nullptr;
+  PagedOctree::State* octree = nullptr;
   OctreeCaches::Place place;
   std::uint32_t node_pages = 0, surfel_pages = 0;
+  // The runs that were asked for last
+  std::uint64_t last_leaf = 0;
+  std::shared_ptr<const LeafRuns> last_runs;
   CacheFront nodes, surfels;
 };
 
@@ -95,7 +126,7 @@ std::size_t PagedOctree::fixedBytes(const SceneFile& file, int threads) {
   const PageFile& pages = file.pages();
   const std::size_t per_thread =
       pages.maxStoredBytes() + 2 * kDirectAlignment + pages.maxPayloadBytes() + kDecoderBytes;
-  return pages.pageCount() * sizeof(PageEntry) + static_cast<std::size_t>(threads) * per_thread;
+  return pages.memoryBytes() + static_cast<std::size_t>(threads) * per_thread;
 }
 
 std::size_t PagedOctree::unlimitedCacheBytes(const SceneFile& file) {
@@ -210,6 +241,8 @@ PagedOctree::Reader::~Reader() = default;
 
 void PagedOctree::Reader::use(const PagedOctree& octree) {
   state_->file = &octree.state_->file;
+  state_->octree = octree.state_.get();
+  state_->last_runs = nullptr;
   state_->place = octree.state_->place;
   state_->node_pages = octree.state_->file.nodePageCount();
   state_->surfel_pages = octree.state_->file.surfelPageCount();
@@ -258,6 +291,35 @@ Result<std::span<const Surfel>> PagedOctree::Reader::surfels(std::uint32_t page,
                     first));
   }
   return surfels.subspan(first, std::min<std::uint64_t>(count, surfels.size() - first));
+}
+
+Result<std::shared_ptr<const LeafRuns>> PagedOctree::Reader::leafRuns(const Node& leaf) {
+  const std::uint64_t key = std::uint64_t{leaf.page} << 32 | leaf.first;
+  if (state_->last_runs != nullptr && state_->last_leaf == key) return state_->last_runs;
+  // Who waits for the lock holds no page that its holder may be waiting for
+  release();
+  const std::lock_guard lock(state_->octree->runs_mutex);
+  std::shared_ptr<const LeafRuns>& runs = state_->octree->runs[key];
+  if (runs == nullptr) {
+    auto found = std::make_shared<LeafRuns>();
+    found->levels.emplace_back();
+    SURFEIT_RETURN_IF_ERROR(visitLeaf(leaf, [&](std::span<const Surfel> surfels) {
+      Bounds3 box;
+      for (const Surfel& surfel : surfels) box.add(surfel.position);
+      found->surfels.push_back(static_cast<std::uint32_t>(surfels.size()));
+      found->levels.front().push_back(sphereAround(box));
+    }));
+    addUpperLevels(*found);
+    runs = std::move(found);
+  }
+  state_->last_leaf = key;
+  state_->last_runs = runs;
+  return runs;
+}
+
+std::uint64_t PagedOctree::leafRunBytes(const SceneFile& file) {
+  // An eighth more for each level
+  return file.surfelPageCount() * (sizeof(std::uint32_t) + sizeof(LeafRuns::Sphere) * 8 / 7 + 1);
 }
 
 }  // namespace surfeit

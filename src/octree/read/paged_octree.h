@@ -7,6 +7,8 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 #include "cache/cache_counters.h"
 #include "cache/cache_front.h"
@@ -19,6 +21,19 @@
 #include "surfeit/surfel.h"
 
 namespace surfeit {
+
+// Where the surfels of a large leaf lie: it may hold a whole cloud when a stray is far away.
+// Spheres around the positions of each page's part, a run, around each eight of these, and so on up
+// to one.
+struct LeafRuns {
+  static constexpr std::size_t kFanOut = 8;
+  struct Sphere {
+    glm::vec3 position{0};
+    float radius = 0;
+  };
+  std::vector<std::uint32_t> surfels;       // of each run
+  std::vector<std::vector<Sphere>> levels;  // runs first
+};
 
 // Open file, directory and caches. Readers on several threads share one of these.
 class PagedOctree {
@@ -103,6 +118,7 @@ class PagedOctree {
                                             std::uint64_t count);
 
     // Calls visit(std::span<const Surfel>) for the surfels of a leaf, page by page, in curve order.
+    // It returns nothing, or a Status, whose failure ends the visit.
     template <typename Visit>
     Status visitLeaf(const Node& leaf, Visit&& visit) {
       return visitSurfels(leaf.page, leaf.first, leaf.surfel_count, visit);
@@ -113,16 +129,27 @@ class PagedOctree {
                         Visit&& visit) {
       for (; count > 0; ++page, first = 0) {
         SURFEIT_ASSIGN_OR_RETURN(const std::span<const Surfel> run, surfels(page, first, count));
-        visit(run);
+        if constexpr (std::is_void_v<decltype(visit(run))>) {
+          visit(run);
+        } else {
+          SURFEIT_RETURN_IF_ERROR(visit(run));
+        }
         count -= run.size();
       }
       return {};
     }
 
+    // The runs of a leaf, found when they are first asked for; the octree's readers share them.
+    // Invalidates what the other calls returned.
+    Result<std::shared_ptr<const LeafRuns>> leafRuns(const Node& leaf);
+
    private:
     struct State;
     std::unique_ptr<State> state_;
   };
+
+  // Most bytes that leafRuns keeps: of a scene whose leaves are all large.
+  static std::uint64_t leafRunBytes(const SceneFile& file);
 
  private:
   struct State;

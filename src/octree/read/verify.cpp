@@ -24,6 +24,7 @@ constexpr std::uint64_t kThreadBytes = std::uint64_t{256} << 10;
 // Quantized sums and spheres may differ by this part.
 constexpr float kAreaTolerance = 2e-3f;
 constexpr float kReachTolerance = 2e-3f;
+constexpr double kPowerTolerance = 1e-2;
 
 // Collects findings from several threads.
 class Findings {
@@ -55,11 +56,17 @@ std::uint64_t placeHash(std::uint32_t page, std::uint32_t index) {
   return hash ^ hash >> 31;
 }
 
-// Checks pages one by one. Each thread has its own.
+// Checks pages one by one. Each thread has its own. All share the number of surfels that leaves
+// refer to: those that refer to more than there are would be visited for ever.
 class PageChecker {
  public:
-  PageChecker(const SceneFile& file, PagedOctree& octree, Findings& findings)
-      : file_(file), reader_(octree), findings_(findings) {
+  PageChecker(const SceneFile& file, PagedOctree& octree, Findings& findings,
+              const Progress& progress, std::atomic<std::uint64_t>& referenced)
+      : file_(file),
+        reader_(octree),
+        findings_(findings),
+        progress_(progress),
+        referenced_(referenced) {
     nodes_.resize(file.header().node_group_capacity);
     surfels_.resize(file.header().surfel_group_capacity);
   }
@@ -68,7 +75,15 @@ class PageChecker {
   Result<std::uint64_t> checkSurfelPage(std::uint32_t page) {
     const Result<std::uint32_t> count = file_.decodeSurfels(page, scratch_, surfels_);
     if (!count.ok()) return report(count.status());
-    for (std::uint32_t i = 0; i < *count; ++i) surfel_balance_ += placeHash(page, i);
+    Status outside;
+    for (std::uint32_t i = 0; i < *count; ++i) {
+      surfel_balance_ += placeHash(page, i);
+      if (outside.ok()) outside = checkInBounds(surfels_[i], i);
+    }
+    if (!outside.ok()) {
+      const std::uint32_t file_page = file_.nodePageCount() + page;
+      findings_.add(file_.pages().pageError(file_page, outside.message()).message());
+    }
     return std::uint64_t{*count};
   }
 
@@ -76,6 +91,7 @@ class PageChecker {
     const Result<std::uint32_t> count = file_.decodeNodes(page, scratch_, nodes_);
     if (!count.ok()) return report(count.status());
     for (std::uint32_t i = 0; i < *count; ++i) {
+      if (progress_.isCancelled()) return Status::interrupted();
       node_balance_ += placeHash(page, i);
       const Status status = nodes_[i].isLeaf() ? checkLeaf(nodes_[i]) : checkInterior(nodes_[i]);
       if (status.ok()) continue;
@@ -106,20 +122,44 @@ class PageChecker {
     return status.message().rfind(file_.path(), 0) == 0;
   }
 
+  static constexpr const char* kColors[] = {"red", "green", "blue"};
+
   // What a node claims, against what lies below it.
   struct Below {
     double area = 0;
     std::uint64_t surfels = 0;
     std::uint64_t groups = 0;
+    glm::dvec3 power{0};
+    float brightest = 0;
     float reach = 0;
-    void add(const Node& node, const glm::vec3& at, float radius, float child_area,
-             std::uint64_t count, std::uint64_t child_groups) {
-      area += double(child_area);
+    // A surfel or a child.
+    template <typename Record>
+    void add(const Node& node, const Record& record, float radius, std::uint64_t count,
+             std::uint64_t record_groups) {
+      area += double(record.area);
+      power += double(record.area) * glm::dvec3(record.radiosity);
+      for (int c = 0; c < 3; ++c) brightest = std::max(brightest, record.radiosity[c]);
       surfels += count;
-      groups |= child_groups;
-      reach = std::max(reach, glm::length(at - node.position) + radius);
+      groups |= record_groups;
+      reach = std::max(reach, glm::length(record.position - node.position) + radius);
     }
   };
+
+  // Positions are quantized by less than a radius.
+  Status checkInBounds(const Surfel& surfel, std::uint32_t index) const {
+    const Bounds3& bounds = file_.header().bounds;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float at = surfel.position[axis];
+      if (at >= bounds.min[axis] - surfel.radius && at <= bounds.max[axis] + surfel.radius) {
+        continue;
+      }
+      return Status::corruption(
+          fmt::format("surfel {}: {} at {}, expected {} to {}, the header's "
+                      "bounds",
+                      index, "xyz"[axis], at, bounds.min[axis], bounds.max[axis]));
+    }
+    return {};
+  }
 
   static Status compare(const Node& node, const Below& below) {
     if (below.surfels != node.surfel_count) {
@@ -134,6 +174,15 @@ class PageChecker {
       return Status::corruption(
           fmt::format("area {}, expected {} from what lies below", node.area, below.area));
     }
+    // What is a millionth as bright as the brightest may be lost
+    const double slack = 1e-6 * below.area * double(below.brightest);
+    for (int c = 0; c < 3; ++c) {
+      const double power = double(node.area) * double(node.radiosity[c]);
+      if (std::abs(below.power[c] - power) <= kPowerTolerance * below.power[c] + slack) continue;
+      return Status::corruption(fmt::format("{} radiosity {}, expected {} from what lies below",
+                                            kColors[c], node.radiosity[c],
+                                            below.power[c] / below.area));
+    }
     return {};
   }
 
@@ -144,7 +193,7 @@ class PageChecker {
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> children, reader_.nodes(childrenOf(node)));
     Below below;
     for (const Node& child : children) {
-      below.add(node, child.position, 0, child.area, child.surfel_count, child.groups);
+      below.add(node, child, 0, child.surfel_count, child.groups);
       // A child's sphere may stick out of its parent's; its centre, a mean of surfels, may not
       const float distance = glm::length(child.position - node.position);
       if (distance > node.radius + (node.radius + child.radius) * kReachTolerance) {
@@ -158,15 +207,24 @@ class PageChecker {
   }
 
   Status checkLeaf(const Node& node) {
+    const std::uint64_t before = referenced_.fetch_add(node.surfel_count);
+    if (node.surfel_count > file_.header().surfel_count ||
+        before > file_.header().surfel_count - node.surfel_count) {
+      findings_.add(fmt::format("{}: leaves refer to more than {} surfels: references form no tree",
+                                file_.path(), file_.header().surfel_count));
+      referenced_ -= node.surfel_count;
+      return {};
+    }
     Below below;
     std::uint32_t page = node.page, place = node.first;
     SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
       for (const Surfel& surfel : surfels) {
-        below.add(node, surfel.position, surfel.radius, surfel.area, 1, groupBit(surfel.group));
+        below.add(node, surfel, surfel.radius, 1, groupBit(surfel.group));
         surfel_balance_ -= placeHash(page, place++);
       }
       ++page;
       place = 0;
+      return progress_.isCancelled() ? Status::interrupted() : Status();
     }));
     if (below.reach > node.radius * (1 + kReachTolerance)) {
       return Status::corruption(
@@ -180,6 +238,8 @@ class PageChecker {
   const SceneFile& file_;
   PagedOctree::Reader reader_;
   Findings& findings_;
+  const Progress& progress_;
+  std::atomic<std::uint64_t>& referenced_;
   SceneFile::Scratch scratch_;
   std::vector<Node> nodes_;
   std::vector<Surfel> surfels_;
@@ -239,10 +299,10 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
 
   std::atomic<std::uint32_t> next_page{0};
   std::atomic<std::uint64_t> nodes{0}, surfels{0};
-  std::atomic<std::uint64_t> node_balance{0}, surfel_balance{0};
+  std::atomic<std::uint64_t> node_balance{0}, surfel_balance{0}, referenced{0};
   FirstFailure failure;
   const auto work = [&]() -> Status {
-    PageChecker checker(file, *octree, findings);
+    PageChecker checker(file, *octree, findings, progress, referenced);
     while (!failure.happened() && !progress.isCancelled()) {
       const std::uint32_t page = next_page++;
       if (page >= pages) break;

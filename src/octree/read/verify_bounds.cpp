@@ -145,6 +145,7 @@ Status BoundsWalk::divide(std::uint64_t most_surfels) {
   PagedOctree::Reader reader(octree_);
   std::vector<Subtree> open = {{kRootRange, kNoParent}};
   while (!open.empty()) {
+    if (progress_.isCancelled()) return Status::interrupted();
     const Subtree at = open.back();
     open.pop_back();
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(at.root));
@@ -196,6 +197,7 @@ Status BoundsWalk::meetLeaf(PagedOctree::Reader& reader, const Node& leaf,
       const Shape shape(surfel);
       for (Claim& claim : path) claim.meet(shape);
     }
+    return progress_.isCancelled() ? Status::interrupted() : Status();
   }));
   progress_.advance(leaf.surfel_count);
   return {};

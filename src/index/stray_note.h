@@ -1,0 +1,19 @@
+// Tells of positions that are far from all others: errors of a scanner, mostly, which make a scene
+// large and its index slow.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "core/bounds.h"
+
+namespace surfeit {
+
+// A sentence with the command that leaves strays out, when 98 % of `sample`, positions from all
+// over a cloud with these bounds, lie in a box of a thousandth of the cloud's width; else nothing.
+// All are counted from `origin`.
+std::string strayNote(std::vector<glm::vec3> sample, const Bounds3& bounds,
+                      const glm::dvec3& origin);
+
+}  // namespace surfeit
