@@ -342,7 +342,7 @@ TEST_F(AtomicFileTest, FinishedUnnamedItIsReadableAndGoesWithItsReader) {
 TEST_F(AtomicFileTest, SceneFinishedUnnamedIsCheckedAndReadable) {
   withAndWithoutName([&] {
     Result<PageFileWriter> writer = PageFileWriter::create(path("a"), 7);
-    ASSERT_TRUE(writer.ok() && writer->addSurfelPage(bytesOf("page"), 4).ok());
+    ASSERT_TRUE(writer.ok() && writer->addSurfelPage(bytesOf("page of 16 bytes"), 16).ok());
     const Result<PageFile> pages = writer->finishUnnamed({}, "provenance");
     ASSERT_TRUE(pages.ok()) << pages.status().message();
     EXPECT_EQ(fileCount(), 0);
