@@ -3,6 +3,7 @@
 // some hundredths of what a closed room sends, where disks leave gaps; a bounce then misses as much
 // of what the bounce before had gained. So with a part d missing, B_k is e times the sum of the
 // (rho (1 - d))^j, and the tests state d.
+#include "surfeit/bake.h"
 #include "surfeit/bounce.h"
 
 #include <fmt/format.h>

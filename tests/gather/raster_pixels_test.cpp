@@ -3,39 +3,13 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/vec2.hpp>
-#include <random>
 #include <vector>
 
-#include "core/spherical_harmonics.h"
-#include "gather/cut/cut.h"
-#include "gather/packet/packet_raster.h"
-#include "gather/packet/pixel_record.h"
+#include "gather/one_raster.h"
 #include "gather/rules/coverage_rules.h"
 
 namespace surfeit {
 namespace {
-
-constexpr glm::vec3 kRound{0};  // the normal of what looks the same from everywhere
-constexpr glm::vec3 kWhite{1};
-
-// A patch that shows the same solid angle from everywhere, and lies between two distances.
-// `spread`: its area over its squared distance.
-Patch patchAt(const glm::vec3& direction, const glm::vec3& normal, float solid_angle,
-              float spread = 0, float begin = .9f, float end = 1.1f) {
-  const float distance = .5f * (begin + end), square = distance * distance;
-  Patch patch;
-  patch.position = distance * direction;
-  patch.radius = std::sqrt(solid_angle) * distance;
-  patch.normal = normal;
-  patch.shape = withoutDirection(normal);
-  patch.area = spread * square;
-  patch.round_area = patch.most_area = solid_angle * square;
-  patch.reach = .5f * (end - begin);
-  patch.radiosity = kWhite;
-  patch.seen = Patch::Seen::kAllAround;
-  return patch;
-}
 
 // Of the near field.
 Patch tracedSphere(const glm::vec3& centre, float radius) {
@@ -61,62 +35,6 @@ Patch tracedDisk(const glm::vec3& centre, const glm::vec3& normal, float radius,
   patch.seen = Patch::Seen::kBoth;
   return patch;
 }
-
-// The raster of a receiver at the origin, with all directions alike.
-class OneRaster {
- public:
-  explicit OneRaster(int resolution, const glm::vec3& normal = kRound)
-      : rules_(rulesOf(resolution)), raster_(rules_), receiver_{glm::vec3(0), normal} {
-    clear();
-  }
-
-  void clear() {
-    raster_.begin({&receiver_, 1}, viewPacket({&receiver_, 1}, rules_));
-    pixels_.clear();
-  }
-  void add(const Patch& patch) {
-    raster_.addPatch(patch);
-    pixels_.clear();
-  }
-  std::size_t size() const { return raster_.geometry().pixels().size(); }
-  float solidAngle(std::size_t pixel) const {
-    return raster_.geometry().pixels()[pixel].solid_angle;
-  }
-  float coverage(std::size_t pixel) { return pixels()[pixel].coverage; }
-  glm::vec3 radiosity(std::size_t pixel) { return pixels()[pixel].radiosity; }
-  const RasterGeometry& geometry() const { return raster_.geometry(); }
-
-  // Covered solid angle of the whole cube.
-  double coveredSolidAngle() {
-    double sum = 0;
-    for (std::size_t i = 0; i < size(); ++i) sum += double(coverage(i)) * double(solidAngle(i));
-    return sum;
-  }
-
- private:
-  static GatherRules rulesOf(int resolution) {
-    GatherQuality quality;
-    quality.raster_resolution = resolution;
-    quality.bias = 0;
-    GatherRules rules(GatherMode::kBleeding, quality);
-    rules.weights.distribution = GatherWeights::Distribution::kUniform;
-    return rules;
-  }
-  // Drawn when it is looked at.
-  const std::vector<PixelContent>& pixels() {
-    if (!pixels_.empty()) return pixels_;
-    pixels_.resize(size());
-    raster_.sort();
-    raster_.draw();
-    raster_.readPixels(pixels_);
-    return pixels_;
-  }
-
-  GatherRules rules_;
-  PacketRaster raster_;
-  LocalReceiver receiver_;
-  std::vector<PixelContent> pixels_;
-};
 
 // Directions all around, with some on edges and corners of the cube and some close to them.
 std::vector<glm::vec3> testDirections() {
@@ -313,109 +231,6 @@ TEST(RasterPixels, WhatIsNestedHidesBehindTheLargerLayer) {
     EXPECT_NEAR(covered(.3f, .5f, is_solid), .5 + apart * .15, 1e-5) << "the larger rises above";
     EXPECT_NEAR(covered(.5f, 1.5f, is_solid), 1, 1e-6) << "what fills the pixel fills all of it";
   }
-}
-
-// A sheet of disks that face the cube at x = `distance`, on the face +x of 16 pixels: squares of
-// `side` pixels, scattered by a part of that, within a square of `half` pixels around the middle.
-struct SheetOfDisks {
-  float distance = 1, side = .8f, scatter = .3f, half = 8;
-  bool is_solid = true;
-  float thicket = 0;
-
-  void drawTo(OneRaster& raster, const glm::vec3& radiosity) const {
-    std::mt19937 random(4);
-    std::uniform_real_distribution<float> uniform(-1, 1);
-    const float step = side * distance / 8;
-    const int count = int(2 * half / side);
-    for (int i = 0; i < count * count; ++i) {
-      const float u =
-          (float(i % count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
-      const float v =
-          (float(i / count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
-      const glm::vec3 to(distance, u, v), direction = glm::normalize(to);
-      Patch patch = patchAt(direction, {-1, 0, 0}, step * step * direction.x / glm::dot(to, to), 0,
-                            .99f * distance, 1.01f * distance);
-      patch.is_solid = is_solid;
-      patch.thicket = thicket;
-      patch.radiosity = radiosity;
-      raster.add(patch);
-    }
-  }
-};
-
-class Closing : public ::testing::Test {
- protected:
-  // Mean of the light, and of what is covered, of pixels in the middle of the face.
-  glm::vec2 seen(int half) {
-    glm::vec2 sum(0);
-    for (int row = 8 - half; row < 8 + half; ++row) {
-      for (int column = 8 - half; column < 8 + half; ++column) {
-        const auto pixel = std::size_t(row * 16 + column);
-        sum += glm::vec2(raster_.radiosity(pixel).x, raster_.coverage(pixel));
-      }
-    }
-    return sum / float(4 * half * half);
-  }
-  const glm::vec3 dark_{0};
-  OneRaster raster_{16};
-};
-
-// Between leaves nothing is closed: a sheet of them shows what gaps there are.
-TEST_F(Closing, NothingShinesThroughTheGapsOfASheet) {
-  for (const float side : {.1f, .3f, .8f, 1.7f}) {
-    raster_.clear();
-    SheetOfDisks{.side = side, .thicket = 1}.drawTo(raster_, dark_);
-    ASSERT_LT(seen(4).y, .999f) << side;
-    raster_.clear();
-    SheetOfDisks{.side = side}.drawTo(raster_, dark_);
-    SheetOfDisks{.distance = 3}.drawTo(raster_, kWhite);
-    EXPECT_LT(seen(4).x, .003f) << side;
-    EXPECT_NEAR(seen(4).y, 1, .003f) << side;
-  }
-}
-
-TEST_F(Closing, WhatIsClosedShinesAsItsOwnLayerDoes) {
-  SheetOfDisks{}.drawTo(raster_, kWhite);
-  SheetOfDisks{.distance = 3}.drawTo(raster_, dark_);
-  EXPECT_NEAR(seen(4).x, 1, .003f);
-}
-
-// The sheet covers a square of 6 by 6 pixels, and a part of those around.
-TEST_F(Closing, OutlinesStayWhereTheyAre) {
-  SheetOfDisks{.side = .5f, .scatter = 0, .half = 3.25f}.drawTo(raster_, dark_);
-  EXPECT_NEAR(seen(8).y * 256, 6.5f * 6.5f, .8f);
-}
-
-TEST_F(Closing, GapsBetweenSpheresStayOpen) {
-  SheetOfDisks{.scatter = 1.5f, .thicket = 1}.drawTo(raster_, kWhite);
-  const float open = 1 - seen(8).y;
-  ASSERT_GT(open, .1f);
-  raster_.clear();
-  SheetOfDisks{.scatter = 1.5f, .is_solid = false}.drawTo(raster_, kWhite);
-  EXPECT_NEAR(1 - seen(8).y, open, .02f);
-}
-
-// Of less than a pixel, before a wall: it sends what its area says, wherever it is.
-TEST_F(Closing, SmallThingsKeepTheirPower) {
-  const SheetOfDisks wall{.distance = 3};
-  double sum = 0;
-  constexpr int kPlaces = 400;
-  for (int i = 0; i < kPlaces; ++i) {
-    raster_.clear();
-    const glm::vec3 direction =
-        glm::normalize(glm::vec3(1, .013f * float(i % 20), .017f * float(i / 20)));
-    const float solid_angle = .1f * 4 / 256;
-    Patch lamp = patchAt(direction, kRound, solid_angle, 0, .999f, 1.001f);
-    lamp.is_solid = false;
-    raster_.add(lamp);
-    wall.drawTo(raster_, dark_);
-    double power = 0;
-    for (std::size_t pixel = 0; pixel < 256; ++pixel) {
-      power += double(raster_.radiosity(pixel).x * raster_.solidAngle(pixel));
-    }
-    sum += power / double(solid_angle) / kPlaces;
-  }
-  EXPECT_NEAR(sum, 1, .01);
 }
 
 TEST(RasterPixels, WhatOverlapsHidesBehindItsOwnLayer) {

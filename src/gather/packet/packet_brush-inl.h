@@ -186,8 +186,7 @@ class Brush {
   }
 
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
-  // image, to first order, of a parallelogram that spreads as the patch does and whose sides follow
-  // the rows. Onto face_.
+  // image of a parallelogram that spreads as the patch does. Onto face_.
   HWY_INLINE void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
     const V3 offset = InRaster(sight.offset);
     const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(offset, face_ / 2));
@@ -214,8 +213,7 @@ class Brush {
   }
 
   // At the rim of a curved thing, a part of a piece faces the receiver whose mean normal does not:
-  // as SeeRoughNode has it, with normals spread evenly. (Without it, AO RMSE and bias of the bunny
-  // on a plane .0047 and -.0038, instead of .0037 and -.0020.) All times the distance.
+  // as SeeRoughNode has it, with normals spread evenly. All times the distance.
   static V RimCosine(V facing, V range) {
     const V sum = hn::Max(hn::Zero(D()), hn::Sub(range, facing));
     const V rim = hn::Div(hn::Mul(sum, sum), hn::Mul(Splat(4), range));
@@ -231,18 +229,12 @@ class Brush {
   // The shape of a patch on the plane of the face; it may lie outside the face. `area`: the visible
   // area times the distance.
   //
-  // A patch spreads by its shape (a disk with normal n by I - n n^T), and on the face by the
-  // gradients of u and v, which are (e_u - u e_axis) / |d[axis]| and the same with v. With a, b, c
-  // the entries of that spread on the face, a row is shifted by b / c for each unit of v and as
-  // wide as what is left of a. For a rectangle on a plane of the world, as cells of the octree cut
-  // it, that is its exact image to first order, so neighbours tile. (With I - n n^T for nodes, too:
-  // AO RMSE .0037 instead of .0031 for the bunny, and 1.9 % instead of 1 % missing at the worst
-  // place of a closed shell.)
-  //
-  // The area on the face is du dv = solid angle / |d[axis]|^3 for something small. Distances along
-  // the axis vary by area (1 - n[axis]^2) / 12 over a square, and the mean of 1 / w^3 is greater
-  // than that of its middle by 6 times that over w^2. For the same reason the middle of the image
-  // lies farther out than the image of the middle, by 4 times the covariance of u and w over w.
+  // With a, b, c the entries of the patch's spread on the face, a row is shifted by b / c for each
+  // unit of v and as wide as what is left of a: the exact image, to first order, of a rectangle on
+  // a plane of the world, so neighbours tile. (With I - n n^T for nodes, too: AO RMSE .0037 instead
+  // of .0031 for the bunny.) Distances along the axis vary over a large patch: the mean of 1 / w^3
+  // is greater than that of its middle, and the middle of the image lies farther out than the image
+  // of the middle (docs/algorithm.md, "The raster cube").
   HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse) const {
     const V one = Splat(1), least = Splat(kFidelity.least_spread);
     const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;

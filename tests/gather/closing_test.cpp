@@ -1,0 +1,118 @@
+// Layers of surfaces are closed before what lies behind them is drawn.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <random>
+
+#include "gather/one_raster.h"
+
+namespace surfeit {
+namespace {
+
+// A sheet of disks that face the cube at x = `distance`, on the face +x of 16 pixels: squares of
+// `side` pixels, scattered by a part of that, within a square of `half` pixels around the middle.
+struct SheetOfDisks {
+  float distance = 1, side = .8f, scatter = .3f, half = 8;
+  bool is_solid = true;
+  float thicket = 0;
+
+  void drawTo(OneRaster& raster, const glm::vec3& radiosity) const {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    const float step = side * distance / 8;
+    const int count = int(2 * half / side);
+    for (int i = 0; i < count * count; ++i) {
+      const float u =
+          (float(i % count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const float v =
+          (float(i / count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const glm::vec3 to(distance, u, v), direction = glm::normalize(to);
+      Patch patch = patchAt(direction, {-1, 0, 0}, step * step * direction.x / glm::dot(to, to), 0,
+                            .99f * distance, 1.01f * distance);
+      patch.is_solid = is_solid;
+      patch.thicket = thicket;
+      patch.radiosity = radiosity;
+      raster.add(patch);
+    }
+  }
+};
+
+class Closing : public ::testing::Test {
+ protected:
+  // Mean of the light, and of what is covered, of pixels in the middle of the face.
+  glm::vec2 seen(int half) {
+    glm::vec2 sum(0);
+    for (int row = 8 - half; row < 8 + half; ++row) {
+      for (int column = 8 - half; column < 8 + half; ++column) {
+        const auto pixel = std::size_t(row * 16 + column);
+        sum += glm::vec2(raster_.radiosity(pixel).x, raster_.coverage(pixel));
+      }
+    }
+    return sum / float(4 * half * half);
+  }
+  const glm::vec3 dark_{0};
+  OneRaster raster_{16};
+};
+
+// Between leaves nothing is closed: a sheet of them shows what gaps there are.
+TEST_F(Closing, NothingShinesThroughTheGapsOfASheet) {
+  for (const float side : {.1f, .3f, .8f, 1.7f}) {
+    raster_.clear();
+    SheetOfDisks{.side = side, .thicket = 1}.drawTo(raster_, dark_);
+    ASSERT_LT(seen(4).y, .999f) << side;
+    raster_.clear();
+    SheetOfDisks{.side = side}.drawTo(raster_, dark_);
+    SheetOfDisks{.distance = 3}.drawTo(raster_, kWhite);
+    EXPECT_LT(seen(4).x, .003f) << side;
+    EXPECT_NEAR(seen(4).y, 1, .003f) << side;
+  }
+}
+
+TEST_F(Closing, WhatIsClosedShinesAsItsOwnLayerDoes) {
+  SheetOfDisks{}.drawTo(raster_, kWhite);
+  SheetOfDisks{.distance = 3}.drawTo(raster_, dark_);
+  EXPECT_NEAR(seen(4).x, 1, .003f);
+}
+
+// The sheet covers a square of 6 by 6 pixels, and a part of those around.
+TEST_F(Closing, OutlinesStayWhereTheyAre) {
+  SheetOfDisks{.side = .5f, .scatter = 0, .half = 3.25f}.drawTo(raster_, dark_);
+  EXPECT_NEAR(seen(8).y * 256, 6.5f * 6.5f, .8f);
+}
+
+TEST_F(Closing, GapsBetweenSpheresStayOpen) {
+  SheetOfDisks{.scatter = 1.5f, .thicket = 1}.drawTo(raster_, kWhite);
+  const float open = 1 - seen(8).y;
+  ASSERT_GT(open, .1f);
+  raster_.clear();
+  SheetOfDisks{.scatter = 1.5f, .is_solid = false}.drawTo(raster_, kWhite);
+  EXPECT_NEAR(1 - seen(8).y, open, .02f);
+}
+
+// Of less than a pixel, before a wall: it sends what its area says, wherever it is.
+TEST_F(Closing, SmallThingsKeepTheirPower) {
+  const SheetOfDisks wall{.distance = 3};
+  double sum = 0;
+  constexpr int kPlaces = 400;
+  for (int i = 0; i < kPlaces; ++i) {
+    raster_.clear();
+    const glm::vec3 direction =
+        glm::normalize(glm::vec3(1, .013f * float(i % 20), .017f * float(i / 20)));
+    const float solid_angle = .1f * 4 / 256;
+    Patch lamp = patchAt(direction, kRound, solid_angle, 0, .999f, 1.001f);
+    lamp.is_solid = false;
+    raster_.add(lamp);
+    wall.drawTo(raster_, dark_);
+    double power = 0;
+    for (std::size_t pixel = 0; pixel < 256; ++pixel) {
+      power += double(raster_.radiosity(pixel).x * raster_.solidAngle(pixel));
+    }
+    sum += power / double(solid_angle) / kPlaces;
+  }
+  EXPECT_NEAR(sum, 1, .01);
+}
+
+}  // namespace
+}  // namespace surfeit
