@@ -87,7 +87,7 @@ struct GatherQuality {
   float max_solid_angle = 0.1f;
   int raster_resolution = 16;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
   // Rays start, and the horizon lies, this far above the receiver, in radii of the surfel that is
-  // tested; for two-sided surfels with a known longer side, in thirds of their width.
+  // tested; for two-sided surfels with a known longer side, in their widths.
   float bias = 0.15f;
   // Surfels closer than this many of their radii are ray traced (memo 3.4.1). Two-sided surfels
   // with a known longer side count in fourths of that side.

@@ -2,7 +2,6 @@
 // same rules make the same scene.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "cloud/color_reader.h"
@@ -10,44 +9,31 @@
 #include "core/up_comment.h"
 #include "index/column_copies.h"
 #include "index/index_from.h"
+#include "index/memory_rows.h"
 #include "surfeit/cloud_rows.h"
 
 namespace surfeit {
 namespace {
 
-class ColumnReader : public RowReader {
+class ColumnReader : public MemoryRows {
  public:
   ColumnReader(const CloudColumns& rows, RowLayout layout)
-      : rows_(rows), layout_(std::move(layout)) {}
+      : MemoryRows(std::move(layout)), rows_(rows) {}
 
   const std::string& path() const override { return rows_.name; }
   std::string formatName() const override { return "rows in memory"; }
-  const RowLayout& element() const override { return layout_; }
   std::vector<std::string> comments() const override {
     if (!rows_.up) return {};
     return {upComment(*rows_.up)};
   }
 
-  Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
-    const auto count =
-        static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, layout_.count - next_));
-    if (count == 0) return Bytes();
-    buffer.reserve(count * layout_.row_bytes);
-    packRows(layout_, rows_.values.data(), static_cast<std::size_t>(next_), count, buffer.data());
-    next_ += count;
-    return Bytes(buffer.data(), count * layout_.row_bytes);
-  }
-  Status rewind() override { return seekRow(0); }
-  bool isSeekable() const override { return true; }
-  Status seekRow(std::uint64_t row) override {
-    next_ = row;
+ private:
+  Status pack(std::uint64_t first, std::size_t count, std::byte* rows) override {
+    packRows(layout_, rows_.values.data(), static_cast<std::size_t>(first), count, rows);
     return {};
   }
 
- private:
   const CloudColumns& rows_;
-  const RowLayout layout_;
-  std::uint64_t next_ = 0;
 };
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include "surfeit/cube.h"

@@ -28,6 +28,7 @@ inline float layerReachOfDisk(float radius, float cosine) {
 inline float inverseLayerGap(float reach) {
   return 1 / std::max(kFidelity.layer_gap * reach, 1e-30f);
 }
+
 // What hides, hides: patches have exact areas, and these scatter around what a pixel of a surface
 // holds, so sums alone would let through what lies behind. So a pixel also knows which of its 4 by
 // 4 samples lie within the hull, the union of the patches, each widened (docs/algorithm.md,
@@ -36,6 +37,7 @@ inline float inverseLayerGap(float reach) {
 // close so; outlines stay where they are, and areas, and with them power, are not touched.
 inline constexpr int kHullSide = 4;  // samples along a pixel
 inline constexpr std::uint32_t kHullSamples = 0xffff;
+
 // What things of this area hide of an outline, spread in it at random (Beer and Lambert).
 inline float thicketOpacity(float area, float outline) { return 1 - std::exp(-area / outline); }
 
@@ -44,6 +46,7 @@ inline float nearBorderSq(float near_distance) {
   return std::clamp(near_distance * near_distance, std::numeric_limits<float>::min(),
                     std::numeric_limits<float>::max());
 }
+
 // The disk of a longer sliver does not tell where its surface is.
 inline float effectiveRadius(float radius, float area) {
   return std::min(radius, kFidelity.largest_radius * std::sqrt(area));
@@ -68,7 +71,7 @@ inline float softDiskPeak(float radius, float area, bool is_two_sided) {
 
 // A node that is seen mostly from behind shows fronts that face each other: folds, bumps and
 // leaves, which hide each other instead of lying side by side. Overlap grows from 0 where fronts
-// and backs are equal (anything closed) to 1 where backs are 9/5 of the fronts. (AO bias of packets
+// and backs are equal (anything closed) to 1 where backs are 9/5 of the fronts. (AO bias
 // with 0.1 sr and 16 pixels, with a gain of 4 and 10: lion on a plane +.0002, -.0014; spheres
 // +.0014, +.0008.)
 inline float overlapOf(float front_area, float back_area) {
