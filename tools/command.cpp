@@ -237,6 +237,8 @@ int exitStatus(StatusCode code) {
       return 74;
     case StatusCode::kInterrupted:
       return 130;
+    case StatusCode::kIncomplete:
+      return 75;
     case StatusCode::kFailed:
       return 1;
   }

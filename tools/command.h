@@ -105,8 +105,8 @@ using PhaseSeconds = std::vector<std::pair<std::string, double>>;
 std::string formatPhases(const PhaseSeconds& phases);
 nlohmann::json jsonOfPhases(const PhaseSeconds& phases);
 
-// Exit status of a failure (docs/architecture.md): 2 usage, 3 bad data, 33 budget, 74 I/O, 130
-// interrupted.
+// Exit status of a failure (docs/architecture.md): 2 usage, 3 bad data, 33 budget, 74 I/O, 75
+// other parts missing, 130 interrupted.
 int exitStatus(StatusCode code);
 
 // The subcommands, one file each.
@@ -118,6 +118,7 @@ void addInfoCommand(CLI::App& app, CommandContext& context);
 void addVerifyCommand(CLI::App& app, CommandContext& context);
 void addNormalsCommand(CLI::App& app, CommandContext& context);
 void addGatherCommand(CLI::App& app, CommandContext& context);
+void addMergeCommand(CLI::App& app, CommandContext& context);
 void addRadianceCommand(CLI::App& app, CommandContext& context);
 void addBounceCommand(CLI::App& app, CommandContext& context);
 void addBrickCommand(CLI::App& app, CommandContext& context);

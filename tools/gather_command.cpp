@@ -1,11 +1,14 @@
 // surfeit gather: occlusion and color bleeding at receivers.
 #include <fmt/format.h>
 
+#include <charconv>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "surfeit/bake.h"
 #include "surfeit/process.h"
+#include "surfeit/shards.h"
 #include "surfeit/tune.h"
 #include "tools/cache_report.h"
 #include "tools/channel_options.h"
@@ -20,6 +23,9 @@ struct GatherArguments {
   bool is_dry_run = false;
   std::string scene, receivers, result, series;
   GatherOptions options;
+  std::optional<ShardRange> shard;
+  bool resumes = false;
+  int resumed_shards = 0;  // 0: as the library thinks best
 };
 
 // --dry-run: what tune finds out, at the budget of the gather.
@@ -49,22 +55,51 @@ Status sayForecast(const GatherArguments& arguments, CommandContext& context) {
                              {"seconds", forecast.seconds}});
 }
 
+// All of the receivers, or some shards.
+Result<ShardStats> gatherAsAsked(const GatherArguments& arguments, CommandContext& context) {
+  const auto& [is_dry_run, scene, receivers, result, series, options, shard, resumes, shards] =
+      arguments;
+  if (shard) {
+    return gatherShards(scene, receivers, result, options, *shard, context.progress());
+  }
+  if (resumes) {
+    return gatherResumable(scene, receivers, result, options, shards, context.progress());
+  }
+  ShardStats stats;
+  SURFEIT_ASSIGN_OR_RETURN(static_cast<GatherStats&>(stats),
+                           gatherCloud(scene, receivers, result, options, context.progress()));
+  return stats;
+}
+
+// "shard 3 of 16: "; what was done before is said.
+std::string describeShards(const GatherArguments& arguments, const ShardStats& stats) {
+  if (!arguments.shard && !arguments.resumes) return {};
+  std::string text;
+  if (stats.finished_shards > 0) {
+    text = fmt::format("{} of {} shards were gathered before and skipped\n", stats.finished_shards,
+                       stats.finished_shards + stats.gathered_shards);
+  }
+  if (arguments.shard) {
+    text += fmt::format("shard {} of {} of ", arguments.shard->first, arguments.shard->count);
+  }
+  return text;
+}
+
 Status runGather(GatherArguments& arguments, CommandContext& context) {
   GatherOptions& options = arguments.options;
   options.threads = context.threads();
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
   if (arguments.is_dry_run) return sayForecast(arguments, context);
-  SURFEIT_ASSIGN_OR_RETURN(const GatherStats stats,
-                           gatherCloud(arguments.scene, arguments.receivers, arguments.result,
-                                       options, context.progress()));
+  SURFEIT_ASSIGN_OR_RETURN(const ShardStats stats, gatherAsAsked(arguments, context));
   const double rate = double(stats.receivers) / std::max(stats.gather_seconds, 1e-9);
   context.say(fmt::format(
-      "{}: {} receivers in {:.1f} s, {} receivers/s with {} threads\n"
+      "{}{}: {} receivers in {:.1f} s, {} receivers/s with {} threads\n"
       "memory: budget {}, peak resident {}, temporary files {}\n{}",
-      arguments.result, formatCount(stats.receivers), context.wallSeconds(),
-      formatCount(static_cast<std::uint64_t>(rate)), stats.threads, formatBytes(stats.memory_bytes),
-      formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes), cacheTable(stats)));
+      describeShards(arguments, stats), arguments.result, formatCount(stats.receivers),
+      context.wallSeconds(), formatCount(static_cast<std::uint64_t>(rate)), stats.threads,
+      formatBytes(stats.memory_bytes), formatBytes(peakResidentBytes()),
+      formatBytes(stats.temporary_bytes), stats.receivers > 0 ? cacheTable(stats) : std::string()));
   if (options.quality.max_variation > 0) {
     context.say(fmt::format("{} of them interpolated", formatCount(stats.interpolated_receivers)));
   }
@@ -82,12 +117,56 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
                              {"receivers", stats.receivers},
                              {"invalid_receivers", stats.invalid_receivers},
                              {"interpolated_receivers", stats.interpolated_receivers},
+                             {"gathered_shards", stats.gathered_shards},
+                             {"finished_shards", stats.finished_shards},
                              {"receivers_per_second", rate},
                              {"gather_seconds", stats.gather_seconds},
                              {"temporary_bytes", stats.temporary_bytes},
                              {"node_cache", cacheJson(stats.node_cache)},
                              {"surfel_cache", cacheJson(stats.surfel_cache)},
                              {"windows", windowsJson(stats.windows)}});
+}
+
+ShardRange parseShard(const std::string& text) {
+  ShardRange range;
+  const char* const end = text.data() + text.size();
+  const auto [slash, error] = std::from_chars(text.data(), end, range.first);
+  if (error == std::errc() && slash != end && *slash == '/') {
+    const auto [at, count_error] = std::from_chars(slash + 1, end, range.count);
+    range.last = range.first;
+    if (count_error == std::errc() && at == end && range.first >= 1 && range.first <= range.count &&
+        range.count <= kMostShards) {
+      return range;
+    }
+  }
+  throw CLI::ValidationError(
+      "--shard", fmt::format("{}, expected I/N such as 3/16, with I from 1 to N, and N up to {}",
+                             text, kMostShards));
+}
+
+void addShardOptions(CLI::App& command, GatherArguments& arguments) {
+  constexpr const char* kGroup = "Many machines";
+  CLI::Option* const shard =
+      command
+          .add_option_function<std::string>(
+              "--shard", [&](const std::string& text) { arguments.shard = parseShard(text); },
+              "Gather the I-th of N parts of the receivers alone, into a file beside CLOUD; "
+              "`surfeit merge` makes the result (docs/farm.md)")
+          ->type_name("I/N")
+          ->group(kGroup);
+  CLI::Option* const resume =
+      command
+          .add_flag("--resume", arguments.resumes,
+                    "Gather part by part; go on where a run of the same command was stopped")
+          ->excludes(shard)
+          ->group(kGroup);
+  command
+      .add_option("--resume-parts", arguments.resumed_shards,
+                  "Parts of --resume; a run that is stopped loses no more than one (default: up to "
+                  "64, of 32,768 receivers or more)")
+      ->check(CLI::Range(1, kMostShards))
+      ->needs(resume)
+      ->group(kGroup);
 }
 
 }  // namespace
@@ -109,6 +188,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
                       "Write statistics of the caches over time to this file, .csv or .json");
   command->add_flag("--dry-run", arguments->is_dry_run,
                     "Write no result; estimate memory, files and time from a sample");
+  addShardOptions(*command, *arguments);
   context.addCommonOptions(*command);
   command->footer(
       "The result holds the receivers in their order with all their properties, and `occlusion`;\n"
@@ -130,7 +210,9 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
       "      --falloff-mode polynomial\n"
       "  surfeit gather city.sft street.ply -o neon.ply --mode bleeding --subset 0,2-5\n"
       "  surfeit gather city.sft street.ply -o street_ao.ply --memory 512M --direct-io \\\n"
-      "      --cache-series paging.csv");
+      "      --cache-series paging.csv\n"
+      "  surfeit gather city.sft street.ply -o street_ao.ply --shard 3/16  # then surfeit merge\n"
+      "  surfeit gather city.sft street.ply -o street_ao.ply --resume");
   command->callback(
       [arguments, &context] { context.run([&] { return runGather(*arguments, context); }); });
 }

@@ -23,6 +23,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addVerifyCommand(app, context);
   addNormalsCommand(app, context);
   addGatherCommand(app, context);
+  addMergeCommand(app, context);
   addRadianceCommand(app, context);
   addBounceCommand(app, context);
   addBrickCommand(app, context);

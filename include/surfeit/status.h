@@ -19,6 +19,7 @@ enum class StatusCode : std::uint8_t {
   kBudgetTooSmall,   // the memory budget cannot hold the work; exit status 33
   kIoError,          // the system refused to open, read, write, sync or rename; exit status 74
   kInterrupted,      // the caller asked to stop; exit status 130
+  kIncomplete,       // other parts of the job must be done first; exit status 75
   kFailed,           // anything else; exit status 1
 };
 
@@ -39,6 +40,9 @@ class [[nodiscard]] Status {
   }
   static Status ioError(std::string message) { return {StatusCode::kIoError, std::move(message)}; }
   static Status interrupted() { return {StatusCode::kInterrupted, "interrupted"}; }
+  static Status incomplete(std::string message) {
+    return {StatusCode::kIncomplete, std::move(message)};
+  }
   static Status failed(std::string message) { return {StatusCode::kFailed, std::move(message)}; }
 
   bool ok() const { return code_ == StatusCode::kOk; }

@@ -56,6 +56,7 @@ void raise(const Status& status) {
     case StatusCode::kInterrupted:
       raiseAs(PyExc_KeyboardInterrupt, message);
     case StatusCode::kOk:
+    case StatusCode::kIncomplete:
     case StatusCode::kFailed:
       break;
   }

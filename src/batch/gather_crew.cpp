@@ -61,44 +61,59 @@ Status GatherCrew::gatherRuns() {
   return {};
 }
 
-Status gatherSorted(SceneFile scene, ExternalSorter& sorter, const GatherMemory& memory,
-                    const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
-                    Progress& progress, const LoadedEnvironment* environment) {
-  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
+Result<std::unique_ptr<SortedGather>> SortedGather::create(SceneFile scene,
+                                                           const GatherMemory& memory,
+                                                           const GatherOptions& options,
+                                                           GatherStats& stats, Progress& progress,
+                                                           const LoadedEnvironment* environment) {
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(scene), memory.caches));
-  progress.beginPhase("gather", stats.receivers, "receivers");
-  progress.advance(stats.invalid_receivers);
+  return std::unique_ptr<SortedGather>(
+      new SortedGather(std::move(octree), memory, options, stats, progress, environment));
+}
+
+SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, const GatherMemory& memory,
+                           const GatherOptions& options, GatherStats& stats, Progress& progress,
+                           const LoadedEnvironment* environment)
+    : octree_(std::move(octree)),
+      prefetch_threads_(memory.prefetch_threads),
+      rules_(gatherRules(options, environment)),
+      stats_(stats),
+      progress_(progress),
+      controller_(*octree_,
+                  {.threads = stats.threads,
+                   .adapts_split = options.cache_split < 0,
+                   .prefetches = memory.prefetch_threads != 0,
+                   .memory_bytes = stats.memory_bytes,
+                   .work = memory.work,
+                   .receivers = stats.receivers - stats.invalid_receivers,
+                   .least_node_frames = memory.caches.least_node_frames,
+                   .least_surfel_frames = memory.caches.least_surfel_frames},
+                  progress) {}
+
+Status SortedGather::gather(ExternalSorter& sorter, GatherCrew::Sink sink, std::uint64_t count) {
   const auto begin = std::chrono::steady_clock::now();
-  const bool adapts_split = options.cache_split < 0;
-  PagingController controller(*octree,
-                              {.threads = stats.threads,
-                               .adapts_split = adapts_split,
-                               .prefetches = memory.prefetch_threads != 0,
-                               .memory_bytes = stats.memory_bytes,
-                               .work = memory.work,
-                               .receivers = stats.receivers - stats.invalid_receivers,
-                               .least_node_frames = memory.caches.least_node_frames,
-                               .least_surfel_frames = memory.caches.least_surfel_frames},
-                              progress);
-  ReceiverQueue queue(sorter, kQueueReceivers);
-  {
-    GatherCrew crew({.octree = *octree,
-                     .queue = queue,
-                     .controller = controller,
-                     .rules = gatherRules(options, environment),
-                     .threads = stats.threads,
-                     .prefetch_threads = memory.prefetch_threads,
-                     .progress = progress},
-                    std::move(sink));
-    SURFEIT_RETURN_IF_ERROR(crew.run());
-    stats.interpolated_receivers = crew.interpolatedCount();
-  }  // the readers go, and with them their last counts reach the caches
-  controller.finish();
-  stats.gather_seconds = secondsSince(begin);
-  stats.node_cache = controller.nodeStats();
-  stats.surfel_cache = controller.surfelStats();
-  stats.windows = controller.windows();
+  ReceiverQueue queue(sorter, kQueueReceivers, count);
+  GatherCrew crew({.octree = *octree_,
+                   .queue = queue,
+                   .controller = controller_,
+                   .rules = rules_,
+                   .threads = stats_.threads,
+                   .prefetch_threads = prefetch_threads_,
+                   .progress = progress_},
+                  std::move(sink));
+  SURFEIT_RETURN_IF_ERROR(crew.run());
+  stats_.interpolated_receivers += crew.interpolatedCount();
+  stats_.gather_seconds += secondsSince(begin);
   return {};
+}
+
+// The readers of all crews are gone, so that their last counts have reached the caches.
+void SortedGather::finish() {
+  controller_.finish();
+  stats_.node_cache = controller_.nodeStats();
+  stats_.surfel_cache = controller_.surfelStats();
+  stats_.windows = controller_.windows();
 }
 
 }  // namespace surfeit

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <span>
 
 #include "batch/gather_memory.h"
@@ -55,10 +56,34 @@ class GatherCrew {
   std::atomic<std::uint64_t> interpolated_count_{0};
 };
 
-// The gather proper: opens the caches of `scene`, gathers at what is in `sorter` (finished), and
-// fills in the statistics of that; threads of `stats` work, as many prefetch as `memory` says.
-Status gatherSorted(SceneFile scene, ExternalSorter& sorter, const GatherMemory& memory,
-                    const GatherOptions& options, GatherStats& stats, GatherCrew::Sink sink,
-                    Progress& progress, const LoadedEnvironment* environment = nullptr);
+// The gather proper: caches of a scene, and a crew for each piece of the order. `threads` of the
+// statistics work, as many prefetch as the memory says. One thread at a time.
+class SortedGather {
+ public:
+  // Opens the caches; `stats` has threads, memory and numbers of receivers. All that is referred to
+  // must outlive this.
+  static Result<std::unique_ptr<SortedGather>> create(
+      SceneFile scene, const GatherMemory& memory, const GatherOptions& options, GatherStats& stats,
+      Progress& progress, const LoadedEnvironment* environment = nullptr);
+
+  // Gathers at the next `count` receivers of the sorter (finished): whole groups, unless none come
+  // after them.
+  Status gather(ExternalSorter& sorter, GatherCrew::Sink sink,
+                std::uint64_t count = ReceiverQueue::kAll);
+  // Fills in the statistics.
+  void finish();
+
+ private:
+  SortedGather(std::unique_ptr<PagedOctree> octree, const GatherMemory& memory,
+               const GatherOptions& options, GatherStats& stats, Progress& progress,
+               const LoadedEnvironment* environment);
+
+  const std::unique_ptr<PagedOctree> octree_;
+  const int prefetch_threads_;
+  const GatherRules rules_;
+  GatherStats& stats_;
+  Progress& progress_;
+  PagingController controller_;
+};
 
 }  // namespace surfeit

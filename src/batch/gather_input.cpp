@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <new>
 #include <span>
 #include <utility>
 
@@ -57,7 +58,15 @@ Result<GatherInput> GatherInput::open(const std::string& path, const std::string
 }
 
 GatherInput::GatherInput(std::unique_ptr<RowReader> reader, ReceiverMapping mapping)
-    : reader_(std::move(reader)), mapping_(std::move(mapping)) {}
+    : reader_(std::move(reader)), mapping_(std::move(mapping)), rows_hash_(XXH3_createState()) {
+  if (rows_hash_ == nullptr) throw std::bad_alloc();
+  XXH3_64bits_reset(rows_hash_.get());
+}
+
+Status GatherInput::rewind() {
+  XXH3_64bits_reset(rows_hash_.get());
+  return reader_->rewind();
+}
 
 Status GatherInput::check(const GatherRules& rules) const {
   if (!rules.isGlossy()) return {};
@@ -87,12 +96,14 @@ void GatherInput::note(Progress& progress) const {
 
 Result<Bytes> GatherInput::readSlice(Progress& progress) {
   if (progress.isCancelled()) return Status::interrupted();
-  return reader_->readRows(kSliceRows, slice_);
+  SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, reader_->readRows(kSliceRows, slice_));
+  XXH3_64bits_update(rows_hash_.get(), slice.data(), slice.size());
+  return slice;
 }
 
 Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool strict,
-                         ExternalSorter& sorter, Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(reader_->rewind());
+                         ExternalSorter& sorter, Progress& progress, const OrderRange& range) {
+  SURFEIT_RETURN_IF_ERROR(rewind());
   defects_ = {};
   mapping_.setOrigin(scene.origin);
   for (std::uint64_t record = 0;;) {
@@ -105,7 +116,9 @@ Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool str
       if (mapping_.decode(row, record, receiver.receiver, defects_)) {
         receiver.index = record;
         receiver.key = keyOf(receiver.receiver.position, record, order, scene.cube);
-        SURFEIT_RETURN_IF_ERROR(sorter.add(receiver));
+        if (range.contains({receiver.key, record})) {
+          SURFEIT_RETURN_IF_ERROR(sorter.add(receiver));
+        }
       } else if (strict) {
         return Status::corruption(fmt::format("{}: record {}: {}", reader_->path(), record,
                                               mapping_.describeDefect(row)));
@@ -117,13 +130,13 @@ Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool str
 
 Status GatherInput::write(const ResultRows& rows, ResultStore& results, RowWriter& writer,
                           Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(reader_->rewind());
+  SURFEIT_RETURN_IF_ERROR(rewind());
   std::vector<GatherResult> slice_results;
   std::vector<std::byte> output(kSliceRows * rows.rowBytes());
   for (;;) {
     SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, readSlice(progress));
     const std::size_t count = slice.size() / receivers().row_bytes;
-    if (count == 0) return writer.finish();
+    if (count == 0) return {};
     slice_results.resize(count);
     SURFEIT_RETURN_IF_ERROR(results.take(slice_results));
     for (std::size_t i = 0; i < count; ++i) {

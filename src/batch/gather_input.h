@@ -2,8 +2,12 @@
 // with their results. Nothing of them is held that grows with their number.
 #pragma once
 
+#include <xxhash.h>
+
+#include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -19,6 +23,23 @@
 #include "surfeit/status.h"
 
 namespace surfeit {
+
+// A place in the order of the receivers, of the next receiver or beyond the last one.
+struct OrderPlace {
+  CurveKey key = 0;
+  std::uint64_t index = 0;
+
+  friend auto operator<=>(const OrderPlace&, const OrderPlace&) = default;
+};
+
+// The receivers from one place to another.
+struct OrderRange {
+  static constexpr OrderPlace kEnd = {std::numeric_limits<CurveKey>::max(),
+                                      std::numeric_limits<std::uint64_t>::max()};
+  OrderPlace begin, end = kEnd;
+
+  bool contains(const OrderPlace& place) const { return begin <= place && place < end; }
+};
 
 // One thread at a time.
 class GatherInput {
@@ -39,19 +60,24 @@ class GatherInput {
   // Tells what of the input the result does not keep, and what the gather makes of the rest.
   void note(Progress& progress) const;
 
-  // Gives all valid receivers to the sorter, about the scene's origin and with keys of `order` in
-  // its cube. Invalid ones are counted; kCorruption with `strict`.
+  // Gives the valid receivers of a range to the sorter, about the scene's origin and with keys of
+  // `order` in its cube. Invalid ones are counted; kCorruption with `strict`.
   Status sort(ReceiverOrder order, const SceneHeader& scene, bool strict, ExternalSorter& sorter,
-              Progress& progress);
+              Progress& progress, const OrderRange& range = {});
   // Of the last sort.
   const SurfelDefects& defects() const { return defects_; }
 
-  // Writes all receivers with their results, in the order of the input.
+  // Of the rows, all of which the last sort or write has read.
+  std::uint64_t checksum() const { return XXH3_64bits_digest(rows_hash_.get()); }
+
+  // Writes all receivers with their results, in the order of the input. The caller finishes the
+  // writer.
   Status write(const ResultRows& rows, ResultStore& results, RowWriter& writer, Progress& progress);
 
  private:
   GatherInput(std::unique_ptr<RowReader> reader, ReceiverMapping mapping);
 
+  Status rewind();
   // Reads the next rows, up to kSliceRows; none at the end.
   Result<Bytes> readSlice(Progress& progress);
 
@@ -59,6 +85,10 @@ class GatherInput {
   ReceiverMapping mapping_;
   AlignedBuffer slice_;
   SurfelDefects defects_;
+  struct FreeHash {
+    void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
+  };
+  std::unique_ptr<XXH3_state_t, FreeHash> rows_hash_;
 };
 
 }  // namespace surfeit

@@ -13,6 +13,7 @@
 #include "gather/rules/gather_outputs.h"
 #include "gather/rules/gather_rules.h"
 #include "gather/rules/raster_geometry.h"
+#include "octree/read/group_set.h"
 
 namespace surfeit {
 namespace {
@@ -58,6 +59,18 @@ Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOpt
   SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, loadEnvironmentMap(environment, progress));
   EnvironmentCube cube(map, RasterGeometry(options.quality.raster_resolution));
   return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
+}
+
+Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
+                               const GatherOptions& options) {
+  SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
+  if (result_path == scene_path) {
+    return Status::invalidArgument(
+        fmt::format("{}: the result would replace the scene", scene_path));
+  }
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
+  SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
+  return scene;
 }
 
 GatherOptions withDefaults(GatherOptions options) {

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "gather/light/environment_map.h"
 #include "gather/rules/gather_rules.h"
+#include "octree/read/scene_file.h"
 #include "storage/positional_file.h"
 #include "surfeit/bake.h"
 #include "surfeit/progress.h"
@@ -14,6 +16,10 @@ namespace surfeit {
 
 // kInvalidArgument, naming the option, what was found and what is expected.
 Status checkGatherOptions(const GatherOptions& options);
+
+// Checks the options, and opens the scene that they are for.
+Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
+                               const GatherOptions& options);
 
 // With threads and memory that were left open filled in, from what the job may use.
 GatherOptions withDefaults(GatherOptions options);

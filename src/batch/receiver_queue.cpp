@@ -5,8 +5,9 @@
 
 namespace surfeit {
 
-ReceiverQueue::ReceiverQueue(ExternalSorter& sorter, std::size_t buffer_receivers)
-    : sorter_(sorter), buffer_(buffer_receivers) {}
+ReceiverQueue::ReceiverQueue(ExternalSorter& sorter, std::size_t buffer_receivers,
+                             std::uint64_t count)
+    : sorter_(sorter), left_(count), buffer_(buffer_receivers) {}
 
 Status ReceiverQueue::take(std::vector<SortedReceiver>& run, std::size_t count) {
   const std::lock_guard lock(mutex_);
@@ -22,15 +23,16 @@ Status ReceiverQueue::take(std::vector<SortedReceiver>& run, std::size_t count) 
 
 // Fills the buffer behind what is left in it.
 Status ReceiverQueue::refill() {
-  if (is_at_end_) return {};
+  if (left_ == 0) return {};
   std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(begin_),
             buffer_.begin() + static_cast<std::ptrdiff_t>(end_), buffer_.begin());
   end_ -= begin_;
   begin_ = 0;
-  const std::size_t room = buffer_.size() - end_;
+  const std::size_t room =
+      static_cast<std::size_t>(std::min<std::uint64_t>(buffer_.size() - end_, left_));
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
                            sorter_.next(std::span(buffer_).subspan(end_, room)));
-  is_at_end_ = count < room;
+  left_ = count < room ? 0 : left_ - count;
   end_ += count;
   return {};
 }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -17,9 +18,11 @@ namespace surfeit {
 // Safe from any thread.
 class ReceiverQueue {
  public:
-  // `sorter` is finished, and not used by anyone else meanwhile. Takes buffer_receivers * 56 bytes;
-  // runs are no longer than that.
-  ReceiverQueue(ExternalSorter& sorter, std::size_t buffer_receivers);
+  static constexpr std::uint64_t kAll = std::numeric_limits<std::uint64_t>::max();
+
+  // The next `count` receivers of `sorter`, or all that it has; it is finished, and not used by
+  // anyone else meanwhile. Takes buffer_receivers * 56 bytes; runs are no longer than that.
+  ReceiverQueue(ExternalSorter& sorter, std::size_t buffer_receivers, std::uint64_t count = kAll);
 
   // Replaces `run` by the next receivers, up to `count` of them; none at the end.
   Status take(std::vector<SortedReceiver>& run, std::size_t count);
@@ -33,13 +36,13 @@ class ReceiverQueue {
   Status refill();
 
   ExternalSorter& sorter_;
+  std::uint64_t left_;  // to be read from it
 
   std::mutex mutex_;
   std::vector<SortedReceiver> buffer_;
   std::size_t begin_ = 0, end_ = 0;  // of what is in the buffer
   std::uint64_t taken_ = 0;
   std::uint64_t next_look_ = 0;  // place in the order
-  bool is_at_end_ = false;
 };
 
 }  // namespace surfeit

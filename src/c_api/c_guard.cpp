@@ -39,6 +39,7 @@ surfeit_code codeOf(StatusCode code) {
       return SURFEIT_IO_ERROR;
     case StatusCode::kInterrupted:
       return SURFEIT_INTERRUPTED;
+    case StatusCode::kIncomplete:  // no call of this interface does parts of a job
     case StatusCode::kFailed:
       break;
   }

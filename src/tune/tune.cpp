@@ -249,9 +249,14 @@ Result<TuneOutcome> Tuning::measure(std::uint64_t memory_bytes) const {
   stats.invalid_receivers = report_.invalid_receivers;
   stats.threads = gather_.threads;
   stats.memory_bytes = memory_bytes;
-  SURFEIT_RETURN_IF_ERROR(gatherSorted(
-      std::move(scene), sorter, memory, gather_, stats,
-      [](std::span<const ResultStore::Entry>) { return Status(); }, progress));
+  progress.beginPhase("gather", stats.receivers, "receivers");
+  progress.advance(stats.invalid_receivers);
+  SURFEIT_ASSIGN_OR_RETURN(
+      const std::unique_ptr<SortedGather> gather,
+      SortedGather::create(std::move(scene), memory, gather_, stats, progress));
+  SURFEIT_RETURN_IF_ERROR(
+      gather->gather(sorter, [](std::span<const ResultStore::Entry>) { return Status(); }));
+  gather->finish();
   return TuneOutcome{measuredCache(stats.node_cache), measuredCache(stats.surfel_cache),
                      stats.gather_seconds};
 }

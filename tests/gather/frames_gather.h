@@ -50,14 +50,16 @@ Status gatherInFrames(const FramesGather& gather, GatherStats& stats, Take&& tak
   std::mutex mutex;
   std::optional<Faults> faults;
   if (gather.fault != nullptr) faults.emplace(std::initializer_list<FaultInjector*>{gather.fault});
-  return gatherSorted(
-      std::move(scene), sorter, memory, gather.options, stats,
-      [&](std::span<const ResultStore::Entry> entries) {
-        const std::lock_guard lock(mutex);
-        for (const ResultStore::Entry& entry : entries) take(entry);
-        return Status();
-      },
-      progress);
+  SURFEIT_ASSIGN_OR_RETURN(
+      const std::unique_ptr<SortedGather> sorted,
+      SortedGather::create(std::move(scene), memory, gather.options, stats, progress));
+  SURFEIT_RETURN_IF_ERROR(sorted->gather(sorter, [&](std::span<const ResultStore::Entry> entries) {
+    const std::lock_guard lock(mutex);
+    for (const ResultStore::Entry& entry : entries) take(entry);
+    return Status();
+  }));
+  sorted->finish();
+  return {};
 }
 
 }  // namespace surfeit

@@ -1,0 +1,124 @@
+#include "batch/gather_job.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "batch/sorted_receiver.h"
+#include "cloud/cloud_formats.h"
+#include "core/parallel.h"
+#include "core/program_memory.h"
+#include "octree/read/scene_light.h"
+#include "storage/output_target.h"
+
+namespace surfeit {
+
+Result<GatherJob> GatherJob::open(const std::string& receivers_path, const std::string& result_path,
+                                  const GatherOptions& options, const SceneFile& scene,
+                                  Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(
+      const std::optional<ColorRange> colors,
+      colorRangeFor(std::span(&receivers_path, 1), result_path, options.color_range));
+  SURFEIT_ASSIGN_OR_RETURN(
+      GatherInput input,
+      GatherInput::open(receivers_path, options.channels, options.part, options.filter, colors));
+  SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options)));
+  GatherJob job(std::move(input), result_path, options, progress);
+  job.options_.eye -= scene.header().origin;
+  SURFEIT_ASSIGN_OR_RETURN(job.environment_,
+                           loadEnvironment(job.options_, scene.header().up, progress));
+  GatherWork work = gatherWork(job.input_.receivers(), job.options_);
+  if (const LoadedEnvironment* environment = job.environment()) {
+    work.held_bytes = environment->map.memoryBytes() + environment->cube.memoryBytes();
+  }
+  SURFEIT_ASSIGN_OR_RETURN(job.memory_, planGatherMemory(scene, options.memory_bytes, work));
+  return job;
+}
+
+GatherJob::GatherJob(GatherInput input, const std::string& result_path,
+                     const GatherOptions& options, Progress& progress)
+    : input_(std::move(input)),
+      result_path_(result_path),
+      options_(options),
+      temporary_directory_(surfeit::temporaryDirectory(options.temporary_directory, result_path)),
+      progress_(&progress) {}
+
+GatherStats GatherJob::stats() const {
+  GatherStats stats;
+  stats.outputs = options_.outputs;
+  stats.threads = options_.threads;
+  stats.memory_bytes = options_.memory_bytes;
+  stats.receivers = input_.receiverCount();
+  return stats;
+}
+
+Status GatherJob::note(const SceneFile& scene) {
+  input_.note(*progress_);
+  if (options_.mode == GatherMode::kOcclusion || environment_ != nullptr) return {};
+  return noteDarkness(scene, *progress_);
+}
+
+Result<std::unique_ptr<ExternalSorter>> GatherJob::sort(const SceneHeader& scene,
+                                                        const OrderRange& range) {
+  progress_->beginPhase("sort", input_.receiverCount(), "receivers");
+  auto sorter = std::make_unique<ExternalSorter>(
+      ExternalSorter::Options{.record_bytes = sizeof(SortedReceiver),
+                              .count = input_.receiverCount(),
+                              .memory_bytes = memory_.sorter_bytes,
+                              .reading_bytes = memory_.sorter_reading_bytes,
+                              .temporary_directory = temporary_directory_});
+  Status sorted;
+  withThreads(options_.threads, [&] {
+    sorted = input_.sort(options_.order, scene, options_.strict, *sorter, *progress_, range);
+  });
+  SURFEIT_RETURN_IF_ERROR(sorted);
+  if (input_.defects().total() > 0) {
+    const std::string note = fmt::format("{}: no result (NaN) at invalid receivers: {}",
+                                         input_.reader().path(), input_.defects().describe());
+    if (told_.insert(note).second) progress_->note(note);
+  }
+  return sorter;
+}
+
+Result<std::unique_ptr<RowWriter>> GatherJob::createWriter(const ResultRows& rows) {
+  RowWriterOptions writing;
+  writing.properties = rows.properties();
+  writing.comments = input_.reader().comments();
+  writing.count = input_.receiverCount();
+  writing.like = &input_.reader();
+  // Of what the caches give back before
+  writing.memory_parts = 2;
+  writing.memory_beside_bytes = programBytes(options_.threads);
+  writing.memory_bytes =
+      (options_.memory_bytes - std::min(options_.memory_bytes, writing.memory_beside_bytes)) / 2;
+  writing.progress = progress_;
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> writer,
+                           createRowWriter(result_path_, writing));
+  noteOf(*writer);
+  return writer;
+}
+
+Status GatherJob::write(const ResultRows& rows, ResultStore& results, RowWriter& writer,
+                        std::optional<std::uint64_t> checksum) {
+  progress_->beginPhase("write", input_.receiverCount(), "receivers");
+  SURFEIT_RETURN_IF_ERROR(input_.write(rows, results, writer, *progress_));
+  if (checksum && input_.checksum() != *checksum) {
+    return Status::corruption(fmt::format(
+        "{}: rows with checksum {:016x}, expected {:016x} as the shards were gathered for: gather "
+        "the shards again, or merge with the receivers they belong to",
+        input_.reader().path(), input_.checksum(), *checksum));
+  }
+  SURFEIT_RETURN_IF_ERROR(writer.finish());
+  noteOf(writer);  // what it found out on the way
+  return {};
+}
+
+void GatherJob::noteOf(const RowWriter& writer) {
+  for (const std::string& note : writer.notes()) {
+    if (told_.insert(note).second) progress_->note(fmt::format("{}: {}", result_path_, note));
+  }
+}
+
+}  // namespace surfeit

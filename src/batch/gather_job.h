@@ -1,0 +1,72 @@
+// What a gather from file to file, its shards and their merge have in common: the receivers and
+// their order, the environment, the memory, and the file of the result.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "batch/gather_input.h"
+#include "batch/gather_memory.h"
+#include "batch/gather_options.h"
+#include "batch/receiver_rows.h"
+#include "cloud/row_writer.h"
+#include "gather/light/environment_map.h"
+#include "octree/read/scene_file.h"
+#include "storage/external_sorter.h"
+#include "surfeit/bake.h"
+#include "surfeit/progress.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+// One thread at a time. Notes are told once.
+class GatherJob {
+ public:
+  // Opens the receivers and the environment, and plans the memory. `options` with defaults filled
+  // in; `progress` must outlive the job. Errors: as gatherCloud.
+  static Result<GatherJob> open(const std::string& receivers_path, const std::string& result_path,
+                                const GatherOptions& options, const SceneFile& scene,
+                                Progress& progress);
+
+  GatherInput& input() { return input_; }
+  const GatherInput& input() const { return input_; }
+  const GatherMemory& memory() const { return memory_; }
+  const LoadedEnvironment* environment() const { return environment_.get(); }
+  // About the scene's origin.
+  const GatherOptions& options() const { return options_; }
+  const std::string& temporaryDirectory() const { return temporary_directory_; }
+
+  // Statistics of a job that has gathered at nothing yet.
+  GatherStats stats() const;
+
+  // Tells what the gather makes of its input, and what stays dark.
+  Status note(const SceneFile& scene);
+
+  // The receivers of a range, along the order. Tells of the invalid ones.
+  Result<std::unique_ptr<ExternalSorter>> sort(const SceneHeader& scene,
+                                               const OrderRange& range = {});
+
+  // Writes the receivers with their results (finished) as rows of the result. `checksum`: of the
+  // receivers' rows, where it is known; kCorruption when they have changed since.
+  Result<std::unique_ptr<RowWriter>> createWriter(const ResultRows& rows);
+  Status write(const ResultRows& rows, ResultStore& results, RowWriter& writer,
+               std::optional<std::uint64_t> checksum = {});
+
+ private:
+  GatherJob(GatherInput input, const std::string& result_path, const GatherOptions& options,
+            Progress& progress);
+  void noteOf(const RowWriter& writer);
+
+  GatherInput input_;
+  std::string result_path_;
+  GatherOptions options_;
+  std::string temporary_directory_;
+  Progress* progress_;
+  std::unique_ptr<const LoadedEnvironment> environment_;
+  GatherMemory memory_;
+  std::set<std::string> told_;
+};
+
+}  // namespace surfeit

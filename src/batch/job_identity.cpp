@@ -1,0 +1,105 @@
+#include "batch/job_identity.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "surfeit/version.h"
+
+namespace surfeit {
+namespace {
+
+using nlohmann::json;
+
+std::string hashOf(Bytes bytes) {
+  return fmt::format("{:016x}", XXH3_64bits(bytes.data(), bytes.size()));
+}
+
+json sceneIdentity(const SceneFile& scene) {
+  const PageFile& pages = scene.pages();
+  return {{"identity", fmt::format("{:016x}", pages.identity())},
+          {"pages", fmt::format("{:016x}", pages.directoryChecksum())},
+          {"fields", hashOf(pages.sceneFields())}};
+}
+
+json settingsOf(const GatherOptions& options) {
+  const GatherQuality& quality = options.quality;
+  const GatherWeights& weights = options.weights;
+  return {{"mode", static_cast<int>(options.mode)},
+          {"outputs", options.outputs},
+          {"order", static_cast<int>(options.order)},
+          {"max_solid_angle", quality.max_solid_angle},
+          {"raster_resolution", quality.raster_resolution},
+          {"bias", quality.bias},
+          {"near_field_radii", quality.near_field_radii},
+          {"max_distance", quality.max_distance},
+          {"sides", static_cast<int>(quality.sides)},
+          {"max_variation", quality.max_variation},
+          {"distribution", static_cast<int>(weights.distribution)},
+          {"cone_angle", weights.cone_angle},
+          {"roughness", weights.roughness},
+          {"falloff", weights.falloff},
+          {"falloff_mode", static_cast<int>(weights.falloff_mode)},
+          {"groups", options.groups},
+          {"eye", {options.eye.x, options.eye.y, options.eye.z}}};
+}
+
+}  // namespace
+
+json jobIdentity(const SceneFile& scene, const GatherJob& job) {
+  const GatherOptions& options = job.options();
+  json identity = {{"version", kVersion},
+                   {"scene", sceneIdentity(scene)},
+                   {"settings", settingsOf(options)},
+                   {"receivers",
+                    {{"rows", job.input().receiverCount()},
+                     {"channels", options.channels},
+                     {"part", options.part},
+                     {"filter", options.filter},
+                     {"color_range", static_cast<int>(options.color_range)}}}};
+  if (const LoadedEnvironment* environment = job.environment()) {
+    identity["environment"] = hashOf(std::as_bytes(environment->cube.pixels()));
+  }
+  return identity;
+}
+
+Result<GatherOptions> optionsOfJob(const json& identity) {
+  GatherOptions options;
+  try {
+    const json& settings = identity.at("settings");
+    const json& receivers = identity.at("receivers");
+    const int mode = settings.at("mode").get<int>();
+    const int range = receivers.at("color_range").get<int>();
+    options.outputs = settings.at("outputs").get<std::uint32_t>();
+    if (mode < 0 || mode > int(GatherMode::kGlossy) || range < 0 || range > 255 ||
+        options.outputs == 0 || (options.outputs & ~kAllOutputs) != 0) {
+      return Status::corruption("options of a job that no gather has");
+    }
+    options.mode = static_cast<GatherMode>(mode);
+    options.color_range = static_cast<ColorRange>(range);
+    options.channels = receivers.at("channels").get<std::string>();
+    options.part = receivers.at("part").get<std::string>();
+    options.filter = receivers.at("filter").get<std::string>();
+  } catch (const json::exception&) {
+    return Status::corruption("no options of a job");
+  }
+  return options;
+}
+
+std::string differenceOf(const json& found, const json& expected) {
+  const json flat_found = found.flatten(), flat_expected = expected.flatten();
+  const auto valueOf = [](const json& flat, const std::string& key) {
+    return flat.contains(key) ? flat.at(key).dump() : std::string("absent");
+  };
+  for (const json* one : {&flat_expected, &flat_found}) {
+    for (const auto& [key, value] : one->items()) {
+      const std::string is = valueOf(flat_found, key), should = valueOf(flat_expected, key);
+      if (is != should) return fmt::format("{} is {}, expected {}", key.substr(1), is, should);
+    }
+  }
+  return {};
+}
+
+}  // namespace surfeit

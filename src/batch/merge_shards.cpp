@@ -1,0 +1,241 @@
+// Brings the results of shards back into the order of the receivers, and writes these with them.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "batch/gather_job.h"
+#include "batch/gather_options.h"
+#include "batch/job_identity.h"
+#include "batch/result_store.h"
+#include "batch/shard_file.h"
+#include "batch/shard_names.h"
+#include "core/guard.h"
+#include "surfeit/shards.h"
+
+namespace surfeit {
+namespace {
+
+class ShardMerge {
+ public:
+  ShardMerge(std::string result_path, int count, Progress& progress)
+      : result_path_(std::move(result_path)), count_(count), progress_(progress) {}
+
+  // Reads all headers. The job is that of most shards.
+  Status readHeaders() {
+    std::map<std::string, int> jobs;
+    std::vector<std::optional<ShardHeader>> headers;
+    for (int shard = 1; shard <= count_; ++shard) {
+      if (progress_.isCancelled()) return Status::interrupted();
+      Result<ShardReader> reader = ShardReader::open(shardPath(result_path_, shard, count_));
+      if (reader.ok()) {
+        headers.emplace_back(reader->header());
+        ++jobs[reader->header().job.dump()];
+        continue;
+      }
+      headers.emplace_back();
+      lack(shard, access(shardPath(result_path_, shard, count_).c_str(), F_OK) == 0
+                      ? reader.status().message()
+                      : std::string());
+    }
+    int most = 0;
+    for (const auto& header : headers) {
+      if (!header || jobs[header->job.dump()] <= most) continue;
+      most = jobs[header->job.dump()];
+      first_ = *header;
+    }
+    if (most == 0) return incomplete();
+    checkTiling(headers);
+    return {};
+  }
+
+  const ShardHeader& job() const { return first_; }
+
+  // kIncomplete unless all shards are there.
+  Status incomplete() const {
+    if (lacking_.empty()) return {};
+    return Status::incomplete(fmt::format(
+        "{}: shards {} of {} are missing{}; gather them by --shard (sbatch --array={}), then merge "
+        "again",
+        result_path_, numberRanges(lacking_), count_,
+        reason_.empty() ? "" : fmt::format(" ({})", reason_), numberRanges(lacking_, ",")));
+  }
+
+  // Puts all results into the store.
+  Status read(ResultStore& results, std::uint64_t receivers) {
+    progress_.beginPhase("merge", first_.valid_receivers, "receivers");
+    std::vector<ResultStore::Entry> entries;
+    for (int shard = 1; shard <= count_; ++shard) {
+      const Status status = readShard(shard, receivers, results, entries);
+      if (status.code() == StatusCode::kCorruption) {
+        lack(shard, status.message());
+      } else if (!status.ok()) {
+        return status;
+      }
+    }
+    return incomplete();
+  }
+
+  void removeShards() const {
+    for (int shard = 1; shard <= count_; ++shard) {
+      unlink(shardPath(result_path_, shard, count_).c_str());
+    }
+    unlink(shardPlanPath(result_path_, count_).c_str());
+  }
+
+ private:
+  // Shards of the job follow each other without gap; those of another plan are to be gathered
+  // again.
+  void checkTiling(const std::vector<std::optional<ShardHeader>>& headers) {
+    std::uint64_t rank = 0;
+    std::map<std::string, std::vector<int>> sets;
+    for (int shard = 1; shard <= count_; ++shard) {
+      const auto& header = headers[static_cast<std::size_t>(shard) - 1];
+      if (!header) {
+        rank = kUnknown;
+        continue;
+      }
+      std::string difference = differenceOf(header->job, first_.job);
+      if (difference.empty() &&
+          (header->receivers_checksum != first_.receivers_checksum ||
+           header->valid_receivers != first_.valid_receivers || header->outputs != first_.outputs ||
+           header->shard != shard || header->count != count_ ||
+           (rank != kUnknown && header->first_rank != rank))) {
+        difference = "gathered for other receivers";
+      }
+      if (!difference.empty()) {
+        lack(shard, fmt::format("shard {} is of another job: {}", shard, difference));
+        rank = kUnknown;
+        continue;
+      }
+      sets[header->instruction_set].push_back(shard);
+      rank = header->first_rank + header->results;
+    }
+    if (lacking_.empty() && rank != first_.valid_receivers) {
+      lack(count_, "the last shard ends too early");
+    }
+    if (sets.size() > 1) noteInstructionSets(sets);
+  }
+
+  void noteInstructionSets(const std::map<std::string, std::vector<int>>& sets) {
+    std::string text;
+    for (const auto& [name, shards] : sets) {
+      text += fmt::format("{}{}: shards {}", text.empty() ? "" : "; ", name, numberRanges(shards));
+    }
+    progress_.note(
+        fmt::format("{}: gathered with several instruction sets, which agree within 1e-4, but not "
+                    "bit for bit ({}); gather all shards on one kind of machine for equal bytes",
+                    result_path_, text));
+  }
+
+  Status readShard(int shard, std::uint64_t receivers, ResultStore& results,
+                   std::vector<ResultStore::Entry>& entries) {
+    SURFEIT_ASSIGN_OR_RETURN(ShardReader reader,
+                             ShardReader::open(shardPath(result_path_, shard, count_)));
+    for (;;) {
+      if (progress_.isCancelled()) return Status::interrupted();
+      SURFEIT_RETURN_IF_ERROR(reader.next(entries));
+      if (entries.empty()) return {};
+      for (const ResultStore::Entry& entry : entries) {
+        if (entry.index >= receivers) {
+          return Status::corruption(fmt::format("{}: result of receiver {}, expected below {}",
+                                                reader.path(), entry.index, receivers));
+        }
+      }
+      SURFEIT_RETURN_IF_ERROR(results.put(entries));
+      progress_.advance(entries.size());
+    }
+  }
+
+  // The first reason is told.
+  void lack(int shard, const std::string& reason) {
+    lacking_.push_back(shard);
+    if (reason_.empty()) reason_ = reason;
+  }
+
+  static constexpr std::uint64_t kUnknown = ~std::uint64_t{0};
+
+  const std::string result_path_;
+  const int count_;
+  Progress& progress_;
+  ShardHeader first_;  // of the job
+  std::vector<int> lacking_;
+  std::string reason_;
+};
+
+Result<int> countOf(const std::string& result_path, int given) {
+  if (given < 0 || given > kMostShards) {
+    return Status::invalidArgument(fmt::format("{} shards, expected 1 to {}", given, kMostShards));
+  }
+  if (given > 0) return given;
+  SURFEIT_ASSIGN_OR_RETURN(const std::set<int> counts, shardCounts(result_path));
+  if (counts.size() == 1) return *counts.begin();
+  if (counts.empty()) {
+    return Status::incomplete(fmt::format(
+        "{}: found no shard of it, expected files {}", result_path,
+        shardPath(result_path, 1, 1)
+            .replace(result_path.size(), std::string::npos, ".shard-I-of-N beside it")));
+  }
+  std::vector<int> numbers(counts.begin(), counts.end());
+  return Status::invalidArgument(
+      fmt::format("{}: shards of several jobs, expected their number (--shards {})", result_path,
+                  numberRanges(numbers, "|")));
+}
+
+Result<MergeStats> merge(const std::string& scene_path, const std::string& receivers_path,
+                         const std::string& result_path, const MergeOptions& merging,
+                         Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(const int count, countOf(result_path, merging.count));
+  ShardMerge shards(result_path, count, progress);
+  SURFEIT_RETURN_IF_ERROR(shards.readHeaders());
+  SURFEIT_ASSIGN_OR_RETURN(GatherOptions options, optionsOfJob(shards.job().job));
+  static_cast<JobOptions&>(options) = merging;
+  options = withDefaults(options);
+  SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, openSceneFor(scene_path, result_path, options));
+  SURFEIT_ASSIGN_OR_RETURN(GatherJob job,
+                           GatherJob::open(receivers_path, result_path, options, scene, progress));
+  for (const char* part : {"version", "scene", "receivers"}) {
+    const std::string difference =
+        differenceOf(jobIdentity(scene, job)[part], shards.job().job[part]);
+    if (difference.empty()) continue;
+    return Status::invalidArgument(fmt::format(
+        "{}: the shards were gathered with another {}: {}; merge with that one, or gather again",
+        result_path, part, difference));
+  }
+  SURFEIT_RETURN_IF_ERROR(shards.incomplete());
+
+  const std::uint64_t receivers = job.input().receiverCount();
+  const ResultRows rows(job.input().receivers(), options.outputs, options.mode);
+  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer, job.createWriter(rows));
+  ResultStore results({.count = receivers,
+                       .outputs = options.outputs,
+                       .memory_bytes = job.memory().result_bytes,
+                       .temporary_directory = job.temporaryDirectory()});
+  SURFEIT_RETURN_IF_ERROR(shards.read(results, receivers));
+  SURFEIT_RETURN_IF_ERROR(results.finish());
+  SURFEIT_RETURN_IF_ERROR(job.write(rows, results, *writer, shards.job().receivers_checksum));
+  if (merging.removes_shards) shards.removeShards();
+  return MergeStats{.shards = count,
+                    .receivers = receivers,
+                    .invalid_receivers = shards.job().invalid_receivers,
+                    .memory_bytes = options.memory_bytes,
+                    .temporary_bytes = results.temporaryBytes()};
+}
+
+}  // namespace
+
+Result<MergeStats> mergeShards(const std::string& scene_path, const std::string& receivers_path,
+                               const std::string& result_path, const MergeOptions& options,
+                               Progress& progress) {
+  return guarded(result_path,
+                 [&] { return merge(scene_path, receivers_path, result_path, options, progress); });
+}
+
+}  // namespace surfeit
