@@ -20,6 +20,17 @@ inline constexpr std::uint32_t kMaxGroups = 64;
 inline constexpr std::uint64_t kAllGroups = ~std::uint64_t{0};
 constexpr std::uint64_t groupBit(std::uint32_t group) { return std::uint64_t{1} << group; }
 
+// Of a code: in steps of 1/65535.
+inline constexpr std::uint16_t kMostTransparency = 65534;
+constexpr float opacityOf(std::uint16_t transparency) {
+  return 1 - float(transparency) * (1.f / 65535);
+}
+// The nearest code of an opacity from 0 to 1; of 0 that of the least.
+constexpr std::uint16_t transparencyOf(double opacity) {
+  const double code = (1 - opacity) * 65535 + 0.5;
+  return code >= kMostTransparency ? kMostTransparency : static_cast<std::uint16_t>(code);
+}
+
 // Plain data, 64 bytes without padding, so that a surfel can be stored and compared as bytes.
 struct Surfel {
   glm::vec3 position{0};    // world units
@@ -27,9 +38,10 @@ struct Surfel {
   glm::vec3 normal{0};      // unit length; zero when kSurfelSphere is set
   float area = 0;           // > 0; exact area of the piece; for a sphere, its cross-section
   glm::vec3 radiosity{0};   // radiant exitance, scene-linear rgb, >= 0
-  std::uint32_t flags = 0;  // SurfelFlags
-  glm::vec3 albedo{0};      // diffuse reflectance, scene-linear rgb, for further bounces
-  std::uint8_t group = 0;   // object group, 0 to kMaxGroups - 1; 0 in clouds without groups
+  std::uint16_t flags = 0;  // SurfelFlags
+  std::uint16_t transparency = 0;  // 1 - opacity, in 1/65535; 0: opaque
+  glm::vec3 albedo{0};             // diffuse reflectance, scene-linear rgb, for further bounces
+  std::uint8_t group = 0;          // object group, 0 to kMaxGroups - 1; 0 in clouds without groups
   // Ratio of length to width of the piece, and direction of its longer side, as codes
   // (core/long_side.h); 0: not known. Two-sided surfels with a longer side are drawn as rectangles.
   std::uint8_t elongation = 0;
@@ -37,6 +49,8 @@ struct Surfel {
 
   bool isSphere() const { return (flags & kSurfelSphere) != 0; }
   bool isTwoSided() const { return (flags & kSurfelTwoSided) != 0; }
+  // How much of its area covers what lies behind, and sends its radiosity: above 0, up to 1.
+  float opacity() const { return opacityOf(transparency); }
 };
 static_assert(sizeof(Surfel) == 64);
 
@@ -50,6 +64,7 @@ struct CloudChannels {
   bool two_sided = false;
   bool group = false;
   bool long_side = false;
+  bool opacity = false;
 };
 
 }  // namespace surfeit

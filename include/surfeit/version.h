@@ -7,7 +7,8 @@ namespace surfeit {
 
 inline constexpr const char* kVersion = "0.1.0";
 
-// docs/format.md; a reader refuses a newer format and keeps reading every older one.
-inline constexpr std::uint32_t kFormatVersion = 2;
+// docs/format.md; a reader refuses a newer format and keeps reading every older one. Scenes without
+// opacity are of version 2, and stay readable by programs that know no newer one.
+inline constexpr std::uint32_t kFormatVersion = 3;
 
 }  // namespace surfeit

@@ -18,7 +18,8 @@ py::list channelNames(const CloudChannels& channels) {
        {std::pair("normal", channels.normal), std::pair("radius", channels.radius),
         std::pair("area", channels.area), std::pair("radiosity", channels.radiosity),
         std::pair("albedo", channels.albedo), std::pair("two_sided", channels.two_sided),
-        std::pair("group", channels.group), std::pair("long_side", channels.long_side)}) {
+        std::pair("group", channels.group), std::pair("long_side", channels.long_side),
+        std::pair("opacity", channels.opacity)}) {
     if (is_there) names.append(name);
   }
   return names;

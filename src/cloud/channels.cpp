@@ -40,6 +40,7 @@ constexpr KnownChannel kKnownChannels[] = {
     {"alpha", ChannelKind::kFloat, 1, {}},
     {"intensity", ChannelKind::kFloat, 1, {}},
     {"density", ChannelKind::kFloat, 1, {}},
+    {"opacity", ChannelKind::kFloat, 1, {}},
     {"radiosity", ChannelKind::kColor, 3, {}},
     {"albedo", ChannelKind::kColor, 3, {}},
     {"power", ChannelKind::kColor, 3, {}},

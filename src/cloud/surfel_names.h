@@ -28,7 +28,8 @@ inline bool isSurfelProperty(std::string_view name) {
   };
   return holds(kPositionNames) || holds(kNormalNames) || holds(kRadiosityNames) ||
          holds(kAlbedoNames) || holds(kColorNames) || holds(kRadiusNames) || holds(kGroupNames) ||
-         holds(kLongSideNames) || name == "area" || name == "coverage" || name == "two_sided";
+         holds(kLongSideNames) || name == "area" || name == "coverage" || name == "opacity" ||
+         name == "two_sided";
 }
 
 }  // namespace surfeit

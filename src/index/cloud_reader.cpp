@@ -86,9 +86,9 @@ void InputPass::decode(const RowFetcher::Rows& rows) {
 }
 
 CloudChannels unionOf(const CloudChannels& a, const CloudChannels& b) {
-  return {a.normal || b.normal,       a.radius || b.radius,      a.area || b.area,
-          a.radiosity || b.radiosity, a.albedo || b.albedo,      a.two_sided || b.two_sided,
-          a.group || b.group,         a.long_side || b.long_side};
+  return {a.normal || b.normal,       a.radius || b.radius,       a.area || b.area,
+          a.radiosity || b.radiosity, a.albedo || b.albedo,       a.two_sided || b.two_sided,
+          a.group || b.group,         a.long_side || b.long_side, a.opacity || b.opacity};
 }
 
 }  // namespace

@@ -354,6 +354,7 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
   header.cube = rootCube(totals_.bounds);
   header.channels = totals_.channels;
   header.channels.normal = header.channels.normal || estimatesNormals();
+  header.format_version = formatVersionFor(header.channels);
   header.full_precision = full_precision;
   return SceneWriter::create(path, header, identity(full_precision));
 }
@@ -430,12 +431,13 @@ std::uint64_t Indexer::identity(bool full_precision) const {
       std::bit_cast<std::uint64_t>(origin.y),
       std::bit_cast<std::uint64_t>(origin.z),
       totals_.surfels,
-      kFormatVersion,
+      formatVersionFor(channels),
       full_precision ? 1u : 0u,
       std::uint64_t{channels.normal} | std::uint64_t{channels.radius} << 1 |
           std::uint64_t{channels.area} << 2 | std::uint64_t{channels.radiosity} << 3 |
           std::uint64_t{channels.albedo} << 4 | std::uint64_t{channels.two_sided} << 5 |
-          std::uint64_t{channels.group} << 6 | std::uint64_t{channels.long_side} << 7,
+          std::uint64_t{channels.group} << 6 | std::uint64_t{channels.long_side} << 7 |
+          std::uint64_t{channels.opacity} << 8,
       XXH3_64bits(text.data(), text.size())};
   return XXH3_64bits(parts, sizeof parts);
 }

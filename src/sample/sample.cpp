@@ -163,14 +163,14 @@ class SurfelMaker {
     surfel.radiosity = 0.5f * (surfel.radiosity + back);
   }
 
-  // Leaves of the surfels from `begin` the areas that are there: none of what is clear.
+  // Of the surfels from `begin`: nothing is there of what is clear.
   static void applyOpacity(const std::vector<float>& opacities, std::size_t begin, Batch& batch) {
     std::size_t kept = begin;
     for (std::size_t i = begin; i < batch.surfels.size(); ++i) {
       const float opacity = opacities[i - begin];
       if (!(opacity > 0)) continue;
       batch.surfels[kept] = batch.surfels[i];
-      batch.surfels[kept].area *= opacity;
+      batch.surfels[kept].transparency = transparencyOf(double(opacity));
       ++kept;
     }
     batch.clear += batch.surfels.size() - kept;
@@ -312,6 +312,7 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.normal = channels.radius = channels.area = channels.albedo = true;
     channels.radiosity = light.hasLight();
     channels.two_sided = channels.long_side = options.is_two_sided;
+    channels.opacity = !mesh.isOpaque();
     SURFEIT_ASSIGN_OR_RETURN(
         SurfelWriter writer,
         SurfelWriter::create(

@@ -47,6 +47,7 @@ constexpr KindName kKindNames[] = {
     {&SurfelDefects::negative_color, "a negative radiosity or albedo"},
     {&SurfelDefects::out_of_range, "a value too large to calculate with"},
     {&SurfelDefects::bad_group, "a group that is not 0 to 63"},
+    {&SurfelDefects::bad_opacity, "an opacity that is not above 0 and at most 1"},
 };
 
 }  // namespace
@@ -175,6 +176,13 @@ Result<SurfelMapping> SurfelMapping::create(const RowLayout& element, const std:
     channels.albedo = channels.albedo || has_color;
   }
 
+  if (!mapping.coverage_.isPresent()) {
+    SURFEIT_ASSIGN_OR_RETURN(mapping.opacity_, findField(element, "opacity", path));
+    const ValueType type = mapping.opacity_.type;
+    mapping.opacity_scale_ =
+        isFloatType(type) ? 1 : 1 / (valueTypeBytes(type) == 1 ? 255. : 65535.);
+    channels.opacity = mapping.opacity_.isPresent();
+  }
   SURFEIT_ASSIGN_OR_RETURN(mapping.two_sided_, findField(element, "two_sided", path));
   channels.two_sided = mapping.two_sided_.isPresent();
   SURFEIT_ASSIGN_OR_RETURN(channels.long_side,
@@ -197,11 +205,12 @@ void SurfelMapping::setOrigin(const glm::dvec3& origin) {
 }
 
 // The decoder of rows whose used properties are floats about an origin of 0, but for colors of 8
-// bits and a two_sided of a byte; nothing when there is any other, or long sides. Its limits are
-// those of decodeRow.
+// bits and a two_sided of a byte; nothing when there is any other, long sides or opacity. Its
+// limits are those of decodeRow.
 std::optional<FloatRowDecoder> SurfelMapping::makeFastDecoder() const {
   FloatRowDecoder decoder(row_bytes_);
-  bool is_fast = !channels_.long_side && !coverage_.isPresent() && origin_ == glm::dvec3(0);
+  bool is_fast = !channels_.long_side && !channels_.opacity && !coverage_.isPresent() &&
+                 origin_ == glm::dvec3(0);
   const auto add = [&](const Field& field, std::size_t place, float least, float most) {
     if (!field.isPresent()) return;
     const std::size_t offset = static_cast<std::size_t>(field.offset);
@@ -279,6 +288,7 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
   const double area = read(area_);
   const bool is_two_sided = read(two_sided_) != 0;
   const double coverage = read(coverage_);
+  const double opacity = opacity_.isPresent() ? opacity_scale_ * read(opacity_) : 1;
   const double group = read(group_);
   if (defect.kind != nullptr) return defect;
 
@@ -348,6 +358,10 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     return {&SurfelDefects::bad_group, group_.name, group, "0 to 63"};
   }
   surfel.group = static_cast<std::uint8_t>(group);
+  if (!(opacity > 0 && opacity <= 1)) {
+    return {&SurfelDefects::bad_opacity, opacity_.name, opacity, "more than 0 and at most 1"};
+  }
+  surfel.transparency = transparencyOf(opacity);
   return {};
 }
 

@@ -32,6 +32,7 @@ struct SurfelDefects {
   Kind negative_color;  // negative radiosity or albedo
   Kind out_of_range;    // beyond kLargestLength, kLargestArea or kLargestColor
   Kind bad_group;       // group that is no whole number from 0 to 63, where the cloud has groups
+  Kind bad_opacity;     // opacity that is 0 or less (nothing is there), or above 1
 
   std::uint64_t total() const;
   // Number of the first record with any defect. Only when total() is not 0.
@@ -57,6 +58,8 @@ struct SurfelDefects {
 //                              radiosity and albedo is absent, whose channel then counts as there
 //   two_sided                  not zero: both sides send and block light
 //   long_side_x _y _z          the longer side of the piece, as a vector; zero: not known
+//   opacity                    above 0 and at most 1, or of 255 (uchar) or 65535 (ushort); where
+//                              there is a coverage, that counts alone
 //   group | light_group        group, a whole number from 0 to 63 of any type
 // What is absent stays 0: radius and area for the indexer's rules, which need the neighbourhood.
 // A record has one defect, the first in the order of SurfelDefects. Immutable; safe from any
@@ -124,7 +127,8 @@ class SurfelMapping {
   CloudChannels channels_;
   std::size_t row_bytes_ = 0;
   Field position_[3], normal_[3], radius_, area_, radiosity_[3], albedo_[3], two_sided_, group_;
-  Field long_side_[3], coverage_;
+  Field long_side_[3], coverage_, opacity_;
+  double opacity_scale_ = 1;
   double radius_scale_ = 1;
   glm::dvec3 origin_{0};
   std::optional<FloatRowDecoder> fast_decoder_;  // when the types of the properties allow it

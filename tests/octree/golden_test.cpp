@@ -22,13 +22,18 @@ struct Golden {
   const char* name;
   std::uint64_t surfel_hash, node_hash;
   bool has_groups, has_long_sides;
-  std::uint32_t format_version = kFormatVersion;
+  std::uint32_t format_version = 2;
 
-  bool isPresent() const { return format_version == kFormatVersion; }
+  bool hasOpacity() const { return format_version == 3; }
+  bool isPresent() const { return format_version > 1; }
 
   std::string path() const { return SURFEIT_TEST_SOURCE_DIR "/golden/" + std::string(name); }
   CloudChannels channels() const {
-    return has_groups ? kAllAndGroups : has_long_sides ? kAllAndLongSides : kAllChannels;
+    CloudChannels channels = has_groups       ? kAllAndGroups
+                             : has_long_sides ? kAllAndLongSides
+                                              : kAllChannels;
+    channels.opacity = hasOpacity();
+    return channels;
   }
   // For the names of the tests
   friend void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
@@ -40,6 +45,7 @@ constexpr Golden kGoldens[] = {
     {"v2.sft", 12531938469041694647ull, 3774583152376164457ull, false, false},
     {"v2_groups.sft", 12687918996693723113ull, 6009126428172456815ull, true, false},
     {"v2_long_sides.sft", 16580172462110769372ull, 3774583152376164457ull, false, true},
+    {"v3_opacity.sft", 7818277089028598686ull, 16727090283409600907ull, false, false, 3},
 };
 // The zstd that compressed them: another one may store the same payloads in other bytes.
 constexpr unsigned kZstdVersion = 10504;
@@ -62,6 +68,7 @@ std::vector<Surfel> goldenCloud(const Golden& golden) {
       surfel.flags = kSurfelSphere;
       surfel.normal = glm::vec3(0);
     }
+    if (golden.hasOpacity()) surfel.transparency = static_cast<std::uint16_t>(i * 211);
     if (golden.has_groups) surfel.group = static_cast<std::uint8_t>(i / 50 * 11);
     cloud.push_back(surfel);
   }
@@ -91,6 +98,7 @@ TEST_P(GoldenTest, DecodesToTheSameContents) {
   ASSERT_EQ(scene->surfels.size(), 300u);
   EXPECT_EQ(scene->header.format_version, golden.format_version);
   EXPECT_EQ(scene->header.channels.group, golden.has_groups);
+  EXPECT_EQ(scene->header.channels.opacity, golden.hasOpacity());
   EXPECT_EQ(scene->header.channels.long_side, golden.has_long_sides);
   std::uint64_t node_hash = 0;
   for (const auto& [node, first] : scene->nodes) {
@@ -102,8 +110,10 @@ TEST_P(GoldenTest, DecodesToTheSameContents) {
     for (std::size_t k = 0; k < node.facet_count; ++k) {
       const Facet facet = node.facet(k);
       add(&facet, offsetof(Facet, is_two_sided));  // those are flags of the node
+      if (golden.hasOpacity()) add(&facet.opacity, sizeof facet.opacity);
     }
     if (!node.hasFacets()) add(&node.rough, sizeof node.rough);
+    if (golden.hasOpacity()) add(&node.transparency, sizeof node.transparency);
     EXPECT_TRUE(golden.has_groups || node.groups == groupBit(0));
     if (golden.format_version == 1) {
       EXPECT_EQ(node.thickness, node.radius);

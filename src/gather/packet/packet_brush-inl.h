@@ -126,7 +126,6 @@ class Brush {
 
   // What a receiver does not look at is not open. No layer has ended anywhere.
   void ClearFace() {
-    constexpr float kInfinity = std::numeric_limits<float>::infinity();
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
     const V3 up = InRaster(receivers_.normal);
@@ -146,16 +145,17 @@ class Brush {
     });
   }
 
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   // Of this part of it.
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
-    const V reach = Splat(patch.reach);
+    const V reach = Splat(patch.isDrop() ? -kInfinity : patch.reach);
     Cover cover;
     cover.depth_begin = hn::Sub(distance, reach);
     cover.depth_end = hn::Add(distance, reach);
     cover.inverse_gap = inverseLayerGap(patch.reach);
     cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
     cover.overlap = patch.overlap;
-    cover.has_hull = patch.thicket == 0;
+    cover.has_hull = patch.thicket == 0 && !patch.lets_through;
     cover.is_solid = patch.is_solid;
     cover.nested = patch.nested();
     cover.opacity = hn::Mul(part, Opacity(patch));

@@ -47,6 +47,7 @@ struct alignas(64) Patch {
   float overlap = 0;
   float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
   float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
+  bool lets_through = false;  // it is translucent: nothing closes what it leaves open
   // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
   // alone
   bool is_solid = true;
@@ -63,11 +64,13 @@ struct alignas(64) Patch {
   float soft_peak = 0;      // of the ray traced disk, softDiskPeak
   float ribbon_width = 0;   // of the ray traced ribbon
 
+  // What is in a volume, as of smoke, hides behind its own layer as behind others: it is one alone.
+  bool isDrop() const { return lets_through && reach == 0; }
   bool isRound() const { return disk_area == 0; }
   // Outlines of surfaces on the same ground rise from the same side of a pixel, and the smaller
   // lies behind the larger: how much of the patch does so.
   float nested() const {
-    return is_solid && seen != Seen::kBoth ? kFidelity.nested * (1 - thicket) : 0;
+    return is_solid && !lets_through && seen != Seen::kBoth ? kFidelity.nested * (1 - thicket) : 0;
   }
   bool showsBoth() const { return seen == Seen::kBoth || seen == Seen::kDarkBack; }
 };

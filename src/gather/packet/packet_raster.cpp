@@ -248,6 +248,8 @@ void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t par
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
   patch.reach = reachOf(facet, direction);
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
+  patch.lets_through = facet.opacity < 1;
+  if (patch.lets_through) patch.opacity = facetOpacity(facet);
   patch.shape = shapeOf(facet.covariance);
   patch.area = facet.area;
   patch.most_area = mostVisibleArea(facet);
@@ -279,7 +281,10 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.position = node.position + visible.middle;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
-  patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
+  patch.lets_through = node.transparency != 0;
+  if (!patch.lets_through) {
+    patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
+  }
   patch.shape = shapeOf(node.covariance);
   patch.thicket = thicketPart(node);
   patch.is_solid = false;
@@ -290,7 +295,9 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.opacity = cover.opacity;
   patch.parts = parts;
   const auto [front, back] = seen.facing;
-  if (sides != GatherSides::kBack) patch.radiosity = (front / round_area) * seen.radiosity;
+  if (sides != GatherSides::kBack) {
+    patch.radiosity = (front / (round_area * node.opacity())) * seen.radiosity;
+  }
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
   patch.overlap = std::max(patch.overlap, patch.thicket);
@@ -312,7 +319,9 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.radius = drawnRadius(surfel, ribbon);
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
-      patch.soft_peak = softDiskPeak(patch.radius, surfel.area, surfel.isTwoSided());
+      // Only what is opaque may cover more than it should to leave no gaps
+      const bool is_exact = surfel.isTwoSided() || surfel.transparency != 0;
+      patch.soft_peak = softDiskPeak(patch.radius, surfel.area, is_exact);
     } else {
       patch.shape = ribbon.shape();
       patch.is_ribbon = true;
@@ -329,6 +338,9 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
+    patch.opacity = surfel.opacity();
+    patch.lets_through = surfel.transparency != 0;
+    if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
     patch.thicket = thicketPart(surfel);
     patch.is_solid = mayTile(surfel);
     // Positive, for a surfel may be at a receiver; then it is near at any setting

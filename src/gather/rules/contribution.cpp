@@ -62,8 +62,14 @@ float normalRange(const glm::vec3& normal) {
 }
 
 Facet facetOf(const Node& node) {
-  return {node.position,  node.radius,     node.flatness * node.normal, node.area,
-          node.radiosity, node.covariance, node.isTwoSided(),           false};
+  return {.position = node.position,
+          .radius = node.radius,
+          .normal = node.flatness * node.normal,
+          .area = node.area,
+          .radiosity = node.radiosity,
+          .covariance = node.covariance,
+          .is_two_sided = node.isTwoSided(),
+          .opacity = node.opacity()};
 }
 
 // Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,
@@ -127,14 +133,23 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
   const float surface = std::min(shown, most);
   constexpr float kThicketOutline = 5.f / 4;
   const float outline = std::min(sphere, kThicketOutline * ellipse);
-  if (!(thicket > 0 && outline > 0)) return {surface, 1, most};
-  const float hidden = outline * thicketOpacity(std::min(shown, node.area), outline);
-  const float area = surface + thicket * (outline - surface);
-  return {area, (surface + thicket * (hidden - surface)) / area, std::max(area, most)};
+  const float opacity = layersOpacity(node.opacity(), shown / surface);
+  if (!(thicket > 0 && outline > 0)) return {surface, opacity, most};
+  const float hidden =
+      outline * thicketOpacity(node.opacity() * std::min(shown, node.area), outline);
+  const float area = surface + thicket * (outline - surface), solid = opacity * surface;
+  return {area, (solid + thicket * (hidden - solid)) / area, std::max(area, most)};
 }
 
 float mostVisibleArea(const Facet& facet) {
   return std::min(facet.area, kPi * facet.radius * facet.radius);
+}
+
+float facetOpacity(const Facet& facet) {
+  const float across = quadraticForm(adjugate(facet.covariance), glm::normalize(facet.normal));
+  const float ellipse = 4 * kPi * std::sqrt(std::max(0.f, across));
+  const float depth = ellipse > 0 ? std::max(1.f, facet.area / ellipse) : 1;
+  return layersOpacity(facet.opacity, depth) / depth;
 }
 
 float reachOf(const Facet& facet, const glm::vec3& direction) {

@@ -46,6 +46,9 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 
 // The largest area that a facet may show in any direction.
 float mostVisibleArea(const Facet& facet);
+// What a translucent facet hides of what its area covers. More area than that of the ellipse that
+// spreads as it does lies behind itself, and is as many layers.
+float facetOpacity(const Facet& facet);
 
 // What a rough node covers that shows `shown` of its area in unit direction `direction` (or its
 // opposite), and of which `thicket` is leaves or hair: an area, and what it hides of that. A

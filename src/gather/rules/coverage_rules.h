@@ -41,6 +41,11 @@ inline constexpr std::uint32_t kHullSamples = 0xffff;
 // What things of this area hide of an outline, spread in it at random (Beer and Lambert).
 inline float thicketOpacity(float area, float outline) { return 1 - std::exp(-area / outline); }
 
+// What so many layers of this opacity hide together where each covers all; `depth` below 1: one.
+inline float layersOpacity(float opacity, float depth) {
+  return opacity < 1 ? 1 - std::pow(1 - opacity, std::max(1.f, depth)) : 1;
+}
+
 // Finite and positive, for a surfel may be at a receiver; then it is near at any setting.
 inline float nearBorderSq(float near_distance) {
   return std::clamp(near_distance * near_distance, std::numeric_limits<float>::min(),
@@ -62,9 +67,9 @@ static_assert(kFidelity.ribbon_part * kPi * kFidelity.largest_radius * kFidelity
 #endif
 
 // Coverage in the middle of a soft disk, which falls off as 1 - (distance / radius)^2 and is
-// limited to 1, such that the whole disk covers that many times `area`.
-inline float softDiskPeak(float radius, float area, bool is_two_sided) {
-  const float covered = (is_two_sided ? 1 : kFidelity.soft_disk_area) * area;
+// limited to 1, such that the whole disk covers `area`, or, where gaps are worse, more.
+inline float softDiskPeak(float radius, float area, bool is_exact) {
+  const float covered = (is_exact ? 1 : kFidelity.soft_disk_area) * area;
   const float share = std::min(0.95f, covered / (kPi * radius * radius));
   return share < 0.5f ? 2 * share : 1 / (2 * (1 - share));
 }

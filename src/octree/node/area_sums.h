@@ -9,13 +9,15 @@
 
 namespace surfeit {
 
-// Of surfels with area A, position x relative to an origin, normal n, radiosity B. Plain data.
+// Of surfels with area A, opacity o, position x relative to an origin, normal n, radiosity B. Plain
+// data.
 struct AreaSums {
   double area = 0;                                       // sum A
   double position[3] = {};                               // sum A x
   double second_moment[SymmetricMatrix::kEntries] = {};  // sum A (x x^T + what a disk spreads)
   double normal[3] = {};                                 // sum A n over one-sided disks
-  double radiosity[3] = {};                              // sum A B
+  double covered = 0;                                    // sum A o
+  double radiosity[3] = {};                              // sum A o B
 
   AreaSums() = default;
   // One surfel.

@@ -9,6 +9,7 @@
 #include "core/spherical_harmonics.h"
 #include "core/symmetric_matrix.h"
 #include "octree/node/node_facet.h"
+#include "surfeit/surfel.h"
 
 namespace surfeit {
 
@@ -63,7 +64,7 @@ struct Node {
   // or sphere: 0 to radius. Radius where nothing is known, and where `normal` is zero.
   float thickness;
   float area;           // sum of the surfel areas
-  glm::vec3 radiosity;  // area-weighted mean
+  glm::vec3 radiosity;  // mean, weighted by area and opacity
   float flatness;       // |sum A n| / sum A, 0..1
   std::uint32_t page;  // interior: node page of the children; leaf: surfel page of its first surfel
   std::uint16_t first;         // index of the first child or surfel in that page
@@ -75,7 +76,8 @@ struct Node {
   // Area-weighted mean of (x - position)(x - position)^T over the disks, not only their middles:
   // how the area spreads. Trace above 0 and at most about radius^2.
   SymmetricMatrix covariance;
-  std::uint8_t facet_count;  // 0: it is flat or rough
+  std::uint8_t facet_count;    // 0: it is flat or rough
+  std::uint16_t transparency;  // of the area-weighted mean of opacities, as in Surfel
   // How far surfels lie off the planes that a flat node or one of facets is drawn on, at most or by
   // their moments; 0 in a rough node. Not stored.
   float off_plane;
@@ -94,6 +96,7 @@ struct Node {
   // Sets off_plane by everything else.
   void findOffPlane();
 
+  float opacity() const { return opacityOf(transparency); }
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
   bool hasFacets() const { return facet_count > 0; }

@@ -9,6 +9,7 @@
 
 #include "core/symmetric_matrix.h"
 #include "octree/node/moment_codes.h"
+#include "surfeit/surfel.h"
 
 namespace surfeit {
 
@@ -22,20 +23,22 @@ struct Facet {
   float radius;        // of a disk that spreads about as it does
   glm::vec3 normal;    // mean over the area: shorter where it is curved
   float area;
-  glm::vec3 radiosity;         // area-weighted mean
+  glm::vec3 radiosity;         // mean, weighted by area and opacity
   SymmetricMatrix covariance;  // Node::covariance
   bool is_two_sided = false;   // seen from both sides; the normal is one of two
   bool is_thicket = false;     // two-sided, and one of several: leaves, or hair
+  float opacity = 1;           // area-weighted mean
 };
 
 // A facet in codes, relative to its node, as pages hold it in either precision: six take less room
 // than the harmonics of a rough node.
 struct NodeFacet {
-  glm::vec3 radiosity;                 // area-weighted mean
+  glm::vec3 radiosity;                 // mean, weighted by area and opacity
   std::array<std::int16_t, 3> normal;  // mean, in 1/32767
   std::uint16_t area;                  // in 1/65535 of the node's
   std::array<std::uint8_t, 3> offset;  // from the node's position, a signed fraction of its radius
   CovarianceCodes covariance;          // within its radius
+  std::uint16_t transparency;          // as in Surfel
 
   static NodeFacet encode(const Facet& facet, const glm::vec3& position, float radius, float area);
   // These and decode(): what the facet is, by the position, radius and area of the node.
@@ -56,7 +59,8 @@ struct NodeFacet {
             .normal = meanNormal(),
             .area = node_area * (float(area) * (1.f / 65535)),
             .radiosity = radiosity,
-            .covariance = covarianceOf(covariance, node_radius)};
+            .covariance = covarianceOf(covariance, node_radius),
+            .opacity = opacityOf(transparency)};
   }
   bool operator==(const NodeFacet&) const = default;
 };

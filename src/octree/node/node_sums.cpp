@@ -44,8 +44,10 @@ void NodeSums::add(const Surfel& surfel) {
   surfel_count += 1;
   groups |= groupBit(surfel.group);
   const double a = double(surfel.area);
-  const double area_and_power[4] = {1, double(surfel.radiosity[0]), double(surfel.radiosity[1]),
-                                    double(surfel.radiosity[2])};
+  const double o = double(surfel.opacity());
+  const double area_and_power[4] = {1, o * double(surfel.radiosity[0]),
+                                    o * double(surfel.radiosity[1]),
+                                    o * double(surfel.radiosity[2])};
   const ZonalFactors& factors = lobeOf(surfel);
   const double bands[3] = {a * double(factors[0]), a * double(factors[1]), a * double(factors[2])};
   const ShCoefficients basis = shBasis(surfel.normal);
@@ -102,8 +104,9 @@ Facet NodeSums::toFacet(const AreaSums& group) const {
   for (int axis = 0; axis < 3; ++axis) {
     facet.position[axis] = float(origin[axis] + group.position[axis] / group.area);
     facet.normal[axis] = float(group.normal[axis] / group.area);
-    facet.radiosity[axis] = float(group.radiosity[axis] / group.area);
+    facet.radiosity[axis] = float(group.radiosity[axis] / group.covered);
   }
+  facet.opacity = float(group.covered / group.area);
   facet.covariance = group.covariance();
   return facet;
 }
@@ -134,6 +137,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   node.position = all.position;
   node.area = all.area;
   node.radiosity = all.radiosity;
+  node.transparency = transparencyOf(covered / area);
   node.covariance = all.covariance;
   setNormal(*this, node);
   if (node.flatness > flatness_limit) {

@@ -10,17 +10,19 @@ namespace surfeit {
 namespace {
 
 // Entries of a facet: its area and normal in 16 bits, its offset and covariance in bytes.
+// Where facets have an opacity, its code in two bytes more.
 constexpr std::size_t kWide = 4, kBytes = 3 + SymmetricMatrix::kEntries;
 
 // Entry `k` of all facets lies side by side.
 struct Codes {
   std::size_t count;
+  bool has_opacity;
   std::vector<std::int16_t>& wide = threadScratch<std::vector<std::int16_t>>([] {});
   std::vector<std::uint8_t>& bytes = threadScratch<std::vector<std::uint8_t>>([] {});
 
-  explicit Codes(std::size_t facets) : count(facets) {
+  Codes(std::size_t facets, bool with_opacity) : count(facets), has_opacity(with_opacity) {
     wide.resize(kWide * facets);
-    bytes.resize(kBytes * facets);
+    bytes.resize((kBytes + (has_opacity ? 2 : 0)) * facets);
   }
   bool get(PayloadReader& reader) {
     return getSmallIntegers(reader, wide) && getBytes8(reader, bytes);
@@ -33,6 +35,9 @@ struct Codes {
     for (std::size_t k = 0; k < facet.covariance.size(); ++k) {
       bytes[(3 + k) * count + i] = facet.covariance[k];
     }
+    if (!has_opacity) return;
+    bytes[kBytes * count + i] = static_cast<std::uint8_t>(facet.transparency & 0xff);
+    bytes[(kBytes + 1) * count + i] = static_cast<std::uint8_t>(facet.transparency >> 8);
   }
   NodeFacet at(std::size_t i) const {
     NodeFacet facet{};
@@ -41,6 +46,10 @@ struct Codes {
     for (std::size_t k = 0; k < 3; ++k) facet.offset[k] = bytes[k * count + i];
     for (std::size_t k = 0; k < facet.covariance.size(); ++k) {
       facet.covariance[k] = bytes[(3 + k) * count + i];
+    }
+    if (has_opacity) {
+      facet.transparency = static_cast<std::uint16_t>(bytes[kBytes * count + i] |
+                                                      bytes[(kBytes + 1) * count + i] << 8);
     }
     return facet;
   }
@@ -74,9 +83,9 @@ void FacetColumns::add(const Node& node) {
   facets_.insert(facets_.end(), node.facets.begin(), node.facets.begin() + node.facet_count);
 }
 
-void FacetColumns::put(PayloadWriter& writer) const {
+void FacetColumns::put(PayloadWriter& writer, bool has_opacity) const {
   putBytes8(writer, counts_);
-  Codes codes(facets_.size());
+  Codes codes(facets_.size(), has_opacity);
   for (std::size_t i = 0; i < facets_.size(); ++i) codes.set(i, facets_[i]);
   putSmallIntegers(writer, codes.wide);
   putBytes8(writer, codes.bytes);
@@ -90,11 +99,11 @@ void FacetColumns::putRadiosity(PayloadWriter& writer, bool full_precision) cons
   putColors(writer, constAxes(columns), full_precision);
 }
 
-bool FacetColumns::pass(PayloadReader& reader) const {
-  return getBytes8(reader, counts_) && Codes(facets_.size()).get(reader);
+bool FacetColumns::pass(PayloadReader& reader, bool has_opacity) const {
+  return getBytes8(reader, counts_) && Codes(facets_.size(), has_opacity).get(reader);
 }
 
-bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes) {
+bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, bool has_opacity) {
   std::vector<std::uint8_t>& counts = threadScratch<std::vector<std::uint8_t>>([] {});
   counts.resize(nodes.size());
   if (!getBytes8(reader, counts)) return false;
@@ -102,13 +111,16 @@ bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes) {
     if (counts[i] > (nodes[i].isFlat() ? 0 : kMostFacets)) return false;
     nodes[i].facet_count = counts[i];
   }
-  Codes codes(countFacets(nodes));
+  Codes codes(countFacets(nodes), has_opacity);
   if (!codes.get(reader)) return false;
   std::size_t next = 0;
   for (Node& node : nodes) {
     if (!node.hasFacets()) continue;
     node.facets = {};
-    for (std::size_t k = 0; k < node.facet_count; ++k) node.facets[k] = codes.at(next++);
+    for (std::size_t k = 0; k < node.facet_count; ++k) {
+      node.facets[k] = codes.at(next++);
+      if (node.facets[k].transparency > kMostTransparency) return false;
+    }
   }
   return true;
 }

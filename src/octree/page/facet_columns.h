@@ -18,14 +18,14 @@ class FacetColumns {
   void add(const Node& node);
 
   // Numbers of facets and all of them but radiosities, and these.
-  void put(PayloadWriter& writer) const;
+  void put(PayloadWriter& writer, bool has_opacity) const;
   void putRadiosity(PayloadWriter& writer, bool full_precision) const;
   // Takes what put() gives for as many nodes and facets; false when it ends early.
-  bool pass(PayloadReader& reader) const;
+  bool pass(PayloadReader& reader, bool has_opacity) const;
 
   // Gives nodes their facets: flags and child counts are there. False when the columns end early,
   // or cannot be those of such nodes. First get(), then getRadiosity().
-  static bool get(PayloadReader& reader, std::span<Node> nodes);
+  static bool get(PayloadReader& reader, std::span<Node> nodes, bool has_opacity);
   static bool getRadiosity(PayloadReader& reader, std::span<Node> nodes);
 
  private:

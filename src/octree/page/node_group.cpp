@@ -85,6 +85,7 @@ class Columns {
     child_level = column(bytes, 2);
     thickness = column(bytes, 3);
     cone = column(bytes, 4);
+    for (std::size_t k = 0; k < transparency.size(); ++k) transparency[k] = column(bytes, 5 + k);
     page = column(integers, 0);
     first = column(integers, 1);
     surfel_count = column(integers, 2);
@@ -103,6 +104,8 @@ class Columns {
       area[i] = node.area;
       flatness[i] = node.flatness;
       flags[i] = node.flags;
+      transparency[0][i] = static_cast<std::uint8_t>(node.transparency & 0xff);
+      transparency[1][i] = static_cast<std::uint8_t>(node.transparency >> 8);
       child_count[i] = node.child_count;
       child_level[i] = nodes[i].child_level;
       page[i] = node.page;
@@ -149,16 +152,21 @@ class Columns {
       node.rough = {};
       node.surfel_count = surfel_count[i];
       node.groups = form.has_groups ? groups[i] : groupBit(0);
+      node.transparency = form.has_opacity ? transparencyAt(i) : std::uint16_t{0};
     }
   }
 
   MutableAxes position, normal, radiosity;
   std::span<float> radius, area, flatness;
   std::span<std::uint8_t> flags, child_count, child_level, thickness, cone;
+  std::array<std::span<std::uint8_t>, 2> transparency;  // lower and upper byte
+  std::uint16_t transparencyAt(std::size_t i) const {
+    return static_cast<std::uint16_t>(transparency[0][i] | transparency[1][i] << 8);
+  }
   std::span<std::uint64_t> page, first, surfel_count, groups;
 
  private:
-  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 5, kIntegerColumns = 4;
+  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 7, kIntegerColumns = 4;
 
   static glm::vec3 at(const MutableAxes& axes, std::size_t i) {
     return {axes[0][i], axes[1][i], axes[2][i]};
@@ -181,7 +189,8 @@ std::array<std::span<T>, kCoefficientKinds> coefficientColumns(std::size_t rough
 
 // What coefficients of a kind are stored relative to.
 float coefficientScale(const Node& node, std::size_t kind) {
-  return kind == 0 ? node.area : node.area * node.radiosity[static_cast<int>(kind) - 1];
+  if (kind == kAreaKind) return node.area;
+  return node.area * node.opacity() * node.radiosity[static_cast<int>(kind) - 1];
 }
 
 // The level that a node page belongs to.
@@ -244,10 +253,18 @@ Status decodeReferences(PayloadReader& reader, const PageForm& form, const Colum
   if (!getCounts(reader, columns.page)) return damaged("page");
   if (!getCounts(reader, columns.first)) return damaged("first");
   if (!getCounts(reader, columns.surfel_count)) return damaged("surfel count");
-  if (!form.has_groups) return {};
-  if (!getCounts(reader, columns.groups)) return damaged("groups");
-  for (const std::uint64_t groups : columns.groups) {
-    if (groups == 0) return damaged("groups");
+  if (form.has_groups) {
+    if (!getCounts(reader, columns.groups)) return damaged("groups");
+    for (const std::uint64_t groups : columns.groups) {
+      if (groups == 0) return damaged("groups");
+    }
+  }
+  if (!form.has_opacity) return {};
+  for (const auto& bytes : columns.transparency) {
+    if (!getBytes8(reader, bytes)) return damaged("transparency");
+  }
+  for (std::size_t i = 0; i < columns.page.size(); ++i) {
+    if (columns.transparencyAt(i) > kMostTransparency) return damaged("transparency");
   }
   return {};
 }
@@ -393,13 +410,16 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   putCounts(writer, columns.first);
   putCounts(writer, columns.surfel_count);
   if (form.has_groups) putCounts(writer, columns.groups);
+  if (form.has_opacity) {
+    for (const auto& bytes : columns.transparency) putBytes8(writer, bytes);
+  }
   FacetColumns facets;
   RoughNodes rough;
   for (const LevelNode& node : nodes) {
     facets.add(node.node);
     rough.add(node.node);
   }
-  facets.put(writer);
+  facets.put(writer, form.has_opacity);
   MomentColumns moments(nodes.size(), rough.nodes.size(), full_precision);
   for (const LevelNode& node : nodes) moments.add(node.node);
   moments.put(writer);
@@ -432,7 +452,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
     SURFEIT_RETURN_IF_ERROR(resolveReference(limits, level, columns.child_level[i], columns.page[i],
                                              columns.first[i], out[i]));
   }
-  if (!FacetColumns::get(reader, out)) return damaged("facets");
+  if (!FacetColumns::get(reader, out, form.has_opacity)) return damaged("facets");
   SURFEIT_RETURN_IF_ERROR(checkFlags(out));
   SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
   SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
@@ -473,7 +493,7 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
     facets.add(node);
     rough.add(node);
   }
-  if (!facets.pass(reader)) return damaged("facets");
+  if (!facets.pass(reader, form.has_opacity)) return damaged("facets");
   if (!MomentColumns(nodes.size(), rough.nodes.size(), full_precision).get(reader)) {
     return damaged("moments");
   }

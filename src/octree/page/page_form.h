@@ -10,7 +10,8 @@ struct PageForm {
   bool has_albedo = false;
   bool has_groups = false;
   bool has_long_sides = false;
-  bool has_bounds = true;  // slabs and cones of nodes: since format version 2
+  bool has_bounds = true;    // slabs and cones of nodes: since format version 2
+  bool has_opacity = false;  // since format version 3
 };
 
 }  // namespace surfeit

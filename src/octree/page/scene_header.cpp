@@ -21,7 +21,8 @@ enum ChannelBits : std::uint32_t {
   kHasTwoSided = 32,
   kHasGroup = 64,
   kHasLongSide = 128,
-  kAllChannels = 255,
+  kHasOpacity = 256,
+  kAllChannels = 511,
 };
 
 // Bits of the feature field. A reader refuses bits that it does not know.
@@ -38,7 +39,8 @@ std::uint32_t channelBits(const CloudChannels& channels) {
   return (channels.normal ? kHasNormal : 0u) | (channels.radius ? kHasRadius : 0u) |
          (channels.area ? kHasArea : 0u) | (channels.radiosity ? kHasRadiosity : 0u) |
          (channels.albedo ? kHasAlbedo : 0u) | (channels.two_sided ? kHasTwoSided : 0u) |
-         (channels.group ? kHasGroup : 0u) | (channels.long_side ? kHasLongSide : 0u);
+         (channels.group ? kHasGroup : 0u) | (channels.long_side ? kHasLongSide : 0u) |
+         (channels.opacity ? kHasOpacity : 0u);
 }
 
 CloudChannels channelsFromBits(std::uint32_t bits) {
@@ -51,6 +53,7 @@ CloudChannels channelsFromBits(std::uint32_t bits) {
   channels.two_sided = (bits & kHasTwoSided) != 0;
   channels.group = (bits & kHasGroup) != 0;
   channels.long_side = (bits & kHasLongSide) != 0;
+  channels.opacity = (bits & kHasOpacity) != 0;
   return channels;
 }
 

@@ -17,9 +17,14 @@
 
 namespace surfeit {
 
+// The version that a scene of these channels is written in: the oldest that has them.
+constexpr std::uint32_t formatVersionFor(const CloudChannels& channels) {
+  return channels.opacity ? 3 : 2;
+}
+
 // What the header says about the scene.
 struct SceneHeader {
-  std::uint32_t format_version = kFormatVersion;  // in the header of the container
+  std::uint32_t format_version = formatVersionFor({});  // in the header of the container
   std::uint64_t surfel_count = 0;
   std::uint64_t node_count = 0;
   std::uint32_t leaf_capacity = 0;          // surfels per leaf, unless more share one curve cell
@@ -38,8 +43,8 @@ struct SceneHeader {
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 
   PageForm pageForm() const {
-    return {full_precision, channels.albedo, channels.group, channels.long_side,
-            format_version >= 2};
+    return {full_precision,     channels.albedo,     channels.group,
+            channels.long_side, format_version >= 2, channels.opacity};
   }
 };
 

@@ -50,6 +50,9 @@ class Columns {
     for (std::size_t k = 0; k < long_side.size(); ++k) {
       long_side[k] = std::span(bytes).subspan((2 + k) * count, count);
     }
+    for (std::size_t k = 0; k < transparency.size(); ++k) {
+      transparency[k] = std::span(bytes).subspan((5 + k) * count, count);
+    }
   }
 
   void gather(std::span<const Surfel> surfels) {
@@ -66,6 +69,8 @@ class Columns {
       long_side[0][i] = static_cast<std::uint8_t>(surfels[i].long_side & 0xff);
       long_side[1][i] = static_cast<std::uint8_t>(surfels[i].long_side >> 8);
       long_side[2][i] = surfels[i].elongation;
+      transparency[0][i] = static_cast<std::uint8_t>(surfels[i].transparency & 0xff);
+      transparency[1][i] = static_cast<std::uint8_t>(surfels[i].transparency >> 8);
     }
   }
 
@@ -82,6 +87,7 @@ class Columns {
       surfel.group = form.has_groups ? group[i] : std::uint8_t{0};
       surfel.long_side = form.has_long_sides ? longSideAt(i) : kNoLongSide;
       surfel.elongation = form.has_long_sides ? long_side[2][i] : std::uint8_t{0};
+      surfel.transparency = form.has_opacity ? transparencyAt(i) : std::uint16_t{0};
       if (surfel.isSphere()) surfel.normal = glm::vec3(0);
       if (!form.has_albedo) surfel.albedo = glm::vec3(0);
     }
@@ -90,13 +96,18 @@ class Columns {
   MutableAxes position, normal, radiosity, albedo;
   std::span<float> radius, area;
   std::span<std::uint8_t> flags, group;
-  std::array<std::span<std::uint8_t>, 3> long_side;  // lower and upper byte, elongation
+  std::array<std::span<std::uint8_t>, 3> long_side;     // lower and upper byte, elongation
+  std::array<std::span<std::uint8_t>, 2> transparency;  // lower and upper byte
   std::uint16_t longSideAt(std::size_t i) const {
     return static_cast<std::uint16_t>(long_side[0][i] | long_side[1][i] << 8);
   }
 
+  std::uint16_t transparencyAt(std::size_t i) const {
+    return static_cast<std::uint16_t>(transparency[0][i] | transparency[1][i] << 8);
+  }
+
  private:
-  static constexpr std::size_t kFloatColumns = 14, kByteColumns = 5;
+  static constexpr std::size_t kFloatColumns = 14, kByteColumns = 7;
 
   static void gatherVectors(std::span<const Surfel> surfels, glm::vec3 Surfel::*field,
                             const MutableAxes& axes) {
@@ -146,6 +157,14 @@ Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns
       if (!isLongSide(columns.longSideAt(i), columns.long_side[2][i])) return damaged("long_side");
     }
   }
+  if (form.has_opacity) {
+    for (const auto& bytes : columns.transparency) {
+      if (!getBytes8(reader, bytes)) return damaged("transparency");
+    }
+    for (std::size_t i = 0; i < columns.group.size(); ++i) {
+      if (columns.transparencyAt(i) > kMostTransparency) return damaged("transparency");
+    }
+  }
   return {};
 }
 
@@ -169,6 +188,9 @@ std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& f
   if (form.has_groups) putBytes8(writer, columns.group);
   if (form.has_long_sides) {
     for (const auto& bytes : columns.long_side) putBytes8(writer, bytes);
+  }
+  if (form.has_opacity) {
+    for (const auto& bytes : columns.transparency) putBytes8(writer, bytes);
   }
   return writer.finish();
 }

@@ -29,6 +29,10 @@ Result<SceneFile> SceneFile::open(PageFile pages) {
     return Status::corruption(
         fmt::format("{}: header: reserved space is not zero, expected zero", scene.path()));
   }
+  if (scene.header_.format_version < 3 && scene.header_.channels.opacity) {
+    return Status::corruption(fmt::format("{}: header: opacity in version {}, expected 3 or more",
+                                          scene.path(), scene.header_.format_version));
+  }
   return scene;
 }
 

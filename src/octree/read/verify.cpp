@@ -132,7 +132,7 @@ class PageChecker {
 
   // What a node claims, against what lies below it.
   struct Below {
-    double area = 0;
+    double area = 0, covered = 0;
     std::uint64_t surfels = 0;
     std::uint64_t groups = 0;
     glm::dvec3 power{0};
@@ -143,7 +143,8 @@ class PageChecker {
     void add(const Node& node, const Record& record, float radius, std::uint64_t count,
              std::uint64_t record_groups) {
       area += double(record.area);
-      power += double(record.area) * glm::dvec3(record.radiosity);
+      covered += double(record.area) * double(record.opacity());
+      power += double(record.area) * double(record.opacity()) * glm::dvec3(record.radiosity);
       for (int c = 0; c < 3; ++c) brightest = std::max(brightest, record.radiosity[c]);
       surfels += count;
       groups |= record_groups;
@@ -180,14 +181,20 @@ class PageChecker {
       return Status::corruption(
           fmt::format("area {}, expected {} from what lies below", node.area, below.area));
     }
-    // What is a millionth as bright as the brightest may be lost: steps are parts of a page's largest
+    const double covered = double(node.area) * double(node.opacity());
+    if (std::abs(below.covered - covered) > double(kAreaTolerance * node.area)) {
+      return Status::corruption(fmt::format("opacity {}, expected {} from what lies below",
+                                            node.opacity(), below.covered / below.area));
+    }
+    // What is a millionth as bright as the brightest may be lost: steps are parts of a page's
+    // largest
     const double slack = 1e-6 * below.area * double(std::max(below.brightest, page_brightest_));
     for (int c = 0; c < 3; ++c) {
-      const double power = double(node.area) * double(node.radiosity[c]);
+      const double power = double(node.area) * double(node.opacity()) * double(node.radiosity[c]);
       if (std::abs(below.power[c] - power) <= kPowerTolerance * below.power[c] + slack) continue;
       return Status::corruption(fmt::format("{} radiosity {}, expected {} from what lies below",
                                             kColors[c], node.radiosity[c],
-                                            below.power[c] / below.area));
+                                            below.power[c] / below.covered));
     }
     return {};
   }

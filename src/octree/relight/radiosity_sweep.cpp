@@ -43,28 +43,28 @@ std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
 // gives its light to the facet that faces most as it does.
 void setFacetRadiosity(const FacetSums& sums, float flatness_limit, Node& node) {
   struct Light {
-    double area = 0, power[3] = {};
+    double covered = 0, power[3] = {};
   };
   std::array<Light, kMostFacets> lights;
   const std::span<NodeFacet> facets = std::span(node.facets).first(node.facet_count);
   const FacetSums fewest = sums.fewest(flatness_limit);
   for (const FacetGroup& group : fewest.groups().empty() ? sums.groups() : fewest.groups()) {
     Light& light = lights[nearestFacet(node, group)];
-    light.area += group.area;
+    light.covered += group.covered;
     for (int c = 0; c < 3; ++c) light.power[c] += group.radiosity[c];
   }
   for (std::size_t k = 0; k < facets.size(); ++k) {
     const Light& light = lights[k];
     for (int c = 0; c < 3; ++c) {
       facets[k].radiosity[c] =
-          light.area > 0 ? float(light.power[c] / light.area) : node.radiosity[c];
+          light.covered > 0 ? float(light.power[c] / light.covered) : node.radiosity[c];
     }
   }
 }
 
 // What the indexer's NodeSums::toNode gives from the same sums; the rest of the node stays.
 void setRadiosity(const NodeSums& sums, float flatness_limit, Node& node) {
-  for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.area);
+  for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.covered);
   if (node.hasFacets()) setFacetRadiosity(sums.facets, flatness_limit, node);
   if (!node.isRough()) return;
   for (int i = 0; i < kShCount; ++i) {

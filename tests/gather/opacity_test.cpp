@@ -1,0 +1,219 @@
+// What is translucent covers its opacity, sends as much of its light, and shows the rest of what
+// lies behind: against the product of what panes let through, and against Beer and Lambert.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "gather/test_clouds.h"
+#include "surfeit/bake.h"
+#include "surfeit/bounce.h"
+#include "surfeit/progress.h"
+#include "surfeit/scene.h"
+
+namespace surfeit {
+namespace {
+
+Table emptyTranslucent() {
+  Table table;
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "radius", "area", "opacity",
+                           "radiosity_r", "radiosity_g", "radiosity_b"}) {
+    table.addProperty(name);
+  }
+  return table;
+}
+
+// A pane of side 100 at height z, that faces down, of side * side surfels.
+void addPane(double z, double opacity, double light, int side, Table& table) {
+  const double step = 100.0 / side;
+  for (int i = 0; i < side * side; ++i) {
+    const double x = (i % side + 0.5) * step - 50, y = (i / side + 0.5) * step - 50;
+    table.rows.push_back(
+        {x, y, z, 0, 0, -1, step * std::sqrt(0.5), step * step, opacity, light, light / 2, 0});
+  }
+}
+
+class Opacity : public testing::Test {
+ protected:
+  struct Means {
+    double occlusion = 0, red = 0, green = 0;
+  };
+  Means gather(const Table& cloud, const GatherOptions& options) {
+    makeScene(cloud, directory_.file("scene.sft"));
+    writeTable(receivers_, directory_.file("receivers.ply"));
+    const auto stats = gatherCloud(directory_.file("scene.sft"), directory_.file("receivers.ply"),
+                                   directory_.file("result.ply"), options, progress_);
+    EXPECT_TRUE(stats.ok()) << stats.status().message();
+    const Table result = readTable(directory_.file("result.ply"));
+    const auto mean = [&](const char* name) {
+      double sum = 0;
+      for (const double value : result.column(name)) sum += value;
+      return sum / double(result.rows.size());
+    };
+    return {mean("occlusion"), mean("irradiance_r"), mean("irradiance_g")};
+  }
+  static GatherOptions bleeding(float max_solid_angle = 0.1f) {
+    GatherOptions options;
+    options.mode = GatherMode::kBleeding;
+    options.threads = 1;
+    options.quality.max_solid_angle = max_solid_angle;
+    return options;
+  }
+  // On the ground below the middle of panes, facing up.
+  static Table ground(int count) {
+    Table table;
+    for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) table.addProperty(name);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> place(-1, 1);
+    for (int i = 0; i < count; ++i) {
+      table.rows.push_back({place(random), place(random), 0, 0, 0, 1});
+    }
+    return table;
+  }
+
+  TestDirectory directory_;
+  Progress progress_;
+  Table receivers_ = ground(24);
+};
+
+// Of the hemisphere a pane of side 100 at height 1 covers all but a thousandth.
+TEST_F(Opacity, APaneCoversItsOpacityHoweverItIsDrawn) {
+  for (const double opacity : {0.05, 0.3, 0.7, 0.95}) {
+    for (const double height : {1.0, 3.0}) {
+      for (const float max_solid_angle : {0.f, 0.1f}) {
+        Table cloud = emptyTranslucent();
+        addPane(height, opacity, 2, 200, cloud);
+        const double whole = height == 1 ? 1 : .9962;
+        const Means found = gather(cloud, bleeding(max_solid_angle));
+        // Where tiles overlap, more than all is not covered: that shows when hardly any is let
+        // through
+        const double error = opacity > .9 ? .06 : .02;
+        EXPECT_NEAR(found.occlusion, opacity * whole, error * opacity)
+            << opacity << " at " << height << ", " << max_solid_angle << " sr";
+        EXPECT_NEAR(found.red, 2 * opacity * whole, 2 * error * opacity);
+        EXPECT_NEAR(found.green, opacity * whole, error * opacity);
+      }
+    }
+  }
+}
+
+TEST_F(Opacity, PanesBehindEachOtherMultiply) {
+  Table cloud = emptyTranslucent();
+  addPane(1, .3, 1, 200, cloud);
+  addPane(2.5, .5, 2, 200, cloud);
+  const Means found = gather(cloud, bleeding());
+  EXPECT_NEAR(found.occlusion, 1 - .7 * .5, .01);
+  EXPECT_NEAR(found.red, .3 * 1 + .7 * .5 * 2, .015);
+}
+
+TEST_F(Opacity, AWallShowsThroughAPane) {
+  Table cloud = emptyTranslucent();
+  addPane(1, .3, 0, 200, cloud);
+  addPane(2, 1, 2, 200, cloud);
+  const Means found = gather(cloud, bleeding());
+  EXPECT_GT(found.occlusion, .985);
+  EXPECT_NEAR(found.red, .7 * 2, .02);
+}
+
+// Less than a hundredth shines through.
+TEST_F(Opacity, AWallHidesWhatIsBehindIt) {
+  Table cloud = emptyTranslucent();
+  addPane(1, 1, 1, 200, cloud);
+  addPane(2, .5, 20, 200, cloud);
+  const Means found = gather(cloud, bleeding());
+  EXPECT_NEAR(found.red, 1, .01 * (.5 * 20));
+}
+
+// The share of cosine-weighted directions that a ball of this density stops, by chords.
+double smokeOcclusion(const glm::dvec3& centre, double radius, double density) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0, 1);
+  double sum = 0;
+  constexpr int kRays = 400000;
+  for (int i = 0; i < kRays; ++i) {
+    const double u = unit(random), phi = 6.283185307 * unit(random), s = std::sqrt(u);
+    const glm::dvec3 ray(s * std::cos(phi), s * std::sin(phi), std::sqrt(1 - u));
+    const double along = glm::dot(ray, centre);
+    const double beside_sq = glm::dot(centre, centre) - along * along;
+    if (along <= 0 || beside_sq >= radius * radius) continue;
+    sum += 1 - std::exp(-density * 2 * std::sqrt(radius * radius - beside_sq));
+  }
+  return sum / kRays;
+}
+
+TEST_F(Opacity, SmokeFollowsBeerAndLambert) {
+  constexpr int kDrops = 40000;
+  constexpr double kRadius = 5, kDrop = .2, kDensity = .2;  // optical depth 2 through the middle
+  const double volume = 4 / 3. * 3.14159265 * kRadius * kRadius * kRadius;
+  const double drop_area = 3.14159265 * kDrop * kDrop;
+  const double opacity = kDensity * volume / (kDrops * drop_area);
+  Table cloud = emptyTranslucent();
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> place(-kRadius, kRadius);
+  while (cloud.rows.size() < kDrops) {
+    const glm::dvec3 p(place(random), place(random), place(random));
+    if (glm::length(p) > kRadius) continue;
+    cloud.rows.push_back({p.x, p.y, p.z + 12, 0, 0, 0, kDrop, drop_area, opacity, 1, 1, 1});
+  }
+  receivers_.rows = {{0, 0, 0, 0, 0, 1}};
+  const double truth = smokeOcclusion({0, 0, 12}, kRadius, kDensity);
+  for (const float max_solid_angle : {0.f, 0.02f, 0.1f}) {
+    const Means found = gather(cloud, bleeding(max_solid_angle));
+    EXPECT_NEAR(found.occlusion / truth, 1, .03) << max_solid_angle;
+    EXPECT_NEAR(found.red / truth, 1, .03) << max_solid_angle;
+  }
+}
+
+// As one without the channel, which is of an older version.
+TEST_F(Opacity, WhollyOpaqueIsAsWithoutOpacity) {
+  Table with = emptyTranslucent(), without;
+  addPane(1, 1, 2, 60, with);
+  addPane(3, 1, 1, 40, with);
+  for (std::size_t i = 0; i < with.properties.size(); ++i) {
+    if (with.properties[i].name != "opacity") without.addProperty(with.properties[i].name);
+  }
+  for (std::vector<double> row : with.rows) {
+    row.erase(row.begin() + 8);
+    without.rows.push_back(row);
+  }
+  gather(with, bleeding());
+  const std::string bytes = readBytes(directory_.file("result.ply"));
+  gather(without, bleeding());
+  EXPECT_EQ(readBytes(directory_.file("result.ply")), bytes);
+}
+
+TEST_F(Opacity, BouncesKeepIt) {
+  Table cloud = emptyTranslucent();
+  for (const char* name : {"albedo_r", "albedo_g", "albedo_b"}) cloud.addProperty(name);
+  addPane(1, .3, 1, 100, cloud);
+  addPane(2, 1, 2, 100, cloud);
+  for (auto& row : cloud.rows) row.insert(row.end(), 3, .5);
+  makeScene(cloud, directory_.file("in.sft"));
+  BounceOptions options;
+  options.threads = 1;
+  const auto stats =
+      bounceScene(directory_.file("in.sft"), directory_.file("out.sft"), options, progress_);
+  ASSERT_TRUE(stats.ok()) << stats.status().message();
+  const auto report = verifyScene(directory_.file("out.sft"), 1, progress_);
+  ASSERT_TRUE(report.ok()) << report.status().message();
+  EXPECT_TRUE(report->findings.empty());
+}
+
+TEST_F(Opacity, WhatIsNoOpacityIsInvalid) {
+  Table cloud = emptyTranslucent();
+  addPane(1, .3, 1, 20, cloud);
+  const double wrong[] = {0, -.5, 1.5};
+  for (std::size_t i = 0; i < 3; ++i) cloud.rows[i][8] = wrong[i];
+  writeTable(cloud, directory_.file("cloud.ply"));
+  const auto stats = indexClouds({directory_.file("cloud.ply")}, directory_.file("scene.sft"),
+                                 IndexOptions{}, progress_);
+  ASSERT_TRUE(stats.ok()) << stats.status().message();
+  EXPECT_EQ(stats->skipped_records, 3u);
+}
+
+}  // namespace
+}  // namespace surfeit
