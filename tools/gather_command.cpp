@@ -110,6 +110,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
   command->add_flag("--dry-run", arguments->is_dry_run,
                     "Write no result; estimate memory, files and time from a sample");
   context.addCommonOptions(*command);
+  context.addFrameOptions(*command);
   command->footer(
       "The result holds the receivers in their order with all their properties, and `occlusion`;\n"
       "with --mode bleeding also `irradiance_r irradiance_g irradiance_b`, with --mode glossy\n"

@@ -1,0 +1,45 @@
+// Sequences of frames: --frames runs a command once for each frame, in this process, with the
+// number of the frame in the names of its files.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "surfeit/status.h"
+#include "tools/frames.h"
+
+namespace surfeit {
+
+// What a command line says about its sequence.
+struct SequenceOptions {
+  std::vector<int> frames;  // empty: no sequence
+  bool is_newer = false;    // skip frames whose outputs are newer than all inputs
+};
+
+// Adds --frames and --newer. With `frame`, the names of files that the command gets are those of
+// that frame. Call it when the command has all its other options.
+void addSequenceOptions(CLI::App& command, SequenceOptions& options,
+                        const std::optional<SequenceFrame>& frame);
+
+// Whether a parsed command is a sequence, of which no frame has begun. kInvalidArgument where names
+// and --frames do not fit: a pattern without frames, unless it is the name of a file that is there,
+// and frames that would all replace one output.
+Result<bool> isSequence(const CLI::App& command, const SequenceOptions& options);
+
+// Of a command with the names of one frame: all outputs are there, and newer than all inputs.
+bool isUpToDate(const CLI::App& command);
+
+enum class FrameEnd { kDone, kUpToDate, kFailed, kStop };
+
+// Runs all frames and returns the exit status: that of the frame that stopped all, else 1 when a
+// frame failed.
+struct FrameOutcome {
+  FrameEnd end = FrameEnd::kDone;
+  int exit_status = 0;
+};
+int runSequence(const std::vector<int>& frames, bool is_quiet,
+                const std::function<FrameOutcome(const SequenceFrame&)>& run_frame);
+
+}  // namespace surfeit
