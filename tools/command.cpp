@@ -117,12 +117,18 @@ void CommandContext::end(Status status) {
   }
 }
 
+void CommandContext::addFrameOptions(CLI::App& command) {
+  addSequenceOptions(command, sequence, frame_);
+  commands_.back().takes_frames = true;
+}
+
 // Looks at what the command was given before it works.
 Result<bool> CommandContext::isToWork() {
   for (const Command& command : commands_) {
     if (!command.app->parsed()) continue;
-    if (!frame_) {
-      SURFEIT_ASSIGN_OR_RETURN(is_sequence_, surfeit::isSequence(*command.app, sequence));
+    if (!frame_ && command.takes_frames) {
+      SURFEIT_RETURN_IF_ERROR(checkFrameNames(*command.app, sequence.frames));
+      is_sequence_ = !sequence.frames.empty();
       if (is_sequence_) return false;
     }
     SURFEIT_RETURN_IF_ERROR(checkOutputs(*command.app, command.works_in_place));

@@ -49,6 +49,7 @@ class CommandContext {
   CommonOptions common;
   int exit_status = 0;
   SequenceOptions sequence;
+  std::vector<std::string> words;  // of the command line
 
   // Of a command that has run: it is a sequence, so its frames are to run, each by a context of its
   // own, and nothing was done yet.
@@ -59,7 +60,7 @@ class CommandContext {
   void addCommonOptions(CLI::App& command, const CommonOptionSet& set = {});
 
   // For commands that take sequences of frames, when they have all their other options.
-  void addFrameOptions(CLI::App& command) { addSequenceOptions(command, sequence, frame_); }
+  void addFrameOptions(CLI::App& command);
 
   // Runs a command's body; a failure is told in one line on stderr and becomes the exit status.
   // Call from the subcommand's callback.
@@ -91,6 +92,7 @@ class CommandContext {
   struct Command {
     const CLI::App* app;
     bool works_in_place;
+    bool takes_frames = false;
   };
   const std::optional<SequenceFrame> frame_;
   bool is_sequence_ = false, is_up_to_date_ = false;
@@ -138,6 +140,7 @@ void addRadianceCommand(CLI::App& app, CommandContext& context);
 void addBounceCommand(CLI::App& app, CommandContext& context);
 void addBrickCommand(CLI::App& app, CommandContext& context);
 void addTuneCommand(CLI::App& app, CommandContext& context);
+void addPlanCommand(CLI::App& app, CommandContext& context);
 void addViewCommand(CLI::App& app, CommandContext& context);
 void addCompositeCommand(CLI::App& app, CommandContext& context);
 void addCubeCommand(CLI::App& app, CommandContext& context);

@@ -27,6 +27,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addBounceCommand(app, context);
   addBrickCommand(app, context);
   addTuneCommand(app, context);
+  addPlanCommand(app, context);
   addViewCommand(app, context);
   addCompositeCommand(app, context);
   addCubeCommand(app, context);
@@ -43,6 +44,7 @@ int answerHelp(const CLI::App& app, const CLI::Success& success) {
 }
 
 int parseAndRun(const std::vector<std::string>& words, CommandContext& context) {
+  context.words = words;
   CLI::App app("Surfeit: gathers over huge surfel clouds inside a memory budget", "surfeit");
   app.set_version_flag("--version", std::string("surfeit ") + kVersion);
   app.require_subcommand(1);

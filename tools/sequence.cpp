@@ -13,6 +13,8 @@
 namespace surfeit {
 namespace {
 
+constexpr const char* kSequenceGroup = "Sequences";
+
 // Inputs that are not given by position.
 constexpr const char* kInputOptions[] = {"environment", "brick", "like"};
 
@@ -72,43 +74,39 @@ Status checkPatterns(const std::vector<FileName>& names) {
 
 }  // namespace
 
+CLI::Option* addFramesOption(CLI::App& command, SequenceOptions& options) {
+  return command
+      .add_option_function<std::string>(
+          "--frames",
+          [&options](const std::string& text) {
+            Result<std::vector<int>> parsed = parseFrames(text);
+            if (!parsed.ok()) throw CLI::ValidationError("--frames", parsed.status().message());
+            options.frames = std::move(*parsed);
+          },
+          "Run once per frame, with its number for ####, %04d, $F4 or $F in names of files: "
+          "1-240, 1-240x2 (every second) or 1,5,10-20 (docs/farm.md)")
+      ->type_name("FRAMES")
+      ->group(kSequenceGroup);
+}
+
 void addSequenceOptions(CLI::App& command, SequenceOptions& options,
                         const std::optional<SequenceFrame>& frame) {
-  constexpr const char* kGroup = "Sequences";
   for (CLI::Option* const option : command.get_options()) {
     if (!frame || (!isOutputOption(*option) && !isInputOption(*option))) continue;
     option->transform(
         [number = frame->number](const std::string& name) { return frameName(name, number); });
   }
-  CLI::Option* const frames =
-      command
-          .add_option_function<std::string>(
-              "--frames",
-              [&options](const std::string& text) {
-                Result<std::vector<int>> parsed = parseFrames(text);
-                if (!parsed.ok()) throw CLI::ValidationError("--frames", parsed.status().message());
-                options.frames = std::move(*parsed);
-              },
-              "Run once per frame, with its number for ####, %04d, $F4 or $F in names of files: "
-              "1-240, 1-240x2 (every second) or 1,5,10-20 (docs/farm.md)")
-          ->type_name("FRAMES")
-          ->group(kGroup);
+  CLI::Option* const frames = addFramesOption(command, options);
   command
       .add_flag("--newer", options.is_newer,
                 "Skip frames whose outputs are newer than all their inputs")
       ->needs(frames)
-      ->group(kGroup);
+      ->group(kSequenceGroup);
 }
 
-Result<bool> isSequence(const CLI::App& command, const SequenceOptions& options) {
-  if (command.get_option_no_throw("--frames") == nullptr) return false;
+Status checkFrameNames(const CLI::App& command, const std::vector<int>& frames) {
   const std::vector<FileName> names = fileNames(command);
-  if (options.frames.empty()) {
-    SURFEIT_RETURN_IF_ERROR(checkNoPattern(names));
-    return false;
-  }
-  SURFEIT_RETURN_IF_ERROR(checkPatterns(names));
-  return true;
+  return frames.empty() ? checkNoPattern(names) : checkPatterns(names);
 }
 
 bool isUpToDate(const CLI::App& command) {

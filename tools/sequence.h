@@ -18,15 +18,18 @@ struct SequenceOptions {
   bool is_newer = false;    // skip frames whose outputs are newer than all inputs
 };
 
+// Adds --frames alone, for a command that only speaks of frames.
+CLI::Option* addFramesOption(CLI::App& command, SequenceOptions& options);
+
 // Adds --frames and --newer. With `frame`, the names of files that the command gets are those of
 // that frame. Call it when the command has all its other options.
 void addSequenceOptions(CLI::App& command, SequenceOptions& options,
                         const std::optional<SequenceFrame>& frame);
 
-// Whether a parsed command is a sequence, of which no frame has begun. kInvalidArgument where names
-// and --frames do not fit: a pattern without frames, unless it is the name of a file that is there,
-// and frames that would all replace one output.
-Result<bool> isSequence(const CLI::App& command, const SequenceOptions& options);
+// Whether the names of a parsed command fit to its frames, none where it is no sequence.
+// kInvalidArgument for a pattern without frames, unless it is the name of a file that is there, and
+// for frames that would all replace one output.
+Status checkFrameNames(const CLI::App& command, const std::vector<int>& frames);
 
 // Of a command with the names of one frame: all outputs are there, and newer than all inputs.
 bool isUpToDate(const CLI::App& command);
