@@ -39,7 +39,7 @@ mkdir -p "$farm" || exit
 rm -f "$farm"/task-*.stop
 
 # The second round is for shards that are gone although their tasks were done
-for round in 1 2; do
+for _ in 1 2; do
   seq "$tasks" | parallel --quote --joblog "$farm/joblog-$shards" --resume-failed --retries 3 \
     --jobs "$jobs" --workdir "$PWD" bash "$script" task {}
   status=0

@@ -129,6 +129,7 @@ bool isUpToDate(const CLI::App& command) {
 int runSequence(const std::vector<int>& frames, bool is_quiet,
                 const std::function<FrameOutcome(const SequenceFrame&)>& run_frame) {
   std::vector<int> failed;
+  int last_status = 0;
   std::size_t up_to_date = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const FrameOutcome outcome = run_frame({frames[i], i + 1, frames.size()});
@@ -137,6 +138,7 @@ int runSequence(const std::vector<int>& frames, bool is_quiet,
                        describeFrames({frames.begin() + std::ptrdiff_t(i), frames.end()})));
       return outcome.exit_status;
     }
+    last_status = outcome.exit_status;
     if (outcome.end == FrameEnd::kFailed) failed.push_back(frames[i]);
     if (outcome.end == FrameEnd::kUpToDate) ++up_to_date;
     // What a frame has freed counts against the budget of the next until the system has it back
@@ -147,6 +149,8 @@ int runSequence(const std::vector<int>& frames, bool is_quiet,
                      frames.size() - up_to_date - failed.size(), up_to_date, failed.size()));
   }
   if (failed.empty()) return 0;
+  // A single frame may be the task of a farm, which goes by the status
+  if (frames.size() == 1) return last_status;
   tell(fmt::format("surfeit: {} of {} frames failed; again with --frames {}\n", failed.size(),
                    frames.size(), describeFrames(failed)));
   return 1;

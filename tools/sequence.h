@@ -36,8 +36,8 @@ bool isUpToDate(const CLI::App& command);
 
 enum class FrameEnd { kDone, kUpToDate, kFailed, kStop };
 
-// Runs all frames and returns the exit status: that of the frame that stopped all, else 1 when a
-// frame failed.
+// Runs all frames and returns the exit status: that of the frame that stopped all, or that was all,
+// else 1 when a frame failed.
 struct FrameOutcome {
   FrameEnd end = FrameEnd::kDone;
   int exit_status = 0;

@@ -77,6 +77,9 @@ missingFramesAreNamedAndTheOthersGoOn() {
   # A memory budget that is too small for all
   run 1 gather set.sft street.####.ply -o none.####.ply --frames 1-2 --memory 1M
   says "frame 1: " "frame 2: " "2 of 2 frames failed"
+  # A sequence of one frame has the status of the frame
+  run 33 gather set.sft street.####.ply -o none.####.ply --frames 2 --memory 1M
+  run 74 gather set.sft none.####.ply -o none.####.png.ply --frames 2 --memory 64M
   # --strict refuses the frame whose cloud lacks something
   printf '0 0 0\n' > odd.2.xyz
   cp street.0001.ply odd.1.ply
