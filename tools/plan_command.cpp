@@ -124,6 +124,10 @@ Status checkPlan(const PlanArguments& arguments) {
                     "--openjd",
                     kinds));
   }
+  if (plan.result == "-" || plan.result.starts_with("-.")) {
+    return Status::invalidArgument(
+        fmt::format("{}: shards lie beside the result, so it must be a file", plan.result));
+  }
   if (plan.taskCount() > kMostTasks) {
     return Status::invalidArgument(
         fmt::format("found {} tasks, expected at most {}: plan some of the frames at a time",

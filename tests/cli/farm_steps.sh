@@ -21,7 +21,13 @@ real=$(printf %q "$surfeit")
 STUB
   cat >> "$1" << 'STUB'
 command=$1 scene=$2 receivers=$3 result=$5 shard='' shards='' frame='' options=()
-for word in "${@:6}"; do
+[[ $command == merge || " $*" == *" --shard"[=\ ]* ]] || exec "$real" "$@"
+for ((i = 6; i <= $#; ++i)); do
+  word=${!i}
+  if [[ $word == --shard || $word == --shards ]]; then
+    i=$((i + 1))
+    word+==${!i}
+  fi
   case $word in
     --shard=*) shard=${word#*=} ;;
     --shards=*) shards=${word#*=} ;;

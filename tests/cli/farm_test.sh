@@ -62,6 +62,8 @@ badPlansAreRefused() {
   says "this is a pattern of frames"
   run 2 plan a.sft r.##.ply -o o.##.ply --shards 1000 --frames 1-2000 --slurm --memory 64M --time 1h
   says "found 2000000 tasks"
+  run 2 plan a.sft r.ply -o - --shards 2 --slurm --memory 64M --time 1h
+  says "must be a file"
   run 2 plan $'a\nb.sft' r.ply -o o.ply --shards 2 --slurm --memory 64M --time 1h
   says "control characters"
   local time
@@ -295,6 +297,36 @@ faultsAreOvercome_once() {
   callsAre 3 "64:143 64:0"
   callsAre 4 "64:33 128:33 256:0"
   callsAre 5 "64:74 64:0"
+}
+
+# The command lines of docs/farm.md under <!-- tested -->, in their order, with Slurm's commands faked.
+documentedCommandsWork() {
+  command -v parallel > /dev/null && command -v make > /dev/null ||
+    { echo "skipped: no GNU parallel or no make"; exit 77; }
+  local commands frame n docs
+  docs=$(dirname "$script")/../../docs/farm.md
+  commands=$(awk '/^<!-- tested -->/ { tested = 1 }
+                  /^```/ { if (inside) { inside = tested = 0 } else inside = 1; next }
+                  inside && tested' "$docs")
+  [[ $(grep -c '^surfeit ' <<< "$commands") -ge 10 ]] || fail "found few commands in $docs"
+  makeFarmScene
+  makeFarmSurfeit
+  makeFakeSlurm
+  ln -s "$PWD/farm_surfeit" bin/surfeit
+  mv "$scene" city.sft
+  cp city.sft set.sft
+  mv "$receivers" street.ply
+  for ((frame = 1; frame <= 24; ++frame)); do
+    n=$(printf %04d "$frame")
+    generate "crowd.$n.ply" --surfels 200 --seed "$frame"
+    cp street.ply "street.$n.ply"
+  done
+  export TMPDIR=$PWD/scratch
+  mkdir scratch
+  bash -euxo pipefail -c "$commands" || fail "a command of $docs"
+  "$surfeit" gather -q city.sft street.ply -o one.ply --mode bleeding --memory 64M
+  for name in lit staged; do sameBytes one.ply "$name.ply"; done
+  for frame in 1 2 3; do exists "lit.000$frame.ply"; done
 }
 
 runCase

@@ -108,7 +108,7 @@ newerFramesAreSkipped() {
   # Of the same time is not newer
   touch -d "2001-01-01" set.sft street.0001.ply lit.0001.ply lit.0001.json
   run 0 gather set.sft street.####.ply -o lit.####.ply --memory 64M --frames 1 --newer
-  says "1 frames: 1 done"
+  says "1 frame: 1 done"
 }
 
 # The peak of a frame does not count against the budget of the next.
