@@ -91,7 +91,7 @@ missingTasks() {
 }
 
 mergeAll() {
-  local round=$1 merge_memory=$2 index status memory waits=0 failed=0 name
+  local round=$1 merge_memory=$2 index status memory task waits=0 failed=0 name
   local -A again=()
   for index in "${!frames[@]}"; do
     [[ ! -e $farm/merged-$index ]] || continue
@@ -116,7 +116,9 @@ mergeAll() {
   for memory in "${!again[@]}"; do
     echo "round $((round + 1)): tasks${again[$memory]} with $memory MiB"
     # shellcheck disable=SC2086
-    submitTasks "$memory" ${again[$memory]} || end 1
+    submitTasks "$memory" ${again[$memory]} && continue
+    # More memory than any node has, for example
+    for task in ${again[$memory]}; do echo "1 $memory" > "$farm/task-$task.status"; done
   done
   submitMerge "$((round + 1))" "$merge_memory" || end 1
 }

@@ -189,7 +189,11 @@ while [[ $1 == -* ]]; do
   case $1 in
     --array=*) array=${1#*=} ;;
     --dependency=*) depends=${1#*=} ;;
-    --mem=*) echo "$id $1" >> "$spool.memory" ;;
+    --mem=*)
+      memory=${1//[!0-9]/}
+      ((memory <= ${MOST_MEMORY:-9999999})) || { echo "sbatch: no node has $memory" >&2; exit 1; }
+      echo "$id $1" >> "$spool.memory"
+      ;;
   esac
   shift
 done
@@ -246,6 +250,13 @@ slurmGivesUp() {
   ROUNDS=3 bash job.sh
   [[ $(cat lit.ply.farm/end) == 75 ]] || fail "ended with $(cat lit.ply.farm/end)"
   callsAre 3 "64:33 128:33 256:33"
+  # More memory than a node has
+  rm lit.ply.shard-1-of-3 faults/log
+  MOST_MEMORY=400 bash job.sh
+  [[ $(cat lit.ply.farm/end) == 1 ]] || fail "ended with $(cat lit.ply.farm/end)"
+  grep -q "sbatch: no node has 576" lit.ply.farm/merge.log || fail "$(cat lit.ply.farm/merge.log)"
+  callsAre 3 "64:33 128:33 256:33"
+  callsAre 1 "64:0"
   # Run again, it goes on: shards that are there stay
   rm faults/*
   bash job.sh
