@@ -146,7 +146,8 @@ int runSequence(const std::vector<int>& frames, bool is_quiet,
   }
   if (!is_quiet) {
     tell(fmt::format("{} frame{}: {} done, {} up to date, {} failed\n", frames.size(),
-                     frames.size() == 1 ? "" : "s", frames.size() - up_to_date - failed.size(), up_to_date, failed.size()));
+                     frames.size() == 1 ? "" : "s", frames.size() - up_to_date - failed.size(),
+                     up_to_date, failed.size()));
   }
   if (failed.empty()) return 0;
   // A single frame may be the task of a farm, which goes by the status
