@@ -15,8 +15,8 @@ packages=(
   python3 python3-dev python3-numpy pybind11-dev python3-pytest python3-matplotlib
   # Its wheel
   python3-setuptools python3-wheel python3-pip python3-venv
-  # Tests
-  libgtest-dev libgmock-dev
+  # Tests; GNU parallel runs one of the jobs of `surfeit plan`
+  libgtest-dev libgmock-dev parallel make
   # OpenVDB itself, against which our reader and writer of .vdb are tested
   libopenvdb-dev libboost-iostreams-dev
 )

@@ -95,6 +95,7 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
   addCacheOptions(*command, options.cache_split, options.direct_io);
   addTemporaryOption(*command, options.temporary_directory)->group("Paging");
   context.addCommonOptions(*command);
+  context.addFrameOptions(*command);
   command->footer(
       "The result holds the same surfels, pages and nodes with new radiosities. A gather from it\n"
       "adds one more bounce at its receivers: after --bounces 1, --mode bleeding shows two.\n"

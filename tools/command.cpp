@@ -30,7 +30,10 @@ ConsoleProgress::Style progressStyle(const CommonOptions& common) {
 
 }  // namespace
 
-CommandContext::CommandContext() : start_(std::chrono::steady_clock::now()) {}
+CommandContext::CommandContext(const std::optional<SequenceFrame>& frame)
+    : frame_(frame),
+      start_(std::chrono::steady_clock::now()),
+      cpu_start_(frame ? processCpuSeconds() : 0) {}
 CommandContext::~CommandContext() = default;
 
 void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& set) {
@@ -77,12 +80,14 @@ void CommandContext::addCommonOptions(CLI::App& command, const CommonOptionSet& 
 void CommandContext::run(const std::function<Status()>& body) {
   Status status;
   progress_ = std::make_unique<ConsoleProgress>(progressStyle(common), common.quiet, common.verbose,
-                                                common.strict);
-  limitProcess(common.memory_bytes);
+                                                common.strict, frame_);
+  // The peak of earlier frames is none of the program's own
+  if (!frame_) limitProcess(common.memory_bytes);
   setReadRetries(common.read_retries);
   try {
-    status = checkParsed();
-    if (status.ok()) status = body();
+    const Result<bool> is_to_work = isToWork();
+    status = is_to_work.status();
+    if (is_to_work.ok() && *is_to_work) status = body();
   } catch (const std::bad_alloc&) {
     // Told without a Status, whose text would take some
     progress_->clear();
@@ -104,18 +109,42 @@ void CommandContext::run(const std::function<Status()>& body) {
 
 void CommandContext::end(Status status) {
   if (status.ok()) return;
-  tell(fmt::format("surfeit: {}\n", status.message()));
+  const std::string frame = frame_ ? fmt::format("frame {}: ", frame_->number) : "";
+  tell(fmt::format("surfeit: {}{}\n", frame, status.message()));
   exit_status = exitStatus(status.code());
   if (status.code() == StatusCode::kInterrupted && ConsoleProgress::cancelSignal() != 0) {
     exit_status = 128 + ConsoleProgress::cancelSignal();
   }
 }
 
-Status CommandContext::checkParsed() const {
+void CommandContext::addFrameOptions(CLI::App& command) {
+  addSequenceOptions(command, sequence, frame_);
+  commands_.back().takes_frames = true;
+}
+
+// Looks at what the command was given before it works.
+Result<bool> CommandContext::isToWork() {
   for (const Command& command : commands_) {
-    if (command.app->parsed()) return checkOutputs(*command.app, command.works_in_place);
+    if (!command.app->parsed()) continue;
+    if (!frame_ && command.takes_frames) {
+      SURFEIT_RETURN_IF_ERROR(checkFrameNames(*command.app, sequence.frames));
+      is_sequence_ = !sequence.frames.empty();
+      if (is_sequence_) return false;
+    }
+    SURFEIT_RETURN_IF_ERROR(checkOutputs(*command.app, command.works_in_place));
+    is_up_to_date_ = frame_ && sequence.is_newer && isUpToDate(*command.app);
+    if (is_up_to_date_) return false;
+    if (frame_) say(frame_->label());
   }
-  return {};
+  return true;
+}
+
+FrameOutcome CommandContext::frameOutcome() const {
+  if (exit_status == 0) return {is_up_to_date_ ? FrameEnd::kUpToDate : FrameEnd::kDone, 0};
+  // What is wrong with the command line is wrong with every frame
+  const bool is_to_stop = ConsoleProgress::cancelSignal() != 0 ||
+                          exit_status == exitStatus(StatusCode::kInvalidArgument);
+  return {is_to_stop ? FrameEnd::kStop : FrameEnd::kFailed, exit_status};
 }
 
 Progress& CommandContext::progress() { return *progress_; }
@@ -136,9 +165,10 @@ Status CommandContext::writeStats(nlohmann::json fields) {
   if (common.stats_path.empty()) return {};
   fields["stats_version"] = kStatsVersion;
   fields["wall_seconds"] = wallSeconds();
-  fields["cpu_seconds"] = processCpuSeconds();
+  fields["cpu_seconds"] = processCpuSeconds() - cpu_start_;
   fields["peak_resident_bytes"] = peakResidentBytes();
   fields["threads"] = threads();
+  if (frame_) fields["frame"] = frame_->number;
   if (common.read_retries > 0) fields["reads_retried"] = readsRetried();
   return writeOutput(common.stats_path, jsonText(fields) + "\n");
 }

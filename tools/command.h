@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "tools/console_progress.h"
+#include "tools/sequence.h"
 
 namespace surfeit {
 
@@ -40,13 +42,25 @@ struct CommonOptionSet {
 
 class CommandContext {
  public:
-  CommandContext();
+  // With `frame` the command runs for that frame of a sequence.
+  explicit CommandContext(const std::optional<SequenceFrame>& frame = {});
   ~CommandContext();
 
   CommonOptions common;
   int exit_status = 0;
+  SequenceOptions sequence;
+  std::vector<std::string> words;  // of the command line
+
+  // Of a command that has run: it is a sequence, so its frames are to run, each by a context of its
+  // own, and nothing was done yet.
+  bool isSequence() const { return is_sequence_; }
+  // How the frame has ended.
+  FrameOutcome frameOutcome() const;
 
   void addCommonOptions(CLI::App& command, const CommonOptionSet& set = {});
+
+  // For commands that take sequences of frames, when they have all their other options.
+  void addFrameOptions(CLI::App& command);
 
   // Runs a command's body; a failure is told in one line on stderr and becomes the exit status.
   // Call from the subcommand's callback.
@@ -72,17 +86,21 @@ class CommandContext {
   int threads() const;
 
  private:
-  Status checkParsed() const;
+  Result<bool> isToWork();
   void end(Status status);
 
   struct Command {
     const CLI::App* app;
     bool works_in_place;
+    bool takes_frames = false;
   };
+  const std::optional<SequenceFrame> frame_;
+  bool is_sequence_ = false, is_up_to_date_ = false;
   std::vector<Command> commands_;
   std::unique_ptr<ConsoleProgress> progress_;
   Status answered_;
   std::chrono::steady_clock::time_point start_;
+  double cpu_start_;
 };
 
 // "512M", "2G", "1.5GiB", "4096": bytes; units are powers of 1024.
@@ -123,6 +141,7 @@ void addRadianceCommand(CLI::App& app, CommandContext& context);
 void addBounceCommand(CLI::App& app, CommandContext& context);
 void addBrickCommand(CLI::App& app, CommandContext& context);
 void addTuneCommand(CLI::App& app, CommandContext& context);
+void addPlanCommand(CLI::App& app, CommandContext& context);
 void addViewCommand(CLI::App& app, CommandContext& context);
 void addCompositeCommand(CLI::App& app, CommandContext& context);
 void addCubeCommand(CLI::App& app, CommandContext& context);

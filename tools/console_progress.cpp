@@ -41,8 +41,9 @@ std::string formatSeconds(double seconds) {
 
 }  // namespace
 
-ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose, bool strict)
-    : style_(style), quiet_(quiet), verbose_(verbose), strict_(strict) {
+ConsoleProgress::ConsoleProgress(Style style, bool quiet, bool verbose, bool strict,
+                                 const std::optional<SequenceFrame>& frame)
+    : style_(style), quiet_(quiet), verbose_(verbose), strict_(strict), frame_(frame) {
   struct sigaction action {};
   action.sa_handler = onCancelSignal;
   sigaction(SIGINT, &action, nullptr);
@@ -90,21 +91,27 @@ void ConsoleProgress::draw() {
   const double byte_rate = seconds > 0 ? double(bytes_) / seconds : 0;
   const std::string bytes = byte_rate > 0 ? fmt::format(" {:.0f} MB/s", byte_rate / 1e6) : "";
   const int percent = static_cast<int>(part * 100);
+  const std::string frame = frame_ ? frame_->label() + " " : "";
   if (style_ == Style::kBar) {
     const auto filled = static_cast<std::size_t>(part * 30);
-    tellRaw(fmt::format("\r\x1b[K{:>8} [{}{}] {:3}%  {} {}{}  {} left", phase_,
+    tellRaw(fmt::format("\r\x1b[K{}{:>8} [{}{}] {:3}%  {} {}{}  {} left", frame, phase_,
                         std::string(filled, '#'), std::string(30 - filled, '.'), percent,
                         formatRate(rate), unit_, bytes, formatSeconds(left)));
     bar_shown_ = true;
   } else if (style_ == Style::kPercent) {
     if (percent == last_percent_) return;
-    tell(fmt::format("{} {}% {} {}{}, {} left\n", phase_, percent, formatRate(rate), unit_, bytes,
-                     formatSeconds(left)));
+    tell(fmt::format("{}{} {}% {} {}{}, {} left\n", frame, phase_, percent, formatRate(rate), unit_,
+                     bytes, formatSeconds(left)));
   } else if (style_ == Style::kJson) {
-    const nlohmann::json line = {{"phase", phase_},     {"done", done},
-                                 {"total", total_},     {"unit", unit_},
-                                 {"per_second", rate},  {"bytes_per_second", byte_rate},
-                                 {"seconds_left", left}};
+    nlohmann::json line = {{"phase", phase_},     {"done", done},
+                           {"total", total_},     {"unit", unit_},
+                           {"per_second", rate},  {"bytes_per_second", byte_rate},
+                           {"seconds_left", left}};
+    if (frame_) {
+      line["frame"] = frame_->number;
+      line["frame_index"] = frame_->index;
+      line["frame_count"] = frame_->count;
+    }
     tell(line.dump() + "\n");
   }
   last_percent_ = percent;
@@ -120,7 +127,8 @@ void ConsoleProgress::note(const std::string& message) {
 void ConsoleProgress::inform(const std::string& message) {
   if (quiet_) return;
   clear();
-  tell(fmt::format("surfeit: {}\n", message));
+  tell(frame_ ? fmt::format("surfeit: frame {}: {}\n", frame_->number, message)
+              : fmt::format("surfeit: {}\n", message));
 }
 
 void ConsoleProgress::clear() {

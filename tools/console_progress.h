@@ -6,10 +6,12 @@
 #include <chrono>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "surfeit/progress.h"
+#include "tools/frames.h"
 
 namespace surfeit {
 
@@ -21,7 +23,9 @@ class ConsoleProgress : public Progress {
   // SIGINT and SIGTERM cancel from now on; a second one ends the program at once.
   // With `verbose` every phase is told as it begins.
   // With `strict` the first note ends the work: it is cancelled, and refused() has the note.
-  ConsoleProgress(Style style, bool quiet, bool verbose, bool strict);
+  // With `frame` every line says which frame of a sequence it is about.
+  ConsoleProgress(Style style, bool quiet, bool verbose, bool strict,
+                  const std::optional<SequenceFrame>& frame = {});
   ~ConsoleProgress() override;
 
   void beginPhase(std::string_view name, std::uint64_t total, std::string_view unit) override;
@@ -45,6 +49,7 @@ class ConsoleProgress : public Progress {
   const bool quiet_;
   const bool verbose_;
   const bool strict_;
+  const std::optional<SequenceFrame> frame_;
   std::atomic<bool> is_refused_{false};
   std::mutex mutex_;  // guards what is below, but not the atomic ones
   std::string phase_, unit_, refused_;

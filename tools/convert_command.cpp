@@ -209,6 +209,7 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
   addChoiceOptions(*command, arguments->options);
   addPlaceOptions(*command, *arguments);
   context.addCommonOptions(*command, {.threads = false, .works_in_place = true});
+  context.addFrameOptions(*command);
   command->footer(
       "Several clouds become one with the properties of all; a property that a cloud lacks is 0.\n"
       "Clouds of any size take some MiB of memory. Only .vdb, which is held until it is written,\n"

@@ -190,6 +190,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
                     "Write no result; estimate memory, files and time from a sample");
   addShardOptions(*command, *arguments);
   context.addCommonOptions(*command);
+  context.addFrameOptions(*command);
   command->footer(
       "The result holds the receivers in their order with all their properties, and `occlusion`;\n"
       "with --mode bleeding also `irradiance_r irradiance_g irradiance_b`, with --mode glossy\n"

@@ -157,6 +157,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   command->add_flag("--dry-run", arguments->is_dry_run,
                     "Write no scene; estimate memory, files and time from a sample");
   context.addCommonOptions(*command);
+  context.addFrameOptions(*command);
   command->footer(
       "Missing channels are filled in by rules, and each rule used is reported once: area from\n"
       "radius and disk overlap; radius from area; both from the neighbours; without a normal a\n"

@@ -28,6 +28,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addBounceCommand(app, context);
   addBrickCommand(app, context);
   addTuneCommand(app, context);
+  addPlanCommand(app, context);
   addViewCommand(app, context);
   addCompositeCommand(app, context);
   addCubeCommand(app, context);
@@ -43,24 +44,35 @@ int answerHelp(const CLI::App& app, const CLI::Success& success) {
   return exitStatus(written.code());
 }
 
-int parseAndRun(int argc, char** argv) {
-  CommandContext context;
+int parseAndRun(const std::vector<std::string>& words, CommandContext& context) {
+  context.words = words;
   CLI::App app("Surfeit: gathers over huge surfel clouds inside a memory budget", "surfeit");
   app.set_version_flag("--version", std::string("surfeit ") + kVersion);
   app.require_subcommand(1);
   app.get_formatter()->column_width(36);
   addCommands(app, context);
   try {
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
   } catch (const CLI::Success& success) {
     return answerHelp(app, success);
   } catch (const CLI::ParseError& error) {
-    const std::string suggestion =
-        suggestOption(app, std::vector<std::string>(argv + 1, argv + argc));
-    tell(std::string("surfeit: ") + error.what() + suggestion + "\n");
-    return exitStatus(StatusCode::kInvalidArgument);
+    tell(std::string("surfeit: ") + error.what() + suggestOption(app, words) + "\n");
+    context.exit_status = exitStatus(StatusCode::kInvalidArgument);
   }
   return context.exit_status;
+}
+
+// A command, or a command once for each frame of its sequence.
+int runWords(const std::vector<std::string>& words) {
+  CommandContext context;
+  const int exit_status = parseAndRun(words, context);
+  if (!context.isSequence()) return exit_status;
+  return runSequence(context.sequence.frames, context.common.quiet,
+                     [&](const SequenceFrame& frame) {
+                       CommandContext of_frame(frame);
+                       parseAndRun(words, of_frame);
+                       return of_frame.frameOutcome();
+                     });
 }
 
 }  // namespace
@@ -71,5 +83,5 @@ int main(int argc, char** argv) {
   // Few arenas, and large buffers given back when freed: the memory budget counts what is in use
   mallopt(M_ARENA_MAX, 2);
   mallopt(M_MMAP_THRESHOLD, 256 << 10);
-  return surfeit::parseAndRun(argc, argv);
+  return surfeit::runWords({argv + 1, argv + argc});
 }

@@ -56,6 +56,7 @@ void addMergeCommand(CLI::App& app, CommandContext& context) {
                     "Remove the files of the shards when the result is complete");
   addTemporaryOption(*command, arguments->options.temporary_directory);
   context.addCommonOptions(*command);
+  context.addFrameOptions(*command);
   command->footer(
       "The result is byte for byte that of one gather. Modes, outputs and how receivers are read\n"
       "are as in the gather; the shards say so. Exit status 75: shards are missing, damaged or of\n"

@@ -25,13 +25,6 @@ struct Output {
   bool is_file = false;  // there is a file that would be replaced
 };
 
-bool isOutput(const CLI::Option& option) {
-  const std::vector<std::string>& names = option.get_lnames();
-  return std::any_of(names.begin(), names.end(), [](const std::string& name) {
-    return std::find(std::begin(kOutputs), std::end(kOutputs), name) != std::end(kOutputs);
-  });
-}
-
 // The same for all paths that lead there.
 std::string placeOf(const std::string& path) {
   const std::filesystem::path file(path);
@@ -51,11 +44,18 @@ Status checkAgainst(const Output& output, const std::string& other, std::string_
 
 }  // namespace
 
+bool isOutputOption(const CLI::Option& option) {
+  const std::vector<std::string>& names = option.get_lnames();
+  return std::any_of(names.begin(), names.end(), [](const std::string& name) {
+    return std::find(std::begin(kOutputs), std::end(kOutputs), name) != std::end(kOutputs);
+  });
+}
+
 Status checkOutputs(const CLI::App& command, bool works_in_place) {
   // What is to be written
   std::vector<Output> outputs;
   for (const CLI::Option* const option : command.get_options()) {
-    if (option->count() == 0 || !isOutput(*option)) continue;
+    if (option->count() == 0 || !isOutputOption(*option)) continue;
     Output output{"--" + option->get_lnames().front(), option->results().back(), {}, {}, false};
     SURFEIT_ASSIGN_OR_RETURN(const OutputPlace target, findOutput(output.path));
     output.is_file = !target.is_stream && ::stat(target.path.c_str(), &output.info) == 0;
@@ -73,7 +73,7 @@ Status checkOutputs(const CLI::App& command, bool works_in_place) {
 
   // What may be read
   for (const CLI::Option* const option : command.get_options()) {
-    if (option->count() == 0 || isOutput(*option)) continue;
+    if (option->count() == 0 || isOutputOption(*option)) continue;
     for (const Output& output : outputs) {
       const bool is_allowed =
           works_in_place && option->get_positional() && output.option == "--output";

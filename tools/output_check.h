@@ -8,10 +8,14 @@
 
 namespace surfeit {
 
-// Of a parsed command: its outputs are the options --output, --passes, --plot, --stats and
-// --cache-series, all others may name inputs. kInvalidArgument when an output is the same file as
-// an input, by whatever name, or as another output, or is a directory; kIoError when it cannot be
-// written. `works_in_place`: the file of --output may be one of the inputs given by position.
+// Whether an option names a file that the command writes: --output, --passes, --plot, --stats or
+// --cache-series.
+bool isOutputOption(const CLI::Option& option);
+
+// Of a parsed command: all options but those of its outputs may name inputs. kInvalidArgument when
+// an output is the same file as an input, by whatever name, or as another output, or is a
+// directory; kIoError when it cannot be written. `works_in_place`: the file of --output may be one
+// of the inputs given by position.
 Status checkOutputs(const CLI::App& command, bool works_in_place);
 
 }  // namespace surfeit

@@ -80,6 +80,7 @@ void addSampleCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<SampleArguments>();
   addSampleOptions(*command, *arguments);
   context.addCommonOptions(*command, {.threads = true, .stats = true});
+  context.addFrameOptions(*command);
   command->footer(
       "Meshes are held in memory, some 100 bytes per triangle; meshes that exceed --memory are\n"
       "refused.\n"

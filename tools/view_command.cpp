@@ -81,6 +81,7 @@ void addViewCommand(CLI::App& app, CommandContext& context) {
   addColorRangeOption(*command, arguments->options.color_range);
   addViewOptions(*command, arguments->options);
   context.addCommonOptions(*command);
+  context.addFrameOptions(*command);
   command->footer(
       "Examples:\n"
       "  surfeit view city.sft -o city.png --eye \"40 60 120\" --look-at \"0 10 0\" --size "

@@ -1,0 +1,82 @@
+# What the tests of farms are made of, beside cli_steps.sh. Sourced after it.
+#
+# The program of a farm job is `farm_surfeit`, a script in front of surfeit that makes some tasks fail
+# as they do on farms. Its rules are files in the directory faults:
+#
+#   killed-I    the program of shard I is killed by SIGKILL, once
+#   lost-I      so is the shell that called it: it cannot say so
+#   stopped-I   it ends with 143, once
+#   memory-I    it ends with 33 with less memory than the number of MiB in the file
+#   files-I     it ends with 74, so many times as the file has lines
+#   data-I      it ends with 3, always
+#   removed-I   its shard file is gone when the merge looks for the first time
+#
+# Every call of a task is a line of faults/log: SHARD FRAME MEMORY STATUS.
+
+# The program of the tests' jobs, as SURFEIT of their environment.
+makeFarmSurfeit() {
+  mkdir -p faults
+  printf '#!/bin/bash\nprogram=%q\nfaults=%q\n' "$surfeit" "$PWD/faults" > farm_surfeit
+  cat >> farm_surfeit << 'FAULTS'
+shard='' memory='' frame=''
+for word in "$@"; do
+  case $word in
+    --shard=*) shard=${word#*=} shard=${shard%/*} ;;
+    --memory=*M) memory=${word#*=} memory=${memory%M} ;;
+    --frames=*) frame=${word#*=} ;;
+  esac
+done
+finish() {
+  [[ -z $shard ]] || echo "$shard ${frame:-0} $memory $1" >> "$faults/log"
+  exit "$1"
+}
+if [[ $1 == merge ]]; then
+  for rule in "$faults"/removed-*; do
+    [[ -e $rule ]] || continue
+    rm "$(< "$rule")" "$rule"
+  done
+  exec "$program" "$@"
+fi
+echo "${SLURMD_NODENAME:-}" >> "$faults/../nodes"
+rule() { [[ -e $faults/$1-$shard ]]; }
+once() { rm "$faults/$1-$shard" 2> /dev/null; }
+if once killed; then
+  echo "$shard ${frame:-0} $memory 137" >> "$faults/log"
+  # As the system does it where memory runs out: the shell of the task, if any, lives
+  bash -c 'kill -9 $$'
+  exit 137
+fi
+if once lost; then
+  echo "$shard ${frame:-0} $memory lost" >> "$faults/log"
+  kill -9 "$PPID" $$
+fi
+if once stopped; then finish 143; fi
+if rule data; then finish 3; fi
+if rule memory && ((memory < $(< "$faults/memory-$shard"))); then finish 33; fi
+if [[ -s $faults/files-$shard ]]; then
+  sed -i 1d "$faults/files-$shard"
+  finish 74
+fi
+status=0
+"$program" "$@" || status=$?
+finish "$status"
+FAULTS
+  chmod +x farm_surfeit
+  export SURFEIT=$PWD/farm_surfeit PAUSE=0
+}
+
+# calls SHARD: memory and status of every call of its task, in order, as "64:33 128:0".
+calls() { awk -v shard="$1" '$1 == shard { printf "%s%s:%s", n++ ? " " : "", $3, $4 }' faults/log; }
+
+# callsAre SHARD CALLS
+callsAre() { [[ $(calls "$1") == "$2" ]] || fail "calls of shard $1: $(calls "$1"), expected $2"; }
+
+# A scene and receivers with names that need quotes, and the result of one machine.
+makeFarmScene() {
+  scene="it's a \$(scene) {{x}}.sft"
+  receivers='two  "blanks".ply'
+  generate set.ply --surfels 3k
+  "$surfeit" index -q set.ply -o "$scene" --memory 64M
+  generate "$receivers" --surfels 300 --seed 2
+  "$surfeit" gather -q "$scene" "$receivers" -o expected.ply --mode bleeding --memory 64M
+}

@@ -1,0 +1,97 @@
+#!/bin/bash
+# A gather in 7 shards for each of 5 frames: 35 tasks of 512 MiB and 1 threads (surfeit VERSION, docs/farm.md).
+# Exit statuses of a task: 0 done, also where its shard was finished before; 33 too little
+# memory: again with twice as much; 74, 137 and 143 (files, killed, told to stop): again; any
+# other, such as 2 and 3 (command line, data): not again, it would end the same way.
+#
+# bash FILE runs the tasks, as many at a time as JOBS says, and merges. Run again, it goes on with
+# what has failed. PARALLEL='--sshloginfile HOSTS' runs them on other machines that share these files;
+# a task that failed is then tried on another machine (man parallel). Logs are in RESULT.farm.
+set -u
+surfeit=${SURFEIT:-surfeit}
+scene=city.sft
+receivers='street.####.ply'
+result='lit.####.ply'
+options=()
+threads=1
+memory=512 # MiB
+shards=7
+frames=(1 4 7 -2 20)
+tasks=35
+
+# gather TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
+gather() {
+  local frame=${frames[($1 - 1) / shards]}
+  "$surfeit" gather "$scene" "$receivers" -o "$result" ${options[@]+"${options[@]}"} \
+    --threads="$threads" --memory="$2M" --shard="$((($1 - 1) % shards + 1))/$shards" \
+    ${frame:+"--frames=$frame"}
+}
+
+# merge INDEX MEMORY: the shards of the frame at that place of `frames`.
+merge() {
+  local frame=${frames[$1]}
+  "$surfeit" merge "$scene" "$receivers" -o "$result" ${options[@]+"${options[@]}"} \
+    --threads="$threads" --memory="$2M" --shards="$shards" ${frame:+"--frames=$frame"}
+}
+
+# runTask TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
+runTask() {
+  local memory=$memory most status tries=0
+  most=$(awk '/^MemTotal:/ { print int($2 / 1024) }' /proc/meminfo)
+  while :; do
+    status=0
+    gather "$1" "$memory" || status=$?
+    case $status in
+      33)
+        ((2 * memory <= most)) || return 33
+        memory=$((2 * memory))
+        ;;
+      74 | 137 | 143)
+        tries=$((tries + 1))
+        ((tries < $2)) || return "$status"
+        sleep "${PAUSE:-5}"
+        ;;
+      *) return "$status" ;;
+    esac
+    echo "task $1: exit status $status, again with $memory MiB" >&2
+  done
+}
+
+farm=$result.farm
+script=$(realpath "${BASH_SOURCE[0]:-}" 2> /dev/null)
+if [[ ! -f $script ]]; then
+  echo "save the plan to a file, and run it by bash FILE" >&2
+  exit 2
+fi
+
+if [[ ${1:-} == task ]]; then
+  # What would end the same way is not tried again, though parallel asks for it
+  stop=$farm/task-$2.stop
+  if [[ -e $stop ]]; then exit "$(< "$stop")"; fi
+  status=0
+  runTask "$2" 1 || status=$?
+  case $status in 0 | 33 | 74 | 137 | 143) ;; *) echo "$status" > "$stop" ;; esac
+  exit "$status"
+fi
+
+# As many tasks as processors and memory allow
+free=$(awk '/^MemAvailable:/ { print int($2 / 1024) }' /proc/meminfo)
+most=$((free / memory < $(nproc) / threads ? free / memory : $(nproc) / threads))
+jobs=${JOBS:-$((most > 0 ? most : 1))}
+mkdir -p "$farm" || exit
+rm -f "$farm"/task-*.stop
+
+# The second round is for shards that are gone although their tasks were done
+for _ in 1 2; do
+  seq "$tasks" | parallel --quote --joblog "$farm/joblog-$shards" --resume-failed --retries 3 \
+    --jobs "$jobs" --workdir "$PWD" bash "$script" task {}
+  status=0
+  for index in "${!frames[@]}"; do
+    merged=0
+    merge "$index" "$memory" || merged=$?
+    if ((merged != 0 && status != 75)); then status=$merged; fi
+  done
+  if ((status != 75)); then break; fi
+  rm -f "$farm/joblog-$shards"
+done
+exit "$status"

@@ -1,0 +1,111 @@
+#include "tools/farm_plan.h"
+
+#include <fmt/format.h>
+
+#include "surfeit/version.h"
+#include "tools/frames.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::string_view kFunctions = R"(
+# gather TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
+gather() {
+  local frame=${frames[($1 - 1) / shards]}
+  "$surfeit" gather "$scene" "$receivers" -o "$result" ${options[@]+"${options[@]}"} \
+    --threads="$threads" --memory="$2M" --shard="$((($1 - 1) % shards + 1))/$shards" \
+    ${frame:+"--frames=$frame"}
+}
+
+# merge INDEX MEMORY: the shards of the frame at that place of `frames`; they say how they were made.
+merge() {
+  local frame=${frames[$1]}
+  "$surfeit" merge "$scene" "$receivers" -o "$result" \
+    --threads="$threads" --memory="$2M" --shards="$shards" ${frame:+"--frames=$frame"}
+}
+)";
+
+constexpr std::string_view kRunTask = R"(
+# runTask TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
+runTask() {
+  local memory=$memory most status tries=0
+  most=$(awk '/^MemTotal:/ { print int($2 / 1024) }' /proc/meminfo)
+  while :; do
+    status=0
+    gather "$1" "$memory" || status=$?
+    case $status in
+      33)
+        ((2 * memory <= most)) || return 33
+        memory=$((2 * memory))
+        ;;
+      74 | 137 | 143)
+        tries=$((tries + 1))
+        ((tries < $2)) || return "$status"
+        sleep "${PAUSE:-5}"
+        ;;
+      *) return "$status" ;;
+    esac
+    echo "task $1: exit status $status, again with $memory MiB" >&2
+  done
+}
+)";
+
+}  // namespace
+
+std::string shellWord(std::string_view text) {
+  constexpr std::string_view kSafe =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./:,=@%+-";
+  if (!text.empty() && text.find_first_not_of(kSafe) == text.npos) return std::string(text);
+  std::string word = "'";
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '\'') {
+      word += "'\\''";
+      continue;
+    }
+    // {{ begins a value in format strings of OpenJD; quotes between them are nothing to bash
+    if (text[i] == '{' && word.back() == '{') word += "''";
+    word += text[i];
+  }
+  return word + "'";
+}
+
+std::string planComment(const FarmPlan& plan) {
+  const std::string frames =
+      plan.frames.empty() ? "" : fmt::format(" for each of {} frames", plan.frames.size());
+  return fmt::format(
+      "# A gather in {} shards{}: {} tasks of {} MiB and {} threads (surfeit {}, docs/farm.md).\n"
+      "# Exit statuses of a task: 0 done, also where its shard was finished before; 33 too little\n"
+      "# memory: again with twice as much; 74, 137 and 143 (files, killed, told to stop): again; "
+      "any\n"
+      "# other, such as 2 and 3 (command line, data): not again, it would end the same way.\n",
+      plan.shards, frames, plan.taskCount(), plan.memory_mib, plan.threads, kVersion);
+}
+
+std::string planFunctions(const FarmPlan& plan) {
+  std::string options, frames;
+  for (const std::string& option : plan.options) {
+    options += (options.empty() ? "" : " ") + shellWord(option);
+  }
+  for (const int frame : plan.frames)
+    frames += fmt::format("{}{}", frames.empty() ? "" : " ", frame);
+  return fmt::format(
+             "set -u\n"
+             "surfeit=${{SURFEIT:-surfeit}}\n"
+             "scene={}\n"
+             "receivers={}\n"
+             "result={}\n"
+             "options=({})\n"
+             "threads={}\n"
+             "memory={} # MiB\n"
+             "shards={}\n"
+             "frames=({})\n"
+             "tasks={}\n",
+             shellWord(plan.scene), shellWord(plan.receivers), shellWord(plan.result), options,
+             plan.threads, plan.memory_mib, plan.shards, plan.frames.empty() ? "''" : frames,
+             plan.taskCount()) +
+         std::string(kFunctions);
+}
+
+std::string_view runTaskFunction() { return kRunTask; }
+
+}  // namespace surfeit
