@@ -26,10 +26,10 @@ gather() {
     $${frame:+"--frames=$$frame"}
 }
 
-# merge INDEX MEMORY: the shards of the frame at that place of `frames`.
+# merge INDEX MEMORY: the shards of the frame at that place of `frames`; they say how they were made.
 merge() {
   local frame=$${frames[$$1]}
-  "$$surfeit" merge "$$scene" "$$receivers" -o "$$result" $${options[@]+"$${options[@]}"} \
+  "$$surfeit" merge "$$scene" "$$receivers" -o "$$result" \
     --threads="$$threads" --memory="$$2M" --shards="$$shards" $${frame:+"--frames=$$frame"}
 }
 
