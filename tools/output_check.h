@@ -8,7 +8,8 @@
 
 namespace surfeit {
 
-// Of a parsed command: its outputs are the options --output, --passes, --plot, --stats and
+// Of a parsed command: its outputs are the options --output, --passes, --caustic-photons, --plot,
+// --stats and
 // --cache-series, all others may name inputs. kInvalidArgument when an output is the same file as
 // an input, by whatever name, or as another output, or is a directory; kIoError when it cannot be
 // written. `works_in_place`: the file of --output may be one of the inputs given by position.
