@@ -2,7 +2,7 @@
 # Makes the pictures of docs/gallery.md, in docs/gallery/, from scenes that it makes itself. Clouds
 # and scenes go to out/gallery/. Minutes on two cores. Chapters may be named to make only these:
 #
-#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube ...]
+#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics ...]
 #
 # SURFEIT_BUILD names a build directory to take the programs from; else build/release is built.
 set -euo pipefail
@@ -200,9 +200,58 @@ cube() {
     --zoom 5 --exposure -1 --reference cornell.obj
 }
 
+# Surfels for the camera of the studio, and of a narrower view, seen from elsewhere
+camera() {
+  say "Surfels for a camera"
+  local from=(--eye "10 10 13" --look-at "0 0 0.5" --fov 40 --size 480x360)
+  local studio=(studio.obj --ground-plane --ground-size 4 "${sun[@]}" --size 560x420 --pixels 4)
+  sample "${studio[@]}" -o camera.ply --camera "$studio_eye 0 0.3 0.1 37"
+  draw camera_wide camera.ply --channel radiosity --radius-scale 0.5 "${from[@]}"
+  sample "${studio[@]}" -o narrow.ply --camera "$studio_eye 1.3 0.8 0.9 8"
+  draw camera_narrow narrow.ply --channel radiosity --radius-scale 0.5 "${from[@]}"
+}
+
+# A ball of glass and one that mirrors, on a floor
+ball() { # MATERIAL X Z
+  awk -v m="$1" -v x="$2" -v z="$3" 'BEGIN {
+    print "usemtl " m
+    for (i = 0; i <= 64; i++) for (k = 0; k < 128; k++) {
+      t = 3.14159265 * i / 64; p = 3.14159265 * k / 64
+      a = sin(t) * cos(p); b = cos(t); c = sin(t) * sin(p)
+      printf "v %.6f %.6f %.6f\nvn %.6f %.6f %.6f\n", x + a, 1.01 + b, z + c, a, b, c
+    }
+    n = 65 * 128
+    for (i = 0; i < 64; i++) for (k = 0; k < 128; k++) {
+      q[0] = i * 128 + k; q[1] = i * 128 + (k + 1) % 128; q[2] = q[1] + 128; q[3] = q[0] + 128
+      s = "f"; for (j = 0; j < 4; j++) s = s " " (q[j] - n) "//" (q[j] - n)
+      print s
+    }
+  }'
+}
+
+caustics() {
+  say "Caustics of glass and of a mirror"
+  printf '%s\n' "newmtl floor" "Kd .7 .7 .7" "newmtl glass" "illum 7" "Ni 1.5" "Tf .9 .97 1" \
+    "newmtl mirror" "Kd 0 0 0" "Ks .9 .8 .6" "illum 3" > balls.mtl
+  {
+    echo "mtllib balls.mtl"
+    ball glass -1.4 0
+    ball mirror 1.4 -0.4
+    printf '%s\n' "usemtl floor" "v -5 0 5" "v 5 0 5" "v 5 0 -5" "v -5 0 -5" "f -4 -3 -2 -1"
+  } > balls.obj
+  sample balls.obj -o ball_photons.ply --photons 3000000 --caustic-photons caustic.ply "${sun[@]}"
+  local view=(--channel radiosity --eye "0 6 8" --look-at "0.5 0 -0.6" --fov 40 --size 420x315)
+  timed surfeit radiance caustic.ply -o caustic_radiosity.ply --photons-per-estimate 60
+  timed surfeit radiance ball_photons.ply caustic.ply -o ball_radiosity.ply \
+    --photons-per-estimate 60
+  draw caustics_alone caustic_radiosity.ply "${view[@]}"
+  draw caustics_all ball_radiosity.ply "${view[@]}"
+}
+
 chapters=("$@")
 if ((${#chapters[@]} == 0)); then
-  chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube)
+  chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube
+    camera caustics)
   scenes
 fi
 for chapter in "${chapters[@]}"; do "$chapter"; done

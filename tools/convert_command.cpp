@@ -12,6 +12,7 @@
 
 #include "surfeit/convert.h"
 #include "surfeit/process.h"
+#include "tools/camera_options.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/number_list.h"
@@ -27,6 +28,7 @@ struct ConvertArguments {
   std::string output;
   double scale = 1;  // of --units
   ConvertOptions options;
+  DensityArguments cameras;  // of the options' density
 };
 
 struct Unit {
@@ -104,6 +106,7 @@ Status runConvert(ConvertArguments& arguments, CommandContext& context) {
   const Matrix scaling{scale, 0, 0, 0, 0, scale, 0, 0, 0, 0, scale, 0};
   options.transform = product(options.transform, scaling);
   options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(options.density, arguments.cameras.cameraDensity());
   SURFEIT_ASSIGN_OR_RETURN(
       const ConvertStats stats,
       convertClouds(arguments.inputs, arguments.output, options, context.progress()));
@@ -165,7 +168,8 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
 }
 
 // Options that say what of the records is written.
-void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
+void addChoiceOptions(CLI::App& command, ConvertArguments& arguments) {
+  ConvertOptions& options = arguments.options;
   addChannelOptions(command, options.channels, options.part, options.filter);
   addColorRangeOption(command, options.color_range);
   CLI::Option* const every =
@@ -178,6 +182,10 @@ void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
                   "stands for all records of the cell")
       ->type_name("D")
       ->excludes(every);
+  CLI::Option* const spacing = command.get_option("--spacing");
+  for (CLI::Option* const camera : addDensityOptions(command, arguments.cameras)) {
+    camera->excludes(every)->excludes(spacing);
+  }
   addTemporaryOption(command, options.temporary_directory);
   CLI::Option* const keep =
       command.add_option("--keep", options.keep, "Only these channels, and the position")
@@ -206,19 +214,20 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
   command->add_option("CLOUD", arguments->inputs, "Clouds of any format (docs/files.md)")
       ->required();
   addCloudOutputOption(*command, arguments->output, "Cloud to write", true);
-  addChoiceOptions(*command, arguments->options);
+  addChoiceOptions(*command, *arguments);
   addPlaceOptions(*command, *arguments);
   context.addCommonOptions(*command, {.threads = false, .works_in_place = true});
   context.addFrameOptions(*command);
   command->footer(
       "Several clouds become one with the properties of all; a property that a cloud lacks is 0.\n"
       "Clouds of any size take some MiB of memory. Only .vdb, which is held until it is written,\n"
-      "and --spacing, which sorts, take more, within --memory (default 2G).\n"
+      "and --spacing and --camera, which sort, take more, within --memory (default 2G).\n"
       "Examples:\n"
       "  surfeit convert scan.las -o scan.ply --units ft:m --up y\n"
       "  surfeit convert a.ptc b.ptc -o both.ply.zst\n"
       "  surfeit convert city.ply -o block.vdb --crop 0,0,0,100,100,50 --drop normal\n"
       "  surfeit convert tile1.las tile2.las -o even.ply --spacing 0.05\n"
+      "  surfeit convert scan.ply -o shot.ply --camera \"0 1.7 9  0 1 0  50\" --pixels 1.5\n"
       "  surfeit convert baked.bgeo -o thin.csv --every 100 --channels bake=radiosity");
   command->callback(
       [arguments, &context] { context.run([&] { return runConvert(*arguments, context); }); });

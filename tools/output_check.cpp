@@ -16,7 +16,8 @@
 namespace surfeit {
 namespace {
 
-constexpr std::string_view kOutputs[] = {"output", "passes", "plot", "stats", "cache-series"};
+constexpr std::string_view kOutputs[] = {"output", "passes", "caustic-photons",
+                                         "plot",   "stats",  "cache-series"};
 
 struct Output {
   std::string option, path;

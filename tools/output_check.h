@@ -8,8 +8,8 @@
 
 namespace surfeit {
 
-// Whether an option names a file that the command writes: --output, --passes, --plot, --stats or
-// --cache-series.
+// Whether an option names a file that the command writes: --output, --passes,
+// --caustic-photons, --plot, --stats or --cache-series.
 bool isOutputOption(const CLI::Option& option);
 
 // Of a parsed command: all options but those of its outputs may name inputs. kInvalidArgument when

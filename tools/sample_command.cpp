@@ -18,6 +18,7 @@ Status runPhotons(const SampleArguments& arguments, CommandContext& context) {
   options.surroundings = arguments.options.surroundings;
   options.photons = arguments.photons;
   options.seed = arguments.photon_seed;
+  options.caustic_output = arguments.caustic_output;
   options.threads = context.threads();
   SURFEIT_ASSIGN_OR_RETURN(
       const PhotonTracingStats stats,
@@ -26,6 +27,10 @@ Status runPhotons(const SampleArguments& arguments, CommandContext& context) {
                           arguments.output, formatCount(stats.stored), formatCount(stats.emitted),
                           context.wallSeconds(),
                           double(stats.emitted) / std::max(stats.trace_seconds, 1e-9) / 1e6));
+  if (!options.caustic_output.empty()) {
+    context.say(fmt::format("{}: {} photons of caustics", options.caustic_output,
+                            formatCount(stats.caustic)));
+  }
   if (stats.lost_at_backs * 20 > stats.emitted) {
     context.say(
         fmt::format("warning: {} photons met the back of a surface, which is black: do "
@@ -37,6 +42,8 @@ Status runPhotons(const SampleArguments& arguments, CommandContext& context) {
                              {"degenerate_faces", stats.degenerate_faces},
                              {"emitted_photons", stats.emitted},
                              {"stored_photons", stats.stored},
+                             {"caustic_photons", stats.caustic},
+                             {"caustic_power", jsonOf(stats.caustic_power)},
                              {"escaped_photons", stats.escaped},
                              {"photons_lost_at_backs", stats.lost_at_backs},
                              {"emitted_power", jsonOf(stats.emitted_power)},
@@ -50,6 +57,7 @@ Status runPhotons(const SampleArguments& arguments, CommandContext& context) {
 Status runSample(SampleArguments& arguments, CommandContext& context) {
   if (arguments.photons > 0) return runPhotons(arguments, context);
   arguments.options.threads = context.threads();
+  SURFEIT_ASSIGN_OR_RETURN(arguments.options.density, arguments.cameras.cameraDensity());
   SURFEIT_ASSIGN_OR_RETURN(
       const SampleStats stats,
       sampleMeshes(arguments.meshes, arguments.output, arguments.options, context.progress()));
@@ -64,6 +72,7 @@ Status runSample(SampleArguments& arguments, CommandContext& context) {
                              {"sliver_surfels", stats.sliver_surfels},
                              {"clear_surfels", stats.clear_surfels},
                              {"area", stats.area},
+                             {"surfel_area", stats.surfel_area},
                              {"disk_area", stats.disk_area},
                              {"spacing", stats.spacing},
                              {"phases",
@@ -88,6 +97,8 @@ void addSampleCommand(CLI::App& app, CommandContext& context) {
       "  surfeit sample cornell.obj -o cornell.ply --count 1000000\n"
       "  surfeit sample lion.ply -o lion.ply --spacing 0.01 --ground-plane --up z \\\n"
       "      --light-directional \"-1 -1 -2  3 3 3\"\n"
+      "  surfeit sample city.obj -o shot.ply --camera \"12 2 40  12 4 0  50\" --size 2048x1024 \\\n"
+      "      --pixels 1.5\n"
       "  surfeit sample cornell.obj -o photons.ply --photons 1000000");
   command->callback(
       [arguments, &context] { context.run([&] { return runSample(*arguments, context); }); });

@@ -96,6 +96,19 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
                                        "[\"0.5 0.5 0.5\"]")
       ->type_name("\"r g b\"");
 
+  CurveOptions& curves = surroundings.curves;
+  app.add_option("--curve-width", curves.width,
+                 "Diameter of hair (.hair) and of the lines of OBJ files, scene units; without it "
+                 "that of the file, and lines of OBJ files are left out")
+      ->type_name("W")
+      ->check(CLI::PositiveNumber.description(""))
+      ->group("Hair and curves");
+  app.add_option("--strands", curves.strands,
+                 "At most so many strands of each file, wider by as much as keeps their total area")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber.description(""))
+      ->group("Hair and curves");
+
   GroundPlane& ground = surroundings.ground;
   app.add_flag("--ground-plane", ground.enabled, "Add a square below the meshes")->group("Ground");
   app.add_option("--ground-size", ground.size,
@@ -115,7 +128,9 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
 }
 
 void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
-  app.add_option("MESH", arguments.meshes, "Triangle meshes: PLY, or OBJ with MTL")->required();
+  app.add_option("MESH", arguments.meshes,
+                 "Triangle meshes: PLY, or OBJ with MTL; hair: .hair (cyHair)")
+      ->required();
   addCloudOutputOption(app, arguments.output, "Cloud to write");
   CLI::Option* const count =
       app.add_option("--count", arguments.options.count,
@@ -127,6 +142,8 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
                      "Distance between surfels in scene units, instead of a count")
           ->check(CLI::PositiveNumber)
           ->excludes(count);
+  const std::vector<CLI::Option*> cameras = addDensityOptions(app, arguments.cameras);
+  for (CLI::Option* const camera : cameras) camera->excludes(count)->excludes(spacing);
   CLI::Option* const photons =
       app.add_option("--photons", arguments.photons,
                      "Instead of surfels, trace this many photons from the lights and write where "
@@ -134,11 +151,17 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
           ->check(CLI::PositiveNumber)
           ->excludes(count)
           ->excludes(spacing);
+  for (CLI::Option* const camera : cameras) camera->excludes(photons);
   app.add_flag("--two-sided", arguments.options.is_two_sided,
                "Both sides of the meshes send and block light: leaves, cloth, hair")
       ->excludes(photons);
   app.add_option("--seed", arguments.photon_seed,
                  "Seed of the photons: another seed gives other photons of the same lights")
+      ->needs(photons);
+  app.add_option("--caustic-photons", arguments.caustic_output,
+                 "Photons that come from a light over mirrors or through glass alone go to this "
+                 "cloud instead: the map of caustics")
+      ->type_name("FILE")
       ->needs(photons);
   addSurroundingsOptions(app, arguments.options.surroundings);
 }

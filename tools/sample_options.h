@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "surfeit/sample.h"
+#include "tools/camera_options.h"
 
 namespace surfeit {
 
@@ -20,11 +21,13 @@ struct SampleArguments {
   std::vector<std::string> meshes;
   std::string output;
   SampleOptions options;
+  DensityArguments cameras;       // of the options' density
   std::uint64_t photons = 0;      // > 0: a photon map instead of surfels
   std::uint64_t photon_seed = 0;  // of PhotonTracingOptions
+  std::string caustic_output;     // likewise
 };
 
-// Adds MESH..., -o, --count, --spacing or --photons, and the options above. Parsing fills
+// Adds MESH..., -o, --count, --spacing, cameras or --photons, and the options above. Parsing fills
 // `arguments`, which must outlive `app`; threads are left to the program's own options.
 void addSampleOptions(CLI::App& app, SampleArguments& arguments);
 

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <charconv>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "tools/camera_options.h"
 #include "tools/number_list.h"
 
 namespace surfeit {
@@ -51,24 +51,6 @@ CLI::Option* addChoice(CLI::App& app, const std::string& name, Enum& value,
                                    fmt::format("found \"{}\", expected one of {}", text, words));
       },
       help);
-}
-
-// "1280x960"
-void parseSize(const std::string& text, ViewOptions& options) {
-  const char* const end = text.data() + text.size();
-  int width = 0, height = 0;
-  auto [at, error] = std::from_chars(text.data(), end, width);
-  bool ok = error == std::errc() && at != end && (*at == 'x' || *at == 'X');
-  if (ok) {
-    const auto second = std::from_chars(at + 1, end, height);
-    ok = second.ec == std::errc() && second.ptr == end && width > 0 && height > 0;
-  }
-  if (!ok) {
-    throw CLI::ValidationError(
-        "--size", fmt::format("found \"{}\", expected WIDTHxHEIGHT, for example 1280x960", text));
-  }
-  options.width = width;
-  options.height = height;
 }
 
 void addRange(CLI::App& app, std::optional<glm::dvec2>& range, const char* group) {
@@ -173,7 +155,8 @@ void addSurfelOptions(CLI::App& app, ViewOptions& options) {
 
 void addPictureOptions(CLI::App& app, ViewOptions& options) {
   app.add_option_function<std::string>(
-         "--size", [&options](const std::string& text) { parseSize(text, options); },
+         "--size",
+         [&options](const std::string& text) { parseSize(text, options.width, options.height); },
          "Pixels (default 1280x960)")
       ->type_name("WxH")
       ->group(kPictureGroup);

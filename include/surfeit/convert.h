@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "surfeit/api.h"
+#include "surfeit/camera_density.h"
 #include "surfeit/job.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -22,7 +23,7 @@ struct CropBox {
 };
 
 // The steps for the records of every input, in this order: rename channels, filter, take every n-th
-// record, move, crop, drop channels, thin by a grid.
+// record, move, crop, drop channels, thin by a grid or for cameras.
 // `memory_bytes` bounds the memory of OpenVDB output, which is held until it is written, and of
 // thinning by a grid, which sorts. All else takes some MiB, for clouds of any size. 0 stands for
 // 2 GiB, or for three quarters of the memory that the job may hold where that is less. Only
@@ -40,6 +41,12 @@ struct ConvertOptions : JobOptions, ReadOptions {
   // there is no area. Records keep their order. Records without a finite position are left out, and
   // a note reports them. The inputs are read twice. Not together with `every`.
   std::optional<double> spacing{};
+
+  // With cameras, places in units of the output: thins as `spacing` does, by cells whose edges are
+  // the power of two nearest to the size of a surfel for the cameras; their up axis is that of the
+  // output. Parts of a cloud that are coarser stay as they are. Neither together with `every` nor
+  // `spacing`.
+  CameraDensity density{};
 
   // The rows of an affine 3x4 matrix: x' = t[0] x + t[1] y + t[2] z + t[3]. All computations are in
   // double precision. Positions are points. Normals are turned by the inverse transpose and keep
@@ -67,7 +74,7 @@ struct ConvertStats {
   std::uint64_t records = 0;                        // of all inputs
   std::uint64_t skipped_records = 0;                // left out by `every`
   std::uint64_t cropped_records = 0;                // left out by `crop`
-  std::uint64_t thinned_records = 0;                // left out by `spacing`
+  std::uint64_t thinned_records = 0;                // left out by `spacing` or `density`
   std::uint64_t placeless_records = 0;              // of the thinned: without a finite position
   std::uint64_t written_records = 0;                // handed to the writer
   std::uint64_t input_bytes = 0, output_bytes = 0;  // of the files

@@ -2,10 +2,11 @@
 // 08-01, section 3.1); and the rays that a raster cube is held to. Needs the component `sample`,
 // which links Embree (docs/engine.md).
 //
-// Meshes are PLY files, or OBJ files with their MTL; several are taken as one. Lengths are scene
-// units. Exitance and irradiance are in W/m2, radiance in W/(m2 sr), all scene-linear rgb. Calls
-// are independent, so threads may call at once; each uses the threads that it is given. Meshes are
-// held whole, some 100 bytes a triangle: nothing but limitProcess (surfeit/process.h) bounds that.
+// Meshes are PLY files, OBJ files with their MTL, or hair (.hair, of cyHair); several are taken as
+// one. Lengths are scene units. Exitance and irradiance are in W/m2, radiance in W/(m2 sr), all
+// scene-linear rgb. Calls are independent, so threads may call at once; each uses the threads that
+// it is given. Meshes are held whole, some 100 bytes a triangle: nothing but limitProcess
+// (surfeit/process.h) bounds that.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "surfeit/api.h"
+#include "surfeit/camera_density.h"
 #include "surfeit/cube.h"
 #include "surfeit/gather.h"
 #include "surfeit/progress.h"
@@ -63,19 +65,34 @@ struct GroundPlane {
   glm::vec3 albedo{0.5f};
 };
 
-// What stands around the meshes; the sampler and the reference share it.
+// How hair (.hair) and the lines of OBJ files become ribbons with two sides.
+struct CurveOptions {
+  // Above 0: the diameter of all strands, scene units. 0: that of the file; lines of OBJ files,
+  // which have none, are then left out.
+  double width = 0;
+  // Above 0: of each file no more than so many strands, all wider by as much as keeps the sum of
+  // length times width. One is chosen of each run of neighbours in the file.
+  std::uint64_t strands = 0;
+};
+
+// What stands around the meshes, and how they are read; the sampler and the reference share it.
 struct Surroundings {
   glm::vec3 default_albedo{0.5f};  // of meshes without colors and materials
   GroundPlane ground;
   Lights lights;
+  CurveOptions curves;
 };
 
 struct SampleOptions {
   Surroundings surroundings;
   std::uint64_t count = 1'000'000;  // surfels, in proportion to area; slivers add a few
   double spacing = 0;               // > 0: one surfel per spacing^2 instead of a count
-  bool is_two_sided = false;        // both sides send and block light, and pieces have longer sides
-  int threads = 0;                  // 0: all that the job may use
+  // With cameras: surfels as large as these ask for, instead of a count or a spacing. Triangles
+  // smaller than a surfel are left out by their numbers, and others get their areas: areas add up
+  // in the mean. A camera that moves changes few surfels.
+  CameraDensity density;
+  bool is_two_sided = false;  // both sides send and block light, and pieces have longer sides
+  int threads = 0;            // 0: all that the job may use
 };
 
 struct SampleStats {
@@ -85,6 +102,7 @@ struct SampleStats {
   std::uint64_t sliver_surfels = 0;  // beyond the count asked for, from cutting slivers
   std::uint64_t clear_surfels = 0;   // not written: nothing of them is there (d, Tr, map_d)
   double area = 0;                   // of the meshes
+  double surfel_area = 0;            // of the surfels
   double disk_area = 0;              // sum of pi r^2: over `area`, how often disks overlap
   double spacing = 0;                // root of the area per surfel
   double load_seconds = 0, build_seconds = 0, sample_seconds = 0;
@@ -104,18 +122,24 @@ struct PhotonTracingOptions {
   Surroundings surroundings;
   std::uint64_t photons = 1'000'000;  // sent from all lights together, at least 1
   std::uint64_t seed = 0;             // another seed, other photons of the same light
-  int threads = 0;                    // 0: all that the job may use
+  // Where photons go that come from a light over mirrors or through glass alone; they are then not
+  // in the photon map, and both together are all light. Empty: all are in the photon map.
+  std::string caustic_output;
+  int threads = 0;  // 0: all that the job may use
 };
 
 struct PhotonTracingStats {
   std::uint64_t triangles = 0;
   std::uint64_t degenerate_faces = 0;
   std::uint64_t emitted = 0;
-  std::uint64_t stored = 0;         // at most one per surface that a photon meets
+  // One per surface that a photon meets, and two per translucent surface, for its two sides.
+  std::uint64_t stored = 0;
+  std::uint64_t caustic = 0;        // stored in the map of caustics
   std::uint64_t escaped = 0;        // photons that left the scene in the end
   std::uint64_t lost_at_backs = 0;  // photons that met the back of a surface, which is black
   glm::dvec3 emitted_power{0};      // of all lights
   glm::dvec3 stored_power{0};       // arrives at surfaces, those of later bounces included
+  glm::dvec3 caustic_power{0};      // the same of the map of caustics
   double load_seconds = 0, build_seconds = 0, trace_seconds = 0;
   int threads = 0;
 };
@@ -127,9 +151,11 @@ struct PhotonTracingStats {
 // surface, power before reflection, direction that the photon came from, albedo; floats, by the
 // names of docs/photons.md. Lights get photons in proportion to power; directional ones fill a disk
 // that covers the scene. Russian roulette ends the paths, so that powers stay as large as albedos
-// are alike, and no bounce is left out. The cloud depends on meshes, surroundings, number and seed
-// alone, not on the threads. Memory: the meshes, Embree's hierarchy and a few batches of photons,
-// whatever their number. Errors: as sampleMeshes; kInvalidArgument when nothing emits.
+// are alike, and no bounce is left out. Materials of MTL that mirror, refract or let light through
+// scatter photons that way (docs/photons.md, "Materials"). The cloud depends on meshes,
+// surroundings, number and seed alone, not on the threads. Memory: the meshes, Embree's hierarchy
+// and a few batches of photons, whatever their number. Errors: as sampleMeshes; kInvalidArgument
+// when nothing emits.
 SURFEIT_API Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
                                                     const std::string& output,
                                                     const PhotonTracingOptions& options,

@@ -148,6 +148,10 @@ std::array<double, 12> behindTurn(std::array<double, 12> transform, UpAxis from,
   return transform;
 }
 
+bool isThinning(const ConvertOptions& options) {
+  return options.spacing || !options.density.cameras.empty();
+}
+
 class Converter {
  public:
   Converter(const std::vector<std::string>& inputs, const std::string& output,
@@ -236,8 +240,10 @@ class Converter {
           "{}: {} records without a finite position are left out: they lie in no cell of the grid",
           output_, thinner_->placeless()));
     }
-    progress_.inform(fmt::format("{}: {} of {} records are kept, one per cell of {}", output_,
-                                 thinner_->kept(), thinner_->measured(), *options_.spacing));
+    progress_.inform(fmt::format(
+        "{}: {} of {} records are kept, one per cell of {}", output_, thinner_->kept(),
+        thinner_->measured(),
+        options_.spacing ? fmt::format("{}", *options_.spacing) : "the cameras' grids"));
     // Now the writer can tell what it will need; nothing was written yet
     writing_.count = thinner_->kept();
     SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing_));
@@ -264,10 +270,10 @@ class Converter {
   Status createWriter() {
     SURFEIT_ASSIGN_OR_RETURN(writing_.properties, chooseProperties(union_.properties(), options_));
     transform_.widenTypes(writing_.properties);
-    if (options_.spacing) RowTransform::widenSizes(writing_.properties);
+    if (isThinning(options_)) RowTransform::widenSizes(writing_.properties);
     writing_.comments = first_->comments();
     if (options_.up) stateUpAxis(*options_.up, writing_.comments);
-    if (!options_.crop && !options_.spacing) writing_.count = rows_to_write_;
+    if (!options_.crop && !isThinning(options_)) writing_.count = rows_to_write_;
     SURFEIT_RETURN_IF_ERROR(planMemory());
     writing_.progress = &progress_;
     if (!options_.like.empty()) {
@@ -290,12 +296,7 @@ class Converter {
     if (options_.crop) {
       SURFEIT_ASSIGN_OR_RETURN(cropper_, Cropper::create(*options_.crop, element));
     }
-    if (options_.spacing) {
-      SURFEIT_ASSIGN_OR_RETURN(
-          thinner_, GridThinner::create({*options_.spacing, thinner_bytes_,
-                                         temporaryDirectory(options_.temporary_directory, output_)},
-                                        element));
-    }
+    if (isThinning(options_)) SURFEIT_RETURN_IF_ERROR(createThinner(element));
     for (const RowProperty& property : element.properties) {
       stats_.properties.push_back(
           fmt::format("{} {}", valueTypeName(property.type), property.name));
@@ -303,10 +304,25 @@ class Converter {
     return {};
   }
 
+  Status createThinner(const RowLayout& element) {
+    GridThinner::Options thinning;
+    thinning.memory_bytes = thinner_bytes_;
+    thinning.temporary_directory = temporaryDirectory(options_.temporary_directory, output_);
+    if (options_.spacing) {
+      thinning.spacing = *options_.spacing;
+    } else {
+      const UpAxis up = statedUpAxis(writing_.comments).value_or(kDefaultUpAxis);
+      SURFEIT_ASSIGN_OR_RETURN(thinning.cameras,
+                               CameraSpacing::create(options_.density, up, glm::dvec3(0), 0));
+    }
+    SURFEIT_ASSIGN_OR_RETURN(thinner_, GridThinner::create(std::move(thinning), element));
+    return {};
+  }
+
   // What writer and thinner get. A writer that holds what it writes comes first.
   Status planMemory() {
     const std::uint64_t fixed = programBytes(1) + kStreamBytes;
-    const std::uint64_t least = fixed + (options_.spacing ? GridThinner::kLeastMemory : 0);
+    const std::uint64_t least = fixed + (isThinning(options_) ? GridThinner::kLeastMemory : 0);
     if (options_.memory_bytes < least) {
       return Status::budgetTooSmall(
           fmt::format("a memory budget of {:.1f} MiB is too small to convert: {} MiB is the least "
@@ -314,7 +330,7 @@ class Converter {
                       double(options_.memory_bytes) / (1 << 20), (least >> 20) + 1));
     }
     const std::uint64_t rest = options_.memory_bytes - fixed;
-    if (options_.spacing) {
+    if (isThinning(options_)) {
       RowLayout row;
       row.properties = writing_.properties;
       packRow(row);
@@ -427,6 +443,9 @@ Status checkOptions(const std::vector<std::string>& inputs, const ConvertOptions
       return Status::invalidArgument("found both every and spacing, expected one of them");
     }
   }
+  if (!options.density.cameras.empty() && (options.every > 1 || options.spacing)) {
+    return Status::invalidArgument("found cameras with every or spacing, expected one of them");
+  }
   if (!options.keep.empty() && !options.drop.empty()) {
     return Status::invalidArgument("found channels both to keep and to drop, expected one of them");
   }
@@ -445,7 +464,7 @@ Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
     SURFEIT_ASSIGN_OR_RETURN(RowTransform transform,
                              RowTransform::create(options.transform, double(options.every)));
     Converter converter(inputs, output, options, std::move(transform), progress);
-    if (!options.spacing) return converter.run();
+    if (!isThinning(options)) return converter.run();
     // What is planned for sorting is that of one thread
     Result<ConvertStats> stats = Status::failed("convert: not run");
     withThreads(1, [&] { stats = converter.run(); });

@@ -18,6 +18,8 @@ namespace surfeit {
 namespace {
 
 constexpr double kMostCells = 0x1p53;  // from 0 on along an axis: whole numbers that doubles tell
+constexpr int kMostGrid = 511;         // and least, negative: ten bits above those of a cell
+constexpr int kCellBits = 54;          // of a number of a cell, with its sign
 constexpr std::uint64_t kRowsPerLook = 65536;
 
 // What is sorted by cell. The sums of the row follow.
@@ -69,7 +71,7 @@ Status GridThinner::checkSpacing(double spacing) {
 
 Result<std::unique_ptr<GridThinner>> GridThinner::create(Options options,
                                                          const RowLayout& element) {
-  SURFEIT_RETURN_IF_ERROR(checkSpacing(options.spacing));
+  if (!options.cameras) SURFEIT_RETURN_IF_ERROR(checkSpacing(options.spacing));
   std::unique_ptr<GridThinner> thinner(new GridThinner(std::move(options)));
   thinner->row_bytes_ = element.row_bytes;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -101,21 +103,30 @@ ExternalSorter::Options GridThinner::sorting(std::size_t head_bytes) const {
 }
 
 Result<std::optional<GridThinner::Place>> GridThinner::placeOf(const std::byte* row) const {
+  glm::dvec3 at(0);
+  for (int axis = 0; axis < 3; ++axis) {
+    const RowProperty& property = position_[std::size_t(axis)];
+    at[axis] = rowValue(row + property.offset, property.type);
+    if (!std::isfinite(at[axis])) return std::optional<Place>();
+  }
   Place place;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const RowProperty& property = position_[axis];
-    const double position = rowValue(row + property.offset, property.type);
-    if (!std::isfinite(position)) return std::optional<Place>();
-    const double cells = position / options_.spacing;
+  double spacing = options_.spacing;
+  if (options_.cameras) {
+    const double exponent = std::round(0.5 * std::log2(options_.cameras->areaAt(at)));
+    place.grid = int(std::clamp(exponent, double(-kMostGrid), double(kMostGrid)));
+    spacing = std::ldexp(1.0, place.grid);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const double cells = at[axis] / spacing;
     if (!(std::abs(cells) < kMostCells)) {
       return Status::invalidArgument(fmt::format(
           "spacing: found {} and a position {} along {}, expected fewer than 2^53 cells from 0: "
           "give a larger spacing",
-          options_.spacing, position, kPositionNames[axis]));
+          spacing, at[axis], kPositionNames[axis]));
     }
     const double cell = std::floor(cells);
     const double off = cells - cell - 0.5;
-    place.cell[axis] = static_cast<std::int64_t>(cell);
+    place.cell[std::size_t(axis)] = static_cast<std::int64_t>(cell);
     place.distance_sq += off * off;
   }
   return std::optional<Place>(place);
@@ -141,8 +152,10 @@ Status GridThinner::measure(const std::byte* rows, std::size_t count) {
     const auto cell = [&](std::size_t axis) { return std::uint64_t(place->cell[axis]); };
     head.y = cell(1);
     head.z = cell(2);
-    // One number of x for each number of this
-    head.mixed_cell = mixBits(cell(0) ^ hashOf(mixBits(head.y), head.z));
+    // One number of x and grid for each number of this
+    const std::uint64_t grid = std::uint64_t(place->grid + kMostGrid + 1) << kCellBits;
+    const std::uint64_t x = (cell(0) & ((std::uint64_t{1} << kCellBits) - 1)) | grid;
+    head.mixed_cell = mixBits(x ^ hashOf(mixBits(head.y), head.z));
     head.distance_sq = __builtin_bswap64(std::bit_cast<std::uint64_t>(place->distance_sq));
     head.row = __builtin_bswap64(number);
     std::memcpy(record_.data(), &head, sizeof head);

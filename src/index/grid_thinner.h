@@ -1,4 +1,5 @@
-// Thins rows to an even density: one of every cell of a grid is kept, and stands for all of them.
+// Thins rows to an even density, or to one for cameras: one of every cell of a grid is kept, and
+// stands for all of them.
 #pragma once
 
 #include <array>
@@ -13,6 +14,7 @@
 #include "storage/external_sorter.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
+#include "surfels/camera_spacing.h"
 
 namespace surfeit {
 
@@ -20,7 +22,10 @@ namespace surfeit {
 // Of each cell the row nearest to the middle is kept, of rows as near the first. Areas and powers
 // of a cell are summed into it; radii grow by the root of the ratio of the areas, of the count
 // where there is no area; all else is that of the kept row. Cells are cubes counted from 0, so that
-// clouds that are thinned by themselves share one grid. What the memory does not hold is sorted in
+// clouds that are thinned by themselves share one grid. With cameras there is a grid for every
+// power of two, and a row lies in the one with cells nearest to the root of the area that the
+// cameras allow at its place: rows of different grids are never merged, so a camera that moves
+// changes only the cells that change their grid. What the memory does not hold is sorted in
 // temporary files, and the result does not depend on it. One thread at a time; sorts with the
 // threads of the arena.
 class GridThinner {
@@ -28,7 +33,8 @@ class GridThinner {
   static constexpr std::uint64_t kLeastMemory = 2 * ExternalSorter::kLeastMemory;
 
   struct Options {
-    double spacing = 0;              // edge of a cell; finite, above 0
+    double spacing = 0;  // edge of a cell; finite, above 0; without meaning with cameras
+    std::optional<CameraSpacing> cameras{};
     std::uint64_t memory_bytes = 0;  // at least kLeastMemory
     std::string temporary_directory;
   };
@@ -59,6 +65,7 @@ class GridThinner {
   // Place of a row in the grid.
   struct Place {
     std::array<std::int64_t, 3> cell{};
+    int grid = 0;            // with cameras: the exponent of the edge
     double distance_sq = 0;  // to the middle, in cells
   };
   // Absent where the position is not finite.

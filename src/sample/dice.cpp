@@ -271,8 +271,7 @@ std::uint64_t TriangleDice::pieceNear(const glm::dvec3& target) const {
   return ((slab + 1) * piece_count_ + slabs_ - 1) / slabs_ - 1;
 }
 
-DicePlan::DicePlan(const Mesh& mesh, std::uint64_t count) : mesh_(mesh), count_(count) {
-  // Triangles along the curve, ties in the order of the file
+std::vector<std::uint32_t> trianglesAlongCurve(const Mesh& mesh) {
   const RootCube cube = rootCube(mesh.bounds());
   std::vector<std::pair<CurveKey, std::uint32_t>> keys;
   keys.reserve(mesh.triangle.size());
@@ -283,9 +282,14 @@ DicePlan::DicePlan(const Mesh& mesh, std::uint64_t count) : mesh_(mesh), count_(
     keys.emplace_back(curveKey(centroid, cube), std::uint32_t(i));
   }
   std::sort(keys.begin(), keys.end());
-  order_.reserve(keys.size());
-  for (const auto& [key, triangle] : keys) order_.push_back(triangle);
+  std::vector<std::uint32_t> order;
+  order.reserve(keys.size());
+  for (const auto& [key, triangle] : keys) order.push_back(triangle);
+  return order;
+}
 
+DicePlan::DicePlan(const Mesh& mesh, std::uint64_t count)
+    : mesh_(mesh), count_(count), order_(trianglesAlongCurve(mesh)) {
   // Always summed in this order: next() must come to the same total, to the last bit
   for (const std::uint32_t triangle : order_) total_area_ += triangleArea(mesh, triangle);
   double area = 0;

@@ -89,6 +89,9 @@ struct DiceJob {
   std::uint64_t carried_begin = 0, carried_end = 0;
 };
 
+// All triangles along the Hilbert curve of their centroids, ties in the order of the file.
+std::vector<std::uint32_t> trianglesAlongCurve(const Mesh& mesh);
+
 // Shares a number of surfels out to triangles in proportion to area: systematic rounding of the
 // summed area, so that the counts add up exactly and never stray by more than one. Triangles are
 // taken along the Hilbert curve, so one that is left without a surfel hands its area to a

@@ -27,6 +27,11 @@ bool Mesh::isOpaque() const {
                      [](const Material& material) { return material.isOpaque(); });
 }
 
+bool Mesh::hasTwoSides() const {
+  return std::any_of(materials.begin(), materials.end(),
+                     [](const Material& material) { return material.is_two_sided; });
+}
+
 void Mesh::completeAttributes() {
   const std::size_t count = position.size();
   if (!normal.empty()) normal.resize(count, glm::vec3(0));
@@ -54,6 +59,33 @@ float opacityAt(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
   const glm::vec2 uv =
       mesh.uv[corners.x] * (1.0f - u - v) + mesh.uv[corners.y] * u + mesh.uv[corners.z] * v;
   return material.opacity * mesh.masks[material.mask].lookup(uv);
+}
+
+glm::vec3 meanEmission(const Mesh& mesh, std::uint32_t triangle) {
+  const Material& material = mesh.materials[mesh.triangle_material[triangle]];
+  if (material.glow == kNoTexture || mesh.uv.empty()) return material.emission;
+  const glm::uvec3& corners = mesh.triangle[triangle];
+  const glm::vec2 a = mesh.uv[corners.x], b = mesh.uv[corners.y] - a, c = mesh.uv[corners.z] - a;
+  const Texture& glow = mesh.textures[material.glow];
+
+  // The middles of rows^2 triangles that tile this one; as many rows as it has texels, up to a
+  // limit
+  constexpr int kMostRows = 64;
+  const glm::vec2 texels(glow.width(), glow.height());
+  const float longest =
+      std::max({glm::length(b * texels), glm::length(c * texels), glm::length((c - b) * texels)});
+  const int rows = int(std::clamp(2 * longest, 1.0f, float(kMostRows)));
+  glm::dvec3 sum(0);
+  for (int i = 0; i < rows; ++i) {
+    for (int k = 0; k < rows - i; ++k) {
+      const auto add = [&](float u, float v) {
+        sum += glm::dvec3(glow.lookup(a + (u / float(rows)) * b + (v / float(rows)) * c));
+      };
+      add(float(i) + 1.0f / 3, float(k) + 1.0f / 3);
+      if (k + 1 < rows - i) add(float(i) + 2.0f / 3, float(k) + 2.0f / 3);
+    }
+  }
+  return material.emission * glm::vec3(sum / (double(rows) * rows));
 }
 
 SurfacePoint surfacePoint(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
@@ -87,8 +119,13 @@ SurfacePoint surfacePoint(const Mesh& mesh, std::uint32_t triangle, float u, flo
   point.emission = material.emission;
   if (!material.isOpaque()) point.opacity = opacityAt(mesh, triangle, u, v);
   if (!mesh.color.empty()) point.albedo *= interpolate(mesh.color);
-  if (material.texture != kNoTexture && !mesh.uv.empty()) {
-    point.albedo *= mesh.textures[material.texture].lookup(interpolate(mesh.uv));
+  if (!mesh.uv.empty()) {
+    if (material.texture != kNoTexture) {
+      point.albedo *= mesh.textures[material.texture].lookup(interpolate(mesh.uv));
+    }
+    if (material.glow != kNoTexture) {
+      point.emission *= mesh.textures[material.glow].lookup(interpolate(mesh.uv));
+    }
   }
   return point;
 }

@@ -20,13 +20,23 @@ namespace surfeit {
 
 inline constexpr std::uint32_t kNoTexture = ~std::uint32_t{0};  // and no mask
 
+// What photons find beside diffuse reflection (docs/photons.md, "Materials").
+enum class Scattering : std::uint8_t { kMatte, kMirror, kGlass, kTranslucent };
+
 struct Material {
   glm::vec3 albedo{0.5f};              // Kd: diffuse reflectance, scene-linear
   glm::vec3 emission{0};               // radiant exitance: pi times the radiance Ke
   std::uint32_t texture = kNoTexture;  // into Mesh::textures; multiplies the albedo
+  std::uint32_t glow = kNoTexture;     // map_Ke, into Mesh::textures; multiplies the emission
   float opacity = 1;                   // d: part of the surface that is there
   std::uint32_t mask = kNoTexture;     // map_d, into Mesh::masks; multiplies the opacity
+  Scattering scattering = Scattering::kMatte;
+  glm::vec3 specular{0};  // Ks of a mirror
+  glm::vec3 transmission{
+      1};              // Tf: of glass the color, of what is translucent the light let through
+  float index = 1.5f;  // Ni of glass
 
+  bool is_two_sided = false;  // curves
   bool isOpaque() const { return opacity >= 1 && mask == kNoTexture; }
 };
 
@@ -50,6 +60,8 @@ struct Mesh {
   Bounds3 bounds() const;
   // Whether no material lets anything through.
   bool isOpaque() const;
+  // Whether some material has two sides.
+  bool hasTwoSides() const;
   // Gives vertices that came without an attribute that others have its neutral value, and Embree
   // the room that it reads into.
   void completeAttributes();
@@ -75,15 +87,18 @@ SurfacePoint surfacePoint(const Mesh& mesh, std::uint32_t triangle, float u, flo
 // The part of the surface that is there at that point, from 0 to 1.
 float opacityAt(const Mesh& mesh, std::uint32_t triangle, float u, float v);
 
+// Mean exitance of a triangle: exact without a texture, else of a grid of places on it.
+glm::vec3 meanEmission(const Mesh& mesh, std::uint32_t triangle);
+
 // Area of a triangle, in double: sums over millions of triangles must stay exact.
 double triangleArea(const Mesh& mesh, std::uint32_t triangle);
 
-// Reads meshes one after the other into one. PLY and OBJ are told apart by content and name.
+// Reads meshes one after the other into one. PLY, OBJ and hair are told apart by content and name.
 // `default_albedo` is the reflectance of what has neither colors nor material. Notes tell of
 // missing textures, and of faces that are skipped or cross themselves. kCorruption for files
 // without any triangle.
 Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& default_albedo,
-                        Progress& progress);
+                        Progress& progress, const CurveOptions& curves = {});
 
 // Appends the ground: centred below the bounds, lowered by 1/10000 of their diagonal so that flat
 // bottoms do not share its plane.

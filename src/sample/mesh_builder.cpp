@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <new>
+#include <string_view>
 #include <utility>
 
 #include "sample/polygon.h"
@@ -32,22 +33,24 @@ void noteFarVertices(const std::string& path, const Mesh& mesh, Progress& progre
       path, step, size));
 }
 
-enum class MeshFormat { kPly, kObj, kUnknown };
+enum class MeshFormat { kPly, kObj, kHair, kUnknown };
 
-// PLY by its magic; OBJ has none, so that its name must tell.
+// PLY and hair by their magic; OBJ has none, so that its name must tell.
 Result<MeshFormat> recogniseMesh(const std::string& path) {
   SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
-  char magic[3] = {};
+  char magic[4] = {};
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
                            file.readSome(0, std::as_writable_bytes(std::span(magic))));
-  if (count == 3 && magic[0] == 'p' && magic[1] == 'l' && magic[2] == 'y') return MeshFormat::kPly;
+  const std::string_view begin(magic, count);
+  if (begin.starts_with("ply")) return MeshFormat::kPly;
+  if (begin == "HAIR") return MeshFormat::kHair;
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension == ".obj" || extension == ".OBJ") return MeshFormat::kObj;
   return MeshFormat::kUnknown;
 }
 
-Status loadFile(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
-                Progress& progress) {
+Status loadFile(const std::string& path, const glm::vec3& default_albedo,
+                const CurveOptions& curves, MeshBuilder& builder, Progress& progress) {
   const std::size_t triangles_before = builder.mesh.triangle.size();
   const std::uint64_t degenerate_before = builder.mesh.degenerate_faces;
   const std::uint64_t crossing_before = builder.crossing_faces;
@@ -57,11 +60,14 @@ Status loadFile(const std::string& path, const glm::vec3& default_albedo, MeshBu
       SURFEIT_RETURN_IF_ERROR(loadPlyMesh(path, default_albedo, builder, progress));
       break;
     case MeshFormat::kObj:
-      SURFEIT_RETURN_IF_ERROR(loadObjMesh(path, default_albedo, builder, progress));
+      SURFEIT_RETURN_IF_ERROR(loadObjMesh(path, default_albedo, curves, builder, progress));
+      break;
+    case MeshFormat::kHair:
+      SURFEIT_RETURN_IF_ERROR(loadHairMesh(path, curves, builder, progress));
       break;
     case MeshFormat::kUnknown:
-      return Status::corruption(
-          fmt::format("{}: not a mesh that we read: expected PLY or a name ending in .obj", path));
+      return Status::corruption(fmt::format(
+          "{}: not a mesh that we read: expected PLY, hair or a name ending in .obj", path));
   }
   const std::uint64_t degenerate = builder.mesh.degenerate_faces - degenerate_before;
   if (builder.mesh.triangle.size() == triangles_before) {
@@ -142,12 +148,12 @@ Mesh MeshBuilder::finish() {
 }
 
 Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& default_albedo,
-                        Progress& progress) {
+                        Progress& progress, const CurveOptions& curves) {
   if (paths.empty()) return Status::invalidArgument("no mesh given");
   MeshBuilder builder;
   try {
     for (const std::string& path : paths) {
-      SURFEIT_RETURN_IF_ERROR(loadFile(path, default_albedo, builder, progress));
+      SURFEIT_RETURN_IF_ERROR(loadFile(path, default_albedo, curves, builder, progress));
     }
     const std::uint64_t degenerate = builder.mesh.degenerate_faces;
     Mesh mesh = builder.finish();

@@ -40,7 +40,9 @@ struct MeshBuilder {
 // were.
 Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
                    Progress& progress);
-Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
-                   Progress& progress);
+Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo,
+                   const CurveOptions& curves, MeshBuilder& builder, Progress& progress);
+Status loadHairMesh(const std::string& path, const CurveOptions& options, MeshBuilder& builder,
+                    Progress& progress);
 
 }  // namespace surfeit

@@ -11,16 +11,15 @@
 #include <map>
 #include <new>
 #include <set>
+#include <span>
 #include <unordered_map>
 
-// The library's own build has floats, too few digits for places on a map
-#define TINYOBJLOADER_USE_DOUBLE
 #define TINYOBJLOADER_IMPLEMENTATION
-#include <tiny_obj_loader.h>
-
 #include "core/spherical_harmonics.h"
+#include "sample/curves.h"
 #include "sample/mesh_builder.h"
 #include "sample/obj_lines.h"
+#include "sample/obj_material_files.h"
 #include "storage/file.h"
 
 namespace surfeit {
@@ -33,82 +32,6 @@ struct ParsedObj {
   std::vector<tinyobj::material_t> materials;
   std::string warnings;
   std::uint64_t free_form_statements = 0;
-};
-
-// The words of a line without line end, then of another one.
-std::vector<std::string> splitAt(const std::string& text, char separator) {
-  std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(separator, begin), text.size());
-    if (end > begin) parts.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return parts;
-}
-
-std::string shown(std::string name) {
-  std::replace(name.begin(), name.end(), kNameBlank, ' ');
-  return name;
-}
-
-// Finds material files beside the OBJ file: a name with blanks may be that of one, or of several.
-class MaterialFiles final : public tinyobj::MaterialReader {
- public:
-  explicit MaterialFiles(std::string directory) : directory_(std::move(directory)) {}
-
-  const Status& status() const { return status_; }
-
-  bool operator()(const std::string& names, std::vector<tinyobj::material_t>* materials,
-                  std::map<std::string, int>* ids, std::string* warnings,
-                  std::string* errors) override {
-    std::vector<std::string> found;
-    if (const std::string whole = find(shown(names)); !whole.empty()) {
-      found.push_back(whole);
-    } else {
-      std::string missing;
-      for (const std::string& name : splitAt(names, kNameBlank)) {
-        if (const std::string part = find(name); !part.empty()) {
-          found.push_back(part);
-        } else {
-          missing += "material file \"" + name + "\" not found\n";
-        }
-      }
-      if (found.empty()) missing = "material file \"" + shown(names) + "\" not found\n";
-      *warnings += missing;
-    }
-    for (const std::string& path : found) load(path, materials, ids, warnings, errors);
-    return true;  // else the parser adds words of its own
-  }
-
- private:
-  // Where the file is; empty: nowhere. Paths of another machine are left out.
-  std::string find(const std::string& name) const {
-    const std::filesystem::path directory(directory_), given(name);
-    std::error_code ignored;
-    for (const std::filesystem::path& path : {directory / given, directory / given.filename()}) {
-      if (std::filesystem::is_regular_file(path, ignored)) return path.string();
-    }
-    return {};
-  }
-
-  void load(const std::string& path, std::vector<tinyobj::material_t>* materials,
-            std::map<std::string, int>* ids, std::string* warnings, std::string* errors) {
-    Result<ByteInput> input = ByteInput::open(path);
-    if (!input.ok()) {
-      status_ = input.status();
-      return;
-    }
-    ObjLines lines(std::move(*input));
-    std::istream stream(&lines);
-    std::string warned, failed;  // it replaces what is there
-    tinyobj::LoadMtl(ids, materials, &stream, &warned, &failed);
-    *warnings += warned;
-    *errors += failed;
-    if (!lines.status().ok()) status_ = lines.status();
-  }
-
-  std::string directory_;
-  Status status_;
 };
 
 Status parseObj(const std::string& path, ParsedObj& parsed) {
@@ -145,15 +68,18 @@ void noteWarnings(const std::string& path, const std::string& warnings, Progress
                             more > 0 ? fmt::format(" (and {} more)", more) : ""));
 }
 
-// What a file has that is no face.
-void noteLeftOut(const std::string& path, const ParsedObj& parsed, Progress& progress) {
-  std::uint64_t corners = 0;
+// What a file has that is no face, nor a line that becomes a ribbon.
+void noteLeftOut(const std::string& path, const ParsedObj& parsed, bool has_curves,
+                 Progress& progress) {
+  std::uint64_t corners = 0, lines = 0;
   for (const tinyobj::shape_t& shape : parsed.shapes) {
-    corners += shape.lines.indices.size() + shape.points.indices.size();
+    corners += shape.points.indices.size();
+    if (!has_curves) lines += shape.lines.indices.size();
   }
-  if (corners > 0) {
-    progress.note(fmt::format("{}: lines and points of {} corners are left out: they have no area",
-                              path, corners));
+  if (corners + lines > 0) {
+    progress.note(
+        fmt::format("{}: lines and points of {} corners are left out: they have no area{}", path,
+                    corners + lines, lines > 0 ? " (--curve-width gives lines one)" : ""));
   }
   if (parsed.free_form_statements > 0) {
     progress.note(fmt::format(
@@ -217,10 +143,12 @@ class ObjImporter {
         noteOptions(parsed.diffuse_texname, parsed.diffuse_texopt);
         material.texture = findPicture(parsed.diffuse_texname, mesh_.textures, textures_);
       }
+      if (!parsed.emissive_texname.empty()) importGlow(parsed, material);
       if (!parsed.alpha_texname.empty()) {
         noteOptions(parsed.alpha_texname, parsed.alpha_texopt);
         material.mask = findPicture(parsed.alpha_texname, mesh_.masks, masks_);
       }
+      importScattering(parsed, material);
       if (material.opacity == 0) {
         progress_.note(
             fmt::format("{}: material \"{}\" is clear (d 0 or Tr 1): its faces give no surfels and "
@@ -258,7 +186,132 @@ class ObjImporter {
     return {};
   }
 
+  // Lines as ribbons, of the color that vertices have.
+  Status importLines(const CurveOptions& options) {
+    std::uint64_t count = 0, strand = 0;
+    for (const tinyobj::shape_t& shape : parsed_.shapes) {
+      count += shape.lines.num_line_vertices.size();
+    }
+    if (count == 0) return {};
+    const StrandChoice choice(count, options.strands);
+    double area = 0, kept_area = 0;
+    const auto measure = [&](std::span<const CurvePoint> points) -> Status {
+      const double own = curveArea(points);
+      area += own;
+      if (choice.keeps(strand++)) kept_area += own;
+      return {};
+    };
+    SURFEIT_RETURN_IF_ERROR(forEachLine(options, measure));
+    Material material = mesh_.materials[material_begin_];
+    material.is_two_sided = true;
+    mesh_.materials.push_back(material);
+    CurveRibbons ribbons(builder_, std::uint32_t(mesh_.materials.size() - 1), has_colors_, path_);
+    const double growth = kept_area > 0 ? area / kept_area : 1;
+    strand = 0;
+    const auto add = [&](std::span<const CurvePoint> points) -> Status {
+      const std::uint64_t number = strand++;
+      if (!choice.keeps(number)) return {};
+      SURFEIT_RETURN_IF_ERROR(ribbons.add(points, number, growth));
+      completeVertices();
+      return {};
+    };
+    SURFEIT_RETURN_IF_ERROR(forEachLine(options, add));
+    if (ribbons.pointlike() > 0) {
+      progress_.note(
+          fmt::format("{}: {} lines without length skipped", path_, ribbons.pointlike()));
+    }
+    return {};
+  }
+
  private:
+  // Illumination models of MTL: 3, 5 and 8 reflect, 4, 6, 7 and 9 refract. Others let through Tf
+  // where it says more than the default of exporters, which is all or nothing.
+  void importScattering(const tinyobj::material_t& parsed, Material& material) {
+    const auto color = [](const double(&rgb)[3]) {
+      glm::vec3 result(0);
+      for (int i = 0; i < 3; ++i) result[i] = rgb[i] > 0 ? float(std::min(rgb[i], 1.0)) : 0;
+      return result;
+    };
+    const glm::vec3 filter = color(parsed.transmittance);
+    const bool has_filter = filter != glm::vec3(0) && filter != glm::vec3(1);
+    switch (parsed.illum) {
+      case 3:
+      case 5:
+      case 8:
+        material.scattering = Scattering::kMirror;
+        material.specular = color(parsed.specular);
+        break;
+      case 4:
+      case 6:
+      case 7:
+      case 9:
+        material.scattering = Scattering::kGlass;
+        if (has_filter) material.transmission = filter;
+        if (parsed.ior > 1 && parsed.ior < 10) {
+          material.index = float(parsed.ior);
+        } else {
+          progress_.note(
+              fmt::format("{}: material \"{}\" refracts (illum {}) with Ni {}: read as {}", path_,
+                          shown(parsed.name), parsed.illum, parsed.ior, material.index));
+        }
+        break;
+      default:
+        if (!has_filter || material.opacity < 1) break;
+        material.scattering = Scattering::kTranslucent;
+        material.transmission = filter;
+    }
+  }
+
+  // What a picture of emission multiplies is Ke; files that say only map_Ke mean the picture alone.
+  void importGlow(const tinyobj::material_t& parsed, Material& material) {
+    noteOptions(parsed.emissive_texname, parsed.emissive_texopt);
+    material.glow = findPicture(parsed.emissive_texname, mesh_.textures, textures_);
+    if (material.glow == kNoTexture || material.emission != glm::vec3(0)) return;
+    material.emission = glm::vec3(kPi);
+    progress_.note(fmt::format(
+        "{}: material \"{}\" has map_Ke and no Ke: read as Ke 1 1 1, a radiance of 1 where the "
+        "picture is white",
+        path_, shown(parsed.name)));
+  }
+
+  template <typename Visit>
+  Status forEachLine(const CurveOptions& options, Visit&& visit) const {
+    std::vector<CurvePoint> points;
+    const std::size_t vertices = parsed_.attributes.vertices.size() / 3;
+    std::uint64_t line = 0;
+    for (const tinyobj::shape_t& shape : parsed_.shapes) {
+      std::size_t index = 0;
+      for (const int corners : shape.lines.num_line_vertices) {
+        points.clear();
+        for (int k = 0; k < corners && index < shape.lines.indices.size(); ++k, ++index) {
+          const int vertex = shape.lines.indices[index].vertex_index;
+          if (vertex < 0 || std::size_t(vertex) >= vertices) {
+            return Status::corruption(fmt::format("{}: line {}: vertex {}, expected 1 to {}", path_,
+                                                  line, vertex + 1, vertices));
+          }
+          const double* const at = &parsed_.attributes.vertices[3 * std::size_t(vertex)];
+          points.push_back({{at[0], at[1], at[2]}, options.width, colorOf(vertex)});
+        }
+        ++line;
+        SURFEIT_RETURN_IF_ERROR(visit(std::span<const CurvePoint>(points)));
+      }
+    }
+    return {};
+  }
+
+  glm::vec3 colorOf(int vertex) const {
+    if (!has_colors_) return glm::vec3(1);
+    const double* const code = &parsed_.attributes.colors[3 * std::size_t(vertex)];
+    const glm::vec3 srgb = glm::dvec3(code[0], code[1], code[2]) / double(largest_color_);
+    return {linearFromSrgb(srgb.x), linearFromSrgb(srgb.y), linearFromSrgb(srgb.z)};
+  }
+
+  // Gives the corners of ribbons, which have none, neutral normals and texture coordinates.
+  void completeVertices() {
+    if (has_normals_) mesh_.normal.resize(builder_.position.size(), glm::vec3(0));
+    if (has_uvs_) mesh_.uv.resize(builder_.position.size(), glm::vec2(0));
+  }
+
   // The parser counts the corners of a face in 8 bits.
   Status tooManyCorners() const {
     return Status::corruption(fmt::format("{}: a face has more than 255 corners", path_));
@@ -370,15 +423,17 @@ class ObjImporter {
 
 }  // namespace
 
-Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo, MeshBuilder& builder,
-                   Progress& progress) {
+Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo,
+                   const CurveOptions& curves, MeshBuilder& builder, Progress& progress) {
   ParsedObj parsed;
   SURFEIT_RETURN_IF_ERROR(parseObj(path, parsed));
   noteWarnings(path, parsed.warnings, progress);
-  noteLeftOut(path, parsed, progress);
+  noteLeftOut(path, parsed, curves.width > 0, progress);
   ObjImporter importer(path, parsed, default_albedo, builder, progress);
   importer.importMaterials();
-  return importer.importFaces();
+  SURFEIT_RETURN_IF_ERROR(importer.importFaces());
+  if (curves.width > 0) return importer.importLines(curves);
+  return {};
 }
 
 }  // namespace surfeit

@@ -30,11 +30,12 @@
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
-#include "core/split_mix.h"
 #include "core/tangent_frame.h"
 #include "core/thread_check.h"
 #include "core/up_comment.h"
 #include "sample/direct_light.h"
+#include "sample/photon_random.h"
+#include "sample/photon_scatter.h"
 #include "sample/ray_scene.h"
 #include "sample/surroundings.h"
 #include "surfeit/sample.h"
@@ -46,8 +47,6 @@ namespace {
 constexpr std::uint64_t kBatchPhotons = 1024;
 constexpr std::size_t kBatchesInFlightPerThread = 4;
 constexpr std::uint64_t kMostPhotons = std::uint64_t{1} << 40;
-// Paths end also where nothing is absorbed: the powers of those that go on grow instead.
-constexpr float kMostSurvival = 0.97f;
 
 // A photon where it meets a surface: a row of the cloud, where the mesh's origin is 0.
 struct Photon {
@@ -91,48 +90,8 @@ Status writeRows(std::span<const Photon> photons, const glm::dvec3& origin, RowW
   return writer.writeRows(std::as_bytes(std::span(far)));
 }
 
-// Random numbers of one photon (SplitMix64).
-class PhotonRandom {
- public:
-  PhotonRandom(std::uint64_t seed, std::uint64_t photon)
-      : state_(splitMix(splitMix(seed) + photon)) {}
-
-  // In [0, 1).
-  float next() {
-    state_ += 0x9e3779b97f4a7c15u;
-    return float(splitMix(state_) >> 40) * 0x1p-24f;
-  }
-
- private:
-  std::uint64_t state_;
-};
-
-// Uniform on the unit disk.
-glm::vec2 diskPoint(PhotonRandom& random) {
-  const float r = std::sqrt(random.next()), phi = 2 * kPi * random.next();
-  return {r * std::cos(phi), r * std::sin(phi)};
-}
-
-// Around a unit normal, with density cos / pi: lifted from the disk.
-glm::vec3 cosineDirection(const glm::vec3& normal, PhotonRandom& random) {
-  const glm::vec2 p = diskPoint(random);
-  const TangentFrame frame(normal);
-  const float cos_theta = std::sqrt(std::max(0.0f, 1 - p.x * p.x - p.y * p.y));
-  return glm::normalize(frame.tangent * p.x + frame.bitangent * p.y + normal * cos_theta);
-}
-
-glm::vec3 sphereDirection(PhotonRandom& random) {
-  const float z = 1 - 2 * random.next(), phi = 2 * kPi * random.next();
-  const float r = std::sqrt(std::max(0.0f, 1 - z * z));
-  return {r * std::cos(phi), r * std::sin(phi), z};
-}
-
 float largest(const glm::vec3& rgb) { return std::max({rgb.x, rgb.y, rgb.z}); }
 double luminance(const glm::dvec3& rgb) { return 0.2126 * rgb.x + 0.7152 * rgb.y + 0.0722 * rgb.z; }
-
-struct Ray {
-  glm::vec3 origin, direction;
-};
 
 // Everything that sends photons. Immutable; safe from any thread.
 class Emitters {
@@ -155,7 +114,7 @@ class Emitters {
       add(Kind::kArea, i, double(kPi) * area * glm::dvec3(light.radiance));
     }
     for (std::size_t i = 0; i < mesh.triangle.size(); ++i) {
-      const glm::dvec3 exitance(mesh.materials[mesh.triangle_material[i]].emission);
+      const glm::dvec3 exitance(meanEmission(mesh, std::uint32_t(i)));
       add(Kind::kTriangle, i, triangleArea(mesh, std::uint32_t(i)) * exitance);
     }
   }
@@ -165,15 +124,15 @@ class Emitters {
 
   // Photon number `index` of `count`: its ray, and its power. Emitters are chosen systematically by
   // luminance, so that each sends the share that it should but for less than one photon.
-  Ray emit(std::uint64_t index, std::uint64_t count, PhotonRandom& random, glm::vec3& power) const {
+  void emit(std::uint64_t index, std::uint64_t count, PhotonRandom& random, PhotonRay& ray) const {
     const double total = emitters_.back().luminance_sum;
     const double target = (double(index) + 0.5) / double(count) * total;
     const auto chosen = std::upper_bound(
         emitters_.begin(), emitters_.end() - 1, target,
         [](double value, const Emitter& emitter) { return value < emitter.luminance_sum; });
     const double probability = luminance(chosen->power) / total;
-    power = glm::vec3(chosen->power / (probability * double(count)));
-    return sendFrom(*chosen, random);
+    ray.power = glm::vec3(chosen->power / (probability * double(count)));
+    sendFrom(*chosen, random, ray);
   }
 
  private:
@@ -192,34 +151,46 @@ class Emitters {
     power_ += power;
   }
 
-  Ray sendFrom(const Emitter& emitter, PhotonRandom& random) const {
+  void sendFrom(const Emitter& emitter, PhotonRandom& random, PhotonRay& ray) const {
     switch (emitter.kind) {
       case Kind::kPoint:
-        return {glm::vec3(lights_.points[emitter.index].position), sphereDirection(random)};
+        ray.origin = glm::vec3(lights_.points[emitter.index].position);
+        ray.direction = sphereDirection(random);
+        return;
       case Kind::kDirectional: {
         // From a disk before the scene that covers it
-        const glm::vec3 direction = glm::normalize(lights_.directionals[emitter.index].direction);
-        const TangentFrame frame(direction);
+        ray.direction = glm::normalize(lights_.directionals[emitter.index].direction);
+        const TangentFrame frame(ray.direction);
         const glm::vec2 p = reach_ * diskPoint(random);
-        return {centre_ - 1.01f * reach_ * direction + p.x * frame.tangent + p.y * frame.bitangent,
-                direction};
+        ray.origin =
+            centre_ - 1.01f * reach_ * ray.direction + p.x * frame.tangent + p.y * frame.bitangent;
+        return;
       }
       case Kind::kArea: {
         const AreaLight& light = lights_.areas[emitter.index];
         const float u = 2 * random.next() - 1, v = 2 * random.next() - 1;
         const glm::vec3 normal = glm::normalize(glm::cross(light.u, light.v));
-        return {glm::vec3(light.centre) + u * light.u + v * light.v + offset_ * normal,
-                cosineDirection(normal, random)};
+        ray.origin = glm::vec3(light.centre) + u * light.u + v * light.v + offset_ * normal;
+        ray.direction = cosineDirection(normal, random);
+        return;
       }
       case Kind::kTriangle:
-        break;
+        sendFromTriangle(std::uint32_t(emitter.index), emitter.power, random, ray);
     }
+  }
+
+  // Where a texture glows decides the part of the power that the photon takes.
+  void sendFromTriangle(std::uint32_t triangle, const glm::dvec3& power, PhotonRandom& random,
+                        PhotonRay& ray) const {
     // Uniform on the triangle: 1 - sqrt(u) weighs the first corner
     const float root = std::sqrt(random.next()), v = random.next();
-    const SurfacePoint point =
-        surfacePoint(mesh_, std::uint32_t(emitter.index), root * (1 - v), root * v);
-    return {point.position + offset_ * point.geometric_normal,
-            cosineDirection(point.geometric_normal, random)};
+    const SurfacePoint point = surfacePoint(mesh_, triangle, root * (1 - v), root * v);
+    if (mesh_.materials[mesh_.triangle_material[triangle]].glow != kNoTexture) {
+      const glm::vec3 mean(power / triangleArea(mesh_, triangle));
+      for (int i = 0; i < 3; ++i) ray.power[i] *= mean[i] > 0 ? point.emission[i] / mean[i] : 0;
+    }
+    ray.origin = point.position + offset_ * point.geometric_normal;
+    ray.direction = cosineDirection(point.geometric_normal, random);
   }
 
   const Mesh& mesh_;
@@ -234,7 +205,8 @@ class Emitters {
 // What one task sends, and what becomes of it.
 struct Batch {
   std::uint64_t begin = 0, end = 0;  // photons
-  std::vector<Photon> stored;
+  std::vector<Photon> stored, caustic;
+  glm::dvec3 stored_power{0}, caustic_power{0};
   std::uint64_t escaped = 0, lost_at_backs = 0;
 };
 
@@ -250,40 +222,49 @@ class PhotonTracer {
   void trace(Batch& batch) const {
     for (std::uint64_t i = batch.begin; i < batch.end; ++i) {
       PhotonRandom random(options_.seed, i);
-      glm::vec3 power;
-      const Ray ray = emitters_.emit(i, options_.photons, random, power);
-      follow(ray, power, random, batch);
+      PhotonRay ray;
+      emitters_.emit(i, options_.photons, random, ray);
+      if (largest(ray.power) > 0) follow(ray, random, batch);  // not from where a lamp is black
     }
   }
 
  private:
-  void follow(Ray ray, glm::vec3 power, PhotonRandom& random, Batch& batch) const {
+  void follow(PhotonRay ray, PhotonRandom& random, Batch& batch) const {
     constexpr float kFar = std::numeric_limits<float>::infinity();
+    bool was_diffuse = false, was_specular = false;
     for (;;) {
       const auto hit = scene_.closestHit(ray.origin, ray.direction, 0, kFar);
       if (!hit) {
         ++batch.escaped;
         return;
       }
+      ScatterPoint at;
+      at.point = surfacePoint(mesh_, hit->triangle, hit->u, hit->v);
+      at.material = &mesh_.materials[mesh_.triangle_material[hit->triangle]];
+      at.is_back = glm::dot(at.point.geometric_normal, ray.direction) >= 0;
       // Backs block and reflect nothing, as they do in the direct light of surfels
-      const SurfacePoint point = surfacePoint(mesh_, hit->triangle, hit->u, hit->v);
-      if (glm::dot(point.geometric_normal, ray.direction) >= 0) {
+      if (!scattersSide(at)) {
         ++batch.lost_at_backs;
         return;
       }
-      batch.stored.push_back({point.position, point.normal, power, ray.direction, point.albedo});
-
-      // Absorbed, or reflected with the power that makes up for those that were absorbed
-      const glm::vec3 reflected = power * point.albedo;
-      const float survival = std::min(largest(reflected) / largest(power), kMostSurvival);
-      if (!(random.next() < survival)) return;
-      power = reflected / survival;
-      ray.origin = point.position + scene_.surfaceOffset() * point.geometric_normal;
-      ray.direction = cosineDirection(point.normal, random);
-      // Shading normals lean over their surface's edge: what would pass into it stays above
-      const float height = glm::dot(ray.direction, point.geometric_normal);
-      if (height < 0) ray.direction -= 2 * height * point.geometric_normal;
+      if (storesPhotons(at)) store(at, ray, was_specular && !was_diffuse, batch);
+      const auto kind = scatter(at, scene_.surfaceOffset(), random, ray);
+      if (!kind) return;
+      (*kind == ScatterKind::kDiffuse ? was_diffuse : was_specular) = true;
     }
+  }
+
+  // What passes through a translucent sheet arrives at its other side, too, whose radiosity is the
+  // light let through.
+  void store(const ScatterPoint& at, const PhotonRay& ray, bool is_caustic, Batch& batch) const {
+    const bool is_apart = is_caustic && !options_.caustic_output.empty();
+    std::vector<Photon>& photons = is_apart ? batch.caustic : batch.stored;
+    const glm::vec3 normal = at.is_back ? -at.point.normal : at.point.normal;
+    photons.push_back({at.point.position, normal, ray.power, ray.direction, at.point.albedo});
+    (is_apart ? batch.caustic_power : batch.stored_power) += glm::dvec3(ray.power);
+    if (at.material->scattering != Scattering::kTranslucent) return;
+    const glm::vec3 mirrored = ray.direction - 2 * glm::dot(ray.direction, normal) * normal;
+    photons.push_back({at.point.position, -normal, ray.power, mirrored, at.material->transmission});
   }
 
   const Mesh& mesh_;
@@ -292,10 +273,68 @@ class PhotonTracer {
   const PhotonTracingOptions& options_;
 };
 
+// The photon map, and the map of caustics where it is apart.
+class PhotonFiles {
+ public:
+  static Result<PhotonFiles> create(const std::string& output, const PhotonTracingOptions& options,
+                                    bool is_far, Progress& progress) {
+    PhotonFiles files(progress);
+    SURFEIT_RETURN_IF_ERROR(files.add(output, options, is_far));
+    if (!options.caustic_output.empty()) {
+      SURFEIT_RETURN_IF_ERROR(files.add(options.caustic_output, options, is_far));
+    }
+    return files;
+  }
+
+  Status write(std::span<const Photon> stored, std::span<const Photon> caustic,
+               const glm::dvec3& origin) {
+    SURFEIT_RETURN_IF_ERROR(writeRows(stored, origin, *files_[0].writer));
+    if (files_.size() == 1) return {};
+    return writeRows(caustic, origin, *files_[1].writer);
+  }
+
+  Status finish() {
+    for (File& file : files_) {
+      SURFEIT_RETURN_IF_ERROR(file.writer->finish());
+      tellNotes(file);
+    }
+    return {};
+  }
+
+ private:
+  struct File {
+    std::string path;
+    std::unique_ptr<RowWriter> writer;
+    std::set<std::string> told;
+  };
+
+  explicit PhotonFiles(Progress& progress) : progress_(&progress) {}
+
+  Status add(const std::string& path, const PhotonTracingOptions& options, bool is_far) {
+    RowWriterOptions writing;
+    writing.properties = photonProperties(is_far);
+    writing.comments = {upComment(options.surroundings.ground.up)};
+    writing.progress = progress_;
+    files_.push_back({path, nullptr, {}});
+    SURFEIT_ASSIGN_OR_RETURN(files_.back().writer, createRowWriter(path, writing));
+    tellNotes(files_.back());
+    return {};
+  }
+
+  void tellNotes(File& file) {
+    for (const std::string& note : file.writer->notes()) {
+      if (file.told.insert(note).second) progress_->note(file.path + ": " + note);
+    }
+  }
+
+  Progress* progress_;
+  std::vector<File> files_;
+};
+
 // Sends, follows and writes in a pipeline: batches are dealt and written in order, followed in
 // parallel.
 Status writePhotons(const PhotonTracer& tracer, const PhotonTracingOptions& options, int threads,
-                    RowWriter& writer, Progress& progress, PhotonTracingStats& stats) {
+                    PhotonFiles& files, Progress& progress, PhotonTracingStats& stats) {
   Status status;
   std::atomic<bool> has_failed = false;
   std::uint64_t next = 0;
@@ -314,13 +353,15 @@ Status writePhotons(const PhotonTracer& tracer, const PhotonTracingOptions& opti
   };
   const auto write = [&](BatchPtr batch) {
     if (!status.ok()) return;
-    status = writeRows(batch->stored, tracer.mesh().origin, writer);
+    status = files.write(batch->stored, batch->caustic, tracer.mesh().origin);
     has_failed = !status.ok();
     stats.emitted += batch->end - batch->begin;
     stats.stored += batch->stored.size();
     stats.escaped += batch->escaped;
     stats.lost_at_backs += batch->lost_at_backs;
-    for (const Photon& photon : batch->stored) stats.stored_power += glm::dvec3(photon.power);
+    stats.caustic += batch->caustic.size();
+    stats.stored_power += batch->stored_power;
+    stats.caustic_power += batch->caustic_power;
     progress.advance(batch->end - batch->begin);
   };
   tbb::parallel_pipeline(
@@ -374,27 +415,21 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
 
     start = std::chrono::steady_clock::now();
     progress.beginPhase("trace", options.photons, "photons");
-    RowWriterOptions writing;
-    writing.properties = photonProperties(mesh.origin != glm::dvec3(0));
-    writing.comments = {upComment(options.surroundings.ground.up)};
-    writing.progress = &progress;
-    SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer,
-                             createRowWriter(output, writing));
-    std::set<std::string> told;
-    const auto noteOfWriter = [&] {
-      for (const std::string& note : writer->notes()) {
-        if (told.insert(note).second) progress.note(output + ": " + note);
-      }
-    };
-    noteOfWriter();
+    SURFEIT_ASSIGN_OR_RETURN(
+        PhotonFiles files,
+        PhotonFiles::create(output, options, mesh.origin != glm::dvec3(0), progress));
     const PhotonTracer tracer(mesh, scene, emitters, options);
-    SURFEIT_RETURN_IF_ERROR(writePhotons(tracer, options, stats.threads, *writer, progress, stats));
-    if (stats.stored == 0) {
+    SURFEIT_RETURN_IF_ERROR(writePhotons(tracer, options, stats.threads, files, progress, stats));
+    if (stats.stored + stats.caustic == 0) {
       return Status::invalidArgument(fmt::format(
           "{}: none of {} photons met the front of a surface", meshes.front(), stats.emitted));
     }
-    SURFEIT_RETURN_IF_ERROR(writer->finish());
-    noteOfWriter();
+    if (stats.caustic == 0 && !options.caustic_output.empty()) {
+      progress.note(fmt::format(
+          "{}: no photon came over a mirror or through glass (illum 3 to 9 in MTL): it is empty",
+          options.caustic_output));
+    }
+    SURFEIT_RETURN_IF_ERROR(files.finish());
     stats.trace_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

@@ -12,6 +12,10 @@ Status checkSurroundings(const Surroundings& surroundings) {
     return Status::invalidArgument(
         fmt::format("light samples {}: expected 1 to 65536", surroundings.lights.samples));
   }
+  if (!(surroundings.curves.width >= 0) || !std::isfinite(surroundings.curves.width)) {
+    return Status::invalidArgument(
+        fmt::format("curves of width {}: expected a positive length", surroundings.curves.width));
+  }
   const GroundPlane& ground = surroundings.ground;
   if (!(ground.size > 0) || !(ground.size < 1e6f)) {
     return Status::invalidArgument(
@@ -43,7 +47,8 @@ Status checkSurroundings(const Surroundings& surroundings) {
 
 Result<Mesh> loadScene(const std::vector<std::string>& meshes, const Surroundings& surroundings,
                        Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(Mesh mesh, loadMeshes(meshes, surroundings.default_albedo, progress));
+  SURFEIT_ASSIGN_OR_RETURN(
+      Mesh mesh, loadMeshes(meshes, surroundings.default_albedo, progress, surroundings.curves));
   addGroundPlane(surroundings.ground, mesh);
   return mesh;
 }

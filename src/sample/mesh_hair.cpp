@@ -1,0 +1,272 @@
+// Strands from cyHair files (Yuksel, http://www.cemyuksel.com/research/hairmodels/):
+//
+//   [ "HAIR" | strands u32 | points u32 | arrays u32 | segments u32 | thickness f32
+//     | transparency f32 | color 3 f32 | text 88 ]                                   128 bytes
+//   [ segments of each strand, u16 ] [ points, 3 f32 ] [ thickness, f32 ]
+//   [ transparency, f32 ] [ color, 3 f32 ]                     those that `arrays` has a bit for
+//
+// Segments, thickness, transparency and color of the header are for strands without an array.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/resident_limit.h"
+#include "sample/curves.h"
+#include "sample/mesh_builder.h"
+#include "storage/byte_coding.h"
+#include "storage/file.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kHeaderBytes = 128;
+enum HairArray : std::uint32_t {
+  kSegments = 1,
+  kPoints = 2,
+  kThickness = 4,
+  kTransparency = 8,
+  kColors = 16,
+  kAllArrays = 31
+};
+
+struct HairHeader {
+  std::uint32_t strands = 0, points = 0, arrays = 0, segments = 0;
+  float thickness = 0, transparency = 0;
+  glm::vec3 color{0};
+
+  bool has(HairArray array) const { return (arrays & array) != 0; }
+};
+
+// One array of the file, read from front to back a buffer at a time.
+class HairStream {
+ public:
+  HairStream(const InputFile& file, std::uint64_t offset, std::uint64_t bytes)
+      : file_(file), offset_(offset), end_(offset + bytes) {}
+
+  template <typename T>
+  Status read(T& value) {
+    std::span<std::byte> to = std::as_writable_bytes(std::span(&value, 1));
+    while (!to.empty()) {
+      if (next_ == buffer_.size()) SURFEIT_RETURN_IF_ERROR(fill());
+      const std::size_t count = std::min(to.size(), buffer_.size() - next_);
+      std::memcpy(to.data(), buffer_.data() + next_, count);
+      next_ += count;
+      to = to.subspan(count);
+    }
+    return {};
+  }
+
+ private:
+  Status fill() {
+    constexpr std::uint64_t kBufferBytes = 1 << 16;
+    buffer_.resize(std::size_t(std::min(kBufferBytes, end_ - offset_)));
+    next_ = 0;
+    if (buffer_.empty()) {
+      return Status::corruption(fmt::format("{}: an array ends early", file_.path()));
+    }
+    SURFEIT_RETURN_IF_ERROR(file_.readAt(offset_, buffer_));
+    offset_ += buffer_.size();
+    return {};
+  }
+
+  const InputFile& file_;
+  std::uint64_t offset_, end_;
+  std::vector<std::byte> buffer_;
+  std::size_t next_ = 0;
+};
+
+Result<HairHeader> readHeader(const InputFile& file) {
+  std::array<std::byte, kHeaderBytes> bytes{};
+  if (file.size() < kHeaderBytes) {
+    return Status::corruption(fmt::format("{}: found {} bytes, expected a header of {}",
+                                          file.path(), file.size(), kHeaderBytes));
+  }
+  SURFEIT_RETURN_IF_ERROR(file.readAt(0, bytes));
+  ByteReader reader(std::span<const std::byte>(bytes).subspan(4));
+  HairHeader header;
+  header.strands = reader.get<std::uint32_t>();
+  header.points = reader.get<std::uint32_t>();
+  header.arrays = reader.get<std::uint32_t>();
+  header.segments = reader.get<std::uint32_t>();
+  header.thickness = reader.get<float>();
+  header.transparency = reader.get<float>();
+  for (int i = 0; i < 3; ++i) header.color[i] = reader.get<float>();
+  if (!header.has(kPoints) || header.arrays > kAllArrays) {
+    return Status::corruption(fmt::format(
+        "{}: at 12: found the arrays {:#x}, expected the bits of 0x1f, points (2) among "
+        "them",
+        file.path(), header.arrays));
+  }
+  return header;
+}
+
+// Colors are sRGB, as those of other meshes without linear ones.
+glm::vec3 linearOf(const glm::vec3& srgb) {
+  glm::vec3 color(0);
+  for (int i = 0; i < 3; ++i) {
+    if (srgb[i] > 0) color[i] = linearFromSrgb(std::min(srgb[i], 1.0f));
+  }
+  return color;
+}
+
+// The strands of a file, one after the other.
+class HairFile {
+ public:
+  static Result<HairFile> open(const std::string& path, const CurveOptions& options) {
+    SURFEIT_ASSIGN_OR_RETURN(InputFile input, InputFile::open(path));
+    SURFEIT_ASSIGN_OR_RETURN(const HairHeader header, readHeader(input));
+    HairFile hair(std::move(input), header, options);
+    SURFEIT_RETURN_IF_ERROR(hair.placeArrays());
+    return hair;
+  }
+
+  const HairHeader& header() const { return header_; }
+  std::uint64_t bytesBehind() const { return file_->size() - end_; }
+
+  // Calls visit(strand, points) for each; the points are overwritten by the next.
+  template <typename Visit>
+  Status forEachStrand(const Progress& progress, Visit&& visit) const {
+    const auto stream = [&](HairArray array, std::size_t i, std::uint64_t bytes) {
+      return HairStream(*file_, offset_[i], header_.has(array) ? bytes : 0);
+    };
+    const std::uint64_t count = header_.points;
+    HairStream segments = stream(kSegments, 0, 2 * std::uint64_t(header_.strands));
+    HairStream places = stream(kPoints, 1, 12 * count);
+    HairStream widths = stream(kThickness, 2, 4 * count);
+    HairStream clears = stream(kTransparency, 3, 4 * count);
+    HairStream colors = stream(kColors, 4, 12 * count);
+    std::uint64_t used = 0;
+    std::vector<CurvePoint> points;
+    for (std::uint64_t strand = 0; strand < header_.strands; ++strand) {
+      if (strand % 4096 == 0 && progress.isCancelled()) return Status::interrupted();
+      std::uint16_t length = 0;
+      if (header_.has(kSegments)) SURFEIT_RETURN_IF_ERROR(segments.read(length));
+      const std::uint64_t corners = 1 + (header_.has(kSegments) ? length : header_.segments);
+      if (corners > count - used) return wrongCount(strand, used + corners);
+      used += corners;
+      points.resize(std::size_t(corners));
+      for (CurvePoint& point : points) {
+        SURFEIT_RETURN_IF_ERROR(readPoint(places, widths, clears, colors, point));
+      }
+      SURFEIT_RETURN_IF_ERROR(visit(strand, std::span<const CurvePoint>(points)));
+    }
+    if (used != count) return wrongCount(header_.strands, used);
+    return {};
+  }
+
+ private:
+  HairFile(InputFile file, const HairHeader& header, const CurveOptions& options)
+      : file_(std::make_unique<InputFile>(std::move(file))), header_(header), options_(options) {}
+
+  // Compares what the header counts with the bytes that there are.
+  Status placeArrays() {
+    const std::uint64_t points = header_.points;
+    const std::uint64_t bytes[5] = {2 * std::uint64_t(header_.strands), 12 * points, 4 * points,
+                                    4 * points, 12 * points};
+    end_ = kHeaderBytes;
+    for (std::size_t i = 0; i < 5; ++i) {
+      offset_[i] = end_;
+      if (header_.has(HairArray(1u << i))) end_ += bytes[i];
+    }
+    if (end_ <= file_->size()) return {};
+    return Status::corruption(
+        fmt::format("{}: found {} bytes, expected {} for {} strands of {} points", file_->path(),
+                    file_->size(), end_, header_.strands, header_.points));
+  }
+
+  Status readPoint(HairStream& places, HairStream& widths, HairStream& clears, HairStream& colors,
+                   CurvePoint& point) const {
+    std::array<float, 3> place{}, color{header_.color.x, header_.color.y, header_.color.z};
+    float width = header_.thickness, clear = header_.transparency;
+    SURFEIT_RETURN_IF_ERROR(places.read(place));
+    if (header_.has(kThickness)) SURFEIT_RETURN_IF_ERROR(widths.read(width));
+    if (header_.has(kTransparency)) SURFEIT_RETURN_IF_ERROR(clears.read(clear));
+    if (header_.has(kColors)) SURFEIT_RETURN_IF_ERROR(colors.read(color));
+    point.position = {place[0], place[1], place[2]};
+    // What is partly clear covers as a thinner strand does
+    const double there = 1 - std::clamp(double(clear), 0.0, 1.0);
+    point.width = (options_.width > 0 ? options_.width : double(width)) * there;
+    point.color = linearOf({color[0], color[1], color[2]});
+    return {};
+  }
+
+  Status wrongCount(std::uint64_t strand, std::uint64_t found) const {
+    return Status::corruption(
+        fmt::format("{}: strand {}: {} points up to here, expected {} in all strands",
+                    file_->path(), strand, found, header_.points));
+  }
+
+  std::unique_ptr<InputFile> file_;
+  HairHeader header_;
+  CurveOptions options_;
+  std::uint64_t offset_[5] = {}, end_ = 0;
+};
+
+}  // namespace
+
+Status loadHairMesh(const std::string& path, const CurveOptions& options, MeshBuilder& builder,
+                    Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(const HairFile hair, HairFile::open(path, options));
+  if (hair.bytesBehind() > 0) {
+    progress.note(
+        fmt::format("{}: {} bytes behind the last array are ignored", path, hair.bytesBehind()));
+  }
+  const HairHeader& header = hair.header();
+  const StrandChoice choice(header.strands, options.strands);
+
+  // Growth of the strands that stand for others, so that the sum of areas stays; this looks at all
+  double growth = 1, area = 0, kept_area = 0;
+  const auto measure = [&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
+    const double own = curveArea(points);
+    area += own;
+    if (choice.keeps(strand)) kept_area += own;
+    return {};
+  };
+  SURFEIT_RETURN_IF_ERROR(hair.forEachStrand(progress, measure));
+  if (!(area > 0) || !std::isfinite(area)) {
+    return Status::corruption(fmt::format(
+        "{}: strands have no width, or places are not finite, expected a thickness (--curve-width "
+        "gives one)",
+        path));
+  }
+  if (!choice.keepsAll()) {
+    if (!(kept_area > 0)) {
+      return Status::corruption(fmt::format("{}: none of {} strands kept has a length: keep more",
+                                            path, choice.keptCount()));
+    }
+    growth = area / kept_area;
+    progress.inform(fmt::format("{}: {} of {} strands stand for all, {:.3g} times as wide", path,
+                                choice.keptCount(), header.strands, growth));
+  }
+
+  Mesh& mesh = builder.mesh;
+  mesh.color.resize(builder.position.size(), glm::vec3(1));
+  Material material;
+  material.albedo = glm::vec3(1);  // times the color of its points
+  material.is_two_sided = true;
+  mesh.materials.push_back(material);
+  CurveRibbons ribbons(builder, std::uint32_t(mesh.materials.size() - 1), true, path);
+  const auto add = [&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
+    if (!choice.keeps(strand)) return {};
+    if (strand % 4096 == 0) {
+      const double part = double(strand + 1) / header.strands;
+      SURFEIT_RETURN_IF_ERROR(checkResidentBytes(path, 0, part, kHeldTimes));
+    }
+    return ribbons.add(points, strand, growth);
+  };
+  SURFEIT_RETURN_IF_ERROR(hair.forEachStrand(progress, add));
+  if (ribbons.pointlike() > 0) {
+    progress.note(fmt::format("{}: {} strands without length skipped", path, ribbons.pointlike()));
+  }
+  return {};
+}
+
+}  // namespace surfeit
