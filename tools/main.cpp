@@ -9,6 +9,7 @@
 #include "surfeit/version.h"
 #include "tools/command.h"
 #include "tools/console.h"
+#include "tools/renderman_words.h"
 #include "tools/suggestion.h"
 
 namespace surfeit {
@@ -30,6 +31,8 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addViewCommand(app, context);
   addCompositeCommand(app, context);
   addCubeCommand(app, context);
+  addPtfilterCommand(app, context);
+  addBrickmakeCommand(app, context);
 }
 
 // --help and --version.
@@ -49,13 +52,14 @@ int parseAndRun(int argc, char** argv) {
   app.require_subcommand(1);
   app.get_formatter()->column_width(36);
   addCommands(app, context);
+  const std::vector<std::string> words = wordsOf(argc, argv);
   try {
-    app.parse(argc, argv);
+    app.parse(
+        std::vector<std::string>(words.rbegin(), words.rend()));  // it takes them from the end
   } catch (const CLI::Success& success) {
     return answerHelp(app, success);
   } catch (const CLI::ParseError& error) {
-    const std::string suggestion =
-        suggestOption(app, std::vector<std::string>(argv + 1, argv + argc));
+    const std::string suggestion = suggestOption(app, words);
     tell(std::string("surfeit: ") + error.what() + suggestion + "\n");
     return exitStatus(StatusCode::kInvalidArgument);
   }
