@@ -18,6 +18,7 @@ namespace {
 struct BrickArguments {
   std::vector<std::string> clouds;
   std::string output;
+  std::vector<std::string> unused;  // words of brickmake without a meaning here
   BrickOptions options;
 };
 
@@ -26,6 +27,7 @@ Status runBrick(BrickArguments& arguments, CommandContext& context) {
   options.threads = context.common.threads;
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
+  for (const std::string& word : arguments.unused) context.progress().note(word);
   SURFEIT_ASSIGN_OR_RETURN(const BrickStats stats, brickClouds(arguments.clouds, arguments.output,
                                                                options, context.progress()));
   const double seconds = std::max(context.wallSeconds(), 1e-9);
@@ -79,6 +81,31 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
   addTemporaryOption(command, options.temporary_directory);
 }
 
+void addMapOption(CLI::App& command, std::string& output, const std::string& description) {
+  command.add_option("-o,--output", output, description)
+      ->required()
+      ->check(
+          [](const std::string& name) {
+            if (name.ends_with(".vdb")) return std::string();
+            return std::string("expected a name that ends with .vdb: brick maps are OpenVDB files");
+          },
+          "");
+}
+
+// A word of brickmake that changes nothing.
+void addUnusedWord(CLI::App& command, const std::string& name, const std::string& reason,
+                   std::vector<std::string>& unused) {
+  command
+      .add_option_function<std::string>(
+          "--" + name,
+          [=, &unused](const std::string& value) {
+            unused.push_back(fmt::format("-{} {}: {}: the word is ignored", name, value, reason));
+          },
+          reason)
+      ->type_name("VALUE")
+      ->group("Without a meaning here");
+}
+
 }  // namespace
 
 void addBrickCommand(CLI::App& app, CommandContext& context) {
@@ -87,13 +114,7 @@ void addBrickCommand(CLI::App& app, CommandContext& context) {
   const auto arguments = std::make_shared<BrickArguments>();
   command->add_option("CLOUD", arguments->clouds, "Clouds with baked values; several are merged")
       ->required();
-  command->add_option("-o,--output", arguments->output, "Brick map to write (.vdb)")
-      ->required()
-      ->check(
-          [](const std::string& name) {
-            return name.ends_with(".vdb") ? std::string() : "expected a name that ends with .vdb";
-          },
-          "");
+  addMapOption(*command, arguments->output, "Brick map to write (.vdb)");
   addBrickOptions(*command, arguments->options);
   context.addCommonOptions(*command);
   command->footer(
@@ -105,6 +126,32 @@ void addBrickCommand(CLI::App& app, CommandContext& context) {
       "  surfeit brick left.ptc right.ptc -o light.vdb --channel irradiance,albedo \\\n"
       "      --voxel-size 0.05\n"
       "  surfeit view other.ply --brick baked.vdb -o other.png");
+  command->callback(
+      [arguments, &context] { context.run([&] { return runBrick(*arguments, context); }); });
+}
+
+// Command lines of RenderMan's brickmake.
+void addBrickmakeCommand(CLI::App& app, CommandContext& context) {
+  CLI::App* command =
+      app.add_subcommand("brickmake", "Command lines of RenderMan's brickmake: the same as brick");
+  const auto arguments = std::make_shared<BrickArguments>();
+  command->add_option("CLOUD", arguments->clouds, "Point clouds; several are merged")->required();
+  addMapOption(*command, arguments->output, "The last word, or behind -o: brick map (.vdb)");
+  command
+      ->add_option("--maxerror", arguments->options.max_error,
+                   "Divide a voxel where a value differs by more than this (brick --max-error)")
+      ->check(CLI::NonNegativeNumber.description(""))
+      ->capture_default_str();
+  addUnusedWord(*command, "maxdepth",
+                "the finest voxels follow from the points (brick --voxel-size)", arguments->unused);
+  addUnusedWord(*command, "radiusscale", "points count by their areas", arguments->unused);
+  addTemporaryOption(*command, arguments->options.temporary_directory);
+  context.addCommonOptions(*command);
+  command->footer(
+      "Options have one dash or two, and the output is the last word; docs/renderman.md has the\n"
+      "words.\n"
+      "Examples:\n"
+      "  surfeit brickmake -maxerror 0.002 wall.ptc wall.vdb");
   command->callback(
       [arguments, &context] { context.run([&] { return runBrick(*arguments, context); }); });
 }

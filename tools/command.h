@@ -145,5 +145,7 @@ void addPlanCommand(CLI::App& app, CommandContext& context);
 void addViewCommand(CLI::App& app, CommandContext& context);
 void addCompositeCommand(CLI::App& app, CommandContext& context);
 void addCubeCommand(CLI::App& app, CommandContext& context);
+void addPtfilterCommand(CLI::App& app, CommandContext& context);
+void addBrickmakeCommand(CLI::App& app, CommandContext& context);
 
 }  // namespace surfeit

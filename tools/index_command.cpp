@@ -16,11 +16,14 @@
 namespace surfeit {
 namespace {
 
+constexpr const char* kCubeWords = "a scene (.sft), or four numbers X,Y,Z,SIZE";
+
 struct IndexArguments {
   std::vector<std::string> inputs;
   std::string output;
   std::string precision = "quantized";
   std::string normals = "none";
+  std::string cube_like;
   NormalEstimation estimation;
   bool is_dry_run = false;
   IndexOptions options;
@@ -64,8 +67,33 @@ Repeats parseRepeats(const std::string& text) {
                       : ""));
 }
 
+// --cube, four numbers or the name of a scene.
+void parseCube(const std::string& text, IndexArguments& arguments) {
+  if (text.find_first_not_of("+-.0123456789eE, ") != std::string::npos) {
+    arguments.cube_like = text;
+    return;
+  }
+  const auto numbers = parseNumberList<4>("--cube", text, kCubeWords);
+  arguments.options.cube = {{numbers[0], numbers[1], numbers[2]}, numbers[3]};
+}
+
+// Cube and origin of the scene of --cube.
+Status takeCube(IndexArguments& arguments) {
+  IndexOptions& options = arguments.options;
+  if (arguments.cube_like.empty()) return {};
+  const Result<SceneInfo> like = readSceneInfo(arguments.cube_like);
+  if (!like.ok()) {
+    return Status(like.status().code(),
+                  fmt::format("--cube: expected {}: {}", kCubeWords, like.status().message()));
+  }
+  options.cube = like->cube;
+  if (!options.origin) options.origin = like->origin;
+  return {};
+}
+
 Status runIndex(IndexArguments& arguments, CommandContext& context) {
   IndexOptions& options = arguments.options;
+  SURFEIT_RETURN_IF_ERROR(takeCube(arguments));
   options.threads = context.common.threads;
   options.full_precision = arguments.precision == "full";
   options.strict = context.common.strict;
@@ -151,6 +179,13 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
           },
           "Origin of positions in the scene (default: 0, or a corner of a cloud far away)")
       ->type_name("X,Y,Z");
+  command
+      ->add_option_function<std::string>(
+          "--cube", [arguments](const std::string& text) { parseCube(text, *arguments); },
+          "Root cube, least coordinates and edge, or that of another scene: scenes of a "
+          "sequence that share it do not pop when something leaves (default: the least "
+          "cube)")
+      ->type_name("LIKE.sft|X,Y,Z,SIZE");
   addUpOption(*command, options.up, "Axis that is up in the scene",
               "as the clouds state, z for LAS, else y");
   addTemporaryOption(*command, options.temporary_directory);
@@ -170,6 +205,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
       "  surfeit index tile1.las tile2.las -o survey.sft --overlap thin\n"
       "  surfeit index city.ply -o city.sft --memory 80%\n"
+      "  surfeit index frame2.ply -o frame2.sft --cube frame1.sft\n"
       "  surfeit index scan.las -o scan.sft --normals estimate --orient up\n"
       "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");
   command->callback(

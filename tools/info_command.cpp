@@ -105,6 +105,7 @@ nlohmann::json sceneJson(const SceneInfo& info) {
       {"input_channels", channelNames(info.channels)},
       {"bounds", {vectorJson(info.min), vectorJson(info.max)}},
       {"origin", vectorJson(info.origin)},
+      {"cube", {info.cube.corner.x, info.cube.corner.y, info.cube.corner.z, info.cube.size}},
       {"up", std::string(1, upAxisName(info.up))},
       {"node_pages", info.node_pages},
       {"node_page_bytes", info.node_page_bytes},
@@ -141,6 +142,7 @@ std::string sceneText(const std::string& path, const SceneInfo& info) {
       "{}: Surfeit scene, {} surfels, {} nodes\n"
       "  file           {} ({:.1f} bytes per surfel)\n"
       "  bounds         {} .. {}{}\n"
+      "  cube           {},{},{},{}\n"
       "  up             {}\n"
       "  input had      {}\n"
       "{}"
@@ -150,7 +152,8 @@ std::string sceneText(const std::string& path, const SceneInfo& info) {
       "  provenance     {}",
       path, formatCount(info.surfels), formatCount(info.nodes), formatBytes(info.file_bytes),
       double(info.file_bytes) / double(info.surfels), placeText(info.min, info.origin),
-      placeText(info.max, info.origin), origin, upAxisName(info.up),
+      placeText(info.max, info.origin), origin, info.cube.corner.x, info.cube.corner.y,
+      info.cube.corner.z, info.cube.size, upAxisName(info.up),
       fmt::join(channelNames(info.channels), ", "), groups,
       info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
       formatBytes(info.node_page_bytes), formatBytes(info.node_cache_bytes),

@@ -9,6 +9,7 @@
 #include "surfeit/version.h"
 #include "tools/command.h"
 #include "tools/console.h"
+#include "tools/renderman_words.h"
 #include "tools/suggestion.h"
 
 namespace surfeit {
@@ -32,6 +33,8 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addViewCommand(app, context);
   addCompositeCommand(app, context);
   addCubeCommand(app, context);
+  addPtfilterCommand(app, context);
+  addBrickmakeCommand(app, context);
 }
 
 // --help and --version.
@@ -83,5 +86,5 @@ int main(int argc, char** argv) {
   // Few arenas, and large buffers given back when freed: the memory budget counts what is in use
   mallopt(M_ARENA_MAX, 2);
   mallopt(M_MMAP_THRESHOLD, 256 << 10);
-  return surfeit::runWords({argv + 1, argv + argc});
+  return surfeit::runWords(surfeit::wordsOf(argc, argv));
 }

@@ -14,6 +14,12 @@
 
 namespace surfeit {
 
+// The root cube: what the octree and the curve of a scene divide. In the cloud's coordinates.
+struct SceneCube {
+  glm::dvec3 corner{0};  // the least coordinates: finite
+  double size = 0;       // of an edge, above 0
+};
+
 struct SceneInfo {
   std::uint64_t file_bytes = 0;
   std::uint64_t surfels = 0;
@@ -25,6 +31,7 @@ struct SceneInfo {
   // Bounds of the surfel positions, and the origin of positions in the file; all in the cloud's
   // coordinates.
   glm::dvec3 min{0}, max{0}, origin{0};
+  SceneCube cube;
   UpAxis up = kDefaultUpAxis;
   CloudChannels channels;  // channels of the input
   bool full_precision = false;

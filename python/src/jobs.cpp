@@ -34,6 +34,9 @@ IndexOptions indexOptions(const py::dict& given) {
   std::optional<std::array<double, 3>> origin;
   options.into("origin", origin);
   if (origin) index.origin = glm::dvec3((*origin)[0], (*origin)[1], (*origin)[2]);
+  std::optional<std::array<double, 4>> cube;
+  options.into("cube", cube);
+  if (cube) index.cube = {{(*cube)[0], (*cube)[1], (*cube)[2]}, (*cube)[3]};
   takeUp(options, "up", index.up);
   bool estimates = false;
   options.choose<bool>("normals", estimates, {{"none", false}, {"estimate", true}});

@@ -100,6 +100,8 @@ py::dict record(const SceneInfo& info) {
       "node_cache_bytes"_a = info.node_cache_bytes,
       "surfel_cache_bytes"_a = info.surfel_cache_bytes, "min"_a = place(info.min),
       "max"_a = place(info.max), "origin"_a = place(info.origin),
+      "cube"_a = py::make_tuple(info.cube.corner.x, info.cube.corner.y, info.cube.corner.z,
+                                info.cube.size),
       "up"_a = std::string(1, "xyz"[int(info.up)]), "channels"_a = channelNames(info.channels),
       "full_precision"_a = info.full_precision, "level_pages"_a = info.level_pages,
       "provenance"_a = info.provenance, "groups"_a = describeGroups(info.groups));

@@ -79,7 +79,7 @@ def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
     for name in ("temporary_directory", "trajectory", "like"):
         if taken.get(name) is not None:
             taken[name] = path_of(taken[name])
-    for name in ("origin", "eye", "sensor", "crop"):
+    for name in ("origin", "cube", "eye", "sensor", "crop"):
         if isinstance(taken.get(name), np.ndarray):
             taken[name] = taken[name].tolist()
     if isinstance(taken.get("environment"), os.PathLike):

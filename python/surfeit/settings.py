@@ -86,5 +86,6 @@ class IndexSettings(ReadSettings, JobSettings, NormalSettings, total=False):
     overlap: Literal["keep", "thin"]  # surfels that repeat another
     full_precision: bool  # keeps floats instead of quantized values
     origin: Sequence[float]  # of positions in the scene
+    cube: Sequence[float]  # root cube: least x, y, z and size, as info()["cube"]
     up: Up  # default: as the clouds state, else y
     normals: Literal["none", "estimate"]  # for surfels without a normal

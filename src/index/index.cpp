@@ -26,6 +26,7 @@
 #include "index/index_places.h"
 #include "index/index_plan.h"
 #include "index/phase_clock.h"
+#include "index/pinned_cube.h"
 #include "octree/build/bucket_stream.h"
 #include "octree/build/octree_builder.h"
 #include "octree/build/scene_writer.h"
@@ -82,7 +83,6 @@ class Indexer {
   Result<SceneFile> runUnnamed();
 
  private:
-  Status checkOptions() const;
   Status openInputs();
   Status checkFreeSpace(double packed_bytes);
   Status checkOutputRoom() const;
@@ -90,6 +90,7 @@ class Indexer {
   Result<std::unique_ptr<SurfelStore>> readInto(const std::optional<RootCube>& cube);
   Status takeSample();
   glm::dvec3 originAsked(const Bounds3& bounds) const;
+  RootCube cubeOf(const Bounds3& bounds) const;
   bool moveOrigin(const glm::dvec3& origin);
   bool mayNeedNeighbours() const { return reader_->lacksSizes() || options_.normals.has_value(); }
   bool estimatesNormals() const { return options_.normals && totals_.spheres > 0; }
@@ -115,6 +116,7 @@ class Indexer {
   const std::string temporary_directory_;
   std::optional<CloudReader> reader_;
   std::vector<Surfel> sample_;
+  std::optional<PinnedCube> pinned_;
   IndexPlan plan_;
   bool gives_space_back_ = false;
   CloudTotals totals_;
@@ -153,42 +155,19 @@ Result<SceneFile> Indexer::runUnnamed() {
 
 Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
   stats_.memory_bytes = options_.memory_bytes;
-  SURFEIT_RETURN_IF_ERROR(checkOptions());
+  if (inputs_.empty()) return Status::invalidArgument("index: no input cloud");
+  SURFEIT_RETURN_IF_ERROR(checkIndexOptions(options_));
+  if (options_.cube) pinned_.emplace(*options_.cube);
   SURFEIT_RETURN_IF_ERROR(openInputs());
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
   stats_.skipped_records = totals_.skipped;
   auto buckets = std::make_unique<BucketStream>(
       std::move(store),
-      BucketStream::Options{rootCube(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
+      BucketStream::Options{cubeOf(totals_.bounds), plan_.bucket_capacity, plan_.spare_memory,
                             temporary_directory_},
       progress_);
   distinct_.emplace(*buckets, options_.repeats);
   return buckets;
-}
-
-Status Indexer::checkOptions() const {
-  if (inputs_.empty()) return Status::invalidArgument("index: no input cloud");
-  if (options_.leaf_capacity < 1 || options_.leaf_capacity > 4096) {
-    return Status::invalidArgument(
-        fmt::format("leaf capacity {}, expected 1 to 4096", options_.leaf_capacity));
-  }
-  for (int axis = 0; options_.origin && axis < 3; ++axis) {
-    if (std::abs((*options_.origin)[axis]) <= double(kLargestLength)) continue;
-    return Status::invalidArgument(
-        fmt::format("origin {}, expected a number of at most 1e12", (*options_.origin)[axis]));
-  }
-  if (options_.normals) {
-    SURFEIT_RETURN_IF_ERROR(NormalRule::check(*options_.normals));
-    if (options_.normals->orientation.toward == NormalOrientation::Toward::kTrajectory) {
-      return Status::invalidArgument(
-          "surfels of a scene have no time: find normals by a trajectory with surfeit normals");
-    }
-  }
-  if (!(options_.disk_overlap >= 1 && options_.disk_overlap <= 16)) {
-    return Status::invalidArgument(
-        fmt::format("disk overlap {}, expected 1 to 16", options_.disk_overlap));
-  }
-  return {};
 }
 
 // Opens the inputs, takes a sample where that is possible, and plans.
@@ -198,7 +177,7 @@ Status Indexer::openInputs() {
       reader_, CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes),
                                  reading, opener_));
   for (const std::string& note : reader_->notes()) progress_.note(note);
-  if (options_.origin) reader_->setOrigin(*options_.origin);
+  if (options_.origin || pinned_) reader_->setOrigin(originAsked({}));
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) SURFEIT_RETURN_IF_ERROR(takeSample());
   // The octree of bare positions is built at full precision
@@ -228,7 +207,13 @@ Status Indexer::takeSample() {
 
 // The origin for a cloud of these bounds, which are counted from the present one.
 glm::dvec3 Indexer::originAsked(const Bounds3& bounds) const {
-  return options_.origin.value_or(originFor(movedBounds(bounds, reader_->origin())));
+  if (options_.origin) return *options_.origin;
+  return pinned_ ? pinned_->origin() : originFor(movedBounds(bounds, reader_->origin()));
+}
+
+// About the present origin.
+RootCube Indexer::cubeOf(const Bounds3& bounds) const {
+  return pinned_ ? pinned_->about(reader_->origin()) : rootCube(bounds);
 }
 
 // Counts positions from another origin from now on, those of the sample too; false when it is the
@@ -269,11 +254,14 @@ Status Indexer::checkOutputRoom() const {
 Result<std::unique_ptr<SurfelStore>> Indexer::readInputs() {
   constexpr int kMostPasses = 4;
   std::optional<RootCube> cube;
-  if (!sample_.empty()) cube = rootCube(boundsOf(sample_));
+  if (!sample_.empty() || pinned_) cube = cubeOf(boundsOf(sample_));
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInto(cube));
   if (totals_.surfels == 0) {
     return Status::corruption(
         fmt::format("{}: no valid surfel in {} records", inputs_.front(), reader_->recordCount()));
+  }
+  if (pinned_) {
+    SURFEIT_RETURN_IF_ERROR(pinned_->status(totals_.surfels, totals_.bounds, reader_->origin()));
   }
   clock_.finish("read");
   for (int pass = 1; store == nullptr; ++pass) {
@@ -313,6 +301,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
   const bool needs_cube = store->bucketCount() > 1;
 
   const auto consume = [&](std::span<Surfel> surfels, const Bounds3& bounds) -> Status {
+    if (pinned_) pinned_->look(surfels, bounds, reader_->origin());
     if (surfels.empty() || !distributing) return {};
     std::vector<CurveKey>& keys = threadScratch<std::vector<CurveKey>>([] {});
     keys.resize(surfels.size());
@@ -332,9 +321,8 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
   };
   progress_.beginPhase("read", reader_->recordCount(), "surfels");
   SURFEIT_ASSIGN_OR_RETURN(totals_, reader_->readAll(consume, progress_));
-  if (totals_.surfels > 0 &&
-      (!distributing || (needs_cube && !(rootCube(totals_.bounds) == *cube)) ||
-       originAsked(totals_.bounds) != reader_->origin())) {
+  if (totals_.surfels > 0 && (!distributing || (needs_cube && !(cubeOf(totals_.bounds) == *cube)) ||
+                              originAsked(totals_.bounds) != reader_->origin())) {
     return std::unique_ptr<SurfelStore>();
   }
   SURFEIT_RETURN_IF_ERROR(store->finish());
@@ -351,7 +339,7 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
   header.origin = reader_->origin();
   header.up = up();
   header.bounds = totals_.bounds;
-  header.cube = rootCube(totals_.bounds);
+  header.cube = cubeOf(totals_.bounds);
   header.channels = totals_.channels;
   header.channels.normal = header.channels.normal || estimatesNormals();
   header.format_version = formatVersionFor(header.channels);
@@ -456,6 +444,10 @@ std::string Indexer::provenance() const {
                          {"radii_from_area", totals_.missing_radius},
                          {"spheres", totals_.spheres}};
   if (options_.repeats == Repeats::kThin) json["repeats"] = "thin";
+  if (const auto cube =
+          pinned_ ? pinned_->unusualNumbers(totals_.bounds, reader_->origin()) : std::nullopt) {
+    json["cube"] = *cube;
+  }
   if (const std::optional<NormalRule> rule = normalRule()) json["normals"] = rule->describe();
   return json.dump();
 }

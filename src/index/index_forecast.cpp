@@ -93,6 +93,7 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
   IndexOptions indexing = options;
   indexing.channels = indexing.part = indexing.filter = {};
   indexing.origin.reset();
+  indexing.cube.reset();
   indexing.strict = false;
   QuietProgress quiet(progress);
   const auto start = std::chrono::steady_clock::now();

@@ -8,9 +8,12 @@
 #include "core/curve_key.h"
 #include "core/job_limits.h"
 #include "core/program_memory.h"
+#include "core/surfel_limits.h"
 #include "index/cloud_reader.h"
+#include "index/pinned_cube.h"
 #include "octree/build/bucket_stream.h"
 #include "octree/build/surfel_block.h"
+#include "octree/neighbours/normal_rule.h"
 
 namespace surfeit {
 namespace {
@@ -63,6 +66,31 @@ void planBuckets(std::uint64_t records, std::uint64_t open_bytes, IndexPlan& pla
 }
 
 }  // namespace
+
+Status checkIndexOptions(const IndexOptions& options) {
+  if (options.leaf_capacity < 1 || options.leaf_capacity > 4096) {
+    return Status::invalidArgument(
+        fmt::format("leaf capacity {}, expected 1 to 4096", options.leaf_capacity));
+  }
+  for (int axis = 0; options.origin && axis < 3; ++axis) {
+    if (std::abs((*options.origin)[axis]) <= double(kLargestLength)) continue;
+    return Status::invalidArgument(
+        fmt::format("origin {}, expected a number of at most 1e12", (*options.origin)[axis]));
+  }
+  if (options.cube) SURFEIT_RETURN_IF_ERROR(PinnedCube::check(*options.cube));
+  if (options.normals) {
+    SURFEIT_RETURN_IF_ERROR(NormalRule::check(*options.normals));
+    if (options.normals->orientation.toward == NormalOrientation::Toward::kTrajectory) {
+      return Status::invalidArgument(
+          "surfels of a scene have no time: find normals by a trajectory with surfeit normals");
+    }
+  }
+  if (!(options.disk_overlap >= 1 && options.disk_overlap <= 16)) {
+    return Status::invalidArgument(
+        fmt::format("disk overlap {}, expected 1 to 16", options.disk_overlap));
+  }
+  return {};
+}
 
 Result<RowReaderOptions> readingOf(const IndexOptions& options) {
   RowReaderOptions reading;

@@ -55,6 +55,9 @@ int indexThreads(const IndexOptions& options, Progress& progress);
 // kBudgetTooSmall, with the least that works, when it cannot be done.
 Result<IndexPlan> planIndex(const IndexTask& task);
 
+// kInvalidArgument for options that no cloud can be indexed with.
+Status checkIndexOptions(const IndexOptions& options);
+
 // How the inputs are opened.
 Result<RowReaderOptions> readingOf(const IndexOptions& options);
 

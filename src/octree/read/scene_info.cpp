@@ -25,6 +25,8 @@ Result<SceneInfo> sceneInfo(const SceneFile& file) {
   info.min = bounds.min;
   info.max = bounds.max;
   info.origin = header.origin;
+  const double* const corner = header.cube.origin;
+  info.cube = {header.origin + glm::dvec3(corner[0], corner[1], corner[2]), header.cube.size};
   info.up = header.up;
   info.channels = header.channels;
   info.full_precision = header.full_precision;
