@@ -1,0 +1,79 @@
+#!/usr/bin/env bash
+# One case of the end-to-end tests of gathers in shards.
+source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
+
+makeInputs() {
+  generate set.ply --surfels 30k
+  "$surfeit" index -q set.ply -o set.sft --memory 64M
+  generate places.ply --surfels 20k --seed 2
+}
+
+# And what one gather makes of them.
+makeJob() {
+  makeInputs
+  "$surfeit" gather -q set.sft places.ply -o one.ply --quality draft --memory 64M
+}
+
+# Killed again and again, each time a little later, a resumed gather ends with the bytes of one.
+killedGathersGoOn() {
+  local kills=0 delay status
+  makeJob
+  # The last one has all the time that it wants
+  for delay in 0.15 0.25 0.35 0.45 0.55 0; do
+    status=0
+    timeout -s KILL "$delay" "$surfeit" gather -q set.sft places.ply -o out.ply --quality draft --memory 64M \
+      --threads 1 --resume --resume-parts 40 || status=$?
+    ((status != 0)) || break
+    ((status == 137)) || fail "status $status"
+    kills=$((kills + 1))
+    [[ ! -e out.ply ]] || fail "a result before the end"
+  done
+  ((kills > 0 && status == 0)) || fail "$kills kills, status $status"
+  sameBytes out.ply one.ply
+  [[ -z $(ls | grep -E 'shard|\.tmp$') ]] || fail "left behind: $(ls)"
+}
+
+# A stopped one says so, and goes on.
+stoppedGathersGoOn() {
+  local status=0
+  makeJob
+  timeout -s TERM 0.7 "$surfeit" gather -q set.sft places.ply -o out.ply --quality draft --memory 64M --threads 1 \
+    --resume --resume-parts 40 --progress none || status=$?
+  ((status == 124)) || return 0 # it was done before
+  run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --resume --resume-parts 40
+  says "shards were gathered before and skipped"
+  sameBytes out.ply one.ply
+}
+
+shardsAreNamedWhereTheyLack() {
+  makeJob
+  local shard
+  for shard in 1 3; do
+    run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --shard "$shard/4"
+  done
+  run 75 merge set.sft places.ply -o out.ply
+  says "2, 4 of 4" "--array=2,4"
+  [[ ! -e out.ply ]] || fail "a result of half of the shards"
+  for shard in 2 4; do
+    run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --shard "$shard/4"
+  done
+  run 0 merge set.sft places.ply -o out.ply --stats merge.json
+  jsonIs merge.json shards 4 receivers 20000 invalid_receivers 0
+  sameBytes out.ply one.ply
+  run 0 merge set.sft places.ply -o out.ply --remove-shards
+  run 75 merge set.sft places.ply -o out.ply
+}
+
+badShardsAreRefused() {
+  makeInputs
+  local shard
+  for shard in 0/3 4/3 3 a/b 1/0 1/99999; do
+    run 2 gather set.sft places.ply -o out.ply --shard "$shard"
+    says "I/N"
+  done
+  run 2 gather set.sft places.ply -o out.ply --shard 1/2 --resume
+  run 2 gather set.sft places.ply -o - --shard 1/2
+  run 74 gather set.sft places.ply -o nowhere/out.ply --shard 1/2
+}
+
+runCase
