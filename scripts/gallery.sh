@@ -2,7 +2,7 @@
 # Makes the pictures of docs/gallery.md, in docs/gallery/, from scenes that it makes itself. Clouds
 # and scenes go to out/gallery/. Minutes on two cores. Chapters may be named to make only these:
 #
-#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics ...]
+#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics translucent ...]
 #
 # SURFEIT_BUILD names a build directory to take the programs from; else build/release is built.
 set -euo pipefail
@@ -248,10 +248,33 @@ caustics() {
   draw caustics_all ball_radiosity.ply "${view[@]}"
 }
 
+pane() { # OPACITY COLOR X: a square above the floor
+  printf '%s\n' "newmtl pane$1" "Kd $2" "d $1" >> panes.mtl
+  printf '%s\n' "usemtl pane$1" "v $3 0.5 0.6" "v $3 0.5 -0.6" >> panes.obj
+  awk -v x="$3" 'BEGIN { print "v", x + 1.2, "0.5 -0.6"; print "v", x + 1.2, "0.5 0.6"; print "f -4 -3 -2 -1" }' >> panes.obj
+}
+
+translucent() {
+  say "Panes of opacity .2, .5 and 1 above a floor"
+  printf '%s\n' "newmtl floor" "Kd .8 .8 .8" > panes.mtl
+  echo "mtllib panes.mtl" > panes.obj
+  pane 0.2 ".9 .2 .1" -2.2
+  pane 0.5 ".1 .8 .2" -0.6
+  pane 1 ".1 .3 .9" 1
+  printf '%s\n' "mtllib panes.mtl" "usemtl floor" "v -3 0 2" "v 3 0 2" "v 3 0 -2" "v -3 0 -2" "f 1 2 3 4" > pane_floor.obj
+  sample panes.obj -o panes.ply --count 100000 --two-sided "${sun[@]}"
+  sample pane_floor.obj -o pane_floor.ply --count 200000
+  index panes.ply -o panes.sft
+  gather panes.sft pane_floor.ply -o pane_light.ply --mode bleeding
+  local view=(--eye "0 5 5" --look-at "0 0 0.1" --fov 40 --size 420x240)
+  draw translucent_ao pane_light.ply --channel ao "${view[@]}"
+  draw translucent_light pane_light.ply --channel irradiance --exposure 1 "${view[@]}"
+}
+
 chapters=("$@")
 if ((${#chapters[@]} == 0)); then
   chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube
-    camera caustics)
+    camera caustics translucent)
   scenes
 fi
 for chapter in "${chapters[@]}"; do "$chapter"; done
