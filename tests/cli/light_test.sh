@@ -23,6 +23,43 @@ photonsAndBouncesWork() {
   leavesNothing none.sft
 }
 
+# Other light for a scene: the light of the sampler, layers, and what is refused.
+relightGivesOtherLight() {
+  "$cornell_scene" .
+  local lamp=(--light-point "0.5 0.8 0.5  1 1 1") sun=(--light-directional "-1 -2 -1  3 3 3")
+  run 0 sample cornell.obj -o cornell.ply --count 20000 --quiet
+  run 0 index cornell.ply -o cornell.sft --quiet
+  run 0 relight cornell.sft -o lamp.sft --mesh cornell.obj "${lamp[@]}" --stats relight.json
+  jsonHas relight.json gain adds surfels lit_surfels triangles file_bytes mean_radiosity phases
+  says "shadows of" "mean radiosity"
+  run 0 verify lamp.sft
+  run 0 relight lamp.sft -o both.sft --mesh cornell.obj "${sun[@]}" --add --gain 0.5 --threads 1 --memory 64M
+  run 0 verify both.sft
+  run 0 info both.sft
+  says radiosity
+  run 0 gather both.sft cornell.ply -o baked.ply --mode bleeding --quality draft --quiet
+  run 0 bounce both.sft -o bounced.sft --quality draft --quiet
+  run 0 relight bounced.sft -o again.sft --mesh cornell.obj "${lamp[@]}"
+  says "bounces of bounced.sft go"
+  run 0 bounce again.sft -o bounced.sft --quality draft --quiet
+
+  run 0 relight cornell.sft -o bright.sft "${lamp[@]}"
+  says "no shadows" --mesh
+  run 3 relight cornell.sft -o none.sft "${lamp[@]}" --strict
+  run 2 relight cornell.sft -o none.sft --light-pont "1 1 1  1 1 1"
+  says --light-point
+  run 2 relight cornell.sft -o none.sft --light-point "1 1 1"
+  run 2 relight cornell.sft -o none.sft "${lamp[@]}" --gain -1
+  run 2 relight cornell.sft -o none.sft "${lamp[@]}" --ground-plane
+  run 2 relight cornell.sft -o cornell.sft "${lamp[@]}"
+  run 74 relight cornell.sft -o none.sft "${lamp[@]}" --mesh nowhere.obj
+  run 0 convert cornell.ply -o bare.ply --keep position,normal --quiet
+  run 0 index bare.ply -o bare.sft --quiet
+  run 3 relight bare.sft -o none.sft "${lamp[@]}"
+  says "no albedo" albedo_r
+  leavesNothing none.sft
+}
+
 # By the name of the result; all of them are read again.
 radianceWritesEveryFormat() {
   local extension
