@@ -66,6 +66,10 @@ void addShadowOptions(CLI::App& command, RelightOptions& options) {
       ->type_name("MESH")
       ->group(kGroup);
   command
+      .add_flag("!--no-mesh-light", options.meshes_emit,
+                "Emissive triangles of the meshes give no light: for layers on light that has it")
+      ->group(kGroup);
+  command
       .add_option("--shadow-bias", options.shadow_bias,
                   "Distance above a surfel at which its shadow rays start, at least; more where "
                   "surfels do not lie on the meshes")
@@ -102,7 +106,8 @@ void addRelightCommand(CLI::App& app, CommandContext& context) {
       "Examples:\n"
       "  surfeit relight cornell.sft -o noon.sft --mesh cornell.obj \\\n"
       "      --light-directional \"-1 -2 -1  3 3 3\"\n"
-      "  surfeit relight noon.sft -o lamp.sft --mesh cornell.obj --add --gain 0.5 \\\n"
+      "  surfeit relight noon.sft -o lamp.sft --mesh cornell.obj --no-mesh-light --add --gain 0.5 "
+      "\\\n"
       "      --light-point \"0.5 0.9 0.5  2 2 1\"");
   command->callback(
       [arguments, &context] { context.run([&] { return runRelight(*arguments, context); }); });

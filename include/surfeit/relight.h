@@ -21,12 +21,14 @@
 namespace surfeit {
 
 struct RelightOptions {
-  // Lights, and shadow rays per light. Emissive triangles of the meshes light the surfels, too.
+  // Lights, and shadow rays per light.
   // `with_emission` is refused: a scene does not keep the emission of its surfels.
   Lights lights;
   // Triangle meshes that cast shadows, in the coordinates of the scene: those that were sampled,
   // fewer, or others. None: light passes through everything, which a note tells.
   std::vector<std::string> meshes;
+  // Emissive triangles of the meshes light the surfels, too. Of layers one alone should have them.
+  bool meshes_emit = true;
   GroundPlane ground;  // below the meshes; casts shadows, too
   double gain = 1;     // factor of the new light, 0 to 1e6
   bool adds = false;   // keep the radiosity of the scene, and add the new light to it

@@ -27,7 +27,8 @@ class DirectLight {
   DirectLight(const Mesh& mesh, const Lights& lights) : DirectLight(mesh, nullptr, lights) {}
 
   // Is there anything that emits?
-  bool hasLight() const { return !lights_.isEmpty() || !emissive_.empty(); }
+  bool hasLight() const { return !lights_.isEmpty() || hasEmissiveMeshes(); }
+  bool hasEmissiveMeshes() const { return !emissive_.empty(); }
 
   // Irradiance on the front side; at a point without a normal the mean over the surface of a small
   // sphere. Area lights are sampled with a Hammersley pattern shifted by

@@ -168,6 +168,12 @@ Result<RelightStats> Relighter::run() {
         "or meshes with emission (Ke)",
         scene_path_));
   }
+  if (options_.adds && light.hasEmissiveMeshes()) {
+    progress_.note(fmt::format(
+        "{}: the emissive triangles of the meshes give light that is added, too: leave it out "
+        "(--no-mesh-light) where {} has it already",
+        result_path_, scene_path_));
+  }
   RelitRadiosity radiosity(scene_, light, scene_.header().origin - mesh_.origin, options_);
   SURFEIT_RETURN_IF_ERROR(write(radiosity));
   stats_.lit_surfels = radiosity.litSurfels();
@@ -207,6 +213,9 @@ Status Relighter::loadShadows() {
   progress_.beginPhase("load", 0, "triangles");
   const Surroundings surroundings = {.ground = options_.ground, .lights = options_.lights};
   SURFEIT_ASSIGN_OR_RETURN(mesh_, loadScene(options_.meshes, surroundings, progress_));
+  if (!options_.meshes_emit) {
+    for (Material& material : mesh_.materials) material.emission = glm::vec3(0);
+  }
   stats_.triangles = mesh_.triangle.size();
   stats_.load_seconds = secondsSince(begin);
 

@@ -34,6 +34,8 @@ relightGivesOtherLight() {
   says "shadows of" "mean radiosity"
   run 0 verify lamp.sft
   run 0 relight lamp.sft -o both.sft --mesh cornell.obj "${sun[@]}" --add --gain 0.5 --threads 1 --memory 64M
+  says --no-mesh-light
+  run 0 relight lamp.sft -o both.sft --mesh cornell.obj "${sun[@]}" --add --gain 0.5 --no-mesh-light --strict
   run 0 verify both.sft
   run 0 info both.sft
   says radiosity

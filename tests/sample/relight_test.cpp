@@ -183,6 +183,16 @@ TEST_F(Relighting, AreaLightsAndEmissiveMeshesAgreeWithinTheirNoise) {
   options.meshes = {mesh};
   const glm::dvec3 found = power(relit(sampled(mesh, "dark.sft", dark, true), options));
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c] / expected[c], 1, 2e-3);
+
+  // The area light alone, and the emissive triangles as a layer on it
+  options.meshes_emit = false;
+  const glm::dvec3 area = power(relit(path("dark.sft"), options, "area.sft"));
+  EXPECT_LT(area.r, 0.9 * found.r);
+  options.meshes_emit = options.adds = true;
+  options.lights.areas.clear();
+  const glm::dvec3 layers = power(relit(path("area.sft"), options, "layers.sft"));
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(layers[c] / found[c], 1, 1e-6);
+  EXPECT_THAT(notes_.notes, ::testing::Contains(HasSubstr("--no-mesh-light")));
 }
 
 TEST_F(Relighting, LayersWithGainsAddUp) {
