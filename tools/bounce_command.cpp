@@ -91,7 +91,7 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
   addQualityOptions(*command, options.quality);
-  addSubsetOption(*command, options.groups);
+  addSubsetOption(*command, options.groups, arguments->scene);
   addCacheOptions(*command, options.cache_split, options.direct_io);
   addTemporaryOption(*command, options.temporary_directory)->group("Paging");
   context.addCommonOptions(*command);

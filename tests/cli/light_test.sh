@@ -210,4 +210,56 @@ subsetsAreChosenByGroup() {
   leavesNothing none
 }
 
+# The scene above, built from a file for each group, whose names choose as the numbers do.
+subsetsAreChosenByName() {
+  makeGroupedScene
+  local group
+  for group in 0 3 7; do
+    run 0 convert groups.ply -o "group_$group.ply" --filter "group == $group" \
+      --keep position,normal,radius,area,radiosity --quiet
+  done
+  run 0 index group_0.ply --group screen=group_3.ply --group "lamp=group_7.ply" -o named.sft
+  run 0 verify named.sft
+  run 0 info named.sft
+  says "groups         0-2 (1 screen, 2 lamp)"
+  run 0 info named.sft --json
+  says '"group_names": {' '"1": "screen"' '"2": "lamp"'
+
+  local chosen
+  for chosen in "7 lamp" "3,7 screen,lamp" "0,7 0,lamp" "0-63 0-63"; do
+    run 0 gather groups.sft group_0.ply -o by_number.ply --mode bleeding --subset "${chosen% *}" --quiet
+    run 0 gather named.sft group_0.ply -o by_name.ply --mode bleeding --subset "${chosen#* }" --quiet
+    sameBytes by_number.ply by_name.ply
+  done
+
+  # Names stay with the light; files of one name are one group, in place of their own
+  run 0 index group_0.ply --group "all of it=groups.ply" --group "all of it=group_7.ply" -o one.sft
+  says "groups of its own are left out"
+  run 0 info one.sft
+  says "groups         0,1 (1 all of it)"
+  run 0 index --group floor=group_0.ply -o floor.sft --dry-run
+  run 3 index --group floor=groups.ply -o none.sft --strict
+
+  run 2 gather named.sft group_0.ply -o none.ply --subset lump
+  says "--subset" lump "screen, lamp"
+  run 2 gather groups.sft group_0.ply -o none.ply --subset lamp
+  says "names of the scene: none"
+  run 74 gather nowhere.sft group_0.ply -o none.ply --subset lamp
+  run 2 index --group 7up=group_7.ply -o none.sft
+  says "begins with a digit"
+  run 2 index --group group_7.ply -o none.sft
+  says "NAME=FILE"
+  run 74 index --group lamp=nowhere.ply -o none.sft
+  run 2 index -o none.sft
+  local many=()
+  for group in {1..64}; do many+=(--group "name_$group=group_7.ply"); done
+  run 2 index "${many[@]}" -o none.sft
+  says "at most 63"
+  cp group_7.ply copy.ply
+  run 2 index --group lamp=copy.ply -o copy.ply
+  says "its input"
+  sameBytes copy.ply group_7.ply
+  leavesNothing none
+}
+
 runCase
