@@ -262,4 +262,43 @@ subsetsAreChosenByName() {
   leavesNothing none
 }
 
+# Bounces at few of the surfels, the last one too, against those at all surfels.
+sparedBouncesAreNearTheWholeOnes() {
+  makeScene 40000
+  run 0 bounce cornell.sft -o whole.sft --bounces 2 --quality draft --stats whole.json --quiet
+  run 0 bounce cornell.sft -o spared.sft --bounces 2 --quality draft --surfels-per-receiver 16 --spare-last \
+    --stats spared.json --quiet
+  run 0 bounce cornell.sft -o most.sft --bounces 2 --quality draft --surfels-per-receiver 16 --stats most.json --quiet
+  run 0 verify spared.sft
+  differentBytes spared.sft most.sft
+  jsonHas spared.json spare_last
+  local name
+  for name in whole most spared; do
+    sed -n -E 's/^ *"receivers": ([0-9]+),?$/\1/p' $name.json | xargs echo $name >> receivers
+    run 0 convert $name.sft -o $name.csv --keep radiosity,area --quiet
+  done
+  cat receivers
+  # Receivers of both bounces: all; few and all; few
+  awk '{ first[$1] = $2; last[$1] = $3 }
+       END { exit !(last["most"] == last["whole"] && first["spared"] == first["most"] &&
+                    last["spared"] == first["spared"] && 6 * last["spared"] < last["whole"]) }' receivers ||
+    fail "numbers of receivers"
+  # Error of what the bounces add, weighted by area, as a part of what they add: root mean square
+  run 0 convert cornell.sft -o direct.csv --keep radiosity,area --quiet
+  head -3 whole.csv
+  paste -d, direct.csv whole.csv spared.csv | awk -F, '
+    NR == 1 { for (i = 1; i <= NF; ++i) at[$i, ++seen[$i]] = i; next }
+    { for (n = split("r g b", c, " "); n; --n) {
+        name = "radiosity_" c[n]
+        whole = $at[name, 2] - $at[name, 1]; spared = $at[name, 3] - $at[name, 1]
+        w = $at["area", 1]; e += w * (spared - whole) ^ 2; s += w * whole ^ 2; d += w * (spared - whole); m += w * whole
+      } }
+    END { rms = sqrt(e / s); mean = d / m; printf "error: rms %.4f, mean %.4f of the bounces\n", rms, mean
+          exit !(rms > 0 && rms < 0.08 && mean < 0.01 && mean > -0.01) }' ||
+    fail "spared bounces are too far off"
+  run 2 bounce cornell.sft -o none.sft --spare-last
+  says --surfels-per-receiver
+  leavesNothing none
+}
+
 runCase
