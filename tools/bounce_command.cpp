@@ -59,6 +59,7 @@ Status runBounce(BounceArguments& arguments, CommandContext& context) {
   return context.writeStats({{"command", "bounce"},
                              {"bounces", options.bounces},
                              {"surfels_per_receiver", options.surfels_per_receiver},
+                             {"spare_last", options.spare_last},
                              {"max_solid_angle", options.quality.max_solid_angle},
                              {"raster_resolution", options.quality.raster_resolution},
                              {"near_field_radii", options.quality.near_field_radii},
@@ -84,14 +85,20 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
   command->add_option("--bounces", options.bounces, "Number of bounces")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+  CLI::Option* const spared =
+      command
+          ->add_option(
+              "--surfels-per-receiver", options.surfels_per_receiver,
+              "Gather all bounces but the last at about one surfel out of N, and interpolate; "
+              "1: at every surfel")
+          ->check(CLI::Range(1, 64))
+          ->capture_default_str();
   command
-      ->add_option("--surfels-per-receiver", options.surfels_per_receiver,
-                   "Gather all bounces but the last at about one surfel out of N, and interpolate; "
-                   "1: at every surfel")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
+      ->add_flag("--spare-last", options.spare_last,
+                 "Gather the last bounce at one surfel out of N, too")
+      ->needs(spared);
   addQualityOptions(*command, options.quality);
-  addSubsetOption(*command, options.groups);
+  addSubsetOption(*command, options.groups, arguments->scene);
   addCacheOptions(*command, options.cache_split, options.direct_io);
   addTemporaryOption(*command, options.temporary_directory)->group("Paging");
   context.addCommonOptions(*command);

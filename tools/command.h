@@ -138,6 +138,7 @@ void addNormalsCommand(CLI::App& app, CommandContext& context);
 void addGatherCommand(CLI::App& app, CommandContext& context);
 void addMergeCommand(CLI::App& app, CommandContext& context);
 void addRadianceCommand(CLI::App& app, CommandContext& context);
+void addRelightCommand(CLI::App& app, CommandContext& context);
 void addBounceCommand(CLI::App& app, CommandContext& context);
 void addBrickCommand(CLI::App& app, CommandContext& context);
 void addTuneCommand(CLI::App& app, CommandContext& context);

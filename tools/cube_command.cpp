@@ -229,7 +229,7 @@ void addCubeCommand(CLI::App& app, CommandContext& context) {
   addModeOption(*command, arguments->options.mode);
   addQualityOptions(*command, arguments->options.quality);
   addDirectionOptions(*command, arguments->options);
-  addSubsetOption(*command, arguments->options.groups);
+  addSubsetOption(*command, arguments->options.groups, arguments->scene);
   addCubePictureOptions(*command, *arguments);
   context.addCommonOptions(*command);
   command->footer(

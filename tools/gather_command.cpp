@@ -183,7 +183,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
   addCloudOutputOption(*command, arguments->result, "Result cloud", true);
   addGatherOptions(*command, arguments->options);
   addLightOptions(*command, arguments->options);
-  addSubsetOption(*command, arguments->options.groups);
+  addSubsetOption(*command, arguments->options.groups, arguments->scene);
   command->add_option("--cache-series", arguments->series,
                       "Write statistics of the caches over time to this file, .csv or .json");
   command->add_flag("--dry-run", arguments->is_dry_run,

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "surfeit/group_names.h"
 #include "surfeit/scene.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
@@ -68,16 +69,31 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
       ->group(kGroup);
 }
 
-void addSubsetOption(CLI::App& command, std::uint64_t& groups) {
+namespace {
+
+// A list of numbers does not need the scene. One that cannot be read is the command's to refuse.
+Result<std::uint64_t> chosenGroups(const std::string& text, const std::string& scene) {
+  Result<std::uint64_t> numbers = parseGroups(text);
+  const bool has_names = text.find_first_not_of("0123456789,-+. ") != text.npos;
+  if (numbers.ok() || !has_names) return numbers;
+  const Result<std::vector<GroupName>> names = readGroupNames(scene);
+  if (!names.ok()) return kAllGroups;
+  return parseGroupNames(text, *names);
+}
+
+}  // namespace
+
+void addSubsetOption(CLI::App& command, std::uint64_t& groups, const std::string& scene) {
   command
       .add_option_function<std::string>(
           "--subset",
-          [&groups](const std::string& found) {
-            const Result<std::uint64_t> chosen = parseGroups(found);
+          [&groups, &scene](const std::string& found) {
+            const Result<std::uint64_t> chosen = chosenGroups(found, scene);
             if (!chosen.ok()) throw CLI::ValidationError("--subset", chosen.status().message());
             groups = *chosen;
           },
-          "Object groups that send light and cover, such as 0,2-5; other surfels are ignored")
+          "Object groups that send light and cover, such as 0,2-5 or lamp,tree (index --group); "
+          "other surfels are ignored")
       ->type_name("GROUPS")
       ->default_str("all");
 }

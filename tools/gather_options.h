@@ -42,8 +42,9 @@ void addModeOption(CLI::App& command, GatherMode& mode);
 void addQualityOptions(CLI::App& command, GatherQuality& quality);
 void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io);
 
-// --subset, the groups of surfels that are seen.
-void addSubsetOption(CLI::App& command, std::uint64_t& groups);
+// --subset, the groups of surfels that are seen, by numbers or by their names in `scene`: an
+// argument of the command that was added before.
+void addSubsetOption(CLI::App& command, std::uint64_t& groups, const std::string& scene);
 
 // "occlusion", "bleeding", "glossy"
 const char* modeName(GatherMode mode);

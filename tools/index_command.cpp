@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/group_names.h"
 #include "surfeit/index.h"
 #include "surfeit/process.h"
 #include "tools/channel_options.h"
@@ -53,6 +54,19 @@ Status sayForecast(const IndexArguments& arguments, CommandContext& context) {
                              {"temporary_bytes", forecast.temporary_bytes},
                              {"file_bytes", forecast.file_bytes},
                              {"seconds", forecast.seconds}});
+}
+
+NamedInput parseNamedInput(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const NamedInput input = {text.substr(0, equals),
+                            equals == text.npos ? "" : text.substr(equals + 1)};
+  const Status named = checkGroupName(input.name);
+  if (!named.ok()) throw CLI::ValidationError("--group", named.message());
+  if (input.path.empty()) {
+    throw CLI::ValidationError("--group",
+                               fmt::format("found \"{}\", expected NAME=FILE: a cloud", text));
+  }
+  return input;
 }
 
 Repeats parseRepeats(const std::string& text) {
@@ -137,10 +151,19 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       app.add_subcommand("index", "Build a paged octree file (.sft) from surfel clouds");
   const auto arguments = std::make_shared<IndexArguments>();
   IndexOptions& options = arguments->options;
+  command->add_option("CLOUD", arguments->inputs,
+                      "Surfel clouds (docs/files.md, or recipes of generate), in any order");
   command
-      ->add_option("CLOUD", arguments->inputs,
-                   "Surfel clouds (docs/files.md, or recipes of generate), in any order")
-      ->required();
+      ->add_option_function<std::vector<std::string>>(
+          "--group",
+          [&options](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) options.named.push_back(parseNamedInput(text));
+          },
+          "A cloud whose surfels are an object group of that name, for --subset NAME; repeatable")
+      ->type_name("NAME=FILE")
+      ->type_size(1)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command->add_option("-o,--output", arguments->output, "Scene file to write (.sft)")->required();
   addChannelOptions(*command, options.channels, options.part, options.filter);
   addColorRangeOption(*command, options.color_range);
@@ -203,6 +226,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "  surfeit index lion.ply -o lion.sft\n"
       "  surfeit index city.ply -o city.sft --memory 512M --dry-run\n"
       "  surfeit index part1.ply part2.ply -o city.sft --memory 512M --temp /scratch\n"
+      "  surfeit index room.ply --group lamp=lamp.ply --group tree=tree.ply -o named.sft\n"
       "  surfeit index tile1.las tile2.las -o survey.sft --overlap thin\n"
       "  surfeit index city.ply -o city.sft --memory 80%\n"
       "  surfeit index frame2.ply -o frame2.sft --cube frame1.sft\n"

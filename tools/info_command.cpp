@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "surfeit/cloud_info.h"
+#include "surfeit/group_names.h"
 #include "surfeit/scene.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
@@ -93,7 +94,7 @@ std::string missingText(const nlohmann::json& json) {
   return text;
 }
 
-nlohmann::json sceneJson(const SceneInfo& info) {
+nlohmann::json sceneJson(const SceneInfo& info, const std::vector<GroupName>& names) {
   nlohmann::json json = {
       {"format", "sft"},
       {"file_bytes", info.file_bytes},
@@ -116,6 +117,7 @@ nlohmann::json sceneJson(const SceneInfo& info) {
       {"node_pages_by_level", info.level_pages},
   };
   if (info.channels.group) json["groups"] = describeGroups(info.groups);
+  for (const GroupName& name : names) json["group_names"][std::to_string(name.group)] = name.name;
   json["provenance"] = nlohmann::json::parse(info.provenance, nullptr, false);
   return json;
 }
@@ -131,13 +133,23 @@ std::string placeText(const glm::dvec3& place, const glm::dvec3& origin) {
   return text;
 }
 
-std::string sceneText(const std::string& path, const SceneInfo& info) {
+// "0-2 (1 lamp, 2 tree)"
+std::string groupText(const SceneInfo& info, const std::vector<GroupName>& names) {
+  std::string text;
+  for (const GroupName& name : names) {
+    text += fmt::format("{}{} {}", text.empty() ? " (" : ", ", name.group, name.name);
+  }
+  return describeGroups(info.groups) + text + (text.empty() ? "" : ")");
+}
+
+std::string sceneText(const std::string& path, const SceneInfo& info,
+                      const std::vector<GroupName>& names) {
   const std::string origin =
       info.origin == glm::dvec3(0)
           ? ""
           : fmt::format("\n  origin         {} {} {}", info.origin.x, info.origin.y, info.origin.z);
   const std::string groups =
-      info.channels.group ? fmt::format("  groups         {}\n", describeGroups(info.groups)) : "";
+      info.channels.group ? fmt::format("  groups         {}\n", groupText(info, names)) : "";
   return fmt::format(
       "{}: Surfeit scene, {} surfels, {} nodes\n"
       "  file           {} ({:.1f} bytes per surfel)\n"
@@ -297,9 +309,10 @@ Status runInfo(const InfoArguments& arguments, CommandContext& context) {
           arguments.path));
     }
     SURFEIT_ASSIGN_OR_RETURN(const SceneInfo info, readSceneInfo(arguments.path));
-    json = sceneJson(info);
+    SURFEIT_ASSIGN_OR_RETURN(const std::vector<GroupName> names, readGroupNames(arguments.path));
+    json = sceneJson(info, names);
     SURFEIT_RETURN_IF_ERROR(addSurfelsOfScene(arguments.path, info, json, context.progress()));
-    text = sceneText(arguments.path, info) + densityText(json) + missingText(json);
+    text = sceneText(arguments.path, info, names) + densityText(json) + missingText(json);
   } else {
     SURFEIT_ASSIGN_OR_RETURN(const CloudInfo info,
                              readCloudInfo(arguments.path, arguments.reading, context.progress()));

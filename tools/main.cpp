@@ -26,6 +26,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addGatherCommand(app, context);
   addMergeCommand(app, context);
   addRadianceCommand(app, context);
+  addRelightCommand(app, context);
   addBounceCommand(app, context);
   addBrickCommand(app, context);
   addTuneCommand(app, context);

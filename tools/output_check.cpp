@@ -79,7 +79,10 @@ Status checkOutputs(const CLI::App& command, bool works_in_place) {
       const bool is_allowed =
           works_in_place && option->get_positional() && output.option == "--output";
       for (const std::string& input : option->results()) {
-        if (!is_allowed) SURFEIT_RETURN_IF_ERROR(checkAgainst(output, input, "its input"));
+        if (is_allowed) continue;
+        SURFEIT_RETURN_IF_ERROR(checkAgainst(output, input, "its input"));
+        const std::string named = input.substr(input.find('=') + 1);  // NAME=FILE
+        SURFEIT_RETURN_IF_ERROR(checkAgainst(output, named, "its input"));
       }
     }
   }

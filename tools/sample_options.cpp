@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -53,10 +54,16 @@ void addLightOption(CLI::App& app, const std::string& name, const std::string& e
 
 constexpr float kNoLimit = 3e38f;
 
+// Parses a reflectance into `target`.
+std::function<void(const std::string&)> reflectance(const std::string& name, glm::vec3& target) {
+  return [name, &target](const std::string& value) {
+    target = colorAt(name, vectorAt(parseNumberList<3>(name, value, "\"r g b\""), 0), 1);
+  };
+}
+
 }  // namespace
 
-void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
-  Lights& lights = surroundings.lights;
+void addLampOptions(CLI::App& app, Lights& lights) {
   addLightOption<6>(
       app, "--light-point", "x y z r g b", "Point light: position, intensity in W/sr; repeatable",
       [&lights](const std::array<double, 6>& n) {
@@ -81,17 +88,31 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->capture_default_str()
       ->check(CLI::Range(1, 65536))
       ->group("Light");
-  app.add_flag("--emission", lights.with_emission,
+}
+
+void addGroundOptions(CLI::App& app, GroundPlane& ground) {
+  app.add_flag("--ground-plane", ground.enabled, "Add a square below the meshes")->group("Ground");
+  app.add_option("--ground-size", ground.size,
+                 "Edge of the ground, as a multiple of the scene's diagonal")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber)
+      ->group("Ground");
+  app.add_option_function<std::string>("--ground-albedo",
+                                       reflectance("--ground-albedo", ground.albedo),
+                                       "Reflectance of the ground [\"0.5 0.5 0.5\"]")
+      ->type_name("\"r g b\"")
+      ->group("Ground");
+}
+
+void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
+  addLampOptions(app, surroundings.lights);
+  app.add_flag("--emission", surroundings.lights.with_emission,
                "Surfels of emissive surfaces carry the emission, too; a gather then counts their "
                "light twice, because it is already in the direct light of other surfels")
       ->group("Light");
 
-  const auto color = [](const std::string& name, glm::vec3& target) {
-    return [name, &target](const std::string& value) {
-      target = colorAt(name, vectorAt(parseNumberList<3>(name, value, "\"r g b\""), 0), 1);
-    };
-  };
-  app.add_option_function<std::string>("--albedo", color("--albedo", surroundings.default_albedo),
+  app.add_option_function<std::string>("--albedo",
+                                       reflectance("--albedo", surroundings.default_albedo),
                                        "Reflectance of meshes without colors and materials "
                                        "[\"0.5 0.5 0.5\"]")
       ->type_name("\"r g b\"");
@@ -109,17 +130,8 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->check(CLI::PositiveNumber.description(""))
       ->group("Hair and curves");
 
+  addGroundOptions(app, surroundings.ground);
   GroundPlane& ground = surroundings.ground;
-  app.add_flag("--ground-plane", ground.enabled, "Add a square below the meshes")->group("Ground");
-  app.add_option("--ground-size", ground.size,
-                 "Edge of the ground, as a multiple of the scene's diagonal")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber)
-      ->group("Ground");
-  app.add_option_function<std::string>("--ground-albedo", color("--ground-albedo", ground.albedo),
-                                       "Reflectance of the ground [\"0.5 0.5 0.5\"]")
-      ->type_name("\"r g b\"")
-      ->group("Ground");
   app.add_option_function<std::string>(
          "--up", [&ground](const std::string& axis) { ground.up = UpAxis(axis[0] - 'x'); },
          "Axis that points up: x, y or z; the cloud states it [y]")

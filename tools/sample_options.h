@@ -12,6 +12,10 @@
 
 namespace surfeit {
 
+// Parts of what is below, for commands that take some of it: --light-*; --ground-*.
+void addLampOptions(CLI::App& app, Lights& lights);
+void addGroundOptions(CLI::App& app, GroundPlane& ground);
+
 // Adds --light-*, --ground-* and --albedo; parsing fills `surroundings`, which must outlive `app`.
 // A malformed value is a usage error that names the option and what it expects.
 void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings);

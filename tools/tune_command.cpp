@@ -205,7 +205,7 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
   command->add_flag("--json", arguments->json, "Print the report as JSON on stdout");
   addGatherOptions(*command, options.gather);
   addLightOptions(*command, options.gather);
-  addSubsetOption(*command, options.gather.groups);
+  addSubsetOption(*command, options.gather.groups, arguments->scene);
   context.addCommonOptions(*command);
   command->footer(
       "Follows the look-ups of a sample of the receivers, and predicts hit rates, bytes read and\n"

@@ -30,6 +30,9 @@ struct BounceOptions : JobOptions {
   // All bounces but the last are gathered at about one surfel out of this many, 1 to 64, and
   // interpolated to its neighbours by distance and normal. 1: at every surfel.
   int surfels_per_receiver = 1;
+  // The last bounce, too. A gather from the result smooths it once more; a picture of the
+  // radiosity itself shows the interpolation.
+  bool spare_last = false;
   // Set of the object groups that send light and cover, as in GatherSettings; all surfels receive.
   std::uint64_t groups = kAllGroups;
 
@@ -62,11 +65,11 @@ struct BounceStats {
 // A two-sided surfel has one radiosity for both sides; it receives the mean of its two sides. A
 // sphere receives the mean over all directions. So no light is lost, and none is made.
 //
-// The result depends only on scene, bounces, quality, surfels_per_receiver, groups and the
-// machine's instruction set, bit for bit. With albedo above 1 radiosity can grow without end; it is
-// limited to 1e12.
-// Errors: as indexClouds; kCorruption for a scene without albedo or radiosity; kInvalidArgument for
-// a scene that bounceScene has written, because its bounces would count twice.
+// The result depends only on scene, bounces, quality, surfels_per_receiver, spare_last,
+// groups and the machine's instruction set, bit for bit. With albedo above 1 radiosity can grow
+// without end; it is limited to 1e12. Errors: as indexClouds; kCorruption for a scene without
+// albedo or radiosity; kInvalidArgument for a scene that bounceScene has written, because its
+// bounces would count twice.
 SURFEIT_API Result<BounceStats> bounceScene(const std::string& scene_path,
                                             const std::string& result_path,
                                             const BounceOptions& options, Progress& progress);

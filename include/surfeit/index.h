@@ -25,6 +25,12 @@ enum class Repeats {
   kThin,  // one stays, the same for any order of the inputs; a note reports the number left out
 };
 
+// An input whose surfels belong to the object group of that name.
+struct NamedInput {
+  std::string name;  // as checkGroupName has it (surfeit/group_names.h)
+  std::string path;
+};
+
 // `memory_bytes`: 0 stands for 1 GiB, or for three quarters of the memory that the job may hold
 // where that is less.
 struct IndexOptions : JobOptions, ReadOptions {
@@ -49,6 +55,11 @@ struct IndexOptions : JobOptions, ReadOptions {
   // Surfels on no surface stay spheres or become two-sided. Absent: surfels without a normal are
   // spheres.
   std::optional<NormalEstimation> normals{};
+  // More input files, whose surfels belong to object groups with names, which the scene keeps.
+  // Names get the groups 1, 2, ... in the order in which they come here; files of one name are one
+  // group, in place of groups of their own. Surfels of the other inputs keep their groups, or have
+  // 0.
+  std::vector<NamedInput> named{};
 };
 
 struct IndexStats {
@@ -72,7 +83,8 @@ struct IndexStats {
 // Writes `output` from the surfels of all inputs. The result depends only on the surfels and the
 // options that describe the scene, not on the order of the surfels, the threads or the budget. It
 // appears under its name only when complete. Channels that an input lacks are filled in by the
-// rules of docs/format.md and reported through progress.note().
+// rules of docs/format.md and reported through progress.note(). `inputs` may be empty where
+// `options.named` is not.
 // Errors: kIoError, kCorruption (bad input, or no valid surfel at all), kInvalidArgument,
 // kBudgetTooSmall, kInterrupted.
 SURFEIT_API Result<IndexStats> indexClouds(const std::vector<std::string>& inputs,

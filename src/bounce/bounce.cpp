@@ -96,7 +96,8 @@ class Bouncer {
   Result<SceneFile> write(int bounce, BounceRadiosity& radiosity, BouncePass& pass);
   std::string phase(const char* what, int bounce) const;
   int surfelsPerReceiver(int bounce) const {
-    return bounce < options_.bounces ? options_.surfels_per_receiver : 1;
+    const bool is_spared = bounce < options_.bounces || options_.spare_last;
+    return is_spared ? options_.surfels_per_receiver : 1;
   }
   std::string provenance() const;
 
@@ -300,6 +301,7 @@ std::string Bouncer::provenance() const {
                           {"bias", quality.bias},
                           {"max_distance", quality.max_distance},
                           {"both_sides", quality.sides == GatherSides::kBoth}};
+  if (options_.spare_last) json[kProvenanceKey]["spare_last"] = true;
   if (options_.groups != kAllGroups) {
     json[kProvenanceKey]["groups"] = describeGroups(options_.groups);
   }

@@ -26,8 +26,12 @@ constexpr std::uint64_t kLeastPlaces = 2048, kMostPlaces = 16384;
 class InputPass {
  public:
   InputPass(const SurfelSource& source, const CloudReader::Consumer& consume,
-            std::uint64_t sample_step, Progress& progress)
-      : source_(source), consume_(consume), sample_step_(sample_step), progress_(progress) {}
+            std::uint64_t sample_step, std::optional<std::uint8_t> group, Progress& progress)
+      : source_(source),
+        consume_(consume),
+        sample_step_(sample_step),
+        group_(group),
+        progress_(progress) {}
 
   void decode(const RowFetcher::Rows& rows);
 
@@ -43,6 +47,7 @@ class InputPass {
   const SurfelSource& source_;
   const CloudReader::Consumer& consume_;
   const std::uint64_t sample_step_;
+  const std::optional<std::uint8_t> group_;
   Progress& progress_;
   FirstFailure failure_;
   std::mutex mutex_;  // guards what is below
@@ -57,6 +62,9 @@ Status InputPass::decodePart(Bytes rows, std::uint64_t first_record, CloudTotals
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
                            source_.decodeRows(rows, first_record, surfels, defects));
   const std::span<Surfel> batch = std::span(surfels).first(count);
+  if (group_) {
+    for (Surfel& surfel : batch) surfel.group = *group_;
+  }
   totals.add(batch);
   const std::uint64_t phase = first_record % sample_step_;
   for (std::size_t i = phase == 0 ? 0 : sample_step_ - phase; i < count; i += sample_step_) {
@@ -190,10 +198,12 @@ Result<std::vector<Surfel>> CloudReader::sample(std::uint64_t buckets) const {
 Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& progress) const {
   CloudTotals totals;
   const std::uint64_t sample_step = std::max<std::uint64_t>(1, record_count_ / kSampleSurfels);
-  for (const std::string& path : inputs_) {
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    const std::string& path = inputs_[i];
+    const std::optional<std::uint8_t> group = groups_.empty() ? std::nullopt : groups_[i];
     SURFEIT_ASSIGN_OR_RETURN(const auto source, opener_(path, strict_, reading_));
     source->setOrigin(origin_);
-    InputPass pass(*source, consume, sample_step, progress);
+    InputPass pass(*source, consume, sample_step, group, progress);
     // Small inputs are read in parts too, so that all threads have some
     const std::uint64_t part_rows = source->recordCount() / (4 * RowFetcher::kSlots) + kReadBatch;
     RowFetcher fetcher(*source, static_cast<std::size_t>(std::min<std::uint64_t>(
@@ -216,6 +226,13 @@ Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& prog
     SURFEIT_RETURN_IF_ERROR(pass.failure().status());
     SURFEIT_RETURN_IF_ERROR(fetcher.status());
     pass.totals().channels = source->channels();
+    if (group) {
+      if (source->channels().group) {
+        progress.note(
+            fmt::format("{}: groups of its own are left out: it has a name (--group)", path));
+      }
+      pass.totals().channels.group = true;
+    }
     pass.totals().skipped = pass.defects().total();
     if (const std::string defects = pass.defects().describe(); !defects.empty()) {
       progress.note(fmt::format("{}: skipped {}", path, defects));

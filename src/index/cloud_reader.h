@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cloud/cloud_formats.h"
@@ -52,6 +53,10 @@ class CloudReader {
                                   std::size_t read_bytes, const RowReaderOptions& reading = {},
                                   const SourceOpener& opener = {});
 
+  // Object groups of all surfels of inputs, by input; absent: the input's own.
+  using Groups = std::vector<std::optional<std::uint8_t>>;
+  void setGroups(Groups groups) { groups_ = std::move(groups); }
+
   // Records of all inputs, valid or not, and bytes of the files.
   std::uint64_t recordCount() const { return record_count_; }
   std::uint64_t fileBytes() const { return file_bytes_; }
@@ -93,6 +98,7 @@ class CloudReader {
 
   std::vector<std::string> inputs_;
   std::vector<std::uint64_t> records_;  // by input
+  Groups groups_;                       // empty: all have their own
   RowReaderOptions reading_;
   SourceOpener opener_;
   bool strict_ = false;

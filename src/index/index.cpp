@@ -20,6 +20,7 @@
 #include "core/parallel.h"
 #include "core/thread_scratch.h"
 #include "index/cloud_reader.h"
+#include "index/group_plan.h"
 #include "index/index_from.h"
 #include "index/index_neighbours.h"
 #include "index/index_notes.h"
@@ -66,10 +67,9 @@ glm::vec3 moved(const glm::vec3& position, const glm::dvec3& shift) {
 
 class Indexer {
  public:
-  Indexer(const std::vector<std::string>& inputs, const std::string& output,
-          const IndexOptions& options, int threads, Progress& progress,
-          const SourceOpener& opener = {})
-      : inputs_(inputs),
+  Indexer(GroupPlan groups, const std::string& output, const IndexOptions& options, int threads,
+          Progress& progress, const SourceOpener& opener = {})
+      : groups_(std::move(groups)),
         opener_(opener),
         output_(output),
         options_(options),
@@ -107,7 +107,7 @@ class Indexer {
   std::uint64_t identity(bool full_precision) const;
   std::string provenance() const;
 
-  const std::vector<std::string>& inputs_;
+  const GroupPlan groups_;
   const SourceOpener opener_;
   const std::string& output_;
   const IndexOptions& options_;
@@ -155,7 +155,7 @@ Result<SceneFile> Indexer::runUnnamed() {
 
 Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
   stats_.memory_bytes = options_.memory_bytes;
-  if (inputs_.empty()) return Status::invalidArgument("index: no input cloud");
+  if (groups_.inputs.empty()) return Status::invalidArgument("index: no input cloud");
   SURFEIT_RETURN_IF_ERROR(checkIndexOptions(options_));
   if (options_.cube) pinned_.emplace(*options_.cube);
   SURFEIT_RETURN_IF_ERROR(openInputs());
@@ -174,8 +174,9 @@ Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
 Status Indexer::openInputs() {
   SURFEIT_ASSIGN_OR_RETURN(const RowReaderOptions reading, readingOf(options_));
   SURFEIT_ASSIGN_OR_RETURN(
-      reader_, CloudReader::open(inputs_, options_.strict, readBytesWithin(options_.memory_bytes),
-                                 reading, opener_));
+      reader_, CloudReader::open(groups_.inputs, options_.strict,
+                                 readBytesWithin(options_.memory_bytes), reading, opener_));
+  reader_->setGroups(groups_.of_inputs);
   for (const std::string& note : reader_->notes()) progress_.note(note);
   if (options_.origin || pinned_) reader_->setOrigin(originAsked({}));
   const std::uint64_t records = reader_->recordCount();
@@ -257,8 +258,8 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInputs() {
   if (!sample_.empty() || pinned_) cube = cubeOf(boundsOf(sample_));
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInto(cube));
   if (totals_.surfels == 0) {
-    return Status::corruption(
-        fmt::format("{}: no valid surfel in {} records", inputs_.front(), reader_->recordCount()));
+    return Status::corruption(fmt::format("{}: no valid surfel in {} records",
+                                          groups_.inputs.front(), reader_->recordCount()));
   }
   if (pinned_) {
     SURFEIT_RETURN_IF_ERROR(pinned_->status(totals_.surfels, totals_.bounds, reader_->origin()));
@@ -449,17 +450,17 @@ std::string Indexer::provenance() const {
     json["cube"] = *cube;
   }
   if (const std::optional<NormalRule> rule = normalRule()) json["normals"] = rule->describe();
-  return json.dump();
+  if (!groups_.names.empty()) json["groups"] = groups_.describe();
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace
 
 Result<SceneFile> indexPlaces(const std::string& input, const std::string& beside,
                               const IndexOptions& options, Progress& progress) {
-  const std::vector<std::string> inputs = {input};
   Result<SceneFile> places = Status::failed("places: not indexed");
   withThreads(options.threads, [&] {
-    places = Indexer(inputs, beside, options, options.threads, progress).runUnnamed();
+    places = Indexer({{input}, {}, {}}, beside, options, options.threads, progress).runUnnamed();
   });
   return places;
 }
@@ -470,10 +471,11 @@ Result<IndexStats> indexFrom(const std::vector<std::string>& inputs, const Sourc
   IndexOptions options = given;
   if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualIndexMemory);
   const int threads = indexThreads(options, progress);
-  return guarded(output, [&] {
+  return guarded(output, [&]() -> Result<IndexStats> {
+    SURFEIT_ASSIGN_OR_RETURN(const GroupPlan groups, planGroups(inputs, options.named, !opener));
     Result<IndexStats> result = Status::failed("index: not run");
     withThreads(threads, [&] {
-      result = Indexer(inputs, output, options, threads, progress, opener).run();
+      result = Indexer(groups, output, options, threads, progress, opener).run();
     });
     return result;
   });

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/seconds_since.h"
 #include "index/cloud_reader.h"
+#include "index/group_plan.h"
 #include "index/index_neighbours.h"
 #include "index/index_plan.h"
 #include "index/scene_rows.h"
@@ -94,6 +95,7 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
   indexing.channels = indexing.part = indexing.filter = {};
   indexing.origin.reset();
   indexing.cube.reset();
+  indexing.named.clear();
   indexing.strict = false;
   QuietProgress quiet(progress);
   const auto start = std::chrono::steady_clock::now();
@@ -124,7 +126,8 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
 Result<IndexForecast> forecastIndex(const std::vector<std::string>& inputs,
                                     const std::string& output, const IndexOptions& given,
                                     Progress& progress) {
-  if (inputs.empty()) return Status::invalidArgument("index: no input cloud");
+  SURFEIT_ASSIGN_OR_RETURN(const GroupPlan groups, planGroups(inputs, given.named, true));
+  if (groups.inputs.empty()) return Status::invalidArgument("index: no input cloud");
   IndexOptions options = given;
   if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualIndexMemory);
   if (options.threads <= 0) {
@@ -134,7 +137,8 @@ Result<IndexForecast> forecastIndex(const std::vector<std::string>& inputs,
   }
   Result<IndexForecast> result = Status::failed("index: no forecast");
   try {
-    withThreads(options.threads, [&] { result = forecast(inputs, output, options, progress); });
+    withThreads(options.threads,
+                [&] { result = forecast(groups.inputs, output, options, progress); });
   } catch (const std::exception& error) {
     return Status::failed(output + ": " + error.what());
   }

@@ -42,6 +42,13 @@ float luminance(const glm::vec3& rgb) {
   return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
 }
 
+// The cosine with which light arrives from there, times the length of `towards`. All sides of a
+// sphere together: its cross-section is a quarter of its surface.
+float arrival(const SurfacePoint& point, const glm::vec3& towards) {
+  if (point.normal == glm::vec3(0)) return 0.25f * glm::length(towards);
+  return glm::dot(towards, point.normal);
+}
+
 }  // namespace
 
 Lights countedFrom(Lights lights, const glm::dvec3& origin) {
@@ -50,11 +57,11 @@ Lights countedFrom(Lights lights, const glm::dvec3& origin) {
   return lights;
 }
 
-DirectLight::DirectLight(const Mesh& mesh, const RayScene& scene, const Lights& lights)
+DirectLight::DirectLight(const Mesh& mesh, const RayScene* scene, const Lights& lights)
     : mesh_(mesh),
       scene_(scene),
       lights_(countedFrom(lights, mesh.origin)),
-      offset_(scene.surfaceOffset()) {
+      offset_(scene != nullptr ? scene->surfaceOffset() : 0) {
   // Triangles emit in proportion to area and luminance, so they are chosen that way
   double sum = 0;
   for (std::size_t i = 0; i < mesh.triangle.size(); ++i) {
@@ -70,9 +77,14 @@ DirectLight::DirectLight(const Mesh& mesh, const RayScene& scene, const Lights& 
   }
 }
 
+glm::vec3 DirectLight::rayOrigin(const SurfacePoint& point) const {
+  return point.position + (offset_ + point.lift) * point.geometric_normal;
+}
+
 bool DirectLight::isShadowed(const SurfacePoint& point, const glm::vec3& target) const {
-  const glm::vec3 origin = point.position + offset_ * point.geometric_normal;
-  return scene_.isOccluded(origin, target - origin, 0, 1 - 1e-5f);
+  if (scene_ == nullptr) return false;
+  const glm::vec3 origin = rayOrigin(point);
+  return scene_->isOccluded(origin, target - origin, 0, 1 - 1e-5f);
 }
 
 // Light from a small piece of an emitter, per unit of its area: L cos cos' / d^2.
@@ -81,8 +93,9 @@ glm::vec3 DirectLight::fromEmitterPoint(const SurfacePoint& point, const glm::ve
   const glm::vec3 towards = position - point.position;
   const float distance_sq = glm::dot(towards, towards);
   if (!(distance_sq > 0)) return glm::vec3(0);
-  const float cosines = glm::dot(towards, point.normal) * -glm::dot(towards, normal);
-  if (glm::dot(towards, point.normal) <= 0 || cosines <= 0) return glm::vec3(0);
+  const float arriving = arrival(point, towards);
+  const float cosines = arriving * -glm::dot(towards, normal);
+  if (arriving <= 0 || cosines <= 0) return glm::vec3(0);
   if (isShadowed(point, position + offset_ * normal)) return glm::vec3(0);
   return radiance * (cosines / (distance_sq * distance_sq));
 }
@@ -138,16 +151,16 @@ glm::vec3 DirectLight::irradiance(const SurfacePoint& point, std::uint64_t seed,
   for (const PointLight& light : lights_.points) {
     const glm::vec3 position(light.position), towards = position - point.position;
     const float distance_sq = glm::dot(towards, towards);
-    const float cos_theta = glm::dot(towards, point.normal) / std::sqrt(distance_sq);
+    const float cos_theta = arrival(point, towards) / std::sqrt(distance_sq);
     if (!(cos_theta > 0) || isShadowed(point, position)) continue;
     sum += light.intensity * (cos_theta / distance_sq);
   }
   for (const DirectionalLight& light : lights_.directionals) {
     const glm::vec3 towards = -glm::normalize(light.direction);
-    const float cos_theta = glm::dot(towards, point.normal);
+    const float cos_theta = arrival(point, towards);
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
     if (!(cos_theta > 0)) continue;
-    const glm::vec3 origin = point.position + offset_ * point.geometric_normal;
-    if (scene_.isOccluded(origin, towards, 0, std::numeric_limits<float>::infinity())) continue;
+    if (scene_ != nullptr && scene_->isOccluded(rayOrigin(point), towards, 0, kInfinity)) continue;
     sum += light.irradiance * cos_theta;
   }
   for (std::size_t i = 0; i < lights_.areas.size(); ++i) {

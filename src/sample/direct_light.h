@@ -21,12 +21,17 @@ Lights countedFrom(Lights lights, const glm::dvec3& origin);
 class DirectLight {
  public:
   // Mesh and scene must outlive it.
-  DirectLight(const Mesh& mesh, const RayScene& scene, const Lights& lights);
+  DirectLight(const Mesh& mesh, const RayScene& scene, const Lights& lights)
+      : DirectLight(mesh, &scene, lights) {}
+  // The same without shadows.
+  DirectLight(const Mesh& mesh, const Lights& lights) : DirectLight(mesh, nullptr, lights) {}
 
   // Is there anything that emits?
-  bool hasLight() const { return !lights_.isEmpty() || !emissive_.empty(); }
+  bool hasLight() const { return !lights_.isEmpty() || hasEmissiveMeshes(); }
+  bool hasEmissiveMeshes() const { return !emissive_.empty(); }
 
-  // Irradiance on the front side. Area lights are sampled with a Hammersley pattern shifted by
+  // Irradiance on the front side; at a point without a normal the mean over the surface of a small
+  // sphere. Area lights are sampled with a Hammersley pattern shifted by
   // `seed`: the same seed gives the same value, and neighbours should get different ones.
   glm::vec3 irradiance(const SurfacePoint& point, std::uint64_t seed, int samples) const;
 
@@ -38,6 +43,9 @@ class DirectLight {
   int samples() const { return lights_.samples; }
 
  private:
+  DirectLight(const Mesh& mesh, const RayScene* scene, const Lights& lights);
+
+  glm::vec3 rayOrigin(const SurfacePoint& point) const;
   bool isShadowed(const SurfacePoint& point, const glm::vec3& target) const;
   glm::vec3 fromEmitterPoint(const SurfacePoint& point, const glm::vec3& position,
                              const glm::vec3& normal, const glm::vec3& radiance) const;
@@ -46,7 +54,7 @@ class DirectLight {
   glm::vec3 fromEmissiveTriangles(const SurfacePoint& point, std::uint64_t seed, int samples) const;
 
   const Mesh& mesh_;
-  const RayScene& scene_;
+  const RayScene* scene_;  // null: nothing casts shadows
   Lights lights_;
   float offset_;                            // of shadow rays from the surface
   std::vector<std::uint32_t> emissive_;     // triangles

@@ -79,6 +79,7 @@ struct SurfacePoint {
   glm::vec3 albedo{0};
   glm::vec3 emission{0};  // radiant exitance
   float opacity = 1;
+  float lift = 0;  // how much farther off the surface shadow rays start than rounding asks for
 };
 
 // The point of a triangle with barycentric weights (1 - u - v, u, v).

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <stb/stb_image.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
@@ -139,6 +140,10 @@ glm::vec3 Texture::lookup(const glm::vec2& uv) const {
   if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return texel(0, 0);
   return interpolate(footprint(uv.x, width_), footprint(1.0f - uv.y, height_),
                      [&](int column, int row) { return texel(column, row); });
+}
+
+std::uint64_t Mask::content(std::uint64_t seed) const {
+  return XXH3_64bits_withSeed(values_.data(), values_.size(), seed ^ std::uint64_t(width_));
 }
 
 }  // namespace surfeit

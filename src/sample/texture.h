@@ -53,6 +53,8 @@ class Mask {
 
   // From 0 (nothing) to 1, bilinear; coordinates as of textures.
   float lookup(const glm::vec2& uv) const;
+  // A number that differs between different masks.
+  std::uint64_t content(std::uint64_t seed) const;
 
  private:
   Mask(int width, int height, std::vector<std::uint8_t> values);

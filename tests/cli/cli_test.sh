@@ -115,7 +115,7 @@ helpAndVersionExitWithZero() {
   says "surfeit 0."
   run 0 --help
   local command help=$said
-  for command in sample generate convert index info verify gather bounce radiance brick tune view \
+  for command in sample generate convert index info verify gather relight bounce radiance brick tune view \
     composite cube normals merge plan ptfilter brickmake; do
     [[ $help == *"  $command "* ]] || fail "no $command in: $help"
     run 0 "$command" --help

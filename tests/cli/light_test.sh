@@ -23,6 +23,45 @@ photonsAndBouncesWork() {
   leavesNothing none.sft
 }
 
+# Other light for a scene: the light of the sampler, layers, and what is refused.
+relightGivesOtherLight() {
+  "$cornell_scene" .
+  local lamp=(--light-point "0.5 0.8 0.5  1 1 1") sun=(--light-directional "-1 -2 -1  3 3 3")
+  run 0 sample cornell.obj -o cornell.ply --count 20000 --quiet
+  run 0 index cornell.ply -o cornell.sft --quiet
+  run 0 relight cornell.sft -o lamp.sft --mesh cornell.obj "${lamp[@]}" --stats relight.json
+  jsonHas relight.json gain adds surfels lit_surfels triangles file_bytes mean_radiosity phases
+  says "shadows of" "mean radiosity"
+  run 0 verify lamp.sft
+  run 0 relight lamp.sft -o both.sft --mesh cornell.obj "${sun[@]}" --add --gain 0.5 --threads 1 --memory 64M
+  says --no-mesh-light
+  run 0 relight lamp.sft -o both.sft --mesh cornell.obj "${sun[@]}" --add --gain 0.5 --no-mesh-light --strict
+  run 0 verify both.sft
+  run 0 info both.sft
+  says radiosity
+  run 0 gather both.sft cornell.ply -o baked.ply --mode bleeding --quality draft --quiet
+  run 0 bounce both.sft -o bounced.sft --quality draft --quiet
+  run 0 relight bounced.sft -o again.sft --mesh cornell.obj "${lamp[@]}"
+  says "bounces of bounced.sft go"
+  run 0 bounce again.sft -o bounced.sft --quality draft --quiet
+
+  run 0 relight cornell.sft -o bright.sft "${lamp[@]}"
+  says "no shadows" --mesh
+  run 3 relight cornell.sft -o none.sft "${lamp[@]}" --strict
+  run 2 relight cornell.sft -o none.sft --light-pont "1 1 1  1 1 1"
+  says --light-point
+  run 2 relight cornell.sft -o none.sft --light-point "1 1 1"
+  run 2 relight cornell.sft -o none.sft "${lamp[@]}" --gain -1
+  run 2 relight cornell.sft -o none.sft "${lamp[@]}" --ground-plane
+  run 2 relight cornell.sft -o cornell.sft "${lamp[@]}"
+  run 74 relight cornell.sft -o none.sft "${lamp[@]}" --mesh nowhere.obj
+  run 0 convert cornell.ply -o bare.ply --keep position,normal --quiet
+  run 0 index bare.ply -o bare.sft --quiet
+  run 3 relight bare.sft -o none.sft "${lamp[@]}"
+  says "no albedo" albedo_r
+  leavesNothing none.sft
+}
+
 # By the name of the result; all of them are read again.
 radianceWritesEveryFormat() {
   local extension
@@ -168,6 +207,97 @@ subsetsAreChosenByGroup() {
   says "city.sft: found no groups"
   run 3 bounce city.sft -o none.sft --subset 0
   says "city.sft: found no groups"
+  leavesNothing none
+}
+
+# The scene above, built from a file for each group, whose names choose as the numbers do.
+subsetsAreChosenByName() {
+  makeGroupedScene
+  local group
+  for group in 0 3 7; do
+    run 0 convert groups.ply -o "group_$group.ply" --filter "group == $group" \
+      --keep position,normal,radius,area,radiosity --quiet
+  done
+  run 0 index group_0.ply --group screen=group_3.ply --group "lamp=group_7.ply" -o named.sft
+  run 0 verify named.sft
+  run 0 info named.sft
+  says "groups         0-2 (1 screen, 2 lamp)"
+  run 0 info named.sft --json
+  says '"group_names": {' '"1": "screen"' '"2": "lamp"'
+
+  local chosen
+  for chosen in "7 lamp" "3,7 screen,lamp" "0,7 0,lamp" "0-63 0-63"; do
+    run 0 gather groups.sft group_0.ply -o by_number.ply --mode bleeding --subset "${chosen% *}" --quiet
+    run 0 gather named.sft group_0.ply -o by_name.ply --mode bleeding --subset "${chosen#* }" --quiet
+    sameBytes by_number.ply by_name.ply
+  done
+
+  # Names stay with the light; files of one name are one group, in place of their own
+  run 0 index group_0.ply --group "all of it=groups.ply" --group "all of it=group_7.ply" -o one.sft
+  says "groups of its own are left out"
+  run 0 info one.sft
+  says "groups         0,1 (1 all of it)"
+  run 0 index --group floor=group_0.ply -o floor.sft --dry-run
+  run 3 index --group floor=groups.ply -o none.sft --strict
+
+  run 2 gather named.sft group_0.ply -o none.ply --subset lump
+  says "--subset" lump "screen, lamp"
+  run 2 gather groups.sft group_0.ply -o none.ply --subset lamp
+  says "names of the scene: none"
+  run 74 gather nowhere.sft group_0.ply -o none.ply --subset lamp
+  run 2 index --group 7up=group_7.ply -o none.sft
+  says "begins with a digit"
+  run 2 index --group group_7.ply -o none.sft
+  says "NAME=FILE"
+  run 74 index --group lamp=nowhere.ply -o none.sft
+  run 2 index -o none.sft
+  local many=()
+  for group in {1..64}; do many+=(--group "name_$group=group_7.ply"); done
+  run 2 index "${many[@]}" -o none.sft
+  says "at most 63"
+  cp group_7.ply copy.ply
+  run 2 index --group lamp=copy.ply -o copy.ply
+  says "its input"
+  sameBytes copy.ply group_7.ply
+  leavesNothing none
+}
+
+# Bounces at few of the surfels, the last one too, against those at all surfels.
+sparedBouncesAreNearTheWholeOnes() {
+  makeScene 40000
+  run 0 bounce cornell.sft -o whole.sft --bounces 2 --quality draft --stats whole.json --quiet
+  run 0 bounce cornell.sft -o spared.sft --bounces 2 --quality draft --surfels-per-receiver 16 --spare-last \
+    --stats spared.json --quiet
+  run 0 bounce cornell.sft -o most.sft --bounces 2 --quality draft --surfels-per-receiver 16 --stats most.json --quiet
+  run 0 verify spared.sft
+  differentBytes spared.sft most.sft
+  jsonHas spared.json spare_last
+  local name
+  for name in whole most spared; do
+    sed -n -E 's/^ *"receivers": ([0-9]+),?$/\1/p' $name.json | xargs echo $name >> receivers
+    run 0 convert $name.sft -o $name.csv --keep radiosity,area --quiet
+  done
+  cat receivers
+  # Receivers of both bounces: all; few and all; few
+  awk '{ first[$1] = $2; last[$1] = $3 }
+       END { exit !(last["most"] == last["whole"] && first["spared"] == first["most"] &&
+                    last["spared"] == first["spared"] && 6 * last["spared"] < last["whole"]) }' receivers ||
+    fail "numbers of receivers"
+  # Error of what the bounces add, weighted by area, as a part of what they add: root mean square
+  run 0 convert cornell.sft -o direct.csv --keep radiosity,area --quiet
+  head -3 whole.csv
+  paste -d, direct.csv whole.csv spared.csv | awk -F, '
+    NR == 1 { for (i = 1; i <= NF; ++i) at[$i, ++seen[$i]] = i; next }
+    { for (n = split("r g b", c, " "); n; --n) {
+        name = "radiosity_" c[n]
+        whole = $at[name, 2] - $at[name, 1]; spared = $at[name, 3] - $at[name, 1]
+        w = $at["area", 1]; e += w * (spared - whole) ^ 2; s += w * whole ^ 2; d += w * (spared - whole); m += w * whole
+      } }
+    END { rms = sqrt(e / s); mean = d / m; printf "error: rms %.4f, mean %.4f of the bounces\n", rms, mean
+          exit !(rms > 0 && rms < 0.08 && mean < 0.01 && mean > -0.01) }' ||
+    fail "spared bounces are too far off"
+  run 2 bounce cornell.sft -o none.sft --spare-last
+  says --surfels-per-receiver
   leavesNothing none
 }
 
