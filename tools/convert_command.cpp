@@ -14,6 +14,7 @@
 #include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/matrix_option.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
 
@@ -60,29 +61,6 @@ double parseUnits(const std::string& text) {
       "--units", fmt::format("found \"{}\", expected FROM:TO, each m, cm, mm, km, in, ft, us-ft or "
                              "the metres of a unit, such as ft:m or 0.5:m",
                              text));
-}
-
-// 12 numbers, or 16 with 0 0 0 1 at the end.
-Matrix parseTransform(const std::string& text) {
-  constexpr const char* kName = "--transform";
-  constexpr const char* kExpected = "12 or 16 numbers, the matrix row by row";
-  const std::string_view separators = " ,\t";
-  std::size_t words = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool begins = i == 0 || separators.find(text[i - 1]) != std::string_view::npos;
-    words += begins && separators.find(text[i]) == std::string_view::npos ? 1 : 0;
-  }
-  if (words <= 12) return parseNumberList<12>(kName, text, kExpected);
-  const auto all = parseNumberList<16>(kName, text, kExpected);
-  if (all[12] != 0 || all[13] != 0 || all[14] != 0 || all[15] != 1) {
-    throw CLI::ValidationError(
-        kName, fmt::format("found a last row {} {} {} {}, expected 0 0 0 1 (what moves stands in "
-                           "the last column; transpose matrices that have it in the last row)",
-                           all[12], all[13], all[14], all[15]));
-  }
-  Matrix matrix;
-  std::copy_n(all.begin(), matrix.size(), matrix.begin());
-  return matrix;
 }
 
 // The map that does `b`, then `a`.
@@ -148,9 +126,11 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
   command
       .add_option_function<std::string>(
           "--transform",
-          [&](const std::string& text) { arguments.options.transform = parseTransform(text); },
+          [&](const std::string& text) {
+            arguments.options.transform = parseMatrix("--transform", text);
+          },
           "Affine matrix, row by row; it acts on column vectors: translations end the rows")
-      ->type_name("\"12 or 16 numbers\"")
+      ->type_name("\"16 numbers\"|FILE")
       ->group(kGroup);
   command
       .add_option_function<std::string>(

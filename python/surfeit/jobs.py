@@ -21,7 +21,7 @@ from .engine import Scene
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from .settings import (GatherJobSettings, IndexSettings, JobSettings, NormalSettings,
+    from .settings import (GatherJobSettings, IndexSettings, JobSettings, LookupSettings, NormalSettings,
                            QualitySettings, ReadSettings, Up)
 
 Stats = Dict[str, Any]
@@ -159,6 +159,18 @@ def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
                          groups=groups)
     with _watch(progress, settings) as watcher:
         return _surfeit.bounce(_scene_path(scene), path_of(output), options, watcher)
+
+
+def lookup(map: PathLike, receivers: PathLike, output: PathLike, *,
+           progress: ProgressLike = None, **settings: "Unpack[LookupSettings]") -> Stats:
+    """Writes the receivers with the values that the baked cloud or brick map has at their places.
+
+    Only values count whose surface faces as the receiver does. Returns counts, among them
+    "missing_receivers", which found none. Settings: surfeit.settings.LookupSettings.
+    """
+    with _watch(progress, settings) as watcher:
+        return _surfeit.lookup(path_of(map), path_of(receivers), path_of(output),
+                               options_of(settings), watcher)
 
 
 def verify(scene: Union[PathLike, Scene], *, memory: Memory = None, threads: Optional[int] = None,
