@@ -148,6 +148,12 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
 void addChoiceOptions(CLI::App& command, ConvertOptions& options) {
   addChannelOptions(command, options.channels, options.part, options.filter);
   addColorRangeOption(command, options.color_range);
+  command
+      .add_option("--set", options.assignments,
+                  "Channel arithmetic, once or more: \"radiosity *= 0.5 where group == 3\" "
+                  "(= *= /= += -=; + - * / min max abs sqrt pow, comparisons)")
+      ->allow_extra_args(false)
+      ->type_name("ASSIGNMENT");
   CLI::Option* const every =
       command.add_option("--every", options.every, "Only records 0, N, 2N, ... of each input")
           ->type_name("N")
@@ -198,6 +204,7 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
       "  surfeit convert a.ptc b.ptc -o both.ply.zst\n"
       "  surfeit convert city.ply -o block.vdb --crop 0,0,0,100,100,50 --drop normal\n"
       "  surfeit convert tile1.las tile2.las -o even.ply --spacing 0.05\n"
+      "  surfeit convert in.ptc -o out.ptc --set \"radiosity *= 0.5 where group == 3\"\n"
       "  surfeit convert baked.bgeo -o thin.csv --every 100 --channels bake=radiosity");
   command->callback(
       [arguments, &context] { context.run([&] { return runConvert(*arguments, context); }); });

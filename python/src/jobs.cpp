@@ -111,6 +111,7 @@ py::dict convert(const std::vector<std::string>& inputs, const std::string& outp
   }
   options.into("keep", converting.keep);
   options.into("drop", converting.drop);
+  options.into("assignments", converting.assignments);
   options.into("like", converting.like);
   options.finish();
   return record(runFor<ConvertStats>(watcher, [&](Progress& progress) {
