@@ -148,5 +148,6 @@ void addCompositeCommand(CLI::App& app, CommandContext& context);
 void addCubeCommand(CLI::App& app, CommandContext& context);
 void addPtfilterCommand(CLI::App& app, CommandContext& context);
 void addBrickmakeCommand(CLI::App& app, CommandContext& context);
+void addLookupCommand(CLI::App& app, CommandContext& context);
 
 }  // namespace surfeit

@@ -15,6 +15,7 @@
 #include "tools/camera_options.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/matrix_option.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
 
@@ -62,29 +63,6 @@ double parseUnits(const std::string& text) {
       "--units", fmt::format("found \"{}\", expected FROM:TO, each m, cm, mm, km, in, ft, us-ft or "
                              "the metres of a unit, such as ft:m or 0.5:m",
                              text));
-}
-
-// 12 numbers, or 16 with 0 0 0 1 at the end.
-Matrix parseTransform(const std::string& text) {
-  constexpr const char* kName = "--transform";
-  constexpr const char* kExpected = "12 or 16 numbers, the matrix row by row";
-  const std::string_view separators = " ,\t";
-  std::size_t words = 0;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool begins = i == 0 || separators.find(text[i - 1]) != std::string_view::npos;
-    words += begins && separators.find(text[i]) == std::string_view::npos ? 1 : 0;
-  }
-  if (words <= 12) return parseNumberList<12>(kName, text, kExpected);
-  const auto all = parseNumberList<16>(kName, text, kExpected);
-  if (all[12] != 0 || all[13] != 0 || all[14] != 0 || all[15] != 1) {
-    throw CLI::ValidationError(
-        kName, fmt::format("found a last row {} {} {} {}, expected 0 0 0 1 (what moves stands in "
-                           "the last column; transpose matrices that have it in the last row)",
-                           all[12], all[13], all[14], all[15]));
-  }
-  Matrix matrix;
-  std::copy_n(all.begin(), matrix.size(), matrix.begin());
-  return matrix;
 }
 
 // The map that does `b`, then `a`.
@@ -151,9 +129,11 @@ void addPlaceOptions(CLI::App& command, ConvertArguments& arguments) {
   command
       .add_option_function<std::string>(
           "--transform",
-          [&](const std::string& text) { arguments.options.transform = parseTransform(text); },
+          [&](const std::string& text) {
+            arguments.options.transform = parseMatrix("--transform", text);
+          },
           "Affine matrix, row by row; it acts on column vectors: translations end the rows")
-      ->type_name("\"12 or 16 numbers\"")
+      ->type_name("\"16 numbers\"|FILE")
       ->group(kGroup);
   command
       .add_option_function<std::string>(
@@ -172,6 +152,12 @@ void addChoiceOptions(CLI::App& command, ConvertArguments& arguments) {
   ConvertOptions& options = arguments.options;
   addChannelOptions(command, options.channels, options.part, options.filter);
   addColorRangeOption(command, options.color_range);
+  command
+      .add_option("--set", options.assignments,
+                  "Channel arithmetic, once or more: \"radiosity *= 0.5 where group == 3\" "
+                  "(= *= /= += -=; + - * / min max abs sqrt pow, comparisons)")
+      ->allow_extra_args(false)
+      ->type_name("ASSIGNMENT");
   CLI::Option* const every =
       command.add_option("--every", options.every, "Only records 0, N, 2N, ... of each input")
           ->type_name("N")
@@ -228,6 +214,7 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
       "  surfeit convert city.ply -o block.vdb --crop 0,0,0,100,100,50 --drop normal\n"
       "  surfeit convert tile1.las tile2.las -o even.ply --spacing 0.05\n"
       "  surfeit convert scan.ply -o shot.ply --camera \"0 1.7 9  0 1 0  50\" --pixels 1.5\n"
+      "  surfeit convert in.ptc -o out.ptc --set \"radiosity *= 0.5 where group == 3\"\n"
       "  surfeit convert baked.bgeo -o thin.csv --every 100 --channels bake=radiosity");
   command->callback(
       [arguments, &context] { context.run([&] { return runConvert(*arguments, context); }); });

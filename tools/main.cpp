@@ -36,6 +36,7 @@ void addCommands(CLI::App& app, CommandContext& context) {
   addCubeCommand(app, context);
   addPtfilterCommand(app, context);
   addBrickmakeCommand(app, context);
+  addLookupCommand(app, context);
 }
 
 // --help and --version.

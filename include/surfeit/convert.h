@@ -23,7 +23,7 @@ struct CropBox {
 };
 
 // The steps for the records of every input, in this order: rename channels, filter, take every n-th
-// record, move, crop, drop channels, thin by a grid or for cameras.
+// record, move, crop, drop channels, set channels, thin by a grid or for cameras.
 // `memory_bytes` bounds the memory of OpenVDB output, which is held until it is written, and of
 // thinning by a grid, which sorts. All else takes some MiB, for clouds of any size. 0 stands for
 // 2 GiB, or for three quarters of the memory that the job may hold where that is less. Only
@@ -63,6 +63,12 @@ struct ConvertOptions : JobOptions, ReadOptions {
   // Channels by name (docs/files.md), or single properties. `keep`: only these and the position;
   // `drop`: all but these. Only one of the two may be given.
   std::vector<std::string> keep{}, drop{};
+
+  // Channel arithmetic on the records of the output, in this order: "radiosity *= 0.5 where group
+  // == 3" (docs/files.md, "Channel arithmetic"). Types stay: integers take the nearest number that
+  // they hold. Well-known channels that no input has may be set, too. A note tells what did not
+  // fit.
+  std::vector<std::string> assignments{};
 
   // A file of the output's format. The output takes from it the data that is not in rows: the
   // windows and attributes of a picture (.exr), the grid of a volume (.vdb), the camera of a .ptc,

@@ -43,11 +43,11 @@ struct IndexOptions : JobOptions, ReadOptions {
   // 0 for clouds about 0, a corner of the root cube for others (docs/format.md). Scenes of one
   // sequence may share an origin.
   std::optional<glm::dvec3> origin{};
-  // The root cube. Scenes of one sequence that share a cube share their cells, so that a surfel that
-  // comes or goes changes no node but those that it lies in. Surfels outside are an error, which
-  // names a cube that holds all. Origin and size are at most 1e12; where `origin` is absent, it
-  // follows from the cube alone: 0, or the corner of a cube far away. Absent: the least cube about
-  // the surfels (docs/format.md). A cube equal to that one changes nothing.
+  // The root cube. Scenes of one sequence that share a cube share their cells, so that a surfel
+  // that comes or goes changes no node but those that it lies in. Surfels outside are an error,
+  // which names a cube that holds all. Origin and size are at most 1e12; where `origin` is absent,
+  // it follows from the cube alone: 0, or the corner of a cube far away. Absent: the least cube
+  // about the surfels (docs/format.md). A cube equal to that one changes nothing.
   std::optional<SceneCube> cube{};
   // The axis that points up. Absent: the axis that the inputs state (surfeit/up_axis.h).
   std::optional<UpAxis> up{};

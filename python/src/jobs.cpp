@@ -1,5 +1,5 @@
 // Jobs from files to files, and what they are told by: index, gather, convert, normals, tune,
-// bounce, verify, info, cube.
+// bounce, lookup, verify, info, cube.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -111,6 +111,7 @@ py::dict convert(const std::vector<std::string>& inputs, const std::string& outp
   }
   options.into("keep", converting.keep);
   options.into("drop", converting.drop);
+  options.into("assignments", converting.assignments);
   options.into("like", converting.like);
   options.finish();
   return record(runFor<ConvertStats>(watcher, [&](Progress& progress) {
@@ -147,6 +148,31 @@ py::dict bounce(const std::string& scene, const std::string& result, const py::d
   options.finish();
   return record(runFor<BounceStats>(
       watcher, [&](Progress& progress) { return bounceScene(scene, result, bouncing, progress); }));
+}
+
+py::dict lookup(const std::string& map, const std::string& receivers, const std::string& result,
+                const py::dict& given, const py::object& watcher) {
+  Options options(given);
+  LookupOptions looking;
+  takeJob(options, looking);
+  takeReading(options, looking);
+  options.into("values", looking.values);
+  options.into("map_channels", looking.map_channels);
+  options.into("map_filter", looking.map_filter);
+  options.choose<LookupInterpolation>(
+      "interpolation", looking.interpolation,
+      {{"smooth", LookupInterpolation::kSmooth}, {"nearest", LookupInterpolation::kNearest}});
+  options.into("max_distance", looking.max_distance);
+  options.into("filter_width", looking.filter_width);
+  options.into("missing", looking.missing);
+  options.into("from_space", looking.from_space);
+  options.into("to_space", looking.to_space);
+  options.into("pref", looking.reference_positions);
+  options.into("nref", looking.reference_normals);
+  options.finish();
+  return record(runFor<LookupStats>(watcher, [&](Progress& progress) {
+    return lookupCloud(map, receivers, result, looking, progress);
+  }));
 }
 
 py::dict verify(const std::string& scene, const py::dict& given, const py::object& watcher) {
@@ -245,6 +271,7 @@ void addJobs(py::module_& module) {
   module.def("convert", &convert);
   module.def("normals", &normals);
   module.def("bounce", &bounce);
+  module.def("lookup", &lookup);
   module.def("verify", &verify);
   module.def("info", &info);
   module.def("cube", &cube);

@@ -197,6 +197,17 @@ py::dict record(const BounceStats& stats) {
                   "passes"_a = passes);
 }
 
+py::dict record(const LookupStats& stats) {
+  return py::dict("is_brick_map"_a = stats.is_brick_map, "channels"_a = stats.channels,
+                  "points"_a = stats.points, "skipped_points"_a = stats.skipped_points,
+                  "spacing"_a = stats.spacing, "max_distance"_a = stats.max_distance,
+                  "receivers"_a = stats.receivers, "invalid_receivers"_a = stats.invalid_receivers,
+                  "missing_receivers"_a = stats.missing_receivers,
+                  "page_loads"_a = stats.page_loads, "threads"_a = stats.threads,
+                  "memory_bytes"_a = stats.memory_bytes,
+                  "temporary_bytes"_a = stats.temporary_bytes);
+}
+
 py::dict record(const TuneReport& report) {
   return py::dict(
       "receivers"_a = report.receivers, "invalid_receivers"_a = report.invalid_receivers,

@@ -11,6 +11,7 @@
 #include "surfeit/convert.h"
 #include "surfeit/engine.h"
 #include "surfeit/index.h"
+#include "surfeit/lookup.h"
 #include "surfeit/normals.h"
 #include "surfeit/scene.h"
 #include "surfeit/tune.h"
@@ -30,6 +31,7 @@ py::dict record(const GatherStats& stats);
 py::dict record(const ConvertStats& stats);
 py::dict record(const NormalsStats& stats);
 py::dict record(const BounceStats& stats);
+py::dict record(const LookupStats& stats);
 py::dict record(const TuneReport& report);
 py::dict record(const VerifyReport& report);
 

@@ -14,7 +14,7 @@ from ._errors import DamagedFile, DataWarning
 from ._surfeit import __version__
 from .clouds import read, read_chunks, write
 from .engine import Engine, Gatherer, Scene
-from .jobs import bounce, convert, cube, gather, index, info, normals, tune, verify
+from .jobs import bounce, convert, cube, gather, index, info, lookup, normals, tune, verify
 
 # Words of the outputs of a gather.
 OUTPUTS = ("occlusion", "irradiance", "bent_normal", "illumination_direction", "environment",
@@ -25,6 +25,6 @@ CUBE_KINDS = ("nothing", "flat node", "facet", "rough node", "patch", "traced")
 
 __all__ = [
     "CUBE_KINDS", "DamagedFile", "DataWarning", "Engine", "Gatherer", "OUTPUTS", "Scene",
-    "__version__", "bounce", "convert", "cube", "gather", "index", "info", "normals", "read",
-    "read_chunks", "settings", "tune", "verify", "write",
+    "__version__", "bounce", "convert", "cube", "gather", "index", "info", "lookup", "normals",
+    "read", "read_chunks", "settings", "tune", "verify", "write",
 ]

@@ -55,7 +55,7 @@ def memory_bytes(memory: Memory) -> int:
     return size
 
 
-def matrix_of(transform: Any) -> Tuple[float, ...]:
+def matrix_of(transform: Any, name: str = "transform") -> Tuple[float, ...]:
     """The 12 numbers of a 3x4 matrix, or of a 4x4 one whose last row is 0 0 0 1."""
     if transform is None:
         return (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
@@ -64,7 +64,7 @@ def matrix_of(transform: Any) -> Tuple[float, ...]:
         matrix = matrix[:3]
     if matrix.shape != (3, 4):
         raise ValueError(
-            f"transform: found shape {matrix.shape}, expected (3, 4), or (4, 4) with 0 0 0 1 last"
+            f"{name}: found shape {matrix.shape}, expected (3, 4), or (4, 4) with 0 0 0 1 last"
         )
     return tuple(float(value) for value in matrix.ravel())
 
@@ -74,8 +74,9 @@ def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
     taken = {**options, **more}
     if "memory" in taken:
         taken["memory"] = memory_bytes(taken["memory"])
-    if taken.get("transform") is not None:
-        taken["transform"] = matrix_of(taken["transform"])
+    for name in ("transform", "from_space", "to_space"):
+        if taken.get(name) is not None:
+            taken[name] = matrix_of(taken[name], name)
     for name in ("temporary_directory", "trajectory", "like"):
         if taken.get(name) is not None:
             taken[name] = path_of(taken[name])

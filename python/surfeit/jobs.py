@@ -21,7 +21,7 @@ from .engine import Scene
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from .settings import (GatherJobSettings, IndexSettings, JobSettings, NormalSettings,
+    from .settings import (GatherJobSettings, IndexSettings, JobSettings, LookupSettings, NormalSettings,
                            QualitySettings, ReadSettings, Up)
 
 Stats = Dict[str, Any]
@@ -112,7 +112,8 @@ def tune(scene: Union[PathLike, Scene], receivers: PathLike, *, sample_receivers
 def convert(inputs: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
             every: Optional[int] = None, spacing: Optional[float] = None, transform: Any = None,
             up: "Optional[Up]" = None, crop: Any = None, keep: Optional[Sequence[str]] = None,
-            drop: Optional[Sequence[str]] = None, like: Optional[PathLike] = None,
+            drop: Optional[Sequence[str]] = None,
+            assignments: Optional[Sequence[str]] = None, like: Optional[PathLike] = None,
             memory: Memory = None, temporary_directory: Optional[PathLike] = None,
             strict: bool = False, progress: ProgressLike = None,
             **settings: "Unpack[ReadSettings]") -> Stats:
@@ -120,14 +121,16 @@ def convert(inputs: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
 
     every: takes every n-th record. spacing: keeps one record per cell of a grid of this edge.
     transform: affine (3, 4) or (4, 4) matrix. up: turns this axis up. crop: corners ((x, y, z),
-    (x, y, z)) of a box in the output. keep, drop: channels. like: a file of the output's format
+    (x, y, z)) of a box in the output. keep, drop: channels. assignments: channel arithmetic, such as
+    "radiosity *= 0.5 where group == 3". like: a file of the output's format
     with the data that is not in rows.
     """
     paths = paths_of(inputs)
     if paths is None:
         raise TypeError(f"inputs: found {type(inputs).__name__}, expected a path or several")
     options = options_of(settings, every=every, spacing=spacing, transform=transform, up=up,
-                         crop=crop, keep=keep, drop=drop, like=like, memory=memory,
+                         crop=crop, keep=keep, drop=drop, assignments=assignments, like=like,
+                         memory=memory,
                          temporary_directory=temporary_directory)
     with Watcher(progress, strict) as watcher:
         return _surfeit.convert(paths, path_of(output), options, watcher)
@@ -159,6 +162,18 @@ def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
                          groups=groups)
     with _watch(progress, settings) as watcher:
         return _surfeit.bounce(_scene_path(scene), path_of(output), options, watcher)
+
+
+def lookup(map: PathLike, receivers: PathLike, output: PathLike, *,
+           progress: ProgressLike = None, **settings: "Unpack[LookupSettings]") -> Stats:
+    """Writes the receivers with the values that the baked cloud or brick map has at their places.
+
+    Only values count whose surface faces as the receiver does. Returns counts, among them
+    "missing_receivers", which found none. Settings: surfeit.settings.LookupSettings.
+    """
+    with _watch(progress, settings) as watcher:
+        return _surfeit.lookup(path_of(map), path_of(receivers), path_of(output),
+                               options_of(settings), watcher)
 
 
 def verify(scene: Union[PathLike, Scene], *, memory: Memory = None, threads: Optional[int] = None,

@@ -71,6 +71,22 @@ class GatherJobSettings(GatherSettings, ReadSettings, JobSettings, total=False):
     prefetch: bool  # reads ahead when reading is slow
 
 
+class LookupSettings(ReadSettings, JobSettings, total=False):
+    """How baked values are looked up; ReadSettings are for the receivers."""
+
+    values: Sequence[str]  # channels of the map; default: its gathered ones
+    interpolation: Literal["smooth", "nearest"]  # of a cloud
+    max_distance: float  # of a cloud; default: 8 times the spacing of its points
+    filter_width: float  # of a brick map; default: its finest voxels
+    missing: float  # for receivers without a value nearby; default: NaN
+    from_space: Any  # matrix (3, 4) or (4, 4) from the object's space to the receivers'
+    to_space: Any  # and to that of the map
+    pref: str  # channel of reference positions to look up at
+    nref: str  # and of normals there
+    map_channels: str  # new names for channels of a cloud
+    map_filter: str  # condition for points of a cloud
+
+
 class NormalSettings(TypedDict, total=False):
     """Which way normals point that are found from the neighbours."""
 

@@ -73,6 +73,29 @@ def test_jobs_have_the_bytes_of_the_programs(files, scene, run_program):
     assert (files / "c.ptc").read_bytes() == (files / "p.ptc").read_bytes()
 
 
+def test_lookups_have_the_bytes_of_the_program(files, run_program):
+    moved = [[0, -1, 0, 3.0], [1, 0, 0, 0.0], [0, 0, 1, -2.0], [0, 0, 0, 1.0]]
+    text = " ".join(str(number) for row in moved for number in row)
+    surfeit.convert(files / "receivers.ply", files / "moved.ply", transform=moved)
+    run_program("lookup", files / "cloud.ply", files / "moved.ply", "-o", files / "p.ply",
+                "--channel", "radiosity", "--from-space", text, "--interpolation", "nearest",
+                "--missing", "0")
+    stats = surfeit.lookup(files / "cloud.ply", files / "moved.ply", files / "l.ply",
+                           values=["radiosity"], from_space=moved, interpolation="nearest",
+                           missing=0.0)
+    assert stats["points"] > 0 and not stats["is_brick_map"]
+    assert stats["missing_receivers"] < stats["receivers"]
+    assert (files / "l.ply").read_bytes() == (files / "p.ply").read_bytes()
+    with pytest.raises(ValueError, match="from_space"):
+        surfeit.lookup(files / "cloud.ply", files / "moved.ply", files / "l.ply",
+                       from_space=[1, 2, 3])
+
+
+def test_scenes_share_a_cube(files, tmp_path):
+    surfeit.index(files / "cloud.ply", tmp_path / "a.sft", cube=(-8, -8, -8, 32))
+    assert surfeit.info(tmp_path / "a.sft")["cube"] == (-8, -8, -8, 32)
+
+
 def test_tune_verify_info_and_cube_answer(files, scene, receivers):
     report = surfeit.tune(scene, files / "receivers.ply", memory="128M", sample_receivers=1000)
     assert report["recommended"]["memory_bytes"] >= report["rows"][0]["memory_bytes"]

@@ -17,6 +17,7 @@
 #include <string_view>
 #include <utility>
 
+#include "cloud/channel_assignment.h"
 #include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
 #include "cloud/row_transform.h"
@@ -179,6 +180,8 @@ class Converter {
       return Status::failed(
           fmt::format("{}: fewer records when read again: an input changed meanwhile", output_));
     }
+    tellAssignments();
+    if (progress_.isCancelled()) return Status::interrupted();  // before it has a name
     progress_.beginPhase("finish", 0, "records");
     SURFEIT_RETURN_IF_ERROR(writer_->finish());
     noteOfWriter();
@@ -232,6 +235,7 @@ class Converter {
     is_measuring_ = true;
     SURFEIT_RETURN_IF_ERROR(convertInputs());
     is_measuring_ = false;
+    for (ChannelAssignment& made : assignments_) made.forget();
     progress_.beginPhase("choose", 0, "records");
     SURFEIT_RETURN_IF_ERROR(thinner_->choose(progress_));
     stats_.placeless_records = thinner_->placeless();
@@ -269,6 +273,9 @@ class Converter {
 
   Status createWriter() {
     SURFEIT_ASSIGN_OR_RETURN(writing_.properties, chooseProperties(union_.properties(), options_));
+    for (const std::string& text : options_.assignments) {
+      SURFEIT_RETURN_IF_ERROR(ChannelAssignment::declare(text, writing_.properties));
+    }
     transform_.widenTypes(writing_.properties);
     if (isThinning(options_)) RowTransform::widenSizes(writing_.properties);
     writing_.comments = first_->comments();
@@ -284,6 +291,13 @@ class Converter {
       writing_.like = like_.get();
     } else if (transform_.isIdentity() && inputs_.size() == 1) {
       writing_.like = first_.get();
+    }
+    // The grid of a volume and the camera of a picture are those of the places that rows had
+    SURFEIT_ASSIGN_OR_RETURN(
+        assignments_, ChannelAssignment::createAll(options_.assignments, writing_.properties));
+    if (options_.like.empty() && std::any_of(assignments_.begin(), assignments_.end(),
+                                             [](const auto& made) { return made.movesRows(); })) {
+      writing_.like = nullptr;
     }
     SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing_));
     noteOfWriter();
@@ -317,6 +331,13 @@ class Converter {
     }
     SURFEIT_ASSIGN_OR_RETURN(thinner_, GridThinner::create(std::move(thinning), element));
     return {};
+  }
+
+  void tellAssignments() {
+    for (const ChannelAssignment& made : assignments_) {
+      progress_.inform(fmt::format("{}: {}", output_, made.describe()));
+      if (!made.loss().empty()) progress_.note(fmt::format("{}: {}", output_, made.loss()));
+    }
   }
 
   // What writer and thinner get. A writer that holds what it writes comes first.
@@ -359,7 +380,7 @@ class Converter {
           fmt::format("{}: not there, 0 is written:{}", reader.path(), listNames(copier.absent())));
     }
     const bool keeps_rows = copier.keepsRows() && options_.every == 1 && transform_.isIdentity() &&
-                            !cropper_ && !thinner_;
+                            !cropper_ && !thinner_ && assignments_.empty();
     const std::size_t batch_rows =
         std::max<std::size_t>(1, kBatchBytes / std::max(from.row_bytes, to.row_bytes));
     for (std::uint64_t record = 0;;) {
@@ -398,6 +419,7 @@ class Converter {
     // Move and crop
     transform_.apply(rows_.data(), taken);
     std::size_t kept = cropper_ ? cropper_->crop(rows_.data(), taken) : taken;
+    for (ChannelAssignment& made : assignments_) made.apply(rows_.data(), kept);
     if (is_measuring_) return thinner_->measure(rows_.data(), kept);
     stats_.cropped_records += taken - kept;
 
@@ -426,6 +448,7 @@ class Converter {
   std::unique_ptr<RowWriter> writer_;
   std::set<std::string> told_;
   std::optional<Cropper> cropper_;
+  std::vector<ChannelAssignment> assignments_;
   std::unique_ptr<GridThinner> thinner_;
   std::uint64_t thinner_bytes_ = 0;
   bool is_measuring_ = false;  // all records for the thinner, nothing is written

@@ -116,7 +116,7 @@ helpAndVersionExitWithZero() {
   run 0 --help
   local command help=$said
   for command in sample generate convert index info verify gather relight bounce radiance brick tune view \
-    composite cube normals merge plan ptfilter brickmake; do
+    composite cube normals merge plan ptfilter brickmake lookup; do
     [[ $help == *"  $command "* ]] || fail "no $command in: $help"
     run 0 "$command" --help
     says Example "  surfeit $command "

@@ -51,6 +51,33 @@ cloudsMergeMoveAndThin() {
   [[ -z $said ]] || fail "said: $said"
 }
 
+# Values are set by channel and condition; what is lost is told, and slips of the pen are refused.
+channelsAreComputed() {
+  generate city.ply --surfels 500
+  run 0 convert city.ply -o grouped.ply --set "group = 3 where x < 500"
+  says "of 500 records"
+  run 0 convert grouped.ply -o dimmed.ply --set "radiosity *= .5 where group == 3" --set "z += 1"
+  run 0 convert city.ply -o before.csv --keep radiosity_r,radiosity_b --quiet
+  run 0 convert dimmed.ply -o after.csv --keep radiosity_r,radiosity_b --quiet
+  paste -d, before.csv after.csv | awk -F, 'NR > 1 {
+      part = $1 < 500 ? .5 : 1
+      for (i = 4; i <= 5; ++i) { e = $(i + 5) - part * $i; if (e * e > 1e-12) exit 1 }
+      e = $8 - $3 - 1; if (e * e > 1e-8) exit 1
+      if (part < 1) ++dimmed
+    } END { if (NR != 501 || dimmed == 0 || dimmed == 500) exit 1 }' || fail "other values"
+  run 0 convert grouped.ply -o out.ply --set "group = 300"
+  says "500 values do not fit the type of group"
+  run 0 convert grouped.ply -o out.csv --set "position *= 2" --spacing 100 --quiet
+  run 3 convert grouped.ply -o refused.ply --set "radius = 1 / (x - x)" --strict
+  run 2 convert city.ply -o refused.ply --set "radiosty *= 2"
+  says "set: at 1: found 'radiosty', expected one of position normal"
+  run 2 convert city.ply -o refused.ply --set "radius = radiosity"
+  says "at 10: found 'radiosity' of 3 numbers, expected one number, such as radiosity_r"
+  run 2 convert city.ply -o refused.ply --set "radius = 1 where"
+  run 2 convert city.ply -o refused.ply --set "radius"
+  leavesNothing refused
+}
+
 # A scan keeps its points through all commands, but for those that are withheld, noise or filtered.
 scansAreFilteredAndWritten() {
   generate city.ply --surfels 3k

@@ -23,6 +23,8 @@ commands=(
   "bounce scene.sft -o out.sft --bounces 2 --surfels-per-receiver 64"
   "radiance photons.ply -o out.ply"
   "brick cloud.ply --channel radiosity -o out.vdb"
+  "lookup cloud.ply receivers.ply -o out.ply --channel radiosity"
+  "lookup map.vdb bare.ply -o out.ply"
   "view cloud.ply -o out.png --size 400x300"
   "cube scene.sft --at 0.5,0.1,0.5 --normal 0,1,0 -o out.png"
   "convert cloud.ply -o out.vdb"
@@ -44,6 +46,7 @@ makeInputs() {
   run 0 convert cloud.ply -o points.ply --keep position --quiet
   run 0 convert cloud.ply -o receivers.ply --every 100 --quiet
   run 0 sample cornell.obj -o photons.ply --photons 50000 --quiet
+  run 0 brick cloud.ply --channel radiosity -o map.vdb --quiet
 }
 
 # peakIsAtMost MEBIBYTES COMMAND: by the statistics that it has written.

@@ -1,5 +1,3 @@
-#include "cloud/row_filter.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,11 +5,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include "cloud/channels.h"
+#include "cloud/row_expression.h"
 
 namespace surfeit {
 namespace {
@@ -22,10 +22,10 @@ constexpr int kMaxDepth = 64;
 constexpr std::size_t kMostNamesTold = 60;
 
 // What programs that read laser scans call properties, besides ways to write the same words.
-struct FilterAlias {
+struct PropertyAlias {
   std::string_view alias, name;
 };
-constexpr FilterAlias kFilterAliases[] = {
+constexpr PropertyAlias kPropertyAliases[] = {
     {"return", "return_number"},
     {"returnnum", "return_number"},
     {"returns", "number_of_returns"},
@@ -86,7 +86,7 @@ class PropertyNames {
     }
     if (const RowProperty* const found = findPlain(name)) return found;
     const std::string plain = plainName(name);
-    for (const FilterAlias& row : kFilterAliases) {
+    for (const PropertyAlias& row : kPropertyAliases) {
       if (row.alias != plain) continue;
       if (const RowProperty* const found = findPlain(row.name)) return found;
     }
@@ -101,6 +101,8 @@ class PropertyNames {
     }
     return properties_.size() > kMostNamesTold ? text + " ..." : text;
   }
+
+  std::span<const RowProperty> properties() const { return properties_; }
 
  private:
   // The only one whose letters and digits are the same.
@@ -118,43 +120,60 @@ class PropertyNames {
   std::span<const RowProperty> properties_;
 };
 
-Status wrongAt(std::size_t at, std::string_view found, std::string_view expected) {
-  return Status::invalidArgument(
-      fmt::format("filter: at {}: found {}, expected {}", at + 1, found, expected));
-}
+// Functions, by their number of values.
+struct Function {
+  std::string_view name;
+  RowExpression::Operation operation;
+  bool has_two;
+};
+using Operation = RowExpression::Operation;
+constexpr Function kFunctions[] = {{"min", Operation::kMin, true},
+                                   {"max", Operation::kMax, true},
+                                   {"pow", Operation::kPower, true},
+                                   {"abs", Operation::kAbs, false},
+                                   {"sqrt", Operation::kRoot, false}};
 
 }  // namespace
 
 // Recursive descent, one function per level of precedence: or, and, not, comparison, sum, product,
 // sign, value.
-class FilterParser {
+class ExpressionParser {
  public:
-  FilterParser(std::string_view text, std::span<const RowProperty> properties)
-      : text_(text), names_(properties) {}
+  ExpressionParser(const ExpressionText& text, const ExpressionNames& names)
+      : subject_(text.subject),
+        first_(text.first),
+        text_(text.text),
+        names_(names.properties),
+        groups_(names.groups),
+        component_(names.component) {}
 
-  Result<RowFilter> parse() {
+  Result<RowExpression> parse() {
     SURFEIT_RETURN_IF_ERROR(advance());
     SURFEIT_ASSIGN_OR_RETURN([[maybe_unused]] const std::size_t root, parseOr());
     if (token_.kind != Token::Kind::kEnd) {
       return wrongAt(token_.at, found(), "and, or, or the end");
     }
-    return std::move(filter_);
+    return std::move(expression_);
   }
 
  private:
-  using Operation = RowFilter::Operation;
-  using Step = RowFilter::Step;
+  using Step = RowExpression::Step;
+
+  Status wrongAt(std::size_t at, std::string_view found, std::string_view expected) const {
+    return Status::invalidArgument(fmt::format("{}: at {}: found {}, expected {}", subject_,
+                                               first_ + at + 1, found, expected));
+  }
 
   std::string found() const {
     return token_.kind == Token::Kind::kEnd ? "the end" : quoteText(token_.text);
   }
 
   Result<std::size_t> add(Step step) {
-    if (filter_.steps_.size() == kMaxSteps) {
+    if (expression_.steps_.size() == kMaxSteps) {
       return wrongAt(token_.at, "more", fmt::format("at most {} steps", kMaxSteps));
     }
-    filter_.steps_.push_back(std::move(step));
-    return filter_.steps_.size() - 1;
+    expression_.steps_.push_back(std::move(step));
+    return expression_.steps_.size() - 1;
   }
   Result<std::size_t> add(Operation operation, std::size_t left, std::size_t right) {
     return add(Step{operation, left, right, 0, {}});
@@ -224,9 +243,9 @@ class FilterParser {
 
   // The number nearest to .1 that a float holds is what a file of floats calls .1.
   void roundToFloat(std::size_t property, std::size_t number) {
-    Step& other = filter_.steps_[number];
-    if (filter_.steps_[property].operation == Operation::kProperty &&
-        filter_.steps_[property].property.type == ValueType::kFloat32 &&
+    Step& other = expression_.steps_[number];
+    if (expression_.steps_[property].operation == Operation::kProperty &&
+        expression_.steps_[property].property.type == ValueType::kFloat32 &&
         other.operation == Operation::kNumber &&
         std::abs(other.number) <= std::numeric_limits<float>::max()) {
       other.number = static_cast<float>(other.number);
@@ -263,7 +282,7 @@ class FilterParser {
     }
     SURFEIT_ASSIGN_OR_RETURN(const std::size_t value, parseValue());
     if (!is_negative) return value;
-    Step& step = filter_.steps_[value];
+    Step& step = expression_.steps_[value];
     if (step.operation != Operation::kNumber) return add(Operation::kNegate, value, value);
     step.number = -step.number;
     return value;
@@ -287,6 +306,17 @@ class FilterParser {
       return wrongAt(token.at, found(), "a number, a name or (");
     }
     SURFEIT_RETURN_IF_ERROR(advance());
+    if (token_.is("(") && !token.is_quoted) return parseCall(token);
+    if (const RowChannel* const group = findGroup(token.text)) {
+      if (component_ < group->properties.size()) {
+        return add(Step{Operation::kProperty, 0, 0, 0,
+                        names_.properties()[group->properties[component_]]});
+      }
+      return wrongAt(
+          token.at,
+          fmt::format("{} of {} numbers", quoteText(token.text), group->properties.size()),
+          fmt::format("one number, such as {}", names_.properties()[group->properties[0]].name));
+    }
     if (const RowProperty* const property = names_.find(token.text)) {
       return add(Step{Operation::kProperty, 0, 0, 0, *property});
     }
@@ -295,6 +325,38 @@ class FilterParser {
     }
     return wrongAt(token.at, quoteText(token.text),
                    fmt::format("true, false or one of{}", names_.describe()));
+  }
+
+  // The channel of several numbers with that name, unless a property has it.
+  const RowChannel* findGroup(std::string_view name) const {
+    for (const RowProperty& property : names_.properties()) {
+      if (property.name == name) return nullptr;
+    }
+    for (const RowChannel& group : groups_) {
+      if (group.name == name && group.properties.size() > 1) return &group;
+    }
+    return nullptr;
+  }
+
+  // What stands behind the name of a function.
+  Result<std::size_t> parseCall(const Token& name) {
+    const auto* const function =
+        std::find_if(std::begin(kFunctions), std::end(kFunctions),
+                     [&](const Function& known) { return known.name == name.text; });
+    if (function == std::end(kFunctions)) {
+      return wrongAt(name.at, quoteText(name.text), "min, max, pow, abs or sqrt before (");
+    }
+    SURFEIT_RETURN_IF_ERROR(advance());
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t left, parseOr());
+    std::size_t right = left;
+    if (function->has_two) {
+      if (!token_.is(",")) return wrongAt(token_.at, found(), "a comma and a second value");
+      SURFEIT_RETURN_IF_ERROR(advance());
+      SURFEIT_ASSIGN_OR_RETURN(right, parseOr());
+    }
+    if (!token_.is(")")) return wrongAt(token_.at, found(), ")");
+    SURFEIT_RETURN_IF_ERROR(advance());
+    return add(function->operation, left, right);
   }
 
   // Takes the next token.
@@ -313,7 +375,7 @@ class FilterParser {
     }
     if (std::isdigit(static_cast<unsigned char>(c)) != 0 || c == '.') return takeNumber();
     for (const std::string_view sign :
-         {"==", "!=", "<=", ">=", "&&", "||", "<", ">", "(", ")", "+", "-", "*", "/", "!"}) {
+         {"==", "!=", "<=", ">=", "&&", "||", "<", ">", "(", ")", "+", "-", "*", "/", "!", ","}) {
       if (!text_.substr(at_).starts_with(sign)) continue;
       take(Token::Kind::kSign, at_ + sign.size());
       return {};
@@ -353,109 +415,21 @@ class FilterParser {
     return {};
   }
 
-  std::string_view text_;
-  PropertyNames names_;
+  const std::string_view subject_;
+  const std::size_t first_;
+  const std::string_view text_;
+  const PropertyNames names_;
+  const std::span<const RowChannel> groups_;
+  const std::size_t component_;
   std::size_t at_ = 0;
   Token token_;
   int depth_ = 0;
-  RowFilter filter_;
+  RowExpression expression_;
 };
 
-namespace {
-
-void loadValues(const RowProperty& property, const std::byte* rows, std::size_t row_bytes,
-                std::size_t count, double* values) {
-  visitValueType(property.type, [&]<typename T>(std::type_identity<T>) {
-    const std::byte* from = rows + property.offset;
-    for (std::size_t i = 0; i < count; ++i, from += row_bytes) {
-      T value;
-      std::memcpy(&value, from, sizeof value);
-      values[i] = static_cast<double>(value);
-    }
-  });
-}
-
-template <typename Function>
-void combine(const double* left, const double* right, std::size_t count, double* values,
-             Function function) {
-  for (std::size_t i = 0; i < count; ++i) {
-    values[i] = static_cast<double>(function(left[i], right[i]));
-  }
-}
-
-}  // namespace
-
-Result<RowFilter> RowFilter::create(std::string_view text,
-                                    std::span<const RowProperty> properties) {
-  return FilterParser(text, properties).parse();
-}
-
-bool RowFilter::isTrue() const {
-  return steps_.size() == 1 && steps_[0].operation == Operation::kNumber && steps_[0].number != 0;
-}
-
-void RowFilter::test(const std::byte* rows, std::size_t row_bytes, std::size_t count,
-                     Workspace& workspace, std::uint8_t* holds) const {
-  workspace.resize(steps_.size() * kFilterRows);
-  for (std::size_t i = 0; i < steps_.size(); ++i) {
-    const Step& step = steps_[i];
-    double* const values = workspace.data() + i * kFilterRows;
-    const double* const a = workspace.data() + step.left * kFilterRows;
-    const double* const b = workspace.data() + step.right * kFilterRows;
-    const auto set = [&](auto function) { combine(a, b, count, values, function); };
-    switch (step.operation) {
-      case Operation::kNumber:
-        std::fill_n(values, count, step.number);
-        break;
-      case Operation::kProperty:
-        loadValues(step.property, rows, row_bytes, count, values);
-        break;
-      case Operation::kNot:
-        set([](double x, double) { return x == 0; });
-        break;
-      case Operation::kNegate:
-        set([](double x, double) { return -x; });
-        break;
-      case Operation::kAdd:
-        set([](double x, double y) { return x + y; });
-        break;
-      case Operation::kSubtract:
-        set([](double x, double y) { return x - y; });
-        break;
-      case Operation::kMultiply:
-        set([](double x, double y) { return x * y; });
-        break;
-      case Operation::kDivide:
-        set([](double x, double y) { return x / y; });
-        break;
-      case Operation::kEqual:
-        set([](double x, double y) { return x == y; });
-        break;
-      case Operation::kNotEqual:
-        set([](double x, double y) { return x != y; });
-        break;
-      case Operation::kLess:
-        set([](double x, double y) { return x < y; });
-        break;
-      case Operation::kLessEqual:
-        set([](double x, double y) { return x <= y; });
-        break;
-      case Operation::kGreater:
-        set([](double x, double y) { return x > y; });
-        break;
-      case Operation::kGreaterEqual:
-        set([](double x, double y) { return x >= y; });
-        break;
-      case Operation::kAnd:
-        set([](double x, double y) { return (x != 0) & (y != 0); });
-        break;
-      case Operation::kOr:
-        set([](double x, double y) { return (x != 0) | (y != 0); });
-        break;
-    }
-  }
-  const double* const last = workspace.data() + (steps_.size() - 1) * kFilterRows;
-  for (std::size_t i = 0; i < count; ++i) holds[i] = last[i] != 0;
+Result<RowExpression> RowExpression::create(const ExpressionText& text,
+                                            const ExpressionNames& names) {
+  return ExpressionParser(text, names).parse();
 }
 
 }  // namespace surfeit

@@ -1,0 +1,46 @@
+#include "lookup/joined_rows.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace surfeit {
+
+JoinedRows::JoinedRows(const RowLayout& input, const std::vector<std::string>& values) {
+  std::vector<bool> is_placed(values.size(), false);
+  for (RowProperty property : input.properties) {
+    if (property.is_list) continue;
+    const auto value = std::find(values.begin(), values.end(), property.name);
+    if (value == values.end()) {
+      copies_.push_back({property.offset, row_bytes_, valueTypeBytes(property.type)});
+    } else {
+      const auto number = static_cast<std::size_t>(value - values.begin());
+      is_placed[number] = true;
+      inserts_.push_back({number, row_bytes_});
+      property.type = ValueType::kFloat32;
+    }
+    add(std::move(property));
+  }
+  for (std::size_t number = 0; number < values.size(); ++number) {
+    if (is_placed[number]) continue;
+    inserts_.push_back({number, row_bytes_});
+    RowProperty property;
+    property.name = values[number];
+    add(std::move(property));
+  }
+}
+
+void JoinedRows::add(RowProperty property) {
+  property.offset = row_bytes_;
+  row_bytes_ += valueTypeBytes(property.type);
+  properties_.push_back(std::move(property));
+}
+
+void JoinedRows::make(const std::byte* input, const float* values, std::byte* output) const {
+  for (const Copy& copy : copies_) std::memcpy(output + copy.to, input + copy.from, copy.bytes);
+  for (const Insert& insert : inserts_) {
+    std::memcpy(output + insert.to, &values[insert.value], sizeof(float));
+  }
+}
+
+}  // namespace surfeit
