@@ -80,7 +80,7 @@ struct Surroundings {
   glm::vec3 default_albedo{0.5f};  // of meshes without colors and materials
   GroundPlane ground;
   Lights lights;
-  CurveOptions curves;
+  CurveOptions curves{};
 };
 
 struct SampleOptions {

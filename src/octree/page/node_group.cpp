@@ -14,12 +14,11 @@
 #include "octree/page/facet_columns.h"
 #include "octree/page/node_bounds.h"
 #include "octree/page/node_moments.h"
+#include "octree/page/transparency_columns.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 namespace {
-
-// Position error allowed, as a part of the smallest node radius in the group.
 
 // Makes up for rounding to a float.
 constexpr double kRoundedUp = 1 + 1.2e-7;
@@ -85,7 +84,7 @@ class Columns {
     child_level = column(bytes, 2);
     thickness = column(bytes, 3);
     cone = column(bytes, 4);
-    for (std::size_t k = 0; k < transparency.size(); ++k) transparency[k] = column(bytes, 5 + k);
+    transparency.bytes = {column(bytes, 5), column(bytes, 6)};
     page = column(integers, 0);
     first = column(integers, 1);
     surfel_count = column(integers, 2);
@@ -104,8 +103,7 @@ class Columns {
       area[i] = node.area;
       flatness[i] = node.flatness;
       flags[i] = node.flags;
-      transparency[0][i] = static_cast<std::uint8_t>(node.transparency & 0xff);
-      transparency[1][i] = static_cast<std::uint8_t>(node.transparency >> 8);
+      transparency.set(i, node.transparency);
       child_count[i] = node.child_count;
       child_level[i] = nodes[i].child_level;
       page[i] = node.page;
@@ -152,17 +150,14 @@ class Columns {
       node.rough = {};
       node.surfel_count = surfel_count[i];
       node.groups = form.has_groups ? groups[i] : groupBit(0);
-      node.transparency = form.has_opacity ? transparencyAt(i) : std::uint16_t{0};
+      node.transparency = form.has_opacity ? transparency.at(i) : std::uint16_t{0};
     }
   }
 
   MutableAxes position, normal, radiosity;
   std::span<float> radius, area, flatness;
   std::span<std::uint8_t> flags, child_count, child_level, thickness, cone;
-  std::array<std::span<std::uint8_t>, 2> transparency;  // lower and upper byte
-  std::uint16_t transparencyAt(std::size_t i) const {
-    return static_cast<std::uint16_t>(transparency[0][i] | transparency[1][i] << 8);
-  }
+  TransparencyColumns transparency;
   std::span<std::uint64_t> page, first, surfel_count, groups;
 
  private:
@@ -259,13 +254,7 @@ Status decodeReferences(PayloadReader& reader, const PageForm& form, const Colum
       if (groups == 0) return damaged("groups");
     }
   }
-  if (!form.has_opacity) return {};
-  for (const auto& bytes : columns.transparency) {
-    if (!getBytes8(reader, bytes)) return damaged("transparency");
-  }
-  for (std::size_t i = 0; i < columns.page.size(); ++i) {
-    if (columns.transparencyAt(i) > kMostTransparency) return damaged("transparency");
-  }
+  if (form.has_opacity && !columns.transparency.get(reader)) return damaged("transparency");
   return {};
 }
 
@@ -410,9 +399,7 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   putCounts(writer, columns.first);
   putCounts(writer, columns.surfel_count);
   if (form.has_groups) putCounts(writer, columns.groups);
-  if (form.has_opacity) {
-    for (const auto& bytes : columns.transparency) putBytes8(writer, bytes);
-  }
+  if (form.has_opacity) columns.transparency.put(writer);
   FacetColumns facets;
   RoughNodes rough;
   for (const LevelNode& node : nodes) {

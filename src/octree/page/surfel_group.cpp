@@ -10,11 +10,10 @@
 #include "core/thread_scratch.h"
 #include "octree/page/column_codec.h"
 #include "octree/page/surfel_marks.h"
+#include "octree/page/transparency_columns.h"
 
 namespace surfeit {
 namespace {
-
-// Position error allowed, as a part of the smallest radius in the group (docs/format.md).
 
 // Flags that a page may hold; the last two only in the indexer's own temporary files.
 constexpr std::uint8_t kStoredFlags =
@@ -50,9 +49,8 @@ class Columns {
     for (std::size_t k = 0; k < long_side.size(); ++k) {
       long_side[k] = std::span(bytes).subspan((2 + k) * count, count);
     }
-    for (std::size_t k = 0; k < transparency.size(); ++k) {
-      transparency[k] = std::span(bytes).subspan((5 + k) * count, count);
-    }
+    transparency.bytes = {std::span(bytes).subspan(5 * count, count),
+                          std::span(bytes).subspan(6 * count, count)};
   }
 
   void gather(std::span<const Surfel> surfels) {
@@ -69,8 +67,7 @@ class Columns {
       long_side[0][i] = static_cast<std::uint8_t>(surfels[i].long_side & 0xff);
       long_side[1][i] = static_cast<std::uint8_t>(surfels[i].long_side >> 8);
       long_side[2][i] = surfels[i].elongation;
-      transparency[0][i] = static_cast<std::uint8_t>(surfels[i].transparency & 0xff);
-      transparency[1][i] = static_cast<std::uint8_t>(surfels[i].transparency >> 8);
+      transparency.set(i, surfels[i].transparency);
     }
   }
 
@@ -87,7 +84,7 @@ class Columns {
       surfel.group = form.has_groups ? group[i] : std::uint8_t{0};
       surfel.long_side = form.has_long_sides ? longSideAt(i) : kNoLongSide;
       surfel.elongation = form.has_long_sides ? long_side[2][i] : std::uint8_t{0};
-      surfel.transparency = form.has_opacity ? transparencyAt(i) : std::uint16_t{0};
+      surfel.transparency = form.has_opacity ? transparency.at(i) : std::uint16_t{0};
       if (surfel.isSphere()) surfel.normal = glm::vec3(0);
       if (!form.has_albedo) surfel.albedo = glm::vec3(0);
     }
@@ -96,14 +93,10 @@ class Columns {
   MutableAxes position, normal, radiosity, albedo;
   std::span<float> radius, area;
   std::span<std::uint8_t> flags, group;
-  std::array<std::span<std::uint8_t>, 3> long_side;     // lower and upper byte, elongation
-  std::array<std::span<std::uint8_t>, 2> transparency;  // lower and upper byte
+  std::array<std::span<std::uint8_t>, 3> long_side;  // lower and upper byte, elongation
+  TransparencyColumns transparency;
   std::uint16_t longSideAt(std::size_t i) const {
     return static_cast<std::uint16_t>(long_side[0][i] | long_side[1][i] << 8);
-  }
-
-  std::uint16_t transparencyAt(std::size_t i) const {
-    return static_cast<std::uint16_t>(transparency[0][i] | transparency[1][i] << 8);
   }
 
  private:
@@ -157,14 +150,7 @@ Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns
       if (!isLongSide(columns.longSideAt(i), columns.long_side[2][i])) return damaged("long_side");
     }
   }
-  if (form.has_opacity) {
-    for (const auto& bytes : columns.transparency) {
-      if (!getBytes8(reader, bytes)) return damaged("transparency");
-    }
-    for (std::size_t i = 0; i < columns.group.size(); ++i) {
-      if (columns.transparencyAt(i) > kMostTransparency) return damaged("transparency");
-    }
-  }
+  if (form.has_opacity && !columns.transparency.get(reader)) return damaged("transparency");
   return {};
 }
 
@@ -189,9 +175,7 @@ std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& f
   if (form.has_long_sides) {
     for (const auto& bytes : columns.long_side) putBytes8(writer, bytes);
   }
-  if (form.has_opacity) {
-    for (const auto& bytes : columns.transparency) putBytes8(writer, bytes);
-  }
+  if (form.has_opacity) columns.transparency.put(writer);
   return writer.finish();
 }
 
