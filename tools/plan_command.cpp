@@ -198,7 +198,7 @@ void addPlanCommand(CLI::App& app, CommandContext& context) {
       ->type_name("TIME");
   addGatherOptions(*command, arguments->options);
   addLightOptions(*command, arguments->options);
-  addSubsetOption(*command, arguments->options.groups);
+  addSubsetOption(*command, arguments->options.groups, plan.scene);
   context.addCommonOptions(*command, {.stats = false});
   command->footer(
       "Memory and time of a task are found from a sample, as by tune, or given: --memory is the\n"
