@@ -107,14 +107,14 @@ class CameraTask final : public SurfelTask {
   void addPiece(const CameraPiece& piece, SurfelBatch& batch) const {
     std::vector<PiecePart> parts;
     dice_.appendParts(piece, parts);
-    std::vector<float> opacities(parts.size());
+    std::vector<float> there(parts.size());
     const std::size_t begin = batch.surfels.size();
     // Light that is sampled anew when a camera moves would flicker: the piece alone decides
     const std::uint64_t seed = splitMix(splitMix(piece.triangle) ^ piece.path);
     for (std::size_t k = 0; k < parts.size(); ++k) {
-      batch.surfels.push_back(maker_.make(piece.triangle, parts[k], seed + k, opacities[k]));
+      batch.surfels.push_back(maker_.make(piece.triangle, parts[k], seed + k, there[k]));
     }
-    maker_.applyOpacity(opacities, begin, batch);
+    maker_.applyMasks(there, begin, batch);
   }
 
   const CameraDice& dice_;

@@ -27,6 +27,12 @@ bool Mesh::isOpaque() const {
                      [](const Material& material) { return material.isOpaque(); });
 }
 
+bool Mesh::isTranslucent() const {
+  return std::any_of(materials.begin(), materials.end(), [](const Material& material) {
+    return material.opacity > 0 && material.opacity < 1;
+  });
+}
+
 bool Mesh::hasTwoSides() const {
   return std::any_of(materials.begin(), materials.end(),
                      [](const Material& material) { return material.is_two_sided; });

@@ -28,8 +28,8 @@ struct Material {
   glm::vec3 emission{0};               // radiant exitance: pi times the radiance Ke
   std::uint32_t texture = kNoTexture;  // into Mesh::textures; multiplies the albedo
   std::uint32_t glow = kNoTexture;     // map_Ke, into Mesh::textures; multiplies the emission
-  float opacity = 1;                   // d: part of the surface that is there
-  std::uint32_t mask = kNoTexture;     // map_d, into Mesh::masks; multiplies the opacity
+  float opacity = 1;                   // d
+  std::uint32_t mask = kNoTexture;     // map_d, into Mesh::masks: part of the surface that is there
   Scattering scattering = Scattering::kMatte;
   glm::vec3 specular{0};  // Ks of a mirror
   glm::vec3 transmission{
@@ -60,6 +60,8 @@ struct Mesh {
   Bounds3 bounds() const;
   // Whether no material lets anything through.
   bool isOpaque() const;
+  // Whether some material lets a part of the light through, everywhere alike.
+  bool isTranslucent() const;
   // Whether some material has two sides.
   bool hasTwoSides() const;
   // Gives vertices that came without an attribute that others have its neutral value, and Embree

@@ -77,18 +77,18 @@ class PlanTask final : public SurfelTask {
     const TriangleDice dice(whole, job.area, job.piece_count, plan_.spacing());
     const Carried carried = gatherCarried(job, dice);
     std::vector<PiecePart> parts;
-    std::vector<float> opacities;
+    std::vector<float> there;
     for (std::uint64_t i = range.begin; i < range.end; ++i) {
       parts.clear();
       dice.appendParts(i, parts);
-      opacities.resize(parts.size());
+      there.resize(parts.size());
       const std::size_t begin = surfels.size();
       for (std::size_t k = 0; k < parts.size(); ++k) {
         const std::uint64_t seed = ((job.first_surfel + i) << kMaxSlabBits) + k;
-        surfels.push_back(maker_.make(job.triangle, parts[k], seed, opacities[k]));
+        surfels.push_back(maker_.make(job.triangle, parts[k], seed, there[k]));
       }
       if (carried.area > 0 && i == carried.piece) takeOver(job, carried, surfels, begin);
-      maker_.applyOpacity(opacities, begin, batch);
+      maker_.applyMasks(there, begin, batch);
     }
   }
 

@@ -189,7 +189,7 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.normal = channels.radius = channels.area = channels.albedo = true;
     channels.radiosity = light.hasLight();
     channels.two_sided = channels.long_side = options.is_two_sided || mesh.hasTwoSides();
-    channels.opacity = !mesh.isOpaque();
+    channels.opacity = mesh.isTranslucent();
     SURFEIT_ASSIGN_OR_RETURN(
         SurfelWriter writer,
         SurfelWriter::create(

@@ -8,10 +8,9 @@
 namespace surfeit {
 
 Surfel SurfelMaker::make(std::uint32_t triangle, const PiecePart& part, std::uint64_t seed,
-                         float& opacity) const {
+                         float& there) const {
   const SurfacePoint point =
       surfacePoint(mesh_, triangle, float(part.weight.y), float(part.weight.z));
-  opacity = point.opacity;
   Surfel surfel;
   surfel.position = glm::vec3(part.centroid);
   surfel.normal = point.normal;
@@ -19,8 +18,10 @@ Surfel SurfelMaker::make(std::uint32_t triangle, const PiecePart& part, std::uin
   surfel.area = std::max(float(part.area), std::numeric_limits<float>::min());  // never 0
   surfel.albedo = point.albedo;
   if (light_ != nullptr) surfel.radiosity = light_->exitance(point, seed, light_->samples());
-  const bool is_curve = mesh_.materials[mesh_.triangle_material[triangle]].is_two_sided;
-  if (is_two_sided_ || is_curve) showBothSides(point, seed, part, surfel);
+  const Material& material = mesh_.materials[mesh_.triangle_material[triangle]];
+  there = material.opacity > 0 ? point.opacity / material.opacity : 0;
+  if (material.opacity < 1) surfel.transparency = transparencyOf(double(material.opacity));
+  if (is_two_sided_ || material.is_two_sided) showBothSides(point, seed, part, surfel);
   return surfel;
 }
 
@@ -36,15 +37,15 @@ void SurfelMaker::showBothSides(SurfacePoint point, std::uint64_t seed, const Pi
   surfel.radiosity = 0.5f * (surfel.radiosity + back);
 }
 
-void SurfelMaker::applyOpacity(const std::vector<float>& opacities, std::size_t begin,
-                               SurfelBatch& batch) const {
+void SurfelMaker::applyMasks(const std::vector<float>& there, std::size_t begin,
+                             SurfelBatch& batch) const {
   if (mesh_.isOpaque()) return;
   std::size_t kept = begin;
   for (std::size_t i = begin; i < batch.surfels.size(); ++i) {
-    const float opacity = opacities[i - begin];
-    if (!(opacity > 0)) continue;
+    const float part = there[i - begin];
+    if (!(part > 0)) continue;
     batch.surfels[kept] = batch.surfels[i];
-    batch.surfels[kept].transparency = transparencyOf(double(opacity));
+    batch.surfels[kept].area *= part;
     ++kept;
   }
   batch.clear += batch.surfels.size() - kept;

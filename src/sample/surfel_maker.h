@@ -33,13 +33,12 @@ class SurfelMaker {
 
   const Mesh& mesh() const { return mesh_; }
 
-  // The surfel of a part of the triangle; `opacity` becomes how much of it is there. The same seed
-  // gives the same light.
+  // The surfel of a part of the triangle; `there` becomes how much of it a mask leaves. The same
+  // seed gives the same light.
   Surfel make(std::uint32_t triangle, const PiecePart& part, std::uint64_t seed,
-              float& opacity) const;
+              float& there) const;
   // Leaves the surfels from `begin` the areas that are there, and none of what is clear.
-  void applyOpacity(const std::vector<float>& opacities, std::size_t begin,
-                    SurfelBatch& batch) const;
+  void applyMasks(const std::vector<float>& there, std::size_t begin, SurfelBatch& batch) const;
 
  private:
   void showBothSides(SurfacePoint point, std::uint64_t seed, const PiecePart& part,
