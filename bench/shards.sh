@@ -2,7 +2,7 @@
 # What shards cost: processor time of a gather in N shards and their merge, over that of one gather;
 # and how much faster two tasks at once are than one after the other, with a thread each.
 #
-#   bench/shards.sh [PROGRAM [RECEIVERS [SHARDS]]]
+#   bench/shards.sh [PROGRAM [RECEIVERS [SHARDS]]]      SHARDS_ONLY=1: not the latter
 set -euo pipefail
 
 surfeit=$(realpath "${1:-build/dev/bin/surfeit}")
@@ -29,6 +29,7 @@ awk -v one="$one" -v all="$all" -v shards="$shards" 'BEGIN {
   printf "%d shards and their merge: %.1f s, %.1f s: %.3f times the processor time, %.3f the wall time\n",
     shards, b[1] + b[2], b[3], (b[1] + b[2]) / (a[1] + a[2]), b[3] / a[3] }'
 
+[[ -z ${SHARDS_ONLY:-} ]] || exit 0
 after=$({ time { gather two.ply --shard 1/2 --threads 1; gather two.ply --shard 2/2 --threads 1; }; } 2>&1)
 rm two.ply.shard-*
 beside=$({ time {
