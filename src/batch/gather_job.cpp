@@ -15,26 +15,48 @@
 
 namespace surfeit {
 
-Result<GatherJob> GatherJob::open(const std::string& receivers_path, const std::string& result_path,
-                                  const GatherOptions& options, const SceneFile& scene,
-                                  Progress& progress) {
+Result<GatherJob> GatherJob::openReceivers(const std::string& receivers_path,
+                                           const std::string& result_path,
+                                           const GatherOptions& options, Progress& progress) {
   SURFEIT_ASSIGN_OR_RETURN(
       const std::optional<ColorRange> colors,
       colorRangeFor(std::span(&receivers_path, 1), result_path, options.color_range));
   SURFEIT_ASSIGN_OR_RETURN(
       GatherInput input,
       GatherInput::open(receivers_path, options.channels, options.part, options.filter, colors));
-  SURFEIT_RETURN_IF_ERROR(input.check(GatherRules(options)));
-  GatherJob job(std::move(input), result_path, options, progress);
+  return GatherJob(std::move(input), result_path, options, progress);
+}
+
+Result<GatherJob> GatherJob::open(const std::string& receivers_path, const std::string& result_path,
+                                  const GatherOptions& options, const SceneFile& scene,
+                                  Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(GatherJob job,
+                           openReceivers(receivers_path, result_path, options, progress));
+  SURFEIT_RETURN_IF_ERROR(job.input_.check(GatherRules(options)));
   job.options_.eye -= scene.header().origin;
   SURFEIT_ASSIGN_OR_RETURN(job.environment_,
                            loadEnvironment(job.options_, scene.header().up, progress));
-  GatherWork work = gatherWork(job.input_.receivers(), job.options_);
-  if (const LoadedEnvironment* environment = job.environment()) {
-    work.held_bytes = environment->map.memoryBytes() + environment->cube.memoryBytes();
-  }
-  SURFEIT_ASSIGN_OR_RETURN(job.memory_, planGatherMemory(scene, options.memory_bytes, work));
+  SURFEIT_RETURN_IF_ERROR(job.plan(scene));
   return job;
+}
+
+Result<GatherJob> GatherJob::openToMerge(const std::string& receivers_path,
+                                         const std::string& result_path,
+                                         const GatherOptions& options, const SceneFile& scene,
+                                         Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(GatherJob job,
+                           openReceivers(receivers_path, result_path, options, progress));
+  SURFEIT_RETURN_IF_ERROR(job.plan(scene));
+  return job;
+}
+
+Status GatherJob::plan(const SceneFile& scene) {
+  GatherWork work = gatherWork(input_.receivers(), options_);
+  if (environment_ != nullptr) {
+    work.held_bytes = environment_->map.memoryBytes() + environment_->cube.memoryBytes();
+  }
+  SURFEIT_ASSIGN_OR_RETURN(memory_, planGatherMemory(scene, options_.memory_bytes, work));
+  return {};
 }
 
 GatherJob::GatherJob(GatherInput input, const std::string& result_path,

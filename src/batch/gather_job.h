@@ -29,6 +29,10 @@ class GatherJob {
   static Result<GatherJob> open(const std::string& receivers_path, const std::string& result_path,
                                 const GatherOptions& options, const SceneFile& scene,
                                 Progress& progress);
+  // For results that were gathered before: only mode, outputs, and how receivers are read count.
+  static Result<GatherJob> openToMerge(const std::string& receivers_path,
+                                       const std::string& result_path, const GatherOptions& options,
+                                       const SceneFile& scene, Progress& progress);
 
   GatherInput& input() { return input_; }
   const GatherInput& input() const { return input_; }
@@ -55,6 +59,10 @@ class GatherJob {
                std::optional<std::uint64_t> checksum = {});
 
  private:
+  static Result<GatherJob> openReceivers(const std::string& receivers_path,
+                                         const std::string& result_path,
+                                         const GatherOptions& options, Progress& progress);
+  Status plan(const SceneFile& scene);
   GatherJob(GatherInput input, const std::string& result_path, const GatherOptions& options,
             Progress& progress);
   void noteOf(const RowWriter& writer);

@@ -198,9 +198,13 @@ Result<MergeStats> merge(const std::string& scene_path, const std::string& recei
   SURFEIT_ASSIGN_OR_RETURN(GatherOptions options, optionsOfJob(shards.job().job));
   static_cast<JobOptions&>(options) = merging;
   options = withDefaults(options);
-  SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, openSceneFor(scene_path, result_path, options));
-  SURFEIT_ASSIGN_OR_RETURN(GatherJob job,
-                           GatherJob::open(receivers_path, result_path, options, scene, progress));
+  if (result_path == scene_path) {
+    return Status::invalidArgument(
+        fmt::format("{}: the result would replace the scene", scene_path));
+  }
+  SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, SceneFile::open(scene_path));
+  SURFEIT_ASSIGN_OR_RETURN(
+      GatherJob job, GatherJob::openToMerge(receivers_path, result_path, options, scene, progress));
   for (const char* part : {"version", "scene", "receivers"}) {
     const std::string difference =
         differenceOf(jobIdentity(scene, job)[part], shards.job().job[part]);

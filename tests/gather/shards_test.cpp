@@ -125,6 +125,26 @@ TEST_F(Shards, EveryOrderModeAndInterpolationHaveTheBytesOfOneGather) {
   }
 }
 
+// What the gather needs and the merge does not: a viewpoint, a picture of light, a falloff.
+TEST_F(Shards, MergesNeedNoOptionsOfTheGather) {
+  GatherOptions glossy = coarseOptions(), sky = coarseOptions(), falloff = coarseOptions();
+  glossy.mode = GatherMode::kGlossy;
+  glossy.eye = {3, -4, 2};
+  sky.mode = GatherMode::kBleeding;
+  sky.environment.path = directory_.file("sky.hdr");
+  std::string picture = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n";
+  for (int i = 0; i < 32; ++i)
+    picture += std::string{char(80 + 3 * i), char(60 + i), 40, char(129)};
+  std::ofstream(sky.environment.path, std::ios::binary) << picture;
+  falloff.weights.falloff = 1;
+  falloff.quality.max_distance = 2;
+  falloff.weights.falloff_mode = GatherWeights::FalloffMode::kPolynomial;
+  for (const GatherOptions& options : {glossy, sky, falloff}) {
+    gatherAll(3, options);
+    expectSameBytes(options);
+  }
+}
+
 TEST_F(Shards, InvalidReceiversStayWithoutResult) {
   Table receivers = receiversOf(2000);
   for (std::size_t i = 0; i < 2000; i += 9) {
