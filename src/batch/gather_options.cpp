@@ -61,14 +61,20 @@ Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOpt
   return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
 }
 
-Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
-                               const GatherOptions& options) {
-  SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
+Result<SceneFile> openSceneBeside(const std::string& scene_path, const std::string& result_path,
+                                  Access access) {
   if (result_path == scene_path) {
     return Status::invalidArgument(
         fmt::format("{}: the result would replace the scene", scene_path));
   }
-  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
+  return SceneFile::open(scene_path, access);
+}
+
+Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
+                               const GatherOptions& options) {
+  SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene,
+                           openSceneBeside(scene_path, result_path, sceneAccess(options)));
   SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
   return scene;
 }

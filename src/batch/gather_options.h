@@ -17,6 +17,10 @@ namespace surfeit {
 // kInvalidArgument, naming the option, what was found and what is expected.
 Status checkGatherOptions(const GatherOptions& options);
 
+// kInvalidArgument for a result that would replace its scene.
+Result<SceneFile> openSceneBeside(const std::string& scene_path, const std::string& result_path,
+                                  Access access = Access::kCached);
+
 // Checks the options, and opens the scene that they are for.
 Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
                                const GatherOptions& options);

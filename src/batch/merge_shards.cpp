@@ -28,31 +28,37 @@ class ShardMerge {
   ShardMerge(std::string result_path, int count, Progress& progress)
       : result_path_(std::move(result_path)), count_(count), progress_(progress) {}
 
-  // Reads all headers. The job is that of most shards.
+  // Reads all headers. The job is that of most shards. Of each job one description is kept, for
+  // there may be thousands of shards.
   Status readHeaders() {
     std::map<std::string, int> jobs;
-    std::vector<std::optional<ShardHeader>> headers;
+    std::vector<std::optional<Piece>> pieces;
     for (int shard = 1; shard <= count_; ++shard) {
       if (progress_.isCancelled()) return Status::interrupted();
       Result<ShardReader> reader = ShardReader::open(shardPath(result_path_, shard, count_));
       if (reader.ok()) {
-        headers.emplace_back(reader->header());
-        ++jobs[reader->header().job.dump()];
+        const auto job = jobs.try_emplace(reader->header().job.dump(), 0).first;
+        ++job->second;
+        pieces.emplace_back(Piece{reader->header(), &job->first});
+        pieces.back()->header.job = nullptr;
         continue;
       }
-      headers.emplace_back();
+      pieces.emplace_back();
       lack(shard, access(shardPath(result_path_, shard, count_).c_str(), F_OK) == 0
                       ? reader.status().message()
                       : std::string());
     }
     int most = 0;
-    for (const auto& header : headers) {
-      if (!header || jobs[header->job.dump()] <= most) continue;
-      most = jobs[header->job.dump()];
-      first_ = *header;
+    const std::string* job = nullptr;
+    for (const auto& piece : pieces) {
+      if (!piece || jobs[*piece->job] <= most) continue;
+      most = jobs[*piece->job];
+      job = piece->job;
+      first_ = piece->header;
     }
     if (most == 0) return incomplete();
-    checkTiling(headers);
+    first_.job = nlohmann::json::parse(*job);
+    checkTiling(pieces, job);
     return {};
   }
 
@@ -91,23 +97,32 @@ class ShardMerge {
   }
 
  private:
+  struct Piece {
+    ShardHeader header;      // without the job
+    const std::string* job;  // equal for equal jobs
+  };
+
   // Shards of the job follow each other without gap; those of another plan are to be gathered
   // again.
-  void checkTiling(const std::vector<std::optional<ShardHeader>>& headers) {
+  void checkTiling(const std::vector<std::optional<Piece>>& pieces, const std::string* job) {
     std::uint64_t rank = 0;
     std::map<std::string, std::vector<int>> sets;
     for (int shard = 1; shard <= count_; ++shard) {
-      const auto& header = headers[static_cast<std::size_t>(shard) - 1];
-      if (!header) {
+      const auto& piece = pieces[static_cast<std::size_t>(shard) - 1];
+      if (!piece) {
         rank = kUnknown;
         continue;
       }
-      std::string difference = differenceOf(header->job, first_.job);
+      const ShardHeader& header = piece->header;
+      std::string difference;
+      if (piece->job != job) {
+        difference = differenceOf(nlohmann::json::parse(*piece->job), first_.job);
+      }
       if (difference.empty() &&
-          (header->receivers_checksum != first_.receivers_checksum ||
-           header->valid_receivers != first_.valid_receivers || header->outputs != first_.outputs ||
-           header->shard != shard || header->count != count_ ||
-           (rank != kUnknown && header->first_rank != rank))) {
+          (header.receivers_checksum != first_.receivers_checksum ||
+           header.valid_receivers != first_.valid_receivers || header.outputs != first_.outputs ||
+           header.shard != shard || header.count != count_ ||
+           (rank != kUnknown && header.first_rank != rank))) {
         difference = "gathered for other receivers";
       }
       if (!difference.empty()) {
@@ -115,8 +130,8 @@ class ShardMerge {
         rank = kUnknown;
         continue;
       }
-      sets[header->instruction_set].push_back(shard);
-      rank = header->first_rank + header->results;
+      sets[header.instruction_set].push_back(shard);
+      rank = header.first_rank + header.results;
     }
     if (lacking_.empty() && rank != first_.valid_receivers) {
       lack(count_, "the last shard ends too early");
@@ -198,11 +213,7 @@ Result<MergeStats> merge(const std::string& scene_path, const std::string& recei
   SURFEIT_ASSIGN_OR_RETURN(GatherOptions options, optionsOfJob(shards.job().job));
   static_cast<JobOptions&>(options) = merging;
   options = withDefaults(options);
-  if (result_path == scene_path) {
-    return Status::invalidArgument(
-        fmt::format("{}: the result would replace the scene", scene_path));
-  }
-  SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, SceneFile::open(scene_path));
+  SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, openSceneBeside(scene_path, result_path));
   SURFEIT_ASSIGN_OR_RETURN(
       GatherJob job, GatherJob::openToMerge(receivers_path, result_path, options, scene, progress));
   for (const char* part : {"version", "scene", "receivers"}) {

@@ -66,61 +66,12 @@ bool ReceiverMapping::decode(const std::byte* row, std::uint64_t record, LocalRe
 }
 
 ResultRows::ResultRows(const RowLayout& input, std::uint32_t outputs, GatherMode mode)
-    : outputs_(outputs) {
-  const std::vector<std::string> results = resultNames(outputs, mode);
-  std::vector<bool> is_placed(results.size(), false);
-
-  // The properties of the input, results in the place of their namesakes
-  for (RowProperty property : input.properties) {
-    if (property.is_list) continue;
-    const auto result = std::find(results.begin(), results.end(), property.name);
-    if (result == results.end()) {
-      addCopy({property.offset, row_bytes_, valueTypeBytes(property.type)});
-    } else {
-      const std::size_t number = static_cast<std::size_t>(result - results.begin());
-      is_placed[number] = true;
-      inserts_.push_back({number, row_bytes_});
-      property.type = ValueType::kFloat32;
-    }
-    addProperty(property);
-  }
-
-  // The other results
-  for (std::size_t number = 0; number < results.size(); ++number) {
-    if (is_placed[number]) continue;
-    RowProperty property;
-    property.name = results[number];
-    inserts_.push_back({number, row_bytes_});
-    addProperty(property);
-  }
-}
+    : outputs_(outputs), rows_(input, resultNames(outputs, mode)) {}
 
 void ResultRows::make(const std::byte* input, const GatherResult& result, std::byte* output) const {
-  for (const Copy& copy : copies_) std::memcpy(output + copy.to, input + copy.from, copy.bytes);
   std::array<float, kResultFloats> values;
   packResult(result, outputs_, values.data());
-  for (const Insert& insert : inserts_) {
-    std::memcpy(output + insert.to, &values[insert.place], sizeof(float));
-  }
-}
-
-// Appends a property to the output row.
-void ResultRows::addProperty(const RowProperty& property) {
-  properties_.push_back(property);
-  properties_.back().offset = row_bytes_;
-  row_bytes_ += valueTypeBytes(property.type);
-}
-
-// Values that are neighbours in input and output are copied at once.
-void ResultRows::addCopy(const Copy& copy) {
-  if (!copies_.empty()) {
-    Copy& last = copies_.back();
-    if (last.from + last.bytes == copy.from && last.to + last.bytes == copy.to) {
-      last.bytes += copy.bytes;
-      return;
-    }
-  }
-  copies_.push_back(copy);
+  rows_.make(input, values.data(), output);
 }
 
 }  // namespace surfeit

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cloud/row_layout.h"
+#include "cloud/rows_with_values.h"
 #include "gather/rules/receiver.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
@@ -62,28 +63,15 @@ class ResultRows {
  public:
   ResultRows(const RowLayout& input, std::uint32_t outputs, GatherMode mode);
 
-  const std::vector<RowProperty>& properties() const { return properties_; }
-  std::size_t rowBytes() const { return row_bytes_; }
+  const std::vector<RowProperty>& properties() const { return rows_.properties(); }
+  std::size_t rowBytes() const { return rows_.rowBytes(); }
 
   // Makes one row of rowBytes() at `output`.
   void make(const std::byte* input, const GatherResult& result, std::byte* output) const;
 
  private:
-  struct Copy {  // bytes of the input row that stay as they are
-    std::size_t from, to, bytes;
-  };
-  struct Insert {  // place in a packed result, offset in the output row
-    std::size_t place, to;
-  };
-
-  void addProperty(const RowProperty& property);
-  void addCopy(const Copy& copy);
-
   std::uint32_t outputs_;
-  std::vector<RowProperty> properties_;
-  std::vector<Copy> copies_;
-  std::vector<Insert> inserts_;
-  std::size_t row_bytes_ = 0;
+  RowsWithValues rows_;
 };
 
 }  // namespace surfeit

@@ -22,6 +22,7 @@
 #include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
 #include "cloud/row_transform.h"
+#include "cloud/rows_with_values.h"
 #include "core/curve_key.h"
 #include "core/guard.h"
 #include "core/job_limits.h"
@@ -29,7 +30,6 @@
 #include "core/program_memory.h"
 #include "index/scene_rows.h"
 #include "lookup/baked_map.h"
-#include "lookup/joined_rows.h"
 #include "lookup/lookup_receivers.h"
 #include "storage/output_target.h"
 #include "surfeit/lookup.h"
@@ -79,7 +79,7 @@ class CloudLookup {
                        progress_));
     finishPhase("open", start);
     const auto opened = std::chrono::steady_clock::now();
-    const JoinedRows rows(reader_->element(), map.names());
+    const RowsWithValues rows(reader_->element(), map.names());
     SURFEIT_RETURN_IF_ERROR(createWriter(rows));
     SURFEIT_RETURN_IF_ERROR(createReturn(map.names()));
     noteReceivers();
@@ -125,7 +125,7 @@ class CloudLookup {
     return {};
   }
 
-  Status createWriter(const JoinedRows& rows) {
+  Status createWriter(const RowsWithValues& rows) {
     RowWriterOptions writing;
     writing.properties = rows.properties();
     writing.comments = reader_->comments();
@@ -157,7 +157,7 @@ class CloudLookup {
     return {};
   }
 
-  Status lookUpAll(const BakedMap& map, const JoinedRows& rows) {
+  Status lookUpAll(const BakedMap& map, const RowsWithValues& rows) {
     const RowLayout& element = reader_->element();
     const std::size_t value_bytes = map.names().size() * sizeof(float);
     const std::size_t per_row = element.row_bytes + value_bytes + sizeof(BatchPlace) + 1;
@@ -234,7 +234,7 @@ class CloudLookup {
     return failure;
   }
 
-  Status writeBatch(const JoinedRows& rows, Bytes batch, std::size_t count) {
+  Status writeBatch(const RowsWithValues& rows, Bytes batch, std::size_t count) {
     const std::size_t row_bytes = reader_->element().row_bytes;
     const std::size_t size = values_.size() / count;
     if (!back_->isIdentity()) {

@@ -262,6 +262,7 @@ std::uint64_t Relighter::meshContent() const {
     const float values[] = {material.emission.r, material.emission.g, material.emission.b,
                             material.opacity};
     content = XXH3_64bits_withSeed(values, sizeof values, content ^ material.mask);
+    if (material.glow != kNoTexture) content = mesh_.textures[material.glow].content(content);
   }
   for (const Mask& mask : mesh_.masks) content = mask.content(content);
   return content;

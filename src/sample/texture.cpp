@@ -142,6 +142,10 @@ glm::vec3 Texture::lookup(const glm::vec2& uv) const {
                      [&](int column, int row) { return texel(column, row); });
 }
 
+std::uint64_t Texture::content(std::uint64_t seed) const {
+  return XXH3_64bits_withSeed(rgb_.data(), rgb_.size(), seed ^ std::uint64_t(width_));
+}
+
 std::uint64_t Mask::content(std::uint64_t seed) const {
   return XXH3_64bits_withSeed(values_.data(), values_.size(), seed ^ std::uint64_t(width_));
 }

@@ -35,6 +35,8 @@ class Texture {
   // Bilinear between texel centres, in linear light; repeats outside 0..1. The origin is the
   // bottom left corner, as in OBJ files.
   glm::vec3 lookup(const glm::vec2& uv) const;
+  // A number that differs between different textures.
+  std::uint64_t content(std::uint64_t seed) const;
 
  private:
   glm::vec3 texel(int column, int row) const;

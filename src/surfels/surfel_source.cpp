@@ -40,6 +40,7 @@ class RowSurfelSource final : public SurfelSource {
     for (std::string& note : notesOfLookalikes(reader_->element(), lacks_color, !has.normal)) {
       notes.push_back(std::move(note));
     }
+    noteOpacity(notes);
     return notes;
   }
 
@@ -98,6 +99,20 @@ class RowSurfelSource final : public SurfelSource {
   Status seekRow(std::uint64_t record) override { return reader_->seekRow(record); }
 
  private:
+  // What of an opacity is not used.
+  void noteOpacity(std::vector<std::string>& notes) const {
+    const RowLayout& element = reader_->element();
+    const bool is_used = mapping_.channels().opacity;
+    if (!is_used && element.find("opacity") != nullptr && element.find("f_dc_0") == nullptr) {
+      notes.push_back("opacity is not used beside coverage: --channels coverage=- leaves that out");
+    }
+    if (!is_used && element.find("opacity_r") != nullptr) {
+      notes.push_back(
+          "opacity_r opacity_g opacity_b are not used: a surfel has one opacity; --channels "
+          "opacity_g=opacity takes the green one");
+    }
+  }
+
   std::unique_ptr<RowReader> reader_;
   SurfelMapping mapping_;
   bool is_strict_;

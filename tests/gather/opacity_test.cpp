@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <glm/geometric.hpp>
 #include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "gather/test_clouds.h"
@@ -128,6 +130,64 @@ TEST_F(Opacity, AWallHidesWhatIsBehindIt) {
   EXPECT_NEAR(found.red, 1, .01 * (.5 * 20));
 }
 
+// Panes anywhere, of any size, turned any way, against rays that meet them.
+TEST_F(Opacity, RandomPanesLetThroughWhatRaysSay) {
+  struct Pane {
+    glm::dvec3 middle, u, v;
+    double opacity;
+  };
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> unit(0, 1), both(-1, 1);
+  const auto direction = [&] {
+    glm::dvec3 d;
+    do d = {both(random), both(random), both(random)};
+    while (glm::length(d) > 1 || glm::length(d) < .1);
+    return glm::normalize(d);
+  };
+  double worst = 0;
+  for (int scene = 0; scene < 12; ++scene) {
+    const double scale = std::pow(10., 4 * both(random));
+    const glm::dvec3 origin = 1000 * scale * direction();
+    std::vector<Pane> panes;
+    Table cloud = emptyTranslucent();
+    for (int k = 0; k < 3; ++k) {
+      const glm::dvec3 n = direction(), u = glm::normalize(glm::cross(n, direction()));
+      const double half = scale * (1 + 2 * unit(random));
+      panes.push_back({scale * (3. + k) * direction(), half * u, half * glm::cross(n, u),
+                       .1 + .6 * unit(random)});
+      constexpr int kSide = 60;
+      const double step = 2 * half / kSide;
+      for (int i = 0; i < kSide * kSide; ++i) {
+        const glm::dvec3 p = panes[k].middle + ((i % kSide + .5) / kSide * 2 - 1) * panes[k].u +
+                             ((i / kSide + .5) / kSide * 2 - 1) * panes[k].v + origin;
+        const glm::dvec3 facing = glm::dot(n, panes[k].middle) < 0 ? n : -n;
+        cloud.rows.push_back({p.x, p.y, p.z, facing.x, facing.y, facing.z, step * std::sqrt(.5),
+                              step * step, panes[k].opacity, 1, 1, 1});
+      }
+    }
+    receivers_.rows = {{origin.x, origin.y, origin.z, 0, 0, 0}};
+    double truth = 0;
+    constexpr int kRays = 100000;
+    for (int i = 0; i < kRays; ++i) {
+      const glm::dvec3 ray = direction();
+      double open = 1;
+      for (const Pane& pane : panes) {
+        const glm::dvec3 n = glm::cross(pane.u, pane.v);
+        const double t = glm::dot(pane.middle, n) / glm::dot(ray, n);
+        const glm::dvec3 hit = t * ray - pane.middle;
+        const double u = glm::dot(hit, pane.u) / glm::dot(pane.u, pane.u);
+        const double v = glm::dot(hit, pane.v) / glm::dot(pane.v, pane.v);
+        if (t > 0 && std::abs(u) < 1 && std::abs(v) < 1) open *= 1 - pane.opacity;
+      }
+      truth += (1 - open) / kRays;
+    }
+    const Means found = gather(cloud, bleeding());
+    worst = std::max(worst, std::abs(found.occlusion - truth));
+    EXPECT_NEAR(found.occlusion, truth, .02) << "scene " << scene << ", scale " << scale;
+  }
+  std::printf("worst of 12 scenes: %.4f\n", worst);
+}
+
 // The share of cosine-weighted directions that a ball of this density stops, by chords.
 double smokeOcclusion(const glm::dvec3& centre, double radius, double density) {
   std::mt19937 random(7);
@@ -201,6 +261,37 @@ TEST_F(Opacity, BouncesKeepIt) {
   const auto report = verifyScene(directory_.file("out.sft"), 1, progress_);
   ASSERT_TRUE(report.ok()) << report.status().message();
   EXPECT_TRUE(report->findings.empty());
+}
+
+// With the way out, which works.
+TEST_F(Opacity, WhatIsNotUsedIsTold) {
+  class ToldNotes : public Progress {
+   public:
+    void note(const std::string& message) override { text += message; }
+    std::string text;
+  };
+  Table tints = emptyTranslucent(), covered = emptyTranslucent();
+  addPane(1, .3, 1, 10, tints);
+  addPane(1, .3, 1, 10, covered);
+  for (const char* name : {"opacity_r", "opacity_g", "opacity_b"}) tints.addProperty(name);
+  for (auto& row : tints.rows) row.insert(row.end(), {.2, .4, .6});
+  tints.properties[8].name = "other";
+  covered.properties[7].name = "coverage";  // in place of the area
+  for (auto& row : covered.rows) row[7] = .5;
+  const std::string path = directory_.file("cloud.ply"), scene = directory_.file("scene.sft");
+  for (const auto& [cloud, told, way_out] :
+       {std::tuple(tints, "opacity_r opacity_g opacity_b are not used", "opacity_g=opacity"),
+        std::tuple(covered, "opacity is not used beside coverage", "coverage=-")}) {
+    writeTable(cloud, path);
+    ToldNotes notes, silence;
+    ASSERT_TRUE(indexClouds({path}, scene, IndexOptions{}, notes).ok());
+    EXPECT_NE(notes.text.find(told), std::string::npos) << notes.text;
+    EXPECT_NE(notes.text.find(way_out), std::string::npos) << notes.text;
+    IndexOptions options;
+    options.channels = way_out;
+    ASSERT_TRUE(indexClouds({path}, scene, options, silence).ok());
+    EXPECT_EQ(silence.text.find(told), std::string::npos) << silence.text;
+  }
 }
 
 TEST_F(Opacity, WhatIsNoOpacityIsInvalid) {

@@ -1,4 +1,4 @@
-#include "lookup/joined_rows.h"
+#include "cloud/rows_with_values.h"
 
 #include <algorithm>
 #include <cstring>
@@ -6,13 +6,13 @@
 
 namespace surfeit {
 
-JoinedRows::JoinedRows(const RowLayout& input, const std::vector<std::string>& values) {
+RowsWithValues::RowsWithValues(const RowLayout& input, const std::vector<std::string>& values) {
   std::vector<bool> is_placed(values.size(), false);
   for (RowProperty property : input.properties) {
     if (property.is_list) continue;
     const auto value = std::find(values.begin(), values.end(), property.name);
     if (value == values.end()) {
-      copies_.push_back({property.offset, row_bytes_, valueTypeBytes(property.type)});
+      addCopy({property.offset, row_bytes_, valueTypeBytes(property.type)});
     } else {
       const auto number = static_cast<std::size_t>(value - values.begin());
       is_placed[number] = true;
@@ -30,13 +30,25 @@ JoinedRows::JoinedRows(const RowLayout& input, const std::vector<std::string>& v
   }
 }
 
-void JoinedRows::add(RowProperty property) {
+void RowsWithValues::add(RowProperty property) {
   property.offset = row_bytes_;
   row_bytes_ += valueTypeBytes(property.type);
   properties_.push_back(std::move(property));
 }
 
-void JoinedRows::make(const std::byte* input, const float* values, std::byte* output) const {
+// Values that are neighbours in input and output are copied at once.
+void RowsWithValues::addCopy(const Copy& copy) {
+  if (!copies_.empty()) {
+    Copy& last = copies_.back();
+    if (last.from + last.bytes == copy.from && last.to + last.bytes == copy.to) {
+      last.bytes += copy.bytes;
+      return;
+    }
+  }
+  copies_.push_back(copy);
+}
+
+void RowsWithValues::make(const std::byte* input, const float* values, std::byte* output) const {
   for (const Copy& copy : copies_) std::memcpy(output + copy.to, input + copy.from, copy.bytes);
   for (const Insert& insert : inserts_) {
     std::memcpy(output + insert.to, &values[insert.value], sizeof(float));
