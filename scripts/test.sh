@@ -19,10 +19,14 @@ case $preset in
 esac
 
 scripts/install-deps.sh
-jobs=$(nproc)
 cmake --preset "$preset"
-cmake --build --preset "$preset" --parallel "$jobs"
-# Tests of files wait for the disk most of their time
-tests=$jobs
-[[ $preset == dev ]] && tests=$((2 * jobs))
-ctest --preset "$preset" --parallel "$tests" "$@"
+cmake --build --preset "$preset" --parallel "$(nproc)"
+
+# The files of the tests are in memory where there is room for them: on a disk tests wait for it most
+# of their time
+if [[ -z ${TMPDIR:-} && $(df --output=avail -B1M /dev/shm 2> /dev/null | tail -n 1) -ge 4096 ]]; then
+  TMPDIR=$(mktemp -d /dev/shm/surfeit_tests.XXXXXX)
+  export TMPDIR
+  trap 'rm -rf "$TMPDIR"' EXIT
+fi
+ctest --preset "$preset" --parallel "$(($(nproc) + 1))" "$@"

@@ -8,6 +8,8 @@ case_name=$1
 surfeit=$2
 cornell_scene=$3
 work_dir=$4
+# In memory, where the run of all tests says so
+[[ -z ${TMPDIR:-} || -n ${SURFEIT_IN_NAMESPACE:-} ]] || work_dir=$TMPDIR/${work_dir##*/}
 script=$(realpath "$0")
 # Limits and places of the job that runs the tests are none of their business
 unset SLURM_TMPDIR TMPDIR SLURM_MEM_PER_NODE SLURM_MEM_PER_CPU SLURM_CPUS_ON_NODE SLURM_CPUS_PER_TASK

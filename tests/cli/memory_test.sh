@@ -20,7 +20,7 @@ commands=(
   "gather scene.sft receivers.ply -o out.vdb --quality draft"
   "tune scene.sft receivers.ply --quality draft"
   "relight scene.sft -o out.sft --light-directional 0,-1,0,1,1,1"
-  "bounce scene.sft -o out.sft --bounces 2 --surfels-per-receiver 64"
+  "bounce scene.sft -o out.sft --bounces 2 --surfels-per-receiver 64 --spare-last"
   "radiance photons.ply -o out.ply"
   "brick cloud.ply --channel radiosity -o out.vdb"
   "lookup cloud.ply receivers.ply -o out.ply --channel radiosity"

@@ -125,7 +125,7 @@ class BounceFidelity : public DirectoryTest {
 TEST_F(BounceFidelity, CornellBoxWithSpheres) {
   ASSERT_EQ(std::system(fmt::format("'{}' '{}' >/dev/null", CORNELL_SCENE, path("")).c_str()), 0);
   SampleOptions sample;
-  sample.count = 200'000;
+  sample.count = 100'000;
   ASSERT_TRUE(sampleMeshes({path("cornell.obj")}, path("cloud.ply"), sample, progress_).ok());
   sample.count = 400;
   ASSERT_TRUE(sampleMeshes({path("cornell.obj")}, path("receivers.ply"), sample, progress_).ok());
