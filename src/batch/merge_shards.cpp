@@ -1,7 +1,6 @@
 // Brings the results of shards back into the order of the receivers, and writes these with them.
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <map>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "batch/shard_file.h"
 #include "batch/shard_names.h"
 #include "core/guard.h"
+#include "storage/system_calls.h"
 #include "surfeit/shards.h"
 
 namespace surfeit {
@@ -91,9 +91,9 @@ class ShardMerge {
 
   void removeShards() const {
     for (int shard = 1; shard <= count_; ++shard) {
-      unlink(shardPath(result_path_, shard, count_).c_str());
+      system_calls::unlink(shardPath(result_path_, shard, count_).c_str());
     }
-    unlink(shardPlanPath(result_path_, count_).c_str());
+    system_calls::unlink(shardPlanPath(result_path_, count_).c_str());
   }
 
  private:
