@@ -30,6 +30,7 @@
 #include "cloud/vdb/vdb_reader.h"
 #include "core/assert.h"
 #include "fuzz/row_probe.h"
+#include "fuzz/scene_probe.h"
 #include "storage/byte_input.h"
 
 namespace surfeit {
@@ -100,6 +101,11 @@ constexpr Probe kProbes[] = {
     {"pdb", readCloud<openPdb>},
     {"exr", readCloud<openExr>},
     {"picture", readPicture},
+    {"scene", probeScene},
+    {"surfel_page", probeSurfelPage},
+    {"node_page", probeNodePage},
+    {"recipe", probeRecipe},
+    {"expression", probeExpression},
 };
 
 }  // namespace

@@ -1,0 +1,24 @@
+// Holds what reads scenes, their pages and the small languages of the program to its contract, on
+// bytes from anywhere.
+#pragma once
+
+#include <string>
+
+namespace surfeit {
+
+// A scene whose checksums are made right first, so that what stands behind them is probed: verified
+// from end to end, told by info, and looked at from three places.
+void probeScene(const std::string& path);
+
+// Payloads of pages: the first byte is the form, PageForm; the rest is decoded, and again with
+// other radiosities.
+void probeSurfelPage(const std::string& path);
+void probeNodePage(const std::string& path);
+
+// Recipes of generated scenes.
+void probeRecipe(const std::string& path);
+
+// Conditions of --filter.
+void probeExpression(const std::string& path);
+
+}  // namespace surfeit
