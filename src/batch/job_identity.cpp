@@ -62,7 +62,8 @@ json jobIdentity(const SceneFile& scene, const GatherJob& job) {
   if (const LoadedEnvironment* environment = job.environment()) {
     identity["environment"] = hashOf(std::as_bytes(environment->cube.pixels()));
   }
-  return identity;
+  // As it is read again: what is no number is null
+  return json::parse(identity.dump());
 }
 
 Result<GatherOptions> optionsOfJob(const json& identity) {

@@ -10,7 +10,9 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "batch/shard_file.h"
@@ -101,6 +103,23 @@ class Shards : public testing::Test {
   const std::string result_ = directory_.file("result.ply");
   NoteList notes_;
 };
+
+class PhaseCount : public Progress {
+ public:
+  void beginPhase(std::string_view name, std::uint64_t, std::string_view) override {
+    ++counts[std::string(name)];
+  }
+  std::map<std::string, int> counts;
+};
+
+TEST_F(Shards, ThePlanIsMadeOnce) {
+  PhaseCount phases;
+  for (int shard = 1; shard <= 4; ++shard) {
+    ASSERT_TRUE(gatherShard(shard, 4, phases, coarseOptions()).ok());
+  }
+  EXPECT_EQ(phases.counts["plan shards"], 1);
+  EXPECT_EQ(phases.counts["sort"], 5);
+}
 
 TEST_F(Shards, AnyNumberOfThemHasTheBytesOfOneGather) {
   for (const int count : {1, 2, 7, 64}) {
