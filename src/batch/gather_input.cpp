@@ -65,7 +65,14 @@ GatherInput::GatherInput(std::unique_ptr<RowReader> reader, ReceiverMapping mapp
 
 Status GatherInput::rewind() {
   XXH3_64bits_reset(rows_hash_.get());
+  blocks_.checksums.clear();
+  row_ = 0;
   return reader_->rewind();
+}
+
+void GatherInput::endBlock() {
+  blocks_.checksums.push_back(XXH3_64bits_digest(rows_hash_.get()));
+  XXH3_64bits_reset(rows_hash_.get());
 }
 
 Status GatherInput::check(const GatherRules& rules) const {
@@ -97,16 +104,40 @@ void GatherInput::note(Progress& progress) const {
 Result<Bytes> GatherInput::readSlice(Progress& progress) {
   if (progress.isCancelled()) return Status::interrupted();
   SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, reader_->readRows(kSliceRows, slice_));
+  const std::size_t count = slice.size() / receivers().row_bytes;
+  if (count == 0) return slice;
   XXH3_64bits_update(rows_hash_.get(), slice.data(), slice.size());
+  row_ += count;
+  if (row_ % blockRows(receiverCount()) == 0 || row_ == receiverCount()) endBlock();
   return slice;
 }
 
+Result<std::uint64_t> GatherInput::skipBlock(const RowBlocks& known, std::uint64_t wanted) {
+  const std::uint64_t rows = blockRows(receiverCount());
+  const std::size_t block = blocks_.checksums.size();
+  if (row_ % rows != 0 || block >= known.shards.size() || (known.shards[block] & wanted) != 0) {
+    return std::uint64_t{0};
+  }
+  const std::uint64_t end = std::min(row_ + rows, receiverCount());
+  SURFEIT_RETURN_IF_ERROR(reader_->seekRow(end));
+  blocks_.checksums.push_back(known.checksums[block]);
+  return end - std::exchange(row_, end);
+}
+
 Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool strict,
-                         ExternalSorter& sorter, Progress& progress, const OrderRange& range) {
+                         ExternalSorter& sorter, Progress& progress, const OrderRange& range,
+                         const RowBlocks* blocks, std::uint64_t wanted) {
   SURFEIT_RETURN_IF_ERROR(rewind());
   defects_ = {};
   mapping_.setOrigin(scene.origin);
-  for (std::uint64_t record = 0;;) {
+  if (!reader_->isSeekable()) blocks = nullptr;
+  for (;;) {
+    if (blocks != nullptr) {
+      SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t skipped, skipBlock(*blocks, wanted));
+      progress.advance(skipped);
+      if (skipped > 0) continue;
+    }
+    std::uint64_t record = row_;
     SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, readSlice(progress));
     const std::size_t count = slice.size() / receivers().row_bytes;
     if (count == 0) return sorter.finish();
@@ -126,6 +157,35 @@ Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool str
     }
     progress.advance(count);
   }
+}
+
+Result<RowBlocks> GatherInput::findBlocks(ReceiverOrder order, const SceneHeader& scene,
+                                          std::span<const OrderPlace> begins, Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(rewind());
+  RowBlocks found;
+  found.shards.assign(blockCount(receiverCount()), 0);
+  const int shards = static_cast<int>(begins.size()) - 1;
+  SurfelDefects ignored;
+  mapping_.setOrigin(scene.origin);
+  for (;;) {
+    std::uint64_t record = row_;
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, readSlice(progress));
+    const std::size_t count = slice.size() / receivers().row_bytes;
+    if (count == 0) break;
+    std::uint64_t& block = found.shards[record / blockRows(receiverCount())];
+    for (std::size_t i = 0; i < count; ++i, ++record) {
+      LocalReceiver receiver;
+      const std::byte* const row = slice.data() + i * receivers().row_bytes;
+      if (!mapping_.decode(row, record, receiver, ignored)) continue;
+      const OrderPlace place = {keyOf(receiver.position, record, order, scene.cube), record};
+      const auto next = std::upper_bound(begins.begin(), begins.end() - 1, place);
+      const int shard = static_cast<int>(next - begins.begin());
+      block |= shardBits(shard, shard, shards);
+    }
+    progress.advance(count);
+  }
+  found.checksums = blocks_.checksums;
+  return found;
 }
 
 Status GatherInput::write(const ResultRows& rows, ResultStore& results, RowWriter& writer,

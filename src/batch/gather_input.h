@@ -13,6 +13,7 @@
 
 #include "batch/receiver_rows.h"
 #include "batch/result_store.h"
+#include "batch/row_blocks.h"
 #include "batch/sorted_receiver.h"
 #include "cloud/row_reader.h"
 #include "cloud/row_writer.h"
@@ -61,14 +62,20 @@ class GatherInput {
   void note(Progress& progress) const;
 
   // Gives the valid receivers of a range to the sorter, about the scene's origin and with keys of
-  // `order` in its cube. Invalid ones are counted; kCorruption with `strict`.
+  // `order` in its cube. Invalid ones are counted; kCorruption with `strict`. With `blocks`, those
+  // that have none of the `wanted` shards are passed over where the reader can.
   Status sort(ReceiverOrder order, const SceneHeader& scene, bool strict, ExternalSorter& sorter,
-              Progress& progress, const OrderRange& range = {});
+              Progress& progress, const OrderRange& range = {}, const RowBlocks* blocks = nullptr,
+              std::uint64_t wanted = 0);
   // Of the last sort.
   const SurfelDefects& defects() const { return defects_; }
 
-  // Of the rows, all of which the last sort or write has read.
-  std::uint64_t checksum() const { return XXH3_64bits_digest(rows_hash_.get()); }
+  // Of the rows, all of which the last sort or write has read, or knew of blocks passed over.
+  std::uint64_t checksum() const { return blocks_.checksum(); }
+  // Reads all rows once more, and finds the shards that have receivers in each block, by the places
+  // where shards begin, and the end.
+  Result<RowBlocks> findBlocks(ReceiverOrder order, const SceneHeader& scene,
+                               std::span<const OrderPlace> begins, Progress& progress);
 
   // Writes all receivers with their results, in the order of the input. The caller finishes the
   // writer.
@@ -80,6 +87,9 @@ class GatherInput {
   Status rewind();
   // Reads the next rows, up to kSliceRows; none at the end.
   Result<Bytes> readSlice(Progress& progress);
+  // Passes over the next block, if it has none of the wanted shards: the rows that it has.
+  Result<std::uint64_t> skipBlock(const RowBlocks& known, std::uint64_t wanted);
+  void endBlock();
 
   std::unique_ptr<RowReader> reader_;
   ReceiverMapping mapping_;
@@ -88,7 +98,9 @@ class GatherInput {
   struct FreeHash {
     void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
   };
-  std::unique_ptr<XXH3_state_t, FreeHash> rows_hash_;
+  std::unique_ptr<XXH3_state_t, FreeHash> rows_hash_;  // of the block
+  RowBlocks blocks_;                                   // up to here
+  std::uint64_t row_ = 0;                              // that comes next
 };
 
 }  // namespace surfeit

@@ -83,7 +83,9 @@ Status GatherJob::note(const SceneFile& scene) {
 }
 
 Result<std::unique_ptr<ExternalSorter>> GatherJob::sort(const SceneHeader& scene,
-                                                        const OrderRange& range) {
+                                                        const OrderRange& range,
+                                                        const RowBlocks* blocks,
+                                                        std::uint64_t wanted) {
   progress_->beginPhase("sort", input_.receiverCount(), "receivers");
   auto sorter = std::make_unique<ExternalSorter>(
       ExternalSorter::Options{.record_bytes = sizeof(SortedReceiver),
@@ -93,15 +95,26 @@ Result<std::unique_ptr<ExternalSorter>> GatherJob::sort(const SceneHeader& scene
                               .temporary_directory = temporary_directory_});
   Status sorted;
   withThreads(options_.threads, [&] {
-    sorted = input_.sort(options_.order, scene, options_.strict, *sorter, *progress_, range);
+    sorted = input_.sort(options_.order, scene, options_.strict, *sorter, *progress_, range, blocks,
+                         wanted);
   });
   SURFEIT_RETURN_IF_ERROR(sorted);
-  if (input_.defects().total() > 0) {
+  if (input_.defects().total() > 0 && blocks == nullptr) {
     const std::string note = fmt::format("{}: no result (NaN) at invalid receivers: {}",
                                          input_.reader().path(), input_.defects().describe());
     if (told_.insert(note).second) progress_->note(note);
   }
   return sorter;
+}
+
+Result<RowBlocks> GatherJob::findBlocks(const SceneHeader& scene,
+                                        std::span<const OrderPlace> begins) {
+  if (options_.strict || !input_.reader().isSeekable()) return RowBlocks();
+  progress_->beginPhase("find blocks", input_.receiverCount(), "receivers");
+  Result<RowBlocks> blocks = RowBlocks();
+  withThreads(options_.threads,
+              [&] { blocks = input_.findBlocks(options_.order, scene, begins, *progress_); });
+  return blocks;
 }
 
 Result<std::unique_ptr<RowWriter>> GatherJob::createWriter(const ResultRows& rows) {

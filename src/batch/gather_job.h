@@ -2,15 +2,18 @@
 // their order, the environment, the memory, and the file of the result.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 
 #include "batch/gather_input.h"
 #include "batch/gather_memory.h"
 #include "batch/gather_options.h"
 #include "batch/receiver_rows.h"
+#include "batch/row_blocks.h"
 #include "cloud/row_writer.h"
 #include "gather/light/environment_map.h"
 #include "octree/read/scene_file.h"
@@ -48,9 +51,14 @@ class GatherJob {
   // Tells what the gather makes of its input, and what stays dark.
   Status note(const SceneFile& scene);
 
-  // The receivers of a range, along the order. Tells of the invalid ones.
+  // The receivers of a range, along the order. Tells of the invalid ones, unless `blocks` say which
+  // rows have none of the `wanted` shards: some may lie there.
   Result<std::unique_ptr<ExternalSorter>> sort(const SceneHeader& scene,
-                                               const OrderRange& range = {});
+                                               const OrderRange& range = {},
+                                               const RowBlocks* blocks = nullptr,
+                                               std::uint64_t wanted = 0);
+  // The shards that have receivers in each block of rows; none where that saves no reading.
+  Result<RowBlocks> findBlocks(const SceneHeader& scene, std::span<const OrderPlace> begins);
 
   // Writes the receivers with their results (finished) as rows of the result. `checksum`: of the
   // receivers' rows, where it is known; kCorruption when they have changed since.

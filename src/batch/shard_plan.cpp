@@ -5,6 +5,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
 #include <utility>
 
@@ -24,7 +25,7 @@ using nlohmann::json;
 // begin at one of them.
 constexpr std::uint64_t kLeastSamples = 4096, kSamplesPerShard = 16;
 // A boundary as text, and what a plan holds beside them, at most.
-constexpr std::uint64_t kBoundaryBytes = 80, kPlanBytes = 64 << 10;
+constexpr std::uint64_t kBoundaryBytes = 80, kPlanBytes = 256 << 10;
 
 // What one receiver costs, and with it its neighbours.
 class CostOfReceiver {
@@ -105,6 +106,20 @@ std::string checksumOf(const std::string& text) {
   return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size()));
 }
 
+std::string hexOf(std::span<const std::uint64_t> numbers) {
+  std::string text;
+  for (const std::uint64_t number : numbers) text += fmt::format("{:016x}", number);
+  return text;
+}
+
+std::vector<std::uint64_t> numbersOf(const std::string& hex) {
+  std::vector<std::uint64_t> numbers(hex.size() / 16);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    numbers[i] = std::strtoull(hex.substr(16 * i, 16).c_str(), nullptr, 16);
+  }
+  return numbers;
+}
+
 json toJson(const ShardPlan& plan) {
   json boundaries = json::array();
   for (const auto& [rank, place] : plan.boundaries) {
@@ -114,7 +129,9 @@ json toJson(const ShardPlan& plan) {
           {"receivers_checksum", plan.receivers_checksum},
           {"valid_receivers", plan.valid_receivers},
           {"invalid_receivers", plan.invalid_receivers},
-          {"boundaries", std::move(boundaries)}};
+          {"boundaries", std::move(boundaries)},
+          {"block_checksums", hexOf(plan.blocks.checksums)},
+          {"block_shards", hexOf(plan.blocks.shards)}};
 }
 
 std::optional<ShardPlan> fromJson(const json& text, int count) {
@@ -129,9 +146,12 @@ std::optional<ShardPlan> fromJson(const json& text, int count) {
           {boundary.at(0).get<std::uint64_t>(),
            {boundary.at(1).get<CurveKey>(), boundary.at(2).get<std::uint64_t>()}});
     }
+    plan.blocks.checksums = numbersOf(text.at("block_checksums").get<std::string>());
+    plan.blocks.shards = numbersOf(text.at("block_shards").get<std::string>());
   } catch (const json::exception&) {
     return std::nullopt;
   }
+  if (plan.blocks.checksums.size() != plan.blocks.shards.size()) return std::nullopt;
   const auto& boundaries = plan.boundaries;
   const bool is_plan =
       boundaries.size() == static_cast<std::size_t>(count) + 1 && boundaries[0].rank == 0 &&

@@ -11,6 +11,7 @@
 
 #include "batch/gather_input.h"
 #include "batch/gather_job.h"
+#include "batch/row_blocks.h"
 #include "octree/read/scene_file.h"
 #include "storage/external_sorter.h"
 #include "surfeit/progress.h"
@@ -29,11 +30,15 @@ struct ShardPlan {
   std::uint64_t receivers_checksum = 0;
   std::uint64_t valid_receivers = 0, invalid_receivers = 0;
   std::vector<Boundary> boundaries;  // of all shards, and the end
+  RowBlocks blocks;                  // of the receivers' rows; or none
 
   // Of shards first to last, from 1 on.
   OrderRange range(int first, int last) const {
     return {boundaries[static_cast<std::size_t>(first) - 1].place,
             boundaries[static_cast<std::size_t>(last)].place};
+  }
+  std::uint64_t bits(int first, int last) const {
+    return shardBits(first, last, static_cast<int>(boundaries.size()) - 1);
   }
   std::uint64_t results(int shard) const {
     return boundaries[static_cast<std::size_t>(shard)].rank - firstRank(shard);

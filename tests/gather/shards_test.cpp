@@ -131,6 +131,30 @@ TEST_F(Shards, AnyNumberOfThemHasTheBytesOfOneGather) {
   }
 }
 
+// Receivers along a line, so that each shard has rows in a few blocks.
+TEST_F(Shards, RowsOfOthersAreNotRead) {
+  Table receivers = receiversOf(20'000);
+  for (std::size_t i = 0; i < receivers.rows.size(); ++i) {
+    receivers.rows[i][0] = -1 + 2 * double(i) / double(receivers.rows.size());
+    receivers.rows[i][1] = 0.1;
+  }
+  writeTable(receivers, receivers_);
+  gatherAll(5);
+  expectSameBytes();
+  EXPECT_THAT(notes_.text, Not(HasSubstr("gathered again")));
+
+  // A change shows to the shard that has it, and to the merge
+  receivers.rows.back()[2] += 0.001;
+  writeTable(receivers, receivers_);
+  ASSERT_TRUE(gatherShard(1, 5).ok());
+  EXPECT_THAT(notes_.text, Not(HasSubstr("gathered again")));
+  EXPECT_THAT(std::string(merge().message()), HasSubstr("gather the shards again"));
+  ASSERT_TRUE(gatherShard(5, 5).ok());
+  EXPECT_THAT(notes_.text, HasSubstr("gathered again"));
+  gatherAll(5);
+  expectSameBytes();
+}
+
 TEST_F(Shards, EveryOrderModeAndInterpolationHaveTheBytesOfOneGather) {
   GatherOptions morton = coarseOptions(), input = coarseOptions(), varied = coarseOptions();
   morton.order = ReceiverOrder::kMorton;
