@@ -18,6 +18,8 @@
 #include "batch/shard_file.h"
 #include "batch/shard_names.h"
 #include "core/guard.h"
+#include "core/json_difference.h"
+#include "core/number_ranges.h"
 #include "surfeit/shards.h"
 
 namespace surfeit {
