@@ -1,7 +1,6 @@
 // surfeit gather: occlusion and color bleeding at receivers.
 #include <fmt/format.h>
 
-#include <charconv>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "tools/command.h"
 #include "tools/gather_options.h"
 #include "tools/light_options.h"
+#include "tools/shard_option.h"
 
 namespace surfeit {
 namespace {
@@ -125,23 +125,6 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
                              {"node_cache", cacheJson(stats.node_cache)},
                              {"surfel_cache", cacheJson(stats.surfel_cache)},
                              {"windows", windowsJson(stats.windows)}});
-}
-
-ShardRange parseShard(const std::string& text) {
-  ShardRange range;
-  const char* const end = text.data() + text.size();
-  const auto [slash, error] = std::from_chars(text.data(), end, range.first);
-  if (error == std::errc() && slash != end && *slash == '/') {
-    const auto [at, count_error] = std::from_chars(slash + 1, end, range.count);
-    range.last = range.first;
-    if (count_error == std::errc() && at == end && range.first >= 1 && range.first <= range.count &&
-        range.count <= kMostShards) {
-      return range;
-    }
-  }
-  throw CLI::ValidationError(
-      "--shard", fmt::format("{}, expected I/N such as 3/16, with I from 1 to N, and N up to {}",
-                             text, kMostShards));
 }
 
 void addShardOptions(CLI::App& command, GatherArguments& arguments) {

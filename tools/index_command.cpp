@@ -2,16 +2,19 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "surfeit/group_names.h"
 #include "surfeit/index.h"
+#include "surfeit/index_shards.h"
 #include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/normal_options.h"
 #include "tools/number_list.h"
+#include "tools/shard_option.h"
 #include "tools/up_option.h"
 
 namespace surfeit {
@@ -27,6 +30,10 @@ struct IndexArguments {
   std::string cube_like;
   NormalEstimation estimation;
   bool is_dry_run = false;
+  std::string pass;  // of an index in shards; empty: all at once
+  std::optional<ShardRange> shard;
+  int shards = 0;
+  bool removes_shards = false;
   IndexOptions options;
 };
 
@@ -105,6 +112,69 @@ Status takeCube(IndexArguments& arguments) {
   return {};
 }
 
+// --pass: what goes with which.
+Status checkPass(const IndexArguments& arguments) {
+  const bool is_merge = arguments.pass == "merge";
+  if (arguments.pass.empty()) {
+    if (!arguments.shard && arguments.shards == 0 && !arguments.removes_shards) return {};
+    return Status::invalidArgument(
+        "--shard, --shards and --remove-shards are of one pass of an index in shards, expected "
+        "--pass count|distribute|build|merge");
+  }
+  if (arguments.is_dry_run) {
+    return Status::invalidArgument("--dry-run estimates a whole index, expected no --pass");
+  }
+  if (is_merge && (arguments.shard || arguments.shards == 0)) {
+    return Status::invalidArgument(
+        "--pass merge writes the scene from all shards, expected their number (--shards N)");
+  }
+  if (!is_merge && (!arguments.shard || arguments.shards > 0 || arguments.removes_shards)) {
+    return Status::invalidArgument(
+        fmt::format("--pass {} is of one shard, expected --shard I/N alone", arguments.pass));
+  }
+  return {};
+}
+
+// One shard of --pass.
+Status runPass(const IndexArguments& arguments, CommandContext& context) {
+  const IndexPass pass = arguments.pass == "count"        ? IndexPass::kCount
+                         : arguments.pass == "distribute" ? IndexPass::kDistribute
+                                                          : IndexPass::kBuild;
+  SURFEIT_ASSIGN_OR_RETURN(const IndexShardStats stats,
+                           indexShards(arguments.inputs, arguments.output, arguments.options, pass,
+                                       *arguments.shard, context.progress()));
+  const std::string shard = fmt::format("{}: shard {} of {}", arguments.output,
+                                        arguments.shard->first, arguments.shard->count);
+  if (stats.finished_shards > 0) {
+    context.say(fmt::format("{}: {} was done before", shard, arguments.pass));
+  } else {
+    context.say(
+        fmt::format("{}: {} of {} surfels in {:.1f} s, wrote {}\n"
+                    "memory: budget {}, peak resident {}, temporary files {}",
+                    shard, arguments.pass, formatCount(stats.surfels), context.wallSeconds(),
+                    formatBytes(stats.file_bytes), formatBytes(stats.memory_bytes),
+                    formatBytes(peakResidentBytes()), formatBytes(stats.temporary_bytes)));
+  }
+  return context.writeStats({{"command", "index"},
+                             {"pass", arguments.pass},
+                             {"shard", arguments.shard->first},
+                             {"shards", arguments.shard->count},
+                             {"finished_shards", stats.finished_shards},
+                             {"memory_bytes", stats.memory_bytes},
+                             {"records", stats.records},
+                             {"surfels", stats.surfels},
+                             {"file_bytes", stats.file_bytes},
+                             {"temporary_bytes", stats.temporary_bytes}});
+}
+
+Result<IndexStats> writeScene(const IndexArguments& arguments, CommandContext& context) {
+  if (arguments.pass == "merge") {
+    return mergeIndexShards(arguments.inputs, arguments.output, arguments.options, arguments.shards,
+                            arguments.removes_shards, context.progress());
+  }
+  return indexClouds(arguments.inputs, arguments.output, arguments.options, context.progress());
+}
+
 Status runIndex(IndexArguments& arguments, CommandContext& context) {
   IndexOptions& options = arguments.options;
   SURFEIT_RETURN_IF_ERROR(takeCube(arguments));
@@ -113,9 +183,10 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
   options.strict = context.common.strict;
   if (arguments.normals == "estimate") options.normals = arguments.estimation;
   options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_RETURN_IF_ERROR(checkPass(arguments));
   if (arguments.is_dry_run) return sayForecast(arguments, context);
-  SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, indexClouds(arguments.inputs, arguments.output,
-                                                               options, context.progress()));
+  if (arguments.shard) return runPass(arguments, context);
+  SURFEIT_ASSIGN_OR_RETURN(const IndexStats stats, writeScene(arguments, context));
   const double seconds = context.wallSeconds();
   const double bytes_per_surfel = double(stats.file_bytes) / double(stats.surfels);
   context.say(
@@ -142,6 +213,30 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                              {"temporary_bytes", stats.temporary_bytes},
                              {"surfels_per_second", double(stats.surfels) / seconds},
                              {"phases", jsonOfPhases(stats.phase_seconds)}});
+}
+
+void addPassOptions(CLI::App& command, IndexArguments& arguments) {
+  constexpr const char* kGroup = "Many machines";
+  command
+      .add_option("--pass", arguments.pass,
+                  "Do one pass of an index in shards alone (docs/farm.md): count, distribute and "
+                  "build of every shard, then merge")
+      ->check(CLI::IsMember({"count", "distribute", "build", "merge"}))
+      ->group(kGroup);
+  command
+      .add_option_function<std::string>(
+          "--shard", [&](const std::string& text) { arguments.shard = parseShard(text); },
+          "The I-th of N shards of --pass count, distribute or build, into a file beside the scene")
+      ->type_name("I/N")
+      ->group(kGroup);
+  command
+      .add_option("--shards", arguments.shards, "Number of shards that --pass merge puts together")
+      ->check(CLI::Range(1, kMostShards))
+      ->group(kGroup);
+  command
+      .add_flag("--remove-shards", arguments.removes_shards,
+                "Remove the files of the shards when --pass merge has written the scene")
+      ->group(kGroup);
 }
 
 }  // namespace
@@ -214,6 +309,7 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   addTemporaryOption(*command, options.temporary_directory);
   command->add_flag("--dry-run", arguments->is_dry_run,
                     "Write no scene; estimate memory, files and time from a sample");
+  addPassOptions(*command, *arguments);
   context.addCommonOptions(*command);
   context.addFrameOptions(*command);
   command->footer(
@@ -229,6 +325,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
       "  surfeit index room.ply --group lamp=lamp.ply --group tree=tree.ply -o named.sft\n"
       "  surfeit index tile1.las tile2.las -o survey.sft --overlap thin\n"
       "  surfeit index city.ply -o city.sft --memory 80%\n"
+      "  surfeit index city.ply -o city.sft --pass count --shard 3/16  # then the other passes\n"
+      "  surfeit index city.ply -o city.sft --pass merge --shards 16 --remove-shards\n"
       "  surfeit index frame2.ply -o frame2.sft --cube frame1.sft\n"
       "  surfeit index scan.las -o scan.sft --normals estimate --orient up\n"
       "  surfeit index baked.ptc -o baked.sft --channels _bake=radiosity,_N2=-");

@@ -24,6 +24,7 @@
 #include "batch/shard_names.h"
 #include "batch/shard_plan.h"
 #include "core/guard.h"
+#include "core/json_difference.h"
 #include "gather/packet/packet_kernel.h"
 #include "storage/output_target.h"
 #include "surfeit/shards.h"

@@ -89,18 +89,4 @@ Result<GatherOptions> optionsOfJob(const json& identity) {
   return options;
 }
 
-std::string differenceOf(const json& found, const json& expected) {
-  const json flat_found = found.flatten(), flat_expected = expected.flatten();
-  const auto valueOf = [](const json& flat, const std::string& key) {
-    return flat.contains(key) ? flat.at(key).dump() : std::string("absent");
-  };
-  for (const json* one : {&flat_expected, &flat_found}) {
-    for (const auto& [key, value] : one->items()) {
-      const std::string is = valueOf(flat_found, key), should = valueOf(flat_expected, key);
-      if (is != should) return fmt::format("{} is {}, expected {}", key.substr(1), is, should);
-    }
-  }
-  return {};
-}
-
 }  // namespace surfeit

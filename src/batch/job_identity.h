@@ -19,7 +19,4 @@ nlohmann::json jobIdentity(const SceneFile& scene, const GatherJob& job);
 // receivers are read. kCorruption when it has none.
 Result<GatherOptions> optionsOfJob(const nlohmann::json& identity);
 
-// Where the two differ: "settings/max_solid_angle is 0.05, expected 0.1"; empty: nowhere.
-std::string differenceOf(const nlohmann::json& found, const nlohmann::json& expected);
-
 }  // namespace surfeit

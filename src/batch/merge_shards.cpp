@@ -17,6 +17,8 @@
 #include "batch/shard_file.h"
 #include "batch/shard_names.h"
 #include "core/guard.h"
+#include "core/json_difference.h"
+#include "core/number_ranges.h"
 #include "storage/system_calls.h"
 #include "surfeit/shards.h"
 

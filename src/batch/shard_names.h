@@ -3,7 +3,6 @@
 
 #include <set>
 #include <string>
-#include <vector>
 
 #include "surfeit/shards.h"
 #include "surfeit/status.h"
@@ -15,8 +14,5 @@ std::string shardPlanPath(const std::string& result_path, int count);
 
 // The numbers of shards of the jobs that have some beside a result.
 Result<std::set<int>> shardCounts(const std::string& result_path);
-
-// "2, 5, 7-9", of rising numbers; without blanks as job schedulers want them.
-std::string numberRanges(const std::vector<int>& numbers, const char* separator = ", ");
 
 }  // namespace surfeit

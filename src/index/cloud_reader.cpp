@@ -141,6 +141,7 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
   for (const std::string& path : inputs) {
     SURFEIT_ASSIGN_OR_RETURN(const auto source, reader.opener_(path, strict, reading));
     reader.records_.push_back(source->recordCount());
+    reader.channels_.push_back(source->channels());
     if (source->hasFloatPositions()) reader.float_inputs_.push_back(path);
     reader.record_count_ += source->recordCount();
     reader.is_seekable_ = reader.is_seekable_ && source->isSeekable();
@@ -195,51 +196,66 @@ Result<std::vector<Surfel>> CloudReader::sample(std::uint64_t buckets) const {
   return all;
 }
 
-Result<CloudTotals> CloudReader::readAll(const Consumer& consume, Progress& progress) const {
+Result<CloudTotals> CloudReader::read(const Records& records, const Consumer& consume,
+                                      Progress& progress) const {
   CloudTotals totals;
-  const std::uint64_t sample_step = std::max<std::uint64_t>(1, record_count_ / kSampleSurfels);
-  for (std::size_t i = 0; i < inputs_.size(); ++i) {
-    const std::string& path = inputs_[i];
-    const std::optional<std::uint8_t> group = groups_.empty() ? std::nullopt : groups_[i];
-    SURFEIT_ASSIGN_OR_RETURN(const auto source, opener_(path, strict_, reading_));
-    source->setOrigin(origin_);
-    InputPass pass(*source, consume, sample_step, group, progress);
-    // Small inputs are read in parts too, so that all threads have some
-    const std::uint64_t part_rows = source->recordCount() / (4 * RowFetcher::kSlots) + kReadBatch;
-    RowFetcher fetcher(*source, static_cast<std::size_t>(std::min<std::uint64_t>(
-                                    read_bytes_, part_rows * source->rowBytes())));
-    std::array<RowFetcher::Rows, RowFetcher::kSlots> fetched;  // by slot
-    const auto fetch = [&]() -> std::optional<std::size_t> {
-      if (progress.isCancelled()) pass.failure().note(Status::interrupted());
-      if (pass.failure().happened()) return std::nullopt;
-      const RowFetcher::Rows rows = fetcher.next();
-      if (rows.bytes.empty()) return std::nullopt;
-      fetched[rows.slot] = rows;
-      return rows.slot;
-    };
-    const PipelineStage decode = {PipelineStage::Mode::kParallel, [&](std::size_t slot) {
-                                    const RowFetcher::Rows rows = fetched[slot];
-                                    pass.decode(rows);
-                                    fetcher.giveBack(rows);
-                                  }};
-    runPipeline(RowFetcher::kSlots, fetch, {&decode, 1});
-    SURFEIT_RETURN_IF_ERROR(pass.failure().status());
-    SURFEIT_RETURN_IF_ERROR(fetcher.status());
-    pass.totals().channels = source->channels();
-    if (group) {
-      if (source->channels().group) {
-        progress.note(
-            fmt::format("{}: groups of its own are left out: it has a name (--group)", path));
-      }
-      pass.totals().channels.group = true;
-    }
-    pass.totals().skipped = pass.defects().total();
-    if (const std::string defects = pass.defects().describe(); !defects.empty()) {
-      progress.note(fmt::format("{}: skipped {}", path, defects));
-    }
-    totals.add(pass.totals());
+  std::uint64_t first = 0;  // record of the input
+  for (std::size_t i = 0; i < inputs_.size(); first += records_[i++]) {
+    totals.channels = unionOf(totals.channels, channels_[i]);
+    if (!groups_.empty() && groups_[i]) totals.channels.group = true;
+    const std::uint64_t begin = std::clamp(records.begin, first, first + records_[i]) - first;
+    const std::uint64_t end = std::clamp(records.end, first, first + records_[i]) - first;
+    // An empty input is opened where a part begins, so that what is wrong with it is told
+    if (begin == end && (records_[i] > 0 || records.begin > 0)) continue;
+    SURFEIT_ASSIGN_OR_RETURN(const CloudTotals added,
+                             readInput(i, {begin, end}, consume, progress));
+    totals.add(added);
   }
   return totals;
+}
+
+Result<CloudTotals> CloudReader::readInput(std::size_t input, const Records& records,
+                                           const Consumer& consume, Progress& progress) const {
+  const std::uint64_t sample_step = std::max<std::uint64_t>(1, record_count_ / kSampleSurfels);
+  const std::string& path = inputs_[input];
+  const std::optional<std::uint8_t> group = groups_.empty() ? std::nullopt : groups_[input];
+  SURFEIT_ASSIGN_OR_RETURN(const auto source, opener_(path, strict_, reading_));
+  source->setOrigin(origin_);
+  InputPass pass(*source, consume, sample_step, group, progress);
+  // Small inputs are read in parts too, so that all threads have some
+  const std::uint64_t part_rows =
+      (records.end - records.begin) / (4 * RowFetcher::kSlots) + kReadBatch;
+  // What lies behind the last record that the source knows of shows too
+  const std::uint64_t end = records.end == source->recordCount() ? ~std::uint64_t{0} : records.end;
+  RowFetcher fetcher(*source,
+                     static_cast<std::size_t>(
+                         std::min<std::uint64_t>(read_bytes_, part_rows * source->rowBytes())),
+                     records.begin, end);
+  std::array<RowFetcher::Rows, RowFetcher::kSlots> fetched;  // by slot
+  const auto fetch = [&]() -> std::optional<std::size_t> {
+    if (progress.isCancelled()) pass.failure().note(Status::interrupted());
+    if (pass.failure().happened()) return std::nullopt;
+    const RowFetcher::Rows rows = fetcher.next();
+    if (rows.bytes.empty()) return std::nullopt;
+    fetched[rows.slot] = rows;
+    return rows.slot;
+  };
+  const PipelineStage decode = {PipelineStage::Mode::kParallel, [&](std::size_t slot) {
+                                  const RowFetcher::Rows rows = fetched[slot];
+                                  pass.decode(rows);
+                                  fetcher.giveBack(rows);
+                                }};
+  runPipeline(RowFetcher::kSlots, fetch, {&decode, 1});
+  SURFEIT_RETURN_IF_ERROR(pass.failure().status());
+  SURFEIT_RETURN_IF_ERROR(fetcher.status());
+  if (group && source->channels().group && records.begin == 0) {
+    progress.note(fmt::format("{}: groups of its own are left out: it has a name (--group)", path));
+  }
+  pass.totals().skipped = pass.defects().total();
+  if (const std::string defects = pass.defects().describe(); !defects.empty()) {
+    progress.note(fmt::format("{}: skipped {}", path, defects));
+  }
+  return pass.totals();
 }
 
 std::uint64_t CloudReader::memoryBytes(std::size_t read_bytes, int threads) {

@@ -59,6 +59,7 @@ class CloudReader {
 
   // Records of all inputs, valid or not, and bytes of the files.
   std::uint64_t recordCount() const { return record_count_; }
+  const std::vector<std::uint64_t>& records() const { return records_; }  // by input
   std::uint64_t fileBytes() const { return file_bytes_; }
   // Whether sample() works: all inputs can be read at any place.
   bool isSeekable() const { return is_seekable_; }
@@ -88,17 +89,29 @@ class CloudReader {
   // Reads everything. Invalid records are skipped, counted and told through progress.note(), or
   // refused. With the threads of the current arena. Errors: those of the inputs and the consumer;
   // of several bad records the first; kInterrupted.
-  Result<CloudTotals> readAll(const Consumer& consume, Progress& progress) const;
+  Result<CloudTotals> readAll(const Consumer& consume, Progress& progress) const {
+    return read({0, record_count_}, consume, progress);
+  }
+  // The same of some records, counted through all inputs. The totals are of these, but for the
+  // channels: those are of all inputs.
+  struct Records {
+    std::uint64_t begin = 0, end = 0;
+  };
+  Result<CloudTotals> read(const Records& records, const Consumer& consume,
+                           Progress& progress) const;
 
   // Memory of readAll for this many threads.
   static std::uint64_t memoryBytes(std::size_t read_bytes, int threads);
 
  private:
   CloudReader() = default;
+  Result<CloudTotals> readInput(std::size_t input, const Records& records, const Consumer& consume,
+                                Progress& progress) const;
 
   std::vector<std::string> inputs_;
   std::vector<std::uint64_t> records_;  // by input
-  Groups groups_;                       // empty: all have their own
+  std::vector<CloudChannels> channels_;
+  Groups groups_;  // empty: all have their own
   RowReaderOptions reading_;
   SourceOpener opener_;
   bool strict_ = false;

@@ -1,16 +1,13 @@
 #include "surfeit/index.h"
 
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <exception>
 #include <memory>
 #include <new>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "cloud/channels.h"
@@ -28,13 +25,14 @@
 #include "index/index_plan.h"
 #include "index/phase_clock.h"
 #include "index/pinned_cube.h"
+#include "index/scene_description.h"
+#include "index/scene_place.h"
 #include "octree/build/bucket_stream.h"
 #include "octree/build/octree_builder.h"
 #include "octree/build/scene_writer.h"
 #include "octree/neighbours/local_density.h"
 #include "octree/neighbours/repeated_surfels.h"
 #include "storage/output_target.h"
-#include "surfeit/version.h"
 
 namespace surfeit {
 namespace {
@@ -89,8 +87,12 @@ class Indexer {
   Result<std::unique_ptr<SurfelStore>> readInputs();
   Result<std::unique_ptr<SurfelStore>> readInto(const std::optional<RootCube>& cube);
   Status takeSample();
-  glm::dvec3 originAsked(const Bounds3& bounds) const;
-  RootCube cubeOf(const Bounds3& bounds) const;
+  glm::dvec3 originAsked(const Bounds3& bounds) const {
+    return surfeit::originAsked(options_, bounds, reader_->origin());
+  }
+  RootCube cubeOf(const Bounds3& bounds) const {
+    return cubeAsked(options_, bounds, reader_->origin());
+  }
   bool moveOrigin(const glm::dvec3& origin);
   bool mayNeedNeighbours() const { return reader_->lacksSizes() || options_.normals.has_value(); }
   bool estimatesNormals() const { return options_.normals && totals_.spheres > 0; }
@@ -104,7 +106,7 @@ class Indexer {
   Result<SceneFile> buildUnnamed(SortedSurfelStream& stream, const char* phase);
   Result<SceneFile> buildPlaces(std::unique_ptr<BucketStream> buckets);
   Status buildWithNeighbours(std::unique_ptr<BucketStream> buckets, SceneWriter& writer);
-  std::uint64_t identity(bool full_precision) const;
+  SceneDescription describe(const std::optional<NormalRule>& rule) const;
   std::string provenance() const;
 
   const GroupPlan groups_;
@@ -160,6 +162,9 @@ Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
   if (options_.cube) pinned_.emplace(*options_.cube);
   SURFEIT_RETURN_IF_ERROR(openInputs());
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
+  // Nothing more is planned, and building has a use for the memory
+  sample_ = std::vector<Surfel>();
+  totals_.sample = std::vector<Surfel>();
   stats_.skipped_records = totals_.skipped;
   auto buckets = std::make_unique<BucketStream>(
       std::move(store),
@@ -204,17 +209,6 @@ Status Indexer::takeSample() {
   }
   for (Surfel& surfel : sample_) applySizeRules(surfel, options_.disk_overlap);
   return {};
-}
-
-// The origin for a cloud of these bounds, which are counted from the present one.
-glm::dvec3 Indexer::originAsked(const Bounds3& bounds) const {
-  if (options_.origin) return *options_.origin;
-  return pinned_ ? pinned_->origin() : originFor(movedBounds(bounds, reader_->origin()));
-}
-
-// About the present origin.
-RootCube Indexer::cubeOf(const Bounds3& bounds) const {
-  return pinned_ ? pinned_->about(reader_->origin()) : rootCube(bounds);
 }
 
 // Counts positions from another origin from now on, those of the sample too; false when it is the
@@ -266,7 +260,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInputs() {
   }
   clock_.finish("read");
   for (int pass = 1; store == nullptr; ++pass) {
-    sample_ = totals_.sample;
+    sample_ = std::move(totals_.sample);
     const CloudTotals before = std::move(totals_);
     const glm::dvec3 old_origin = reader_->origin();
     const bool is_moved = moveOrigin(originAsked(before.bounds));
@@ -332,20 +326,19 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
 
 Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& path,
                                                            bool full_precision) {
-  SceneHeader header;
-  header.leaf_capacity = options_.leaf_capacity;
-  header.node_group_capacity = kDefaultNodeGroup;
-  header.surfel_group_capacity = kDefaultSurfelGroup;
-  header.flatness_limit = kDefaultFlatnessLimit;
-  header.origin = reader_->origin();
-  header.up = up();
-  header.bounds = totals_.bounds;
-  header.cube = cubeOf(totals_.bounds);
-  header.channels = totals_.channels;
-  header.channels.normal = header.channels.normal || estimatesNormals();
-  header.format_version = formatVersionFor(header.channels);
-  header.full_precision = full_precision;
-  return SceneWriter::create(path, header, identity(full_precision));
+  const std::optional<NormalRule> rule = normalRule();
+  const SceneDescription description = describe(rule);
+  return SceneWriter::create(path, description.header(full_precision),
+                             description.identity(full_precision));
+}
+
+SceneDescription Indexer::describe(const std::optional<NormalRule>& rule) const {
+  return {options_, groups_, totals_, reader_->origin(), up(), rule ? &*rule : nullptr};
+}
+
+std::string Indexer::provenance() const {
+  const std::optional<NormalRule> rule = normalRule();
+  return describe(rule).provenance();
 }
 
 Status Indexer::build(SceneWriter& writer, SortedSurfelStream& stream, const char* phase) {
@@ -407,51 +400,6 @@ Status Indexer::buildWithNeighbours(std::unique_ptr<BucketStream> buckets, Scene
   SURFEIT_RETURN_IF_ERROR(buildFromNeighbours(std::move(places), how, stats_, clock_, progress_));
   noteThinSurfels(stats_, options_, progress_);
   return {};
-}
-
-// Two files of one identity hold the same surfels built the same way.
-std::uint64_t Indexer::identity(bool full_precision) const {
-  const CloudChannels& channels = totals_.channels;
-  const std::string text = provenance();
-  const glm::dvec3 origin = reader_->origin();
-  const std::uint64_t parts[] = {
-      totals_.content,
-      std::bit_cast<std::uint64_t>(origin.x),
-      std::bit_cast<std::uint64_t>(origin.y),
-      std::bit_cast<std::uint64_t>(origin.z),
-      totals_.surfels,
-      formatVersionFor(channels),
-      full_precision ? 1u : 0u,
-      std::uint64_t{channels.normal} | std::uint64_t{channels.radius} << 1 |
-          std::uint64_t{channels.area} << 2 | std::uint64_t{channels.radiosity} << 3 |
-          std::uint64_t{channels.albedo} << 4 | std::uint64_t{channels.two_sided} << 5 |
-          std::uint64_t{channels.group} << 6 | std::uint64_t{channels.long_side} << 7 |
-          std::uint64_t{channels.opacity} << 8,
-      XXH3_64bits(text.data(), text.size())};
-  return XXH3_64bits(parts, sizeof parts);
-}
-
-// Only what the surfels themselves do not say, and nothing that differs between equal runs: no
-// time, no paths, no order.
-std::string Indexer::provenance() const {
-  nlohmann::json json = {{"program", "surfeit"},
-                         {"version", kVersion},
-                         {"leaf_capacity", options_.leaf_capacity},
-                         {"overlap", options_.disk_overlap},
-                         {"precision", options_.full_precision ? "full" : "quantized"},
-                         {"skipped_records", totals_.skipped},
-                         {"sizes_from_neighbours", totals_.missing_both},
-                         {"areas_from_radius", totals_.missing_area},
-                         {"radii_from_area", totals_.missing_radius},
-                         {"spheres", totals_.spheres}};
-  if (options_.repeats == Repeats::kThin) json["repeats"] = "thin";
-  if (const auto cube =
-          pinned_ ? pinned_->unusualNumbers(totals_.bounds, reader_->origin()) : std::nullopt) {
-    json["cube"] = *cube;
-  }
-  if (const std::optional<NormalRule> rule = normalRule()) json["normals"] = rule->describe();
-  if (!groups_.names.empty()) json["groups"] = groups_.describe();
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace

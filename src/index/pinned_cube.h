@@ -36,6 +36,9 @@ class PinnedCube {
 
   // Counts the surfels outside, about that origin; `bounds` are theirs.
   void look(std::span<const Surfel> surfels, const Bounds3& bounds, const glm::dvec3& origin);
+  // The number of surfels outside so far; more of them, which another machine has counted.
+  std::uint64_t outside() const { return outside_; }
+  void addOutside(std::uint64_t surfels) { outside_ += surfels; }
   // kInvalidArgument when there were any, with a cube that holds all `surfels` in `bounds`.
   Status status(std::uint64_t surfels, const Bounds3& bounds, const glm::dvec3& origin) const;
 

@@ -6,8 +6,12 @@
 
 namespace surfeit {
 
-RowFetcher::RowFetcher(SurfelSource& source, std::size_t read_bytes)
-    : source_(source), max_rows_(std::max<std::size_t>(1, read_bytes / source.rowBytes())) {
+RowFetcher::RowFetcher(SurfelSource& source, std::size_t read_bytes, std::uint64_t begin,
+                       std::uint64_t end)
+    : source_(source),
+      max_rows_(std::max<std::size_t>(1, read_bytes / source.rowBytes())),
+      begin_(begin),
+      end_(end) {
   ready_.reserve(kSlots);
   for (std::size_t slot = 0; slot < kSlots; ++slot) free_.push_back(slot);
   thread_ = std::thread([this] { run(); });
@@ -34,8 +38,27 @@ void RowFetcher::run() {
   }
 }
 
+// Before the first record: what cannot be sought is read.
+Status RowFetcher::skipRows() {
+  if (begin_ == 0) return {};
+  if (source_.isSeekable()) return source_.seekRow(begin_);
+  AlignedBuffer buffer;
+  for (std::uint64_t record = 0; record < begin_;) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_) return {};
+    }
+    const auto rows = static_cast<std::size_t>(std::min<std::uint64_t>(max_rows_, begin_ - record));
+    SURFEIT_ASSIGN_OR_RETURN(const Bytes bytes, source_.readRows(rows, buffer));
+    if (bytes.empty()) return {};
+    record += bytes.size() / source_.rowBytes();
+  }
+  return {};
+}
+
 void RowFetcher::fetchRows() {
-  std::uint64_t record = 0;
+  const Status skipped = skipRows();
+  std::uint64_t record = begin_;
   for (;;) {
     std::size_t slot = 0;
     {
@@ -45,7 +68,10 @@ void RowFetcher::fetchRows() {
       slot = free_.back();
       free_.pop_back();
     }
-    const Result<Bytes> bytes = source_.readRows(max_rows_, buffers_[slot]);
+    const auto rows = static_cast<std::size_t>(std::min<std::uint64_t>(max_rows_, end_ - record));
+    const Result<Bytes> bytes = !skipped.ok() ? Result<Bytes>(skipped)
+                                : rows == 0   ? Result<Bytes>(Bytes())
+                                              : source_.readRows(rows, buffers_[slot]);
     const std::lock_guard lock(mutex_);
     if (!bytes.ok() || bytes->empty()) {
       status_ = bytes.status();

@@ -27,8 +27,10 @@ class RowFetcher {
     std::size_t slot = 0;
   };
 
-  // Begins at once; about `read_bytes` at a time.
-  RowFetcher(SurfelSource& source, std::size_t read_bytes);
+  // Begins at once; about `read_bytes` at a time. Fetches records [begin, end), as far as there are
+  // some; `source` is at its first one.
+  RowFetcher(SurfelSource& source, std::size_t read_bytes, std::uint64_t begin = 0,
+             std::uint64_t end = ~std::uint64_t{0});
   ~RowFetcher();
 
   // The next rows; empty at the end or after a failure. Waits. One thread at a time.
@@ -41,9 +43,11 @@ class RowFetcher {
  private:
   void run();
   void fetchRows();
+  Status skipRows();
 
   SurfelSource& source_;
   const std::size_t max_rows_;
+  const std::uint64_t begin_, end_;
   std::array<AlignedBuffer, kSlots> buffers_;
   mutable std::mutex mutex_;  // guards all below
   std::condition_variable changed_;

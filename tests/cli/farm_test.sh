@@ -338,6 +338,8 @@ documentedCommandsWork() {
   "$surfeit" gather -q city.sft street.ply -o one.ply --mode bleeding --memory 64M
   for name in lit staged; do sameBytes one.ply "$name.ply"; done
   for frame in 1 2 3; do exists "lit.000$frame.ply"; done
+  "$surfeit" index -q crowd.0001.ply crowd.0002.ply -o one.sft --memory 64M
+  sameBytes one.sft two.sft
 }
 
 runCase

@@ -66,4 +66,44 @@ sequencesAreOneArray() {
   for frame in 1 2 3; do sameBytes expected.ply "lit.000$frame.ply"; done
 }
 
+# submitIndex SHARDS: the passes of an index as arrays behind each other, and the merge; waits for its
+# exit status, in `ended`.
+submitIndex() {
+  local shards=$1 pass job='' index
+  index="'$SURFEIT' index set.ply -o out.sft --memory=64M --threads=1"
+  local submit=(sbatch --parsable --no-requeue --mem=128M --time=5 --output=/dev/null)
+  rm -f end
+  for pass in count distribute build; do
+    job=$("${submit[@]}" ${job:+"--dependency=afterany:${job%%;*}"} --array="1-$shards" \
+      --wrap "$index --pass=$pass --shard=\$SLURM_ARRAY_TASK_ID/$shards") || fail "sbatch: $pass"
+  done
+  "${submit[@]}" --dependency="afterany:${job%%;*}" \
+    --wrap "$index --pass=merge --shards=$shards; echo \$? > end" > /dev/null || fail "sbatch: merge"
+  waitUntil 240 test -s end || fail "no end: $(squeue; tail -n 20 "$slurm"/*.log)"
+  ended=$(cat end)
+}
+
+# An index by arrays. A task that is killed lacks in the merge, and comes again when all is submitted
+# again.
+indexesGiveTheSameBytes() {
+  skipWithoutSlurm
+  makeFarmSurfeit
+  generate set.ply --surfels 300k
+  "$surfeit" index -q set.ply -o one.sft --memory 128M
+  startSlurm
+  local shards
+  : > faults/killed-2
+  submitIndex 7
+  [[ $ended == 75 ]] || fail "ended with $ended though a task was killed"
+  submitIndex 7
+  [[ $ended == 0 ]] || fail "ended with $ended"
+  sameBytes one.sft out.sft
+  for shards in 1 2 ${FARM_SHARDS:-64}; do
+    rm -f out.sft
+    submitIndex "$shards"
+    [[ $ended == 0 ]] || fail "$shards shards ended with $ended"
+    sameBytes one.sft out.sft
+  done
+}
+
 runCase

@@ -119,5 +119,47 @@ TEST(SlabCutter, OneKeyWithMoreThanABrickIsAGiant) {
   EXPECT_EQ(surfels, keys.size());
 }
 
+// The surfels of a cloud up to a place where slabs begin anew, and those behind it, have the slabs
+// of the whole, whatever comes before and after.
+TEST(SlabCutter, SlabsBeginAnewBehindGreatCells) {
+  const std::vector<CurveKey> keys = randomKeys(500000);
+  const std::vector<Slab> whole = slabsOf(keys, 30000);
+  std::size_t place = 0, cuts = 0;
+  for (std::size_t s = 0; s < whole.size(); place += whole[s++].surfel_count) {
+    if (place == 0) continue;
+    const int level = firstDifferentLevel(keys[place - 1], keys[place]);
+    const int shift = 3 * (kCurveLevels - level + 1);
+    const CurveKey cell = keys[place] >> shift << shift;
+    const auto begin = std::lower_bound(keys.begin(), keys.end(), cell) - keys.begin();
+    if (place - std::size_t(begin) < kFreshSurfels) continue;
+    ++cuts;
+    const std::span<const CurveKey> all = keys;
+    KeyStream stream(all.subspan(place), 7000);
+    SlabCutter cutter(stream, {level, 0});
+    for (std::size_t i = s; i < whole.size(); ++i) {
+      const Result<std::optional<Slab>> slab = cutter.next();
+      ASSERT_TRUE(slab.ok() && slab->has_value());
+      ASSERT_EQ((*slab)->surfel_count, whole[i].surfel_count);
+      ASSERT_EQ((*slab)->bricks.size(), whole[i].bricks.size());
+      for (std::size_t b = 0; b < whole[i].bricks.size(); ++b) {
+        ASSERT_EQ((*slab)->bricks[b].end, whole[i].bricks[b].end);
+        ASSERT_EQ((*slab)->bricks[b].level, whole[i].bricks[b].level);
+        ASSERT_EQ((*slab)->bricks[b].boundary_level, whole[i].bricks[b].boundary_level);
+      }
+    }
+    // What is before does not ask for what is behind
+    KeyStream front(all.first(place), 7000);
+    SlabCutter front_cutter(front, {0, level});
+    for (std::size_t i = 0; i < s; ++i) {
+      const Result<std::optional<Slab>> slab = front_cutter.next();
+      ASSERT_TRUE(slab.ok() && slab->has_value());
+      ASSERT_EQ((*slab)->surfel_count, whole[i].surfel_count);
+      ASSERT_EQ((*slab)->bricks.back().level, whole[i].bricks.back().level);
+      ASSERT_EQ((*slab)->bricks.back().boundary_level, whole[i].bricks.back().boundary_level);
+    }
+  }
+  EXPECT_GE(cuts, 3u);
+}
+
 }  // namespace
 }  // namespace surfeit

@@ -14,7 +14,6 @@ namespace {
 
 // A slab on its way through the stages. Its memory is used again by a later one.
 struct Work {
-  Slab slab;
   BuiltSlab built;
   std::vector<FullNodePage> full_pages;
   std::vector<EncodedPages> node_pages;  // one each; there may be more from before
@@ -23,9 +22,8 @@ struct Work {
 // The stages. What fails first ends the work: later stages pass what they get.
 class OctreePipeline {
  public:
-  OctreePipeline(SortedSurfelStream& stream, SceneWriter& writer, std::size_t slabs,
-                 Progress& progress)
-      : cutter_(stream),
+  OctreePipeline(SlabSource& source, SceneWriter& writer, std::size_t slabs, Progress& progress)
+      : source_(source),
         writer_(writer),
         // The writer's header changes while slabs are built
         header_(writer.header()),
@@ -38,14 +36,14 @@ class OctreePipeline {
   Status run();
 
  private:
-  std::optional<std::size_t> cut();
+  std::optional<std::size_t> fetch();
   void build(Work& work);
   void stitch(Work& work);
   void encode(Work& work);
   void write(Work& work);
   void giveBack(Work& work);
 
-  SlabCutter cutter_;
+  SlabSource& source_;
   SceneWriter& writer_;
   const SceneHeader header_;
   SlabStitcher stitcher_;
@@ -56,24 +54,25 @@ class OctreePipeline {
   std::vector<std::size_t> free_works_;  // the last one given back is taken first: caches have it
 };
 
-std::optional<std::size_t> OctreePipeline::cut() {
+std::optional<std::size_t> OctreePipeline::fetch() {
   if (progress_.isCancelled()) failure_.note(Status::interrupted());
   if (failure_.happened()) return std::nullopt;
-  Result<std::optional<Slab>> slab = cutter_.next();
-  failure_.note(slab.status());
-  if (!slab.ok() || !slab->has_value()) return std::nullopt;
-  const std::lock_guard lock(free_mutex_);
-  SURFEIT_CHECK(!free_works_.empty());
-  const std::size_t number = free_works_.back();
-  free_works_.pop_back();
-  works_[number].slab = std::move(**slab);
+  std::size_t number = 0;
+  {
+    const std::lock_guard lock(free_mutex_);
+    SURFEIT_CHECK(!free_works_.empty());
+    number = free_works_.back();
+    free_works_.pop_back();
+  }
+  const Result<bool> has_one = source_.fetch(number);
+  failure_.note(has_one.status());
+  if (!has_one.ok() || !*has_one) return std::nullopt;
   return number;
 }
 
 void OctreePipeline::build(Work& work) {
   if (failure_.happened()) return;
-  failure_.note(buildSlab(work.slab, header_, work.built));
-  work.slab = {};
+  failure_.note(source_.build(static_cast<std::size_t>(&work - works_.data()), work.built));
 }
 
 void OctreePipeline::stitch(Work& work) {
@@ -119,7 +118,7 @@ Status OctreePipeline::run() {
                                   stage(Mode::kInOrder, &OctreePipeline::write),
                                   stage(Mode::kParallel, &OctreePipeline::giveBack)};
   runPipeline(
-      works_.size(), [this] { return cut(); }, stages);
+      works_.size(), [this] { return fetch(); }, stages);
   if (failure_.happened()) return failure_.status();
   SURFEIT_CHECK(stitcher_.isComplete());
 
@@ -192,7 +191,13 @@ void SlabStitcher::join(FinishedNode& node, int boundary_level) {
 
 Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, std::size_t slabs,
                    Progress& progress) {
-  return OctreePipeline(stream, writer, slabs, progress).run();
+  CutSlabs source(stream, writer.header(), slabs);
+  return stitchOctree(source, writer, slabs, progress);
+}
+
+Status stitchOctree(SlabSource& source, SceneWriter& writer, std::size_t slabs,
+                    Progress& progress) {
+  return OctreePipeline(source, writer, slabs, progress).run();
 }
 
 double SlabForm::nodesPerSurfel() const { return std::min(2.0, 4.0 / leaf_capacity); }

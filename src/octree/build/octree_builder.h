@@ -11,6 +11,7 @@
 #include "octree/build/cell_sweep.h"
 #include "octree/build/scene_writer.h"
 #include "octree/build/slab_builder.h"
+#include "octree/build/slab_source.h"
 #include "octree/build/sorted_surfels.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -60,6 +61,9 @@ constexpr std::size_t fewestSlabs(int threads) { return static_cast<std::size_t>
 // current arena; `slabs` bound what is on its way. kInterrupted when cancelled.
 Status buildOctree(SortedSurfelStream& stream, SceneWriter& writer, std::size_t slabs,
                    Progress& progress);
+
+// The same from slabs of any source.
+Status stitchOctree(SlabSource& source, SceneWriter& writer, std::size_t slabs, Progress& progress);
 
 // Memory that buildOctree takes at most, beside stream and writer.
 std::uint64_t buildOctreeBytes(const SlabForm& form, int threads, std::size_t slabs);

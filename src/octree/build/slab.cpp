@@ -4,6 +4,14 @@
 
 namespace surfeit {
 
+// A part of a cloud begins where every cell that it goes on with has had kFreshSurfels.
+SlabCutter::SlabCutter(SortedSurfelStream& stream, const StreamEnds& ends)
+    : stream_(stream), boundary_level_(ends.begin_level), end_level_(ends.end_level) {
+  for (int level = 0; level < ends.begin_level && level <= kCurveLevels; ++level) {
+    cell_places_[static_cast<std::size_t>(level)] = -std::int64_t{kFreshSurfels};
+  }
+}
+
 // Pulls batches until `count` surfels lie ahead or the stream ends.
 Status SlabCutter::ensure(std::size_t count) {
   while (available_ < count && !stream_ended_) {
@@ -12,6 +20,7 @@ Status SlabCutter::ensure(std::size_t count) {
       stream_ended_ = true;
     } else {
       available_ += batch->tickets.size();
+      if (batches_.empty()) batch_place_ += std::int64_t(batch->dropped_before);
       batches_.push_back(std::move(batch));
     }
   }
@@ -25,6 +34,18 @@ CurveKey SlabCutter::keyAt(std::size_t offset) const {
     offset -= batch->tickets.size();
   }
   return 0;
+}
+
+// Unfiltered surfels before the front.
+std::int64_t SlabCutter::frontPlace() const {
+  return batch_place_ + std::int64_t(batches_.front()->placeOf(at_));
+}
+
+// Whether a slab ends before the front in any case.
+bool SlabCutter::beginsAnew() const {
+  if (boundary_level_ < 1 || boundary_level_ > kCurveLevels) return false;
+  const std::int64_t cell = cell_places_[static_cast<std::size_t>(boundary_level_ - 1)];
+  return frontPlace() - cell >= std::int64_t{kFreshSurfels};
 }
 
 std::size_t SlabCutter::runInCell(int level, std::size_t limit) const {
@@ -45,7 +66,7 @@ Result<std::optional<Slab>> SlabCutter::next() {
   Slab slab;
   while (slab.surfel_count < kBrickSurfels) {
     SURFEIT_RETURN_IF_ERROR(ensure(kBrickSurfels + 1));
-    if (available_ == 0) break;
+    if (available_ == 0 || (slab.surfel_count > 0 && beginsAnew())) break;
     int level = boundary_level_;
     if (available_ > kBrickSurfels) {
       level = std::max(level, firstDifferentLevel(keyAt(0), keyAt(kBrickSurfels)));
@@ -79,11 +100,16 @@ void SlabCutter::take(std::size_t count, int level, Slab& slab) {
     at_ += size;
     count -= size;
     if (at_ == batches_.front()->tickets.size()) {
+      batch_place_ += std::int64_t(batches_.front()->unfilteredCount());
       batches_.pop_front();
       at_ = 0;
+      if (!batches_.empty()) batch_place_ += std::int64_t(batches_.front()->dropped_before);
     }
   }
-  boundary_level_ = available_ > 0 ? firstDifferentLevel(last, keyAt(0)) : 0;
+  boundary_level_ = available_ > 0 ? firstDifferentLevel(last, keyAt(0)) : end_level_;
+  for (int begun = boundary_level_; available_ > 0 && begun <= kCurveLevels; ++begun) {
+    cell_places_[static_cast<std::size_t>(begun)] = frontPlace();
+  }
   slab.bricks.push_back({slab.surfel_count, level, boundary_level_});
 }
 

@@ -1,6 +1,8 @@
 // Surfels in curve order, as the octree is built from them.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -17,6 +19,15 @@ namespace surfeit {
 struct SortedBatch {
   std::vector<Ticket> tickets;
   std::span<Surfel> surfels;  // what the tickets' indices point into
+  // Where a filter left surfels out: how many of the stream behind it came before this batch and
+  // after the last one, the place of each ticket among those of the batch, and their number.
+  std::uint64_t dropped_before = 0;
+  std::vector<std::uint32_t> places;
+  std::size_t unfiltered_count = 0;
+
+  // Surfels of the stream before any filter.
+  std::size_t placeOf(std::size_t ticket) const { return places.empty() ? ticket : places[ticket]; }
+  std::size_t unfilteredCount() const { return places.empty() ? tickets.size() : unfiltered_count; }
 
   // Room for `count` surfels, each in one cache line; what was there is lost.
   void resize(std::size_t count) {

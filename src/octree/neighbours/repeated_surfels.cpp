@@ -37,10 +37,11 @@ bool RepeatFilter::isRepeated(const Surfel& surfel) {
   return false;
 }
 
-// The tickets of what is kept; none where that is all.
-std::vector<Ticket> RepeatFilter::ticketsLeft(const SortedBatch& batch) {
+// The tickets of what is kept, with their places; none where that is all.
+void RepeatFilter::thin(const SortedBatch& batch, SortedBatch& thinned) {
   const std::span<const Ticket> tickets = batch.tickets;
-  std::vector<Ticket> left;
+  std::vector<Ticket>& left = thinned.tickets;
+  std::vector<std::uint32_t>& places = thinned.places;
   bool is_thinned = false;
   for (std::size_t i = 0; i < tickets.size(); ++i) {
     // Few surfels have the key of another: the rest need not be looked at
@@ -63,15 +64,19 @@ std::vector<Ticket> RepeatFilter::ticketsLeft(const SortedBatch& batch) {
       if (!is_thinned) {
         left.reserve(tickets.size() - 1);
         left.assign(tickets.begin(), tickets.begin() + std::ptrdiff_t(i));
+        places.reserve(tickets.size() - 1);
+        for (std::size_t place = 0; place < i; ++place) {
+          places.push_back(static_cast<std::uint32_t>(place));
+        }
       }
       is_thinned = true;
     } else if (is_thinned) {
       left.push_back(tickets[i]);
+      places.push_back(static_cast<std::uint32_t>(i));
     }
   }
   // The next batch may go on here
   if (pieces_.empty()) pieces_.push_back(batch.surfels[tickets.back().index]);
-  return is_thinned ? left : std::vector<Ticket>();
 }
 
 Result<std::shared_ptr<const SortedBatch>> RepeatFilter::next() {
@@ -79,11 +84,17 @@ Result<std::shared_ptr<const SortedBatch>> RepeatFilter::next() {
     SURFEIT_ASSIGN_OR_RETURN(std::shared_ptr<const SortedBatch> batch, source_.next());
     if (batch == nullptr) return batch;
     const std::uint64_t before = leftOut();
-    std::vector<Ticket> left = ticketsLeft(*batch);
-    if (leftOut() == before) return batch;
-    if (left.empty()) continue;
     const auto thinned = std::make_shared<ThinnedBatch>();
-    thinned->tickets = std::move(left);
+    thin(*batch, *thinned);
+    if (leftOut() == before && dropped_ == 0) return batch;
+    if (leftOut() == before) {
+      thinned->tickets = batch->tickets;
+    } else if (thinned->tickets.empty()) {
+      dropped_ += batch->tickets.size();
+      continue;
+    }
+    thinned->dropped_before = std::exchange(dropped_, 0);
+    thinned->unfiltered_count = batch->tickets.size();
     thinned->surfels = batch->surfels;
     thinned->whole = std::move(batch);
     return std::shared_ptr<const SortedBatch>(thinned);

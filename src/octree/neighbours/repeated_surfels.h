@@ -25,7 +25,7 @@ bool isSamePiece(const Surfel& a, const Surfel& b);
 class RepeatFilter : public SortedSurfelStream {
  public:
   // Beside the batches of the other stream, for each of their surfels.
-  static constexpr std::size_t kBytesPerSurfel = 2 * sizeof(Ticket);
+  static constexpr std::size_t kBytesPerSurfel = 2 * (sizeof(Ticket) + sizeof(std::uint32_t));
 
   RepeatFilter(SortedSurfelStream& source, Repeats repeats) : source_(source), repeats_(repeats) {}
 
@@ -38,11 +38,12 @@ class RepeatFilter : public SortedSurfelStream {
 
  private:
   bool isRepeated(const Surfel& surfel);
-  std::vector<Ticket> ticketsLeft(const SortedBatch& batch);
+  void thin(const SortedBatch& batch, SortedBatch& thinned);
 
   SortedSurfelStream& source_;
   const Repeats repeats_;
   std::uint64_t repeated_ = 0;
+  std::uint64_t dropped_ = 0;  // surfels of batches of which nothing was left, since the last one
   // Of the last ticket: its key, and the pieces at its position (at most 7 of each group); empty
   // while no other surfel has asked for them
   bool has_last_ = false;

@@ -1,0 +1,64 @@
+// One scene indexed by many processes, on one machine or many, byte for byte as indexClouds does
+// it.
+//
+// The shards of a job share the work of four passes. Each pass reads what the one before wrote, and
+// every shard writes one file beside the scene ("out.sft.count-03-of-16"):
+//
+//   count        shard I reads the I-th part of the records: bounds, counts, a sample of places
+//   distribute   reads the part again; sends its surfels to ranges of the curve, as many as shards
+//   build        sorts the I-th range, and builds the pages and octrees of its slabs
+//   merge        one process writes the pages, and the top of the octree above them
+//
+// docs/farm.md, "An index in shards", has the sizes of the files and the memory of each pass.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "surfeit/api.h"
+#include "surfeit/index.h"
+#include "surfeit/progress.h"
+#include "surfeit/shards.h"
+#include "surfeit/status.h"
+
+namespace surfeit {
+
+enum class IndexPass { kCount, kDistribute, kBuild };
+
+// The file of a shard.
+SURFEIT_API std::string indexShardPath(const std::string& scene_path, IndexPass pass, int shard,
+                                       int count);
+
+struct IndexShardStats {
+  int done_shards = 0;
+  int finished_shards = 0;            // that were there already, and were skipped
+  std::uint64_t memory_bytes = 0;     // the budget
+  std::uint64_t records = 0;          // read by count and distribute
+  std::uint64_t surfels = 0;          // counted, distributed or built
+  std::uint64_t file_bytes = 0;       // of the files of shards that were written
+  std::uint64_t temporary_bytes = 0;  // most bytes of temporary files at any time
+};
+
+// One pass over shards of the job that indexClouds does with these arguments; `count` must be the
+// same in all passes. A shard that is finished is read and checked, and skipped. Each appears
+// whole, so that a job that was stopped goes on with those that are missing. Files depend on inputs
+// and options that describe the scene; not on threads and memory. Where a far cloud asks for
+// another origin than a sample of it did, distribute counts the records anew, about that origin.
+// Errors: as indexClouds; kIncomplete, naming the shards of the pass before that are missing,
+// damaged or of another job; kInvalidArgument for a range outside 1 to count, inputs that are
+// streams, and for what one range cannot know of the others: sizes or normals from neighbours (the
+// message says what to do first). kBudgetTooSmall, too, where open blocks of all ranges do not fit.
+SURFEIT_API Result<IndexShardStats> indexShards(const std::vector<std::string>& inputs,
+                                                const std::string& output,
+                                                const IndexOptions& options, IndexPass pass,
+                                                const ShardRange& shards, Progress& progress);
+
+// Writes the scene from the files of the build. `removes_shards`: the files of all passes go once
+// it is complete. The statistics are those of indexClouds. Errors: as indexShards.
+SURFEIT_API Result<IndexStats> mergeIndexShards(const std::vector<std::string>& inputs,
+                                                const std::string& output,
+                                                const IndexOptions& options, int count,
+                                                bool removes_shards, Progress& progress);
+
+}  // namespace surfeit
