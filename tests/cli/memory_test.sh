@@ -105,6 +105,19 @@ budgetsThatAreNamedDo() {
   done
 }
 
+# Of a cloud of many times its budget, also where buckets are small and many: what is kept for the
+# next one must not grow to the largest, nor what planning needed stay.
+largeIndexesStayBelowTheBudget() {
+  local limit threads
+  skipWhereSanitized
+  run 0 generate -o city.ply --surfels 4M --quiet
+  for limit in "66 2" "72 2"; do
+    read -r limit threads <<< "$limit"
+    runWithin "$limit" "index city.ply -o out.sft" --memory "${limit}M" --threads "$threads" ||
+      fail "$limit MiB do not do"
+  done
+}
+
 # 79,202 triangles, as text and as PLY.
 makeMeshes() {
   skipWhereSanitized

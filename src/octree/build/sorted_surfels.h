@@ -29,14 +29,23 @@ struct SortedBatch {
   std::size_t placeOf(std::size_t ticket) const { return places.empty() ? ticket : places[ticket]; }
   std::size_t unfilteredCount() const { return places.empty() ? tickets.size() : unfiltered_count; }
 
-  // Room for `count` surfels, each in one cache line; what was there is lost.
+  // Room for `count` surfels, each in one cache line; what was there is lost. Batches are used again
+  // for buckets of other sizes: much more room than is needed is given back, or each would grow to
+  // the largest.
   void resize(std::size_t count) {
+    const std::size_t bytes = count * sizeof(Surfel);
+    if (memory_.capacity() > bytes + bytes / kMostSpare) {
+      memory_ = AlignedBuffer(bytes);
+      tickets = std::vector<Ticket>();
+    }
     tickets.resize(count);
-    memory_.reserve(count * sizeof(Surfel));
+    memory_.reserve(bytes);
     surfels = {reinterpret_cast<Surfel*>(memory_.data()), count};
   }
 
  private:
+  static constexpr std::size_t kMostSpare = 4;  // a quarter
+
   AlignedBuffer memory_;
 };
 
