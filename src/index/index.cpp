@@ -108,6 +108,7 @@ class Indexer {
   std::string provenance() const;
 
   const GroupPlan groups_;
+  GroupNames group_names_;
   const SourceOpener opener_;
   const std::string& output_;
   const IndexOptions& options_;
@@ -178,6 +179,9 @@ Status Indexer::openInputs() {
                                  readBytesWithin(options_.memory_bytes), reading, opener_));
   reader_->setGroups(groups_.of_inputs);
   for (const std::string& note : reader_->notes()) progress_.note(note);
+  std::vector<std::string> notes;
+  group_names_ = groupNames(groups_, *reader_, notes);
+  for (const std::string& note : notes) progress_.note(note);
   if (options_.origin || pinned_) reader_->setOrigin(originAsked({}));
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) SURFEIT_RETURN_IF_ERROR(takeSample());
@@ -450,7 +454,7 @@ std::string Indexer::provenance() const {
     json["cube"] = *cube;
   }
   if (const std::optional<NormalRule> rule = normalRule()) json["normals"] = rule->describe();
-  if (!groups_.names.empty()) json["groups"] = groups_.describe();
+  for (const auto& [group, name] : group_names_) json["groups"][std::to_string(group)] = name;
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
