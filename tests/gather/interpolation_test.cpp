@@ -245,7 +245,9 @@ TEST_F(Interpolation, SamplesLieAsCloseAsPixelsAreAllowedTo) {
     const double gathered = 1 - interpolatedPart(found);
     std::printf("%d pixels: %.4f gathered\n", pixels, gathered);
     EXPECT_GE(gathered, .9 / (pixels * pixels));
-    if (pixels == 1) EXPECT_EQ(gathered, 1);
+    if (pixels == 1) {
+      EXPECT_EQ(gathered, 1);
+    }
     EXPECT_LE(gathered, before);
     before = gathered;
   }

@@ -102,7 +102,9 @@ TEST_F(SampleGrouping, MaterialsAreGroups) {
   const std::vector<Surfel> surfels = sampled({squares_}, SampleGroups::kMaterial);
   EXPECT_THAT(groupsOfSquares(surfels), ElementsAre(0, 1, 1, 2));
   for (const Surfel& surfel : surfels) {
-    if (surfel.group == 2) EXPECT_EQ(surfel.albedo, glm::vec3(0, 1, 0));
+    if (surfel.group == 2) {
+      EXPECT_EQ(surfel.albedo, glm::vec3(0, 1, 0));
+    }
   }
   EXPECT_THAT(namesOfScene({path("out.ply")}), ElementsAre("1 red", "2 green"));
 }
