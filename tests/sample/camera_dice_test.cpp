@@ -85,7 +85,7 @@ TEST(CameraSpacing, DistanceToAWindowIsThatOfItsNearestPlace) {
     inside += found == 0;
     sides += found > 0 && found < 0.999 * glm::length(place);
   }
-  EXPECT_GT(inside, 10);
+  EXPECT_GT(inside, 3);
   EXPECT_GT(sides, 100);
   // A window in the middle is the pyramid
   for (int i = 0; i < 1000; ++i) {
@@ -108,7 +108,7 @@ TEST(CameraSpacing, ACropIsInViewAndWhatIsBesideItIsNot) {
   }
   for (const glm::dvec3& out :
        {glm::dvec3(-.5, .75, -1), glm::dvec3(.5, .2, -1), glm::dvec3(.5, -.75, -1)}) {
-    EXPECT_GT(crop->areaAt(out), 5 * whole->areaAt(out));
+    EXPECT_GT(crop->areaAt(out), 2 * whole->areaAt(out));
   }
   for (const PixelWindow& wrong : {PixelWindow{-1, 0, 5, 5}, PixelWindow{0, 0, 101, 5},
                                    PixelWindow{5, 0, 5, 5}, PixelWindow{0, 9, 5, 3}}) {
