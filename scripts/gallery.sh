@@ -2,7 +2,7 @@
 # Makes the pictures of docs/gallery.md, in docs/gallery/, from scenes that it makes itself. Clouds
 # and scenes go to out/gallery/. Minutes on two cores. Chapters may be named to make only these:
 #
-#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics translucent ...]
+#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics translucent hair screen relit looked_up look brightness]
 #
 # SURFEIT_BUILD names a build directory to take the programs from; else build/release is built.
 set -euo pipefail
@@ -10,6 +10,7 @@ cd "$(dirname "$0")/.."
 
 surfels=600000
 receivers=300000
+fewer=120000 # surfels that are seen as disks, where 300,000 would show no more
 box_camera=(--eye "0.5 0.5 2.4" --look-at "0.5 0.5 0" --fov 37)
 box_view=("${box_camera[@]}" --size 400x400)
 speckled_view=("${box_camera[@]}" --size 280x280)  # of what a PNG packs badly
@@ -271,10 +272,91 @@ translucent() {
   draw translucent_light pane_light.ply --channel irradiance --exposure 1 "${view[@]}"
 }
 
+hair() {
+  say "A ball with fur"
+  clouds fur fur.hair 12000
+  {
+    ball skin 0 0
+    printf '%s\n' "usemtl floor" "v -5 0 5" "v 5 0 5" "v 5 0 -5" "v -5 0 -5" "f -4 -3 -2 -1"
+  } > skin.obj
+  sample skin.obj fur.hair -o furry.ply --count 250000 "${sun[@]}"
+  draw hair furry.ply --channel radiosity --radius-scale 0.75 --eye "0 2.4 5.6" --look-at "0 1.15 0" --fov 34 \
+    --size 420x420
+}
+
+screen() {
+  say "A screen whose picture lights the room"
+  cp "$pictures/bounces_2.png" screen.png
+  printf '%s\n' "newmtl wall" "Kd .7 .7 .7" "newmtl screen" "Kd 0 0 0" "Ke 6 6 6" \
+    "map_Ke screen.png" > screen.mtl
+  {
+    printf '%s\n' "mtllib screen.mtl" "usemtl screen" "v -2 .3 -2" "v 2 .3 -2" "v 2 3.3 -2" \
+      "v -2 3.3 -2" "vt 0 0" "vt 1 0" "vt 1 1" "vt 0 1" "f 1/1 2/2 3/3 4/4" "usemtl wall" \
+      "v -4 0 3" "v 4 0 3" "v 4 0 -2.1" "v -4 0 -2.1" "f -4 -3 -2 -1" \
+      "v -4 0 -2.1" "v 4 0 -2.1" "v 4 5 -2.1" "v -4 5 -2.1" "f -4 -3 -2 -1"
+    ball wall 1.2 .6 | sed 's/^usemtl.*/usemtl wall/'
+  } > screen.obj
+  sample screen.obj -o screen.ply --count $fewer --light-samples 16
+  sample screen.obj -o screen_glow.ply --count $fewer --light-samples 64 --emission
+  index screen.ply -o screen.sft
+  gather screen.sft screen_glow.ply -o screen_lit.ply --mode bleeding
+  local view=(--eye "0 2.6 7.2" --look-at "0 1.5 0" --fov 38 --size 560x420)
+  draw screen_lit screen_lit.ply --channel lit --exposure -1.6 "${view[@]}"
+}
+
+relit() {
+  say "Key and fill as layers of one scene"
+  local key="key=0.9 -1.6 -1.0  1.25 1.2 1.1" fill="fill=-1 -0.8 -0.3  .5 .7 1.1"
+  local gains
+  sample studio.obj -o few.ply --count 80000
+  index few.ply -o few.sft
+  for gains in key=1,fill=0 key=0,fill=1 key=.6,fill=1.6; do
+    timed surfeit relight few.sft -o relit.sft --mesh studio.obj \
+      --light-directional "$key" --light-directional "$fill" --gain $gains
+    timed surfeit convert relit.sft -o relit.ply
+    gather relit.sft relit.ply -o relit_lit.ply --mode bleeding
+    draw relit_${gains//[^0-9]/} relit_lit.ply --channel lit "${middle_view[@]}"
+  done
+}
+
+looked_up() {
+  say "Baked light in a brick map, looked up at other surfels"
+  sample cornell.obj -o bake_at.ply --count $fewer
+  gather box.sft bake_at.ply -o bake.ply --mode bleeding
+  timed surfeit brick bake.ply -o bake.vdb --channel irradiance --max-error 0.02
+  sample cornell.obj -o other.ply --count 80000
+  timed surfeit lookup bake.vdb other.ply -o looked_up.ply
+  gather box.sft other.ply -o other_lit.ply --mode bleeding
+  draw lookup_map looked_up.ply --channel irradiance "${box_view[@]}"
+  draw lookup_gathered other_lit.ply --channel irradiance "${box_view[@]}"
+}
+
+look() {
+  say "The look of bounce light"
+  local at=(box.sft box_receivers.ply --mode bleeding)
+  local view=(--channel lit --exposure -1 "${box_view[@]}")
+  gather "${at[@]}" -o look_0.ply
+  draw look_plain look_0.ply "${view[@]}"
+  gather "${at[@]}" -o look_1.ply --bounce-saturation 0 --bounce-gain 1.5
+  draw look_grey look_1.ply "${view[@]}"
+  gather "${at[@]}" -o look_2.ply --bounce-filter "centre=.3,.46,.32 radius=.1,.6 gain=4 tint=1,.8,.4"
+  draw look_sphere look_2.ply "${view[@]}"
+  gather "${at[@]}" -o look_3.ply --bounce-filter "direction=0,-1,0 angle=10,70 tint=.2,.6,3"
+  draw look_ceiling look_3.ply "${view[@]}"
+}
+
+brightness() {
+  say "Occlusion by directions and by the brightness of the sky"
+  clouds sky sky.hdr sky.ply
+  gather black.sft black_receivers.ply -o bright.ply --environment sky.hdr --up y \
+    --raster-resolution 24 --outputs occlusion --occlusion-by-brightness
+  draw occlusion_by_brightness bright.ply --channel ao "${studio_view[@]}"
+}
+
 chapters=("$@")
 if ((${#chapters[@]} == 0)); then
   chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube
-    camera caustics translucent)
+    camera caustics translucent hair screen relit looked_up look brightness)
   scenes
 fi
 for chapter in "${chapters[@]}"; do "$chapter"; done

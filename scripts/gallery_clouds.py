@@ -10,6 +10,8 @@
       COUNT^2 spheres side by side in the plane z = DEPTH of that box.
   gallery_clouds.py sky OUT.hdr OUT.ply
       A lat-long picture of a dim sky with four small bright spots, and a cloud that shows it.
+  gallery_clouds.py fur OUT.hair STRANDS
+      Strands on the unit sphere about (0, 1, 0), longer on top, each bent down by its weight.
 """
 import math
 import operator
@@ -125,7 +127,30 @@ def sky(picture, cloud):
     write_cloud(cloud, ["x", "y", "z", "radiosity_r", "radiosity_g", "radiosity_b"], "f" * 6, records)
 
 
-COMMANDS = {"join": join, "haze": haze, "slab": slab, "sky": sky}
+def fur(output, strands):
+    number = random.Random(2).random
+    segments, points, colors = 8, bytearray(), bytearray()
+    for i in range(int(strands)):
+        height = 1 - (2 * i + 1) / int(strands)
+        angle, across = 2.39996323 * i, math.sqrt(1 - height * height)
+        out = (across * math.cos(angle), height, across * math.sin(angle))
+        length = (0.25 + 0.2 * max(0.0, height)) * (0.7 + 0.6 * number())
+        lean = [0.5 * (number() - 0.5) for _ in range(3)]
+        shade = 0.6 + 0.4 * number()
+        for k in range(segments + 1):
+            t = length * k / segments
+            at = [o + t * (o + l) for o, l in zip(out, lean)]
+            points += struct.pack("<3f", at[0], 1 + at[1] - 1.1 * t * t, at[2])
+            colors += struct.pack("<3f", 0.85 * shade, 0.62 * shade, 0.4 * shade)
+    count = int(strands) * (segments + 1)
+    # Points and colors as arrays, all else the same for all: 2 and 16 of the flags
+    header = struct.pack("<4s3I", b"HAIR", int(strands), count, 2 | 16)
+    header += struct.pack("<I5f", segments, 0.012, 0.0, 1.0, 1.0, 1.0) + bytes(88)
+    with open(output, "wb") as file:
+        file.write(header + points + colors)
+
+
+COMMANDS = {"fur": fur, "join": join, "haze": haze, "slab": slab, "sky": sky}
 
 if __name__ == "__main__":
     if len(sys.argv) < 3 or sys.argv[1] not in COMMANDS:

@@ -9,6 +9,7 @@
 #include "tools/cache_report.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
+#include "tools/look_options.h"
 
 namespace surfeit {
 namespace {
@@ -16,6 +17,7 @@ namespace {
 struct BounceArguments {
   std::string scene, result;
   BounceOptions options;
+  GroupLookArguments of_groups;
 };
 
 nlohmann::json passJson(const BouncePass& pass) {
@@ -42,6 +44,8 @@ Status runBounce(BounceArguments& arguments, CommandContext& context) {
   BounceOptions& options = arguments.options;
   options.threads = context.threads();
   options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_ASSIGN_OR_RETURN(options.group_corrections,
+                           arguments.of_groups.corrections(arguments.scene));
   SURFEIT_ASSIGN_OR_RETURN(const BounceStats stats, bounceScene(arguments.scene, arguments.result,
                                                                 options, context.progress()));
   std::string lines;
@@ -99,6 +103,8 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
       ->needs(spared);
   addQualityOptions(*command, options.quality);
   addSubsetOption(*command, options.groups, arguments->scene);
+  addLookOptions(*command, options.look);
+  addGroupLookOptions(*command, arguments->of_groups);
   addCacheOptions(*command, options.cache_split, options.direct_io);
   addTemporaryOption(*command, options.temporary_directory)->group("Paging");
   context.addCommonOptions(*command);
@@ -111,7 +117,9 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
       "Examples:\n"
       "  surfeit bounce cornell.sft -o cornell_b2.sft --bounces 2\n"
       "  surfeit bounce city.sft -o city_b3.sft --bounces 3 --surfels-per-receiver 8 --memory 2G\n"
-      "  surfeit bounce city.sft -o look.sft --quality draft --stats bounce.json");
+      "  surfeit bounce city.sft -o look.sft --quality draft --stats bounce.json\n"
+      "  surfeit bounce room.sft -o warm.sft --bounce-gain 1.2 --group-saturation curtain=.4 \\\n"
+      "      --bounce-filter \"centre=0,1,2 radius=1,3 gain=.5 tint=1,.9,.8\"");
   command->callback(
       [arguments, &context] { context.run([&] { return runBounce(*arguments, context); }); });
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <utility>
 
 #include "tools/number_list.h"
@@ -55,6 +56,21 @@ void parseSize(const std::string& text, int& width, int& height) {
   }
   width = columns;
   height = rows;
+}
+
+PixelWindow parseCrop(const std::string& text) {
+  constexpr const char* kExpected =
+      "x0,y0,x1,y1, whole numbers: columns x0 to x1 - 1, rows y0 to "
+      "y1 - 1, such as 400,0,800,300";
+  const auto n = parseNumberList<4>("--crop", text, kExpected);
+  constexpr double kMost = 1 << 30;
+  const bool are_whole = std::all_of(n.begin(), n.end(), [](double number) {
+    return number == std::floor(number) && std::abs(number) <= kMost;
+  });
+  if (!are_whole || n[0] >= n[2] || n[1] >= n[3]) {
+    throw CLI::ValidationError("--crop", fmt::format("found \"{}\", expected {}", text, kExpected));
+  }
+  return {int(n[0]), int(n[1]), int(n[2]), int(n[3])};
 }
 
 Result<CameraDensity> DensityArguments::cameraDensity() const {
@@ -128,6 +144,16 @@ std::vector<CLI::Option*> addDensityOptions(CLI::App& app, DensityArguments& arg
           "Pixels of the cameras' pictures (default 1280x960)"))
       ->type_name("WxH");
   return {camera, file};
+}
+
+void addCameraCropOption(CLI::App& app, DensityArguments& arguments) {
+  CameraDensity& density = arguments.density;
+  CLI::Option* const crop = app.add_option_function<std::string>(
+      "--crop", [&density](const std::string& text) { density.crop = parseCrop(text); },
+      "Only these pixels of the cameras' pictures are in view, the others are out of view: columns "
+      "x0 to x1 - 1, rows y0 to y1 - 1, from the top left");
+  crop->type_name("x0,y0,x1,y1")->group(kDensityGroup);
+  arguments.details.push_back(crop);
 }
 
 }  // namespace surfeit

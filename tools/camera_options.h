@@ -14,6 +14,9 @@ namespace surfeit {
 // "1280x960". Throws CLI's usage error, which names --size and what it expects.
 void parseSize(const std::string& text, int& width, int& height);
 
+// "x0,y0,x1,y1": columns from x0 to x1 - 1, rows from y0 to y1 - 1. Throws likewise, for --crop.
+PixelWindow parseCrop(const std::string& text);
+
 // What addDensityOptions parses into.
 struct DensityArguments {
   CameraDensity density;
@@ -27,8 +30,10 @@ struct DensityArguments {
 };
 
 // Adds --camera, --camera-file, --pixels, --max-solid-angle, --stereo, --fov and --size. Parsing
-// fills `arguments`, which must outlive `app`. Returns --camera and --camera-file, which exclude
-// other ways to choose a density.
+// fills `arguments`, which must outlive `app`. Returns --camera and --camera-file, which
+// exclude other ways to choose a density.
 std::vector<CLI::Option*> addDensityOptions(CLI::App& app, DensityArguments& arguments);
+// Adds --crop, which is another thing where clouds are cropped.
+void addCameraCropOption(CLI::App& app, DensityArguments& arguments);
 
 }  // namespace surfeit

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <string>
 
+#include "tools/camera_options.h"
 #include "tools/gather_options.h"
+#include "tools/look_options.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
 
@@ -87,6 +89,23 @@ void addEnvironmentOptions(CLI::App& command, GatherEnvironment& environment) {
   addUpOption(command, environment.up, "Axis that points up", "the scene's")->group(kGroup);
 }
 
+// Parsed behind --filter, which it adds to.
+void addCropOption(CLI::App& command, std::string& filter) {
+  command
+      .add_option_function<std::string>(
+          "--crop",
+          [&filter](const std::string& text) {
+            const PixelWindow crop = parseCrop(text);
+            const std::string window =
+                fmt::format("pixel_x >= {} and pixel_x < {} and pixel_y >= {} and pixel_y < {}",
+                            crop.x0, crop.x1, crop.y0, crop.y1);
+            filter = filter.empty() ? window : fmt::format("({}) and {}", filter, window);
+          },
+          "Only receivers of these pixels of passes: columns x0 to x1 - 1, rows y0 to y1 - 1 "
+          "(pixel_x, pixel_y)")
+      ->type_name("x0,y0,x1,y1");
+}
+
 }  // namespace
 
 void addLightOptions(CLI::App& command, GatherOptions& options) {
@@ -108,8 +127,22 @@ void addLightOptions(CLI::App& command, GatherOptions& options) {
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str()
       ->group("Quality");
+  command
+      .add_option("--max-pixel-dist,--maxpixeldist", options.quality.max_pixel_distance,
+                  "With --max-variation, at most about so many pixels, or receivers, between "
+                  "samples, 1 to 8")
+      ->check(CLI::Range(1, 8))
+      ->capture_default_str()
+      ->group("Quality");
   addDirectionOptions(command, options);
   addEnvironmentOptions(command, options.environment);
+  command
+      .add_flag("--occlusion-by-brightness", options.weights.by_brightness,
+                "Occlusion is the covered part of the environment's light, instead of the covered "
+                "part of the directions")
+      ->group("Environment");
+  addLookOptions(command, options.look);
+  addCropOption(command, options.filter);
 }
 
 }  // namespace surfeit

@@ -2,8 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
+#include <string_view>
 
 #include "surfeit/process.h"
 #include "surfeit/relight.h"
@@ -14,12 +18,81 @@ namespace surfeit {
 namespace {
 
 struct RelightArguments {
-  std::string scene, result;
+  std::string scene, result, gain = "1";
+  LightNames names;
   RelightOptions options;
 };
 
-Status runRelight(RelightArguments& arguments, CommandContext& context) {
-  RelightOptions& options = arguments.options;
+constexpr double kMostGain = 1e6;
+
+// Gains by name: "key=2,fill=.5".
+Result<std::map<std::string, float>> parseGains(const std::string& text) {
+  std::map<std::string, float> gains;
+  std::string_view rest = text;
+  while (!rest.empty()) {
+    const std::string_view part = rest.substr(0, rest.find(','));
+    rest.remove_prefix(std::min(part.size() + 1, rest.size()));
+    const std::size_t equals = std::min(part.find('='), part.size());
+    const std::string_view number = part.substr(std::min(equals + 1, part.size()));
+    double gain = -1;
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), gain);
+    const bool is_number = error == std::errc() && end == number.data() + number.size();
+    if (equals == 0 || !is_number || !(gain >= 0 && gain <= kMostGain)) {
+      return Status::invalidArgument(
+          fmt::format("--gain: found \"{}\" in \"{}\", expected a factor from 0 to {:g}, or "
+                      "factors of lights by name, such as key=2,fill=.5",
+                      part, text, kMostGain));
+    }
+    if (!gains.emplace(part.substr(0, equals), float(gain)).second) {
+      return Status::invalidArgument(
+          fmt::format("--gain: found \"{}\" twice in \"{}\"", part.substr(0, equals), text));
+    }
+  }
+  return gains;
+}
+
+// Gives the lights of each name its gain.
+Status applyGains(const std::map<std::string, float>& gains, const LightNames& names,
+                  Lights& lights) {
+  std::set<std::string> known;
+  const auto gainOf = [&](const std::string& name) {
+    if (!name.empty()) known.insert(name);
+    const auto found = gains.find(name);
+    return name.empty() || found == gains.end() ? 1.f : found->second;
+  };
+  const auto apply = [&](auto& of_kind, const std::vector<std::string>& of_names, auto light) {
+    for (std::size_t i = 0; i < of_kind.size(); ++i) of_kind[i].*light *= gainOf(of_names[i]);
+  };
+  apply(lights.points, names.points, &PointLight::intensity);
+  apply(lights.directionals, names.directionals, &DirectionalLight::irradiance);
+  apply(lights.areas, names.areas, &AreaLight::radiance);
+  for (const auto& [name, gain] : gains) {
+    if (known.count(name) > 0) continue;
+    return Status::invalidArgument(fmt::format(
+        "--gain: no light has the name \"{}\": found {}; names stand before the numbers "
+        "of a light, --light-point \"key=0 2 1  3 3 3\"",
+        name, known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
+  }
+  return {};
+}
+
+// One factor of all light, or some of lights by name.
+Status readGain(const RelightArguments& arguments, RelightOptions& options) {
+  const std::string& text = arguments.gain;
+  const char* const end = text.data() + text.size();
+  double gain = 1;
+  const auto [stop, error] = std::from_chars(text.data(), end, gain);
+  if (error == std::errc() && stop == end && gain >= 0 && gain <= kMostGain) {
+    options.gain = gain;
+    return {};
+  }
+  SURFEIT_ASSIGN_OR_RETURN(const auto gains, parseGains(text));
+  return applyGains(gains, arguments.names, options.lights);
+}
+
+Status runRelight(const RelightArguments& arguments, CommandContext& context) {
+  RelightOptions options = arguments.options;
+  SURFEIT_RETURN_IF_ERROR(readGain(arguments, options));
   options.threads = context.threads();
   SURFEIT_ASSIGN_OR_RETURN(const RelightStats stats, relightScene(arguments.scene, arguments.result,
                                                                   options, context.progress()));
@@ -45,14 +118,17 @@ Status runRelight(RelightArguments& arguments, CommandContext& context) {
                                {"light", stats.light_seconds}}}});
 }
 
-void addLayerOptions(CLI::App& command, RelightOptions& options) {
+void addLayerOptions(CLI::App& command, RelightOptions& options, std::string& gain) {
   constexpr const char* kGroup = "Light";
   command
       .add_flag("--add", options.adds,
                 "Add to the light of the scene, instead of taking its place: lights in layers")
       ->group(kGroup);
-  command.add_option("--gain", options.gain, "Factor of the new light")
-      ->check(CLI::Range(0.0, 1e6))
+  command
+      .add_option("--gain", gain,
+                  "Factor of the new light, or of lights by the names before their numbers: "
+                  "key=2,fill=.5")
+      ->type_name("GAIN|NAME=GAIN,...")
       ->capture_default_str()
       ->group(kGroup);
 }
@@ -87,8 +163,8 @@ void addRelightCommand(CLI::App& app, CommandContext& context) {
   RelightOptions& options = arguments->options;
   command->add_option("SCENE", arguments->scene, "Scene file (.sft) with albedo")->required();
   command->add_option("-o,--output", arguments->result, "Scene file to write (.sft)")->required();
-  addLampOptions(*command, options.lights);
-  addLayerOptions(*command, options);
+  addLampOptions(*command, options.lights, &arguments->names);
+  addLayerOptions(*command, options, arguments->gain);
   addShadowOptions(*command, options);
   addGroundOptions(*command, options.ground);
   command
@@ -108,7 +184,9 @@ void addRelightCommand(CLI::App& app, CommandContext& context) {
       "      --light-directional \"-1 -2 -1  3 3 3\"\n"
       "  surfeit relight noon.sft -o lamp.sft --mesh cornell.obj --no-mesh-light --add --gain 0.5 "
       "\\\n"
-      "      --light-point \"0.5 0.9 0.5  2 2 1\"");
+      "      --light-point \"0.5 0.9 0.5  2 2 1\"\n"
+      "  surfeit relight cornell.sft -o look.sft --light-point \"key=0 1 2  9 9 8\" \\\n"
+      "      --light-directional \"fill=0 -1 -1  1 1 2\" --gain key=2,fill=.5");
   command->callback(
       [arguments, &context] { context.run([&] { return runRelight(*arguments, context); }); });
 }

@@ -36,12 +36,18 @@ glm::vec3 colorAt(const std::string& option, const glm::vec3& color, float max) 
 }
 
 // A light option that may be given several times; each value has N numbers.
+// `names`: of these lights, where they may have some; else null.
 template <std::size_t N, typename Add>
 void addLightOption(CLI::App& app, const std::string& name, const std::string& expected,
-                    const std::string& description, Add add) {
-  const auto parse = [name, expected, add](const std::vector<std::string>& values) {
-    for (const std::string& value : values)
-      add(parseNumberList<N>(name, value, "\"" + expected + "\""));
+                    const std::string& description, std::vector<std::string>* names, Add add) {
+  const auto parse = [name, expected, names, add](const std::vector<std::string>& values) {
+    for (const std::string& value : values) {
+      const std::size_t equals = names != nullptr ? value.find('=') : value.npos;
+      const std::string numbers = equals == value.npos ? value : value.substr(equals + 1);
+      add(parseNumberList<N>(name, numbers, "\"" + expected + "\""));
+      if (names == nullptr) continue;
+      names->push_back(equals == value.npos ? std::string() : value.substr(0, equals));
+    }
     return true;
   };
   app.add_option(name, parse, description)
@@ -61,25 +67,39 @@ std::function<void(const std::string&)> reflectance(const std::string& name, glm
   };
 }
 
+void addFalloffOptions(CLI::App& app, Lights& lights) {
+  app.add_option("--falloff", lights.falloff,
+                 "Light of points and rectangles falls off as 1 / distance ^ FALLOFF: 2 is "
+                 "physical, 1 reaches farther, 0 does not fall off")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 8.0))
+      ->group("Light");
+  app.add_option("--falloff-distance", lights.falloff_distance,
+                 "Distance at which all falloffs give the same light, scene units")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber)
+      ->group("Light");
+}
+
 }  // namespace
 
-void addLampOptions(CLI::App& app, Lights& lights) {
+void addLampOptions(CLI::App& app, Lights& lights, LightNames* names) {
   addLightOption<6>(
       app, "--light-point", "x y z r g b", "Point light: position, intensity in W/sr; repeatable",
-      [&lights](const std::array<double, 6>& n) {
+      names != nullptr ? &names->points : nullptr, [&lights](const std::array<double, 6>& n) {
         lights.points.push_back({placeAt(n), colorAt("--light-point", vectorAt(n, 3), kNoLimit)});
       });
   addLightOption<6>(
       app, "--light-directional", "dx dy dz r g b",
       "Directional light: direction it travels in, irradiance facing it; repeatable",
-      [&lights](const std::array<double, 6>& n) {
+      names != nullptr ? &names->directionals : nullptr, [&lights](const std::array<double, 6>& n) {
         lights.directionals.push_back(
             {vectorAt(n, 0), colorAt("--light-directional", vectorAt(n, 3), kNoLimit)});
       });
   addLightOption<12>(
       app, "--light-area", "cx cy cz ux uy uz vx vy vz r g b",
       "Rectangle light: centre, half edges u and v, radiance; emits towards u x v; repeatable",
-      [&lights](const std::array<double, 12>& n) {
+      names != nullptr ? &names->areas : nullptr, [&lights](const std::array<double, 12>& n) {
         lights.areas.push_back({placeAt(n), vectorAt(n, 3), vectorAt(n, 6),
                                 colorAt("--light-area", vectorAt(n, 9), kNoLimit)});
       });
@@ -88,6 +108,7 @@ void addLampOptions(CLI::App& app, Lights& lights) {
       ->capture_default_str()
       ->check(CLI::Range(1, 65536))
       ->group("Light");
+  addFalloffOptions(app, lights);
 }
 
 void addGroundOptions(CLI::App& app, GroundPlane& ground) {
@@ -155,6 +176,7 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
           ->check(CLI::PositiveNumber)
           ->excludes(count);
   const std::vector<CLI::Option*> cameras = addDensityOptions(app, arguments.cameras);
+  addCameraCropOption(app, arguments.cameras);
   for (CLI::Option* const camera : cameras) camera->excludes(count)->excludes(spacing);
   CLI::Option* const photons =
       app.add_option("--photons", arguments.photons,
@@ -164,6 +186,18 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
           ->excludes(count)
           ->excludes(spacing);
   for (CLI::Option* const camera : cameras) camera->excludes(photons);
+  app.add_option_function<std::string>(
+         "--group-by",
+         [&arguments](const std::string& word) {
+           arguments.options.groups = word == "file"     ? SampleGroups::kFile
+                                      : word == "object" ? SampleGroups::kObject
+                                                         : SampleGroups::kMaterial;
+         },
+         "Object groups with names, for --subset NAME: by file, by object or group of OBJ (o, g), "
+         "or by material (usemtl); other meshes by file")
+      ->type_name("file|object|material")
+      ->check(CLI::IsMember({"file", "object", "material"}).description(""))
+      ->excludes(photons);
   app.add_flag("--two-sided", arguments.options.is_two_sided,
                "Both sides of the meshes send and block light: leaves, cloth, hair")
       ->excludes(photons);

@@ -12,8 +12,14 @@
 
 namespace surfeit {
 
-// Parts of what is below, for commands that take some of it: --light-*; --ground-*.
-void addLampOptions(CLI::App& app, Lights& lights);
+// Names that lights have, by light; empty: none. In the order of Lights.
+struct LightNames {
+  std::vector<std::string> points, directionals, areas;
+};
+
+// Parts of what is below, for commands that take some of it: --light-*; --ground-*. With `names`,
+// lights may have one before their numbers: "key=0 2 1  3 3 3".
+void addLampOptions(CLI::App& app, Lights& lights, LightNames* names = nullptr);
 void addGroundOptions(CLI::App& app, GroundPlane& ground);
 
 // Adds --light-*, --ground-* and --albedo; parsing fills `surroundings`, which must outlive `app`.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "surfeit/api.h"
+#include "surfeit/bounce_look.h"
 #include "surfeit/gather.h"
 #include "surfeit/job.h"
 #include "surfeit/progress.h"
@@ -37,6 +38,8 @@ enum class ReceiverOrder : std::uint8_t {
 // for them. ReadOptions are for the receivers; results keep the receivers' colors.
 struct GatherOptions : GatherSettings, JobOptions, ReadOptions {
   GatherEnvironment environment;
+  // Of the output irradiance alone: light from surfels, after the gather. Other outputs stay.
+  BounceLook look;
 
   ReceiverOrder order = ReceiverOrder::kHilbert;
   // Part of the cache memory for node groups, 0..1; negative: found by measurement.

@@ -4,6 +4,9 @@
 //   B_0 = the radiosity in the scene: emission and direct light
 //   B_k = B_0 + albedo * E(B_{k-1}),   k = 1 .. bounces
 //
+// With a look (surfeit/bounce_look.h) B_k = B_0 + C_group(albedo * F(E(B_{k-1}))): F is its color
+// correction and its filters at the surfel, C_group the correction of the surfel's object group.
+//
 // E is the irradiance that a gather finds at the surfel (surfeit/gather.h), in the unit of the
 // radiosity: inside a closed shell of radiosity B, E = B. A gather from the result adds one more
 // bounce at its receivers.
@@ -15,6 +18,7 @@
 #include <vector>
 
 #include "surfeit/api.h"
+#include "surfeit/bounce_look.h"
 #include "surfeit/gather.h"
 #include "surfeit/job.h"
 #include "surfeit/progress.h"
@@ -35,6 +39,10 @@ struct BounceOptions : JobOptions {
   bool spare_last = false;
   // Set of the object groups that send light and cover, as in GatherSettings; all surfels receive.
   std::uint64_t groups = kAllGroups;
+
+  BounceLook look;  // of all bounces
+  // Of what surfels of these groups reflect; no group twice. Groups that the scene lacks are told.
+  std::vector<GroupCorrection> group_corrections;
 
   double cache_split = -1;  // as in GatherOptions (surfeit/bake.h)
   bool direct_io = false;
@@ -65,11 +73,11 @@ struct BounceStats {
 // A two-sided surfel has one radiosity for both sides; it receives the mean of its two sides. A
 // sphere receives the mean over all directions. So no light is lost, and none is made.
 //
-// The result depends only on scene, bounces, quality, surfels_per_receiver, spare_last,
-// groups and the machine's instruction set, bit for bit. With albedo above 1 radiosity can grow
-// without end; it is limited to 1e12. Errors: as indexClouds; kCorruption for a scene without
-// albedo or radiosity; kInvalidArgument for a scene that bounceScene has written, because its
-// bounces would count twice.
+// The result depends only on scene, bounces, quality, surfels_per_receiver, spare_last, groups,
+// look, group_corrections and the machine's instruction set, bit for bit. With albedo or gains
+// above 1 radiosity can grow without end; it is limited to 1e12. Errors: as indexClouds;
+// kCorruption for a scene without albedo or radiosity; kInvalidArgument for a scene that
+// bounceScene has written, because its bounces would count twice.
 SURFEIT_API Result<BounceStats> bounceScene(const std::string& scene_path,
                                             const std::string& result_path,
                                             const BounceOptions& options, Progress& progress);

@@ -25,11 +25,20 @@ struct DensityCamera {
   double fov_degrees = 35;       // vertical field of view, 1..170
 };
 
+// Pixels x0 <= x < x1, y0 <= y < y1 of a picture; the first row is at the top.
+struct PixelWindow {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+
+  bool isEmpty() const { return x0 >= x1 || y0 >= y1; }
+};
+
 // Plain data. Where several cameras look at a place, the one that asks for the smallest surfels
 // decides.
 struct CameraDensity {
   std::vector<DensityCamera> cameras;  // empty: no density by cameras
   int width = 1280, height = 960;      // pixels of all cameras
+  // In view is this part of the pictures alone, which lies in them; absent: all of them.
+  std::optional<PixelWindow> crop;
   // Edge of a surfel in view, in pixels: its solid angle is that many times that many pixels of the
   // middle of the picture. 0.01 to 10,000; 1 to 1.5 is usual (1.5 gives half as many surfels).
   double pixels = 1;

@@ -67,6 +67,10 @@ struct GatherWeights {
   // ^ falloff, which needs a max distance. 0: none. Light has no falloff.
   float falloff = 0;
   FalloffMode falloff_mode = FalloffMode::kExponential;
+  // Directions weigh in the output occlusion by the luminance of the environment, too: the covered
+  // part of its light instead of the covered part of the directions (app note 3.3). Needs an
+  // environment. 0 where none of its light can arrive. Other outputs stay.
+  bool by_brightness = false;
 };
 
 // Rotation and intensity of the environment, light from infinitely far away (memo 7.3).
@@ -99,6 +103,10 @@ struct GatherQuality {
   // interpolated. The limit is absolute for occlusion, relative to the brightest receiver nearby
   // for lights, and a part of half a turn for directions (app note 2.2). 0: off.
   float max_variation = 0;
+  // With max_variation, no more than about so many receivers lie between neighbouring samples, 1 to
+  // 8: pixels where receivers are those of a picture (app note 2.2, maxpixeldist). 8 is the most
+  // that there is.
+  int max_pixel_distance = 8;
 };
 
 // Settings from measured tables (docs/benchmarks.md, "Errors and rates"). Standard is the default.

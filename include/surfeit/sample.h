@@ -48,6 +48,10 @@ struct Lights {
   std::vector<PointLight> points;
   std::vector<DirectionalLight> directionals;
   std::vector<AreaLight> areas;
+  // Light of points and rectangles falls off with distance d as 1 / d^falloff, 0 to 8: E = I cos /
+  // d^2 * (d / falloff_distance)^(2 - falloff). 2 is physical; emissive triangles always have it.
+  float falloff = 2;
+  double falloff_distance = 1;  // scene units, above 0: there all falloffs give the same light
   // Shadow rays per area light, and as many for all emissive triangles together.
   int samples = 16;
   // Do emissive surfaces carry their own emission as radiosity? They light the others either way; a
@@ -83,8 +87,20 @@ struct Surroundings {
   CurveOptions curves{};
 };
 
+// How surfels get object groups with names (surfeit/group_names.h).
+enum class SampleGroups : std::uint8_t {
+  kNone,      // the cloud has no groups
+  kFile,      // by the file that they come from, without folder and ending
+  kObject,    // by the object or group (o, g) of OBJ; other meshes by file
+  kMaterial,  // by the material (usemtl) of OBJ
+};
+
 struct SampleOptions {
   Surroundings surroundings;
+  // Names get the groups 1, 2, ... in the order in which they come; equal names are one group, what
+  // has no name is in group 0. At most kMaxGroups - 1 names. Comments of the cloud keep them
+  // (docs/files.md), and index gives them to the scene.
+  SampleGroups groups = SampleGroups::kNone;
   std::uint64_t count = 1'000'000;  // surfels, in proportion to area; slivers add a few
   double spacing = 0;               // > 0: one surfel per spacing^2 instead of a count
   // With cameras: surfels as large as these ask for, instead of a count or a spacing. Triangles

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "batch/bounce_look.h"
 #include "core/seconds_since.h"
 #include "core/worker_threads.h"
 #include "gather/packet/group_gatherer.h"
@@ -49,6 +50,7 @@ Status GatherCrew::gatherRuns() {
       for (std::size_t i = 0; i < count; ++i) group[i] = run[begin + i].receiver;
       SURFEIT_RETURN_IF_ERROR(gatherer.gather(std::span(group).first(count), world,
                                               std::span(group_results).first(count)));
+      applyLook(group, std::span(group_results).first(count));
       for (std::size_t i = 0; i < count; ++i) {
         results.push_back({run[begin + i].index, group_results[i]});
       }
@@ -59,6 +61,15 @@ Status GatherCrew::gatherRuns() {
   }
   interpolated_count_ += gatherer.interpolatedCount();
   return {};
+}
+
+void GatherCrew::applyLook(std::span<const LocalReceiver> receivers,
+                           std::span<GatherResult> results) const {
+  if (setup_.look == nullptr || setup_.look->isOff()) return;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    results[i].irradiance = lookedAt(*setup_.look, results[i].irradiance, receivers[i].position,
+                                     receivers[i].normal, false);
+  }
 }
 
 Result<std::unique_ptr<SortedGather>> SortedGather::create(SceneFile scene,
@@ -78,6 +89,7 @@ SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, const GatherMemo
     : octree_(std::move(octree)),
       prefetch_threads_(memory.prefetch_threads),
       rules_(gatherRules(options, environment)),
+      look_(options.look),
       stats_(stats),
       progress_(progress),
       controller_(*octree_,
@@ -98,6 +110,7 @@ Status SortedGather::gather(ExternalSorter& sorter, GatherCrew::Sink sink, std::
                    .queue = queue,
                    .controller = controller_,
                    .rules = rules_,
+                   .look = &look_,
                    .threads = stats_.threads,
                    .prefetch_threads = prefetch_threads_,
                    .progress = progress_},

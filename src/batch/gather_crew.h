@@ -33,6 +33,7 @@ class GatherCrew {
     ReceiverQueue& queue;
     PagingController& controller;
     GatherRules rules;
+    const BounceLook* look = nullptr;  // of the irradiance, about the scene's origin
     int threads = 1;
     int prefetch_threads = 0;
     Progress& progress;
@@ -48,6 +49,7 @@ class GatherCrew {
 
  private:
   Status gatherRuns();
+  void applyLook(std::span<const LocalReceiver> receivers, std::span<GatherResult> results) const;
 
   const Setup setup_;
   const Sink sink_;
@@ -81,6 +83,7 @@ class SortedGather {
   const std::unique_ptr<PagedOctree> octree_;
   const int prefetch_threads_;
   const GatherRules rules_;
+  const BounceLook look_;
   GatherStats& stats_;
   Progress& progress_;
   PagingController controller_;

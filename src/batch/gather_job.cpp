@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "batch/bounce_look.h"
 #include "batch/sorted_receiver.h"
 #include "cloud/cloud_formats.h"
 #include "core/parallel.h"
@@ -34,6 +35,7 @@ Result<GatherJob> GatherJob::open(const std::string& receivers_path, const std::
                            openReceivers(receivers_path, result_path, options, progress));
   SURFEIT_RETURN_IF_ERROR(job.input_.check(GatherRules(options)));
   job.options_.eye -= scene.header().origin;
+  job.options_.look = countedFrom(std::move(job.options_.look), scene.header().origin);
   SURFEIT_ASSIGN_OR_RETURN(job.environment_,
                            loadEnvironment(job.options_, scene.header().up, progress));
   SURFEIT_RETURN_IF_ERROR(job.plan(scene));

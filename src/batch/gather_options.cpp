@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "batch/bounce_look.h"
 #include "batch/environment_file.h"
 #include "core/job_limits.h"
 #include "core/up_comment.h"
@@ -37,6 +38,12 @@ Status checkEnvironment(const GatherEnvironment& environment) {
 Status checkGatherOptions(const GatherOptions& options) {
   SURFEIT_RETURN_IF_ERROR(checkGatherSettings(options, !options.environment.path.empty()));
   SURFEIT_RETURN_IF_ERROR(checkEnvironment(options.environment));
+  SURFEIT_RETURN_IF_ERROR(checkLook(options.look));
+  if (!options.look.isOff() && (GatherRules(options).outputs & kOutputIrradiance) == 0) {
+    return Status::invalidArgument(
+        "look of bounce light: found no output irradiance that it changes, expected --mode "
+        "bleeding or glossy, or --outputs irradiance");
+  }
   if (options.threads < 0 || options.threads > kMostThreads) {
     return refuse("thread count", options.threads, fmt::format("0 to {}", kMostThreads));
   }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "batch/bounce_look.h"
 #include "surfeit/version.h"
 
 namespace surfeit {
@@ -22,6 +23,14 @@ json sceneIdentity(const SceneFile& scene) {
   return {{"identity", fmt::format("{:016x}", pages.identity())},
           {"pages", fmt::format("{:016x}", pages.directoryChecksum())},
           {"fields", hashOf(pages.sceneFields())}};
+}
+
+// Settings that are at their defaults say nothing, so that jobs from before they were are the same.
+void addNewerSettings(const GatherOptions& options, json& settings) {
+  if (options.weights.by_brightness) settings["by_brightness"] = true;
+  const int distance = options.quality.max_pixel_distance;
+  if (distance != GatherQuality().max_pixel_distance) settings["max_pixel_distance"] = distance;
+  if (!options.look.isOff()) settings["look"] = identityOf(options.look);
 }
 
 json settingsOf(const GatherOptions& options) {
@@ -59,6 +68,7 @@ json jobIdentity(const SceneFile& scene, const GatherJob& job) {
                      {"part", options.part},
                      {"filter", options.filter},
                      {"color_range", static_cast<int>(options.color_range)}}}};
+  addNewerSettings(options, identity["settings"]);
   if (const LoadedEnvironment* environment = job.environment()) {
     identity["environment"] = hashOf(std::as_bytes(environment->cube.pixels()));
   }

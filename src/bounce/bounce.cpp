@@ -18,6 +18,7 @@
 #include <optional>
 #include <utility>
 
+#include "batch/bounce_look.h"
 #include "batch/gather_memory.h"
 #include "batch/gather_options.h"
 #include "batch/paging_controller.h"
@@ -70,6 +71,8 @@ Status checkOptions(const BounceOptions& options) {
   if (options.quality.sides != GatherSides::kFront && options.quality.sides != GatherSides::kBoth) {
     return Status::invalidArgument("sides: found those that send no light, expected front or both");
   }
+  SURFEIT_RETURN_IF_ERROR(checkLook(options.look));
+  SURFEIT_RETURN_IF_ERROR(checkGroupCorrections(options.group_corrections));
   return checkGatherOptions(gatherOptions(options));
 }
 
@@ -88,6 +91,7 @@ class Bouncer {
 
  private:
   Status checkScene() const;
+  Status checkCorrectedGroups() const;
   Status checkMemory() const;
   std::uint64_t bytesBesideGather() const;
   std::uint64_t laterGrowthBytes() const;
@@ -175,7 +179,22 @@ Status Bouncer::checkScene() const {
                     "it was made from",
                     scene_path_));
   }
+  SURFEIT_RETURN_IF_ERROR(checkCorrectedGroups());
   return checkGroups(*scene_, options_.groups);
+}
+
+// Corrections of groups that the scene lacks change nothing.
+Status Bouncer::checkCorrectedGroups() const {
+  std::uint64_t corrected = 0;
+  for (const GroupCorrection& of : options_.group_corrections) corrected |= groupBit(of.group);
+  if (corrected == 0) return {};
+  SURFEIT_RETURN_IF_ERROR(checkGroups(*scene_, corrected));
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t present, scene_->readGroups());
+  if (const std::uint64_t absent = corrected & ~present; absent != 0) {
+    progress_.note(fmt::format("{}: has no surfels of groups {}: their corrections change nothing",
+                               scene_path_, describeGroups(absent)));
+  }
+  return {};
 }
 
 GatherWork Bouncer::gatherWork() const {
@@ -241,6 +260,8 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
   BounceCrew crew({.scene = *scene_,
                    .octree = *octree,
                    .rules = GatherRules(gather_options_),
+                   .look = countedFrom(options_.look, scene_->header().origin),
+                   .of_groups = byGroup(options_.group_corrections),
                    .surfels_per_receiver = surfelsPerReceiver(bounce),
                    .threads = gather_options_.threads,
                    .radiosity = radiosity,
@@ -302,6 +323,9 @@ std::string Bouncer::provenance() const {
                           {"max_distance", quality.max_distance},
                           {"both_sides", quality.sides == GatherSides::kBoth}};
   if (options_.spare_last) json[kProvenanceKey]["spare_last"] = true;
+  if (!options_.look.isOff() || !options_.group_corrections.empty()) {
+    json[kProvenanceKey]["look"] = identityOf(options_.look, options_.group_corrections);
+  }
   if (options_.groups != kAllGroups) {
     json[kProvenanceKey]["groups"] = describeGroups(options_.groups);
   }

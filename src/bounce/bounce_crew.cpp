@@ -113,6 +113,15 @@ Status BounceCrew::gather(PacketGatherer& gatherer, PagedOctree::Reader& reader,
   return {};
 }
 
+// albedo E by the look; a look that is off leaves every bit.
+glm::vec3 BounceCrew::reflected(const Surfel& surfel, const glm::vec3& irradiance) const {
+  const bool has_two_sides = surfel.isTwoSided() && !surfel.isSphere();
+  const glm::vec3 normal = surfel.isSphere() ? glm::vec3(0) : surfel.normal;
+  const glm::vec3 arriving =
+      lookedAt(setup_.look, irradiance, surfel.position, normal, has_two_sides);
+  return corrected(setup_.of_groups[surfel.group], surfel.albedo * arriving);
+}
+
 // B_k = B_0 + albedo E (memo 7.4).
 Status BounceCrew::handIn(std::uint32_t first_page, Stretch& stretch) {
   float largest_change = 0;
@@ -123,7 +132,7 @@ Status BounceCrew::handIn(std::uint32_t first_page, Stretch& stretch) {
       const Surfel& surfel = stretch.surfels[i];
       const glm::vec3 irradiance = stretch.receivers.irradiance(i, stretch.irradiance);
       const glm::vec3 radiosity =
-          glm::min(surfel.radiosity + surfel.albedo * irradiance, glm::vec3(kLargestColor));
+          glm::min(surfel.radiosity + reflected(surfel, irradiance), glm::vec3(kLargestColor));
       const glm::vec3 change = glm::abs(radiosity - stretch.before[i]);
       largest_change = std::max({largest_change, change.r, change.g, change.b});
       stretch.radiosity.push_back(radiosity);

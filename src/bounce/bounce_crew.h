@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "batch/bounce_look.h"
 #include "batch/paging_controller.h"
 #include "bounce/bounce_radiosity.h"
 #include "bounce/bounce_receivers.h"
@@ -27,6 +28,8 @@ class BounceCrew {
     const SceneFile& scene;  // with B_0
     PagedOctree& octree;     // the same scene with B_{k-1}
     GatherRules rules;
+    BounceLook look;  // about the scene's origin
+    CorrectionOfGroup of_groups{};
     int surfels_per_receiver = 1;
     int threads = 1;
     BounceRadiosity& radiosity;  // gets B_k
@@ -53,6 +56,7 @@ class BounceCrew {
   Status load(std::uint32_t first_page, PagedOctree::Reader& reader, Stretch& stretch) const;
   Status gather(PacketGatherer& gatherer, PagedOctree::Reader& reader, Stretch& stretch) const;
   Status handIn(std::uint32_t first_page, Stretch& stretch);
+  glm::vec3 reflected(const Surfel& surfel, const glm::vec3& irradiance) const;
   void noteChange(float change);
 
   const Setup setup_;

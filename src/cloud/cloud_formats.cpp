@@ -32,6 +32,7 @@
 #include "cloud/vdb/vdb_output.h"
 #include "cloud/vdb/vdb_reader.h"
 #include "cloud/vdb/vdb_writer.h"
+#include "core/group_comment.h"
 #include "core/up_comment.h"
 #include "storage/byte_output.h"
 #include "storage/output_target.h"
@@ -220,6 +221,17 @@ void noteLostUpAxis(const std::string& path, const CloudFormat& format,
                   is_csv ? "CSV" : format.name, upAxisName(up), upAxisName(up)));
 }
 
+// Other formats without comments say so themselves.
+void noteLostGroupNames(const std::string& path, const CloudFormat& format,
+                        const RowWriterOptions& options) {
+  const bool has_names =
+      std::any_of(options.comments.begin(), options.comments.end(),
+                  [](const std::string& comment) { return statedGroupName(comment).has_value(); });
+  if (format.create != createPtc || !has_names || options.progress == nullptr) return;
+  options.progress->note(fmt::format(
+      "{}: {} has no place for the names of object groups: they stay numbers", path, format.name));
+}
+
 // Of a PLY.
 std::uint64_t rowBytesOf(const RowWriterOptions& writing) {
   std::uint64_t bytes = 0;
@@ -240,6 +252,7 @@ Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
   for (const CloudFormat& format : kFormats) {
     if (format.create != nullptr && hasExtension(name, format.extensions)) {
       noteLostUpAxis(path, format, writing);
+      noteLostGroupNames(path, format, writing);
       if (writing.count && name == path && format.extensions == ".ply") {
         SURFEIT_RETURN_IF_ERROR(checkOutputRoom(path, *writing.count * rowBytesOf(writing)));
       }

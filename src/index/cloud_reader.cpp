@@ -10,11 +10,13 @@
 #include <optional>
 
 #include "core/first_failure.h"
+#include "core/group_comment.h"
 #include "core/parallel.h"
 #include "core/thread_scratch.h"
 #include "core/up_comment.h"
 #include "index/row_fetcher.h"
 #include "index/scene_rows.h"
+#include "surfeit/group_names.h"
 
 namespace surfeit {
 namespace {
@@ -148,6 +150,7 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     for (const std::string& note : source->notes()) {
       reader.notes_.push_back(fmt::format("{}: {}", path, note));
     }
+    reader.addGroupNames(*source);
     const UpAxis up = source->up();
     if (reader.up_.value_or(up) != up) {
       reader.notes_.push_back(fmt::format("{}: {} is up, but {} in {}: the scene has that (--up)",
@@ -166,6 +169,39 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     reader.file_bytes_ += file.size();
   }
   return reader;
+}
+
+void CloudReader::addGroupNames(const SurfelSource& source) {
+  auto& names = group_names_.emplace_back();
+  if (!source.channels().group) return;
+  for (const std::string& comment : source.comments()) {
+    const std::optional<StatedGroupName> stated = statedGroupName(comment);
+    if (!stated) continue;
+    if (stated->group < kMaxGroups && checkGroupName(stated->name).ok()) {
+      names.emplace_back(stated->group, stated->name);
+      continue;
+    }
+    notes_.push_back(fmt::format(
+        "{}: comment \"{}\" names no group: expected a number from 0 to {} and a name such as lamp",
+        source.path(), comment.substr(0, 80), kMaxGroups - 1));
+  }
+}
+
+std::map<std::uint32_t, std::string> CloudReader::groupNames(
+    std::vector<std::string>& notes) const {
+  std::map<std::uint32_t, std::string> names;
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    if (!groups_.empty() && groups_[i]) continue;
+    for (const auto& [group, name] : group_names_[i]) {
+      const auto [known, is_new] = names.emplace(group, name);
+      if (is_new || known->second == name) continue;
+      notes.push_back(
+          fmt::format("{}: group {} is \"{}\", but \"{}\" in a cloud before it, and keeps that "
+                      "name (index --group gives clouds names)",
+                      inputs_[i], group, name, known->second));
+    }
+  }
+  return names;
 }
 
 Result<std::vector<Surfel>> CloudReader::sample(std::uint64_t buckets) const {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -57,6 +58,10 @@ class CloudReader {
   using Groups = std::vector<std::optional<std::uint8_t>>;
   void setGroups(Groups groups) { groups_ = std::move(groups); }
 
+  // Names of groups that the comments of inputs with groups of their own say, by group. Where two
+  // inputs differ the first is right, which `notes` then tell. After setGroups.
+  std::map<std::uint32_t, std::string> groupNames(std::vector<std::string>& notes) const;
+
   // Records of all inputs, valid or not, and bytes of the files.
   std::uint64_t recordCount() const { return record_count_; }
   const std::vector<std::uint64_t>& records() const { return records_; }  // by input
@@ -107,11 +112,14 @@ class CloudReader {
   CloudReader() = default;
   Result<CloudTotals> readInput(std::size_t input, const Records& records, const Consumer& consume,
                                 Progress& progress) const;
+  void addGroupNames(const SurfelSource& source);
 
   std::vector<std::string> inputs_;
   std::vector<std::uint64_t> records_;  // by input
   std::vector<CloudChannels> channels_;
   Groups groups_;  // empty: all have their own
+  // By input, those that may be names
+  std::vector<std::vector<std::pair<std::uint32_t, std::string>>> group_names_;
   RowReaderOptions reading_;
   SourceOpener opener_;
   bool strict_ = false;

@@ -9,10 +9,27 @@
 
 namespace surfeit {
 
-nlohmann::json GroupPlan::describe() const {
-  nlohmann::json json = nlohmann::json::object();
-  for (std::size_t i = 0; i < names.size(); ++i) json[std::to_string(i + 1)] = names[i];
-  return json;
+GroupNames groupNames(const GroupPlan& plan, const CloudReader& reader,
+                      std::vector<std::string>& notes) {
+  GroupNames names;
+  for (std::size_t i = 0; i < plan.names.size(); ++i) {
+    names[static_cast<std::uint32_t>(i + 1)] = plan.names[i];
+  }
+  for (const auto& stated : reader.groupNames(notes)) {
+    // A name that two groups have would choose one of them
+    const auto taken = std::find_if(names.begin(), names.end(), [&](const auto& known) {
+      return known.first == stated.first || known.second == stated.second;
+    });
+    if (taken == names.end()) {
+      names.insert(stated);
+    } else if (*taken != stated) {
+      notes.push_back(
+          fmt::format("group {} of the clouds is \"{}\", but group {} is \"{}\", which stays: "
+                      "index --group gives all clouds names",
+                      stated.first, stated.second, taken->first, taken->second));
+    }
+  }
+  return names;
 }
 
 Result<GroupPlan> planGroups(const std::vector<std::string>& inputs,

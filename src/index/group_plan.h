@@ -1,7 +1,8 @@
 // Which object groups the inputs of the indexer get that have names.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,10 +17,15 @@ struct GroupPlan {
   std::vector<std::string> inputs;  // all of them
   CloudReader::Groups of_inputs;    // empty without names
   std::vector<std::string> names;   // of the groups from 1
-
-  // For the provenance, as group_names.h reads it.
-  nlohmann::json describe() const;
 };
+
+// Names by group.
+using GroupNames = std::map<std::uint32_t, std::string>;
+
+// Those of the plan, then those that clouds say. Where two are at odds the former is right, which
+// `notes` then tell.
+GroupNames groupNames(const GroupPlan& plan, const CloudReader& reader,
+                      std::vector<std::string>& notes);
 
 // The inputs, then those with names. kInvalidArgument for names that cannot be, or too many, or
 // where the inputs are no files.

@@ -110,6 +110,7 @@ class Indexer {
   std::string provenance() const;
 
   const GroupPlan groups_;
+  GroupNames group_names_;
   const SourceOpener opener_;
   const std::string& output_;
   const IndexOptions& options_;
@@ -183,6 +184,9 @@ Status Indexer::openInputs() {
                                  readBytesWithin(options_.memory_bytes), reading, opener_));
   reader_->setGroups(groups_.of_inputs);
   for (const std::string& note : reader_->notes()) progress_.note(note);
+  std::vector<std::string> notes;
+  group_names_ = groupNames(groups_, *reader_, notes);
+  for (const std::string& note : notes) progress_.note(note);
   if (options_.origin || pinned_) reader_->setOrigin(originAsked({}));
   const std::uint64_t records = reader_->recordCount();
   if (records > kReadBatch && reader_->isSeekable()) SURFEIT_RETURN_IF_ERROR(takeSample());
@@ -333,7 +337,7 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
 }
 
 SceneDescription Indexer::describe(const std::optional<NormalRule>& rule) const {
-  return {options_, groups_, totals_, reader_->origin(), up(), rule ? &*rule : nullptr};
+  return {options_, group_names_, totals_, reader_->origin(), up(), rule ? &*rule : nullptr};
 }
 
 std::string Indexer::provenance() const {

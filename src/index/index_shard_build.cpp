@@ -185,7 +185,7 @@ class ShardBuild {
                                                job_.temporary_directory},
                          progress_);
     RepeatFilter distinct(buckets, job_.options.repeats);
-    const SceneDescription description{job_.options, job_.groups, plan_.totals, plan_.origin,
+    const SceneDescription description{job_.options, job_.group_names, plan_.totals, plan_.origin,
                                        job_.up()};
     CountedSurfels left(distinct, plan_.splitters);
     const bool is_thin = job_.options.repeats == Repeats::kThin;

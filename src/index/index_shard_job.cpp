@@ -95,7 +95,9 @@ Result<IndexShardJob> IndexShardJob::open(const std::vector<std::string>& inputs
                            CloudReader::open(groups.inputs, options.strict,
                                              readBytesWithin(options.memory_bytes), reading));
   reader.setGroups(groups.of_inputs);
-  for (const std::string& note : reader.notes()) progress.note(note);
+  std::vector<std::string> notes = reader.notes();
+  GroupNames group_names = groupNames(groups, reader, notes);
+  for (const std::string& note : notes) progress.note(note);
   // As one machine takes it
   if (options.origin || options.cube) reader.setOrigin(originAsked(options, {}, {}));
   if (reader.recordCount() > kReadBatch && reader.isSeekable()) {
@@ -106,9 +108,15 @@ Result<IndexShardJob> IndexShardJob::open(const std::vector<std::string>& inputs
     if (!sample.empty()) reader.setOrigin(originAsked(options, bounds, reader.origin()));
   }
   const glm::dvec3 origin = reader.origin();
-  IndexShardJob job{
-      std::move(groups), output, options, count,
-      std::move(reader), origin, nullptr, temporaryDirectory(options.temporary_directory, output)};
+  IndexShardJob job{std::move(groups),
+                    std::move(group_names),
+                    output,
+                    options,
+                    count,
+                    std::move(reader),
+                    origin,
+                    nullptr,
+                    temporaryDirectory(options.temporary_directory, output)};
   job.identity = identityOf(job);
   return job;
 }

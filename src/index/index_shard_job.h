@@ -25,6 +25,7 @@ namespace surfeit {
 // A job with its inputs open. What is read of them is counted from the origin of the reader.
 struct IndexShardJob {
   GroupPlan groups;
+  GroupNames group_names;
   std::string output;
   IndexOptions options;  // with memory and threads set
   int count = 1;         // shards

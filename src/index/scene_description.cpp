@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "index/pinned_cube.h"
 #include "index/scene_place.h"
@@ -65,7 +66,7 @@ std::string SceneDescription::provenance() const {
       options.cube ? PinnedCube(*options.cube).unusualNumbers(totals.bounds, origin) : std::nullopt;
   if (cube) json["cube"] = *cube;
   if (normals != nullptr) json["normals"] = normals->describe();
-  if (!groups.names.empty()) json["groups"] = groups.describe();
+  for (const auto& [group, name] : groups) json["groups"][std::to_string(group)] = name;
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

@@ -18,7 +18,7 @@ namespace surfeit {
 // What it follows from.
 struct SceneDescription {
   const IndexOptions& options;
-  const GroupPlan& groups;
+  const GroupNames& groups;
   const CloudTotals& totals;  // about the origin
   glm::dvec3 origin{0};
   UpAxis up = kDefaultUpAxis;

@@ -77,6 +77,13 @@ DirectLight::DirectLight(const Mesh& mesh, const RayScene* scene, const Lights& 
   }
 }
 
+// What light has there beside the physical 1 / d^2.
+float DirectLight::falloffAt(float distance_sq) const {
+  if (lights_.falloff == 2) return 1;
+  const auto reference = float(lights_.falloff_distance);
+  return std::pow(distance_sq / (reference * reference), 1 - 0.5f * lights_.falloff);
+}
+
 glm::vec3 DirectLight::rayOrigin(const SurfacePoint& point) const {
   return point.position + (offset_ + point.lift) * point.geometric_normal;
 }
@@ -89,7 +96,8 @@ bool DirectLight::isShadowed(const SurfacePoint& point, const glm::vec3& target)
 
 // Light from a small piece of an emitter, per unit of its area: L cos cos' / d^2.
 glm::vec3 DirectLight::fromEmitterPoint(const SurfacePoint& point, const glm::vec3& position,
-                                        const glm::vec3& normal, const glm::vec3& radiance) const {
+                                        const glm::vec3& normal, const glm::vec3& radiance,
+                                        float falloff) const {
   const glm::vec3 towards = position - point.position;
   const float distance_sq = glm::dot(towards, towards);
   if (!(distance_sq > 0)) return glm::vec3(0);
@@ -97,7 +105,7 @@ glm::vec3 DirectLight::fromEmitterPoint(const SurfacePoint& point, const glm::ve
   const float cosines = arriving * -glm::dot(towards, normal);
   if (arriving <= 0 || cosines <= 0) return glm::vec3(0);
   if (isShadowed(point, position + offset_ * normal)) return glm::vec3(0);
-  return radiance * (cosines / (distance_sq * distance_sq));
+  return radiance * (falloff * (cosines / (distance_sq * distance_sq)));
 }
 
 glm::vec3 DirectLight::fromAreaLight(const AreaLight& light, const SurfacePoint& point,
@@ -107,13 +115,17 @@ glm::vec3 DirectLight::fromAreaLight(const AreaLight& light, const SurfacePoint&
   const glm::vec3 normal = cross / quarter_area;
   const Pattern pattern(seed, samples);
   glm::vec3 sum(0);
+  float most_falloff = 0;
   for (int i = 0; i < samples; ++i) {
     const glm::vec3 position = glm::vec3(light.centre) + (2 * pattern.u(i) - 1) * light.u +
                                (2 * pattern.v(i) - 1) * light.v;
-    sum += fromEmitterPoint(point, position, normal, light.radiance);
+    const glm::vec3 towards = position - point.position;
+    const float falloff = falloffAt(glm::dot(towards, towards));
+    most_falloff = std::max(most_falloff, falloff);
+    sum += fromEmitterPoint(point, position, normal, light.radiance, falloff);
   }
   // 1 / d^2 has no bound for samples next to the light, but irradiance has: pi L
-  return glm::min(sum * (4 * quarter_area / float(samples)), kPi * light.radiance);
+  return glm::min(sum * (4 * quarter_area / float(samples)), kPi * most_falloff * light.radiance);
 }
 
 glm::vec3 DirectLight::fromEmissiveTriangles(const SurfacePoint& point, std::uint64_t seed,
@@ -140,7 +152,7 @@ glm::vec3 DirectLight::fromEmissiveTriangles(const SurfacePoint& point, std::uin
     const double probability_per_area = power / total / triangleArea(mesh_, triangle);
     sum += fromEmitterPoint(
         point, light.position, light.geometric_normal,
-        light.emission * light.opacity * float(1 / (double(kPi) * probability_per_area)));
+        light.emission * light.opacity * float(1 / (double(kPi) * probability_per_area)), 1);
   }
   return glm::min(sum / float(samples), max_emission_);  // bounded as above: pi L is the exitance
 }
@@ -153,7 +165,7 @@ glm::vec3 DirectLight::irradiance(const SurfacePoint& point, std::uint64_t seed,
     const float distance_sq = glm::dot(towards, towards);
     const float cos_theta = arrival(point, towards) / std::sqrt(distance_sq);
     if (!(cos_theta > 0) || isShadowed(point, position)) continue;
-    sum += light.intensity * (cos_theta / distance_sq);
+    sum += light.intensity * (falloffAt(distance_sq) * (cos_theta / distance_sq));
   }
   for (const DirectionalLight& light : lights_.directionals) {
     const glm::vec3 towards = -glm::normalize(light.direction);

@@ -45,10 +45,12 @@ class DirectLight {
  private:
   DirectLight(const Mesh& mesh, const RayScene* scene, const Lights& lights);
 
+  float falloffAt(float distance_sq) const;
   glm::vec3 rayOrigin(const SurfacePoint& point) const;
   bool isShadowed(const SurfacePoint& point, const glm::vec3& target) const;
   glm::vec3 fromEmitterPoint(const SurfacePoint& point, const glm::vec3& position,
-                             const glm::vec3& normal, const glm::vec3& radiance) const;
+                             const glm::vec3& normal, const glm::vec3& radiance,
+                             float falloff) const;
   glm::vec3 fromAreaLight(const AreaLight& light, const SurfacePoint& point, std::uint64_t seed,
                           int samples) const;
   glm::vec3 fromEmissiveTriangles(const SurfacePoint& point, std::uint64_t seed, int samples) const;

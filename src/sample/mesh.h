@@ -36,6 +36,7 @@ struct Material {
       1};              // Tf: of glass the color, of what is translucent the light let through
   float index = 1.5f;  // Ni of glass
 
+  std::uint8_t group = 0;     // object group of its surfels
   bool is_two_sided = false;  // curves
   bool isOpaque() const { return opacity >= 1 && mask == kNoTexture; }
 };
@@ -55,7 +56,8 @@ struct Mesh {
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<Mask> masks;
-  std::uint64_t degenerate_faces = 0;  // faces without area, skipped
+  std::vector<std::string> group_names;  // of the groups from 1, where they are asked for
+  std::uint64_t degenerate_faces = 0;    // faces without area, skipped
 
   Bounds3 bounds() const;
   // Whether no material lets anything through.
@@ -101,7 +103,8 @@ double triangleArea(const Mesh& mesh, std::uint32_t triangle);
 // missing textures, and of faces that are skipped or cross themselves. kCorruption for files
 // without any triangle.
 Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& default_albedo,
-                        Progress& progress, const CurveOptions& curves = {});
+                        Progress& progress, const CurveOptions& curves = {},
+                        SampleGroups groups = SampleGroups::kNone);
 
 // Appends the ground: centred below the bounds, lowered by 1/10000 of their diagonal so that flat
 // bottoms do not share its plane.

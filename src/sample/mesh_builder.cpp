@@ -13,6 +13,7 @@
 
 #include "sample/polygon.h"
 #include "storage/file.h"
+#include "surfeit/surfel.h"
 
 namespace surfeit {
 namespace {
@@ -31,6 +32,26 @@ void noteFarVertices(const std::string& path, const Mesh& mesh, Progress& progre
       "{}: vertices are taken as floats, which stand {:.2g} apart in a scene so wide, beside "
       "triangles of about {:.2g}: sample the parts one by one",
       path, step, size));
+}
+
+// Names of groups have no commas, control characters or digits at the front (checkGroupName).
+std::string usableGroupName(std::string_view name) {
+  constexpr std::size_t kLongest = 200;
+  std::string usable(name.substr(0, kLongest - 1));
+  for (char& c : usable) {
+    if (c == ',' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '_';
+  }
+  if (!usable.empty() && usable[0] >= '0' && usable[0] <= '9') usable.insert(usable.begin(), '_');
+  return usable;
+}
+
+// Gives what a file without groups of its own has one.
+Status groupByFile(const std::string& path, std::size_t first_material, MeshBuilder& builder) {
+  const std::string stem = std::filesystem::path(path).stem().string();
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint8_t group, builder.groupOf(stem, path));
+  std::vector<Material>& materials = builder.mesh.materials;
+  for (std::size_t i = first_material; i < materials.size(); ++i) materials[i].group = group;
+  return {};
 }
 
 enum class MeshFormat { kPly, kObj, kHair, kUnknown };
@@ -54,6 +75,7 @@ Status loadFile(const std::string& path, const glm::vec3& default_albedo,
   const std::size_t triangles_before = builder.mesh.triangle.size();
   const std::uint64_t degenerate_before = builder.mesh.degenerate_faces;
   const std::uint64_t crossing_before = builder.crossing_faces;
+  const std::size_t materials_before = builder.mesh.materials.size();
   SURFEIT_ASSIGN_OR_RETURN(const MeshFormat format, recogniseMesh(path));
   switch (format) {
     case MeshFormat::kPly:
@@ -68,6 +90,10 @@ Status loadFile(const std::string& path, const glm::vec3& default_albedo,
     case MeshFormat::kUnknown:
       return Status::corruption(fmt::format(
           "{}: not a mesh that we read: expected PLY, hair or a name ending in .obj", path));
+  }
+  const bool has_own_groups = format == MeshFormat::kObj && builder.groups != SampleGroups::kFile;
+  if (builder.groups != SampleGroups::kNone && !has_own_groups) {
+    SURFEIT_RETURN_IF_ERROR(groupByFile(path, materials_before, builder));
   }
   const std::uint64_t degenerate = builder.mesh.degenerate_faces - degenerate_before;
   if (builder.mesh.triangle.size() == triangles_before) {
@@ -123,6 +149,22 @@ Status MeshBuilder::addFace(std::span<const std::uint64_t> corners, std::uint32_
   return {};
 }
 
+Result<std::uint8_t> MeshBuilder::groupOf(std::string_view name, const std::string& path) {
+  std::vector<std::string>& names = mesh.group_names;
+  const std::string usable = usableGroupName(name);
+  const auto found = std::find(names.begin(), names.end(), usable);
+  const auto group = static_cast<std::size_t>(found - names.begin()) + 1;
+  if (found != names.end()) return static_cast<std::uint8_t>(group);
+  if (group >= kMaxGroups) {
+    return Status::invalidArgument(fmt::format(
+        "{}: \"{}\" is name {} of a group, expected at most {}: group by file or material, or "
+        "sample parts of the scene apart and name them (index --group)",
+        path, usable, group, kMaxGroups - 1));
+  }
+  names.push_back(usable);
+  return static_cast<std::uint8_t>(group);
+}
+
 Mesh MeshBuilder::finish() {
   Bounds3d bounds;
   for (const glm::uvec3& corners : mesh.triangle) {
@@ -148,9 +190,10 @@ Mesh MeshBuilder::finish() {
 }
 
 Result<Mesh> loadMeshes(const std::vector<std::string>& paths, const glm::vec3& default_albedo,
-                        Progress& progress, const CurveOptions& curves) {
+                        Progress& progress, const CurveOptions& curves, SampleGroups groups) {
   if (paths.empty()) return Status::invalidArgument("no mesh given");
   MeshBuilder builder;
+  builder.groups = groups;
   try {
     for (const std::string& path : paths) {
       SURFEIT_RETURN_IF_ERROR(loadFile(path, default_albedo, curves, builder, progress));

@@ -9,6 +9,7 @@ inline constexpr double kHeldTimes = 2.5, kHeldTimesOfObj = 2.1;
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sample/mesh.h"
@@ -20,6 +21,11 @@ struct MeshBuilder {
   Mesh mesh;  // but for its positions and origin
   std::vector<glm::dvec3> position;
   std::uint64_t crossing_faces = 0;  // whose edges cross
+  SampleGroups groups = SampleGroups::kNone;
+
+  // The group of that name, which is made when it is new: one that cannot be a name of a group is
+  // changed. kInvalidArgument, naming `path`, for more names than there are groups.
+  Result<std::uint8_t> groupOf(std::string_view name, const std::string& path);
 
   // Appends the face with those corners (indices into position), polygons in triangles. Faces
   // without area are counted and skipped. kCorruption, naming the file and `face` (from 0), when a

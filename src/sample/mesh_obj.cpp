@@ -176,9 +176,7 @@ class ObjImporter {
         }
         index += count;
         const int id = i < faces.material_ids.size() ? faces.material_ids[i] : -1;
-        const bool has_material = id >= 0 && std::size_t(id) < parsed_.materials.size();
-        const std::uint32_t material =
-            material_begin_ + (has_material ? 1 + std::uint32_t(id) : 0u);
+        SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t material, materialOf(shape.name, id));
         SURFEIT_RETURN_IF_ERROR(builder_.addFace(corners, material, vertex_begin_, path_, face));
       }
       if (index != faces.indices.size()) return tooManyCorners();
@@ -204,6 +202,10 @@ class ObjImporter {
     SURFEIT_RETURN_IF_ERROR(forEachLine(options, measure));
     Material material = mesh_.materials[material_begin_];
     material.is_two_sided = true;
+    if (builder_.groups == SampleGroups::kObject || builder_.groups == SampleGroups::kMaterial) {
+      progress_.note(fmt::format(
+          "{}: lines are in group 0: groups by object or material are of faces", path_));
+    }
     mesh_.materials.push_back(material);
     CurveRibbons ribbons(builder_, std::uint32_t(mesh_.materials.size() - 1), has_colors_, path_);
     const double growth = kept_area > 0 ? area / kept_area : 1;
@@ -224,6 +226,29 @@ class ObjImporter {
   }
 
  private:
+  // The material of a face with that id. Groups by object have copies of materials, one for each
+  // object that they are on.
+  Result<std::uint32_t> materialOf(const std::string& object, int id) {
+    const bool has_material = id >= 0 && std::size_t(id) < parsed_.materials.size();
+    const std::uint32_t material = material_begin_ + (has_material ? 1 + std::uint32_t(id) : 0u);
+    const bool is_by_material = builder_.groups == SampleGroups::kMaterial;
+    if (!is_by_material && builder_.groups != SampleGroups::kObject) return material;
+    std::string name = object;
+    if (is_by_material) name = has_material ? parsed_.materials[std::size_t(id)].name : "";
+    std::replace(name.begin(), name.end(), kNameBlank, ' ');
+    if (name.empty()) return material;
+
+    SURFEIT_ASSIGN_OR_RETURN(const std::uint8_t group, builder_.groupOf(name, path_));
+    const auto [copy, is_new] = grouped_.try_emplace({material, group}, 0);
+    if (is_new) {
+      copy->second = std::uint32_t(mesh_.materials.size());
+      Material grouped = mesh_.materials[material];
+      grouped.group = group;
+      mesh_.materials.push_back(grouped);
+    }
+    return copy->second;
+  }
+
   // Illumination models of MTL: 3, 5 and 8 reflect, 4, 6, 7 and 9 refract. Others let through Tf
   // where it says more than the default of exporters, which is all or nothing.
   void importScattering(const tinyobj::material_t& parsed, Material& material) {
@@ -416,6 +441,7 @@ class ObjImporter {
   bool has_normals_, has_uvs_, has_colors_;
   std::uint64_t vertex_begin_;
   std::uint32_t material_begin_;
+  std::map<std::pair<std::uint32_t, std::uint8_t>, std::uint32_t> grouped_;  // copies of materials
   std::unordered_map<Corner, std::uint64_t, CornerHash> vertices_;
   std::map<std::string, std::uint32_t> textures_, masks_;
   double largest_color_ = 1;

@@ -377,6 +377,12 @@ Status checkOptions(const PhotonTracingOptions& options) {
   if (options.photons < 1 || options.photons > kMostPhotons) {
     return Status::invalidArgument(fmt::format("photons {}: expected 1 to 2^40", options.photons));
   }
+  if (options.surroundings.lights.falloff != 2) {
+    return Status::invalidArgument(fmt::format(
+        "falloff of lights {}: photons spread, so that their light always falls off with the "
+        "square of the distance: expected 2",
+        options.surroundings.lights.falloff));
+  }
   return checkSurroundings(options.surroundings);
 }
 

@@ -282,6 +282,9 @@ std::uint64_t Relighter::lightContent() const {
     add(light.centre), add(light.u), add(light.v), add(light.radiance);
   }
   values.push_back(options_.shadow_bias);
+  if (lights.falloff != 2) {
+    values.insert(values.end(), {double(lights.falloff), lights.falloff_distance});
+  }
   return XXH3_64bits(values.data(), values.size() * sizeof(double));
 }
 
@@ -307,6 +310,10 @@ Result<std::string> Relighter::provenance() const {
                     {"gain", options_.gain},
                     {"adds", options_.adds},
                     {"triangles", stats_.triangles}});
+  if (lights.falloff != 2) {
+    layers.back()["falloff"] = lights.falloff;
+    layers.back()["falloff_distance"] = lights.falloff_distance;
+  }
   std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   if (text.size() <= kMaxProvenanceBytes) return text;
   return Status::invalidArgument(

@@ -16,6 +16,7 @@
 #include <new>
 #include <optional>
 
+#include "core/group_comment.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
@@ -166,7 +167,8 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     requireThreads(stats.threads);
     auto start = std::chrono::steady_clock::now();
     progress.beginPhase("load", 0, "triangles");
-    SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh, loadScene(meshes, options.surroundings, progress));
+    SURFEIT_ASSIGN_OR_RETURN(const Mesh mesh,
+                             loadScene(meshes, options.surroundings, progress, options.groups));
     stats.triangles = mesh.triangle.size();
     stats.degenerate_faces = mesh.degenerate_faces;
     stats.load_seconds = secondsSince(start);
@@ -190,12 +192,16 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.radiosity = light.hasLight();
     channels.two_sided = channels.long_side = options.is_two_sided || mesh.hasTwoSides();
     channels.opacity = mesh.isTranslucent();
+    channels.group = options.groups != SampleGroups::kNone;
+    std::vector<std::string> comments = {upComment(options.surroundings.ground.up)};
+    for (std::size_t i = 0; i < mesh.group_names.size(); ++i) {
+      comments.push_back(groupComment(i + 1, mesh.group_names[i]));
+    }
     SURFEIT_ASSIGN_OR_RETURN(
         SurfelWriter writer,
-        SurfelWriter::create(
-            output, channels,
-            {.comments = {upComment(options.surroundings.ground.up)}, .progress = &progress},
-            mesh.origin));
+        SurfelWriter::create(output, channels,
+                             {.comments = std::move(comments), .progress = &progress},
+                             mesh.origin));
     const SurfelMaker maker(mesh, light.hasLight() ? &light : nullptr, options.is_two_sided);
     const std::unique_ptr<SurfelTasks> tasks = cutting->tasks(maker);
     SURFEIT_RETURN_IF_ERROR(writeSurfels(*tasks, stats.threads, writer, progress, stats));

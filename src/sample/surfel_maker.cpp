@@ -20,6 +20,7 @@ Surfel SurfelMaker::make(std::uint32_t triangle, const PiecePart& part, std::uin
   if (light_ != nullptr) surfel.radiosity = light_->exitance(point, seed, light_->samples());
   const Material& material = mesh_.materials[mesh_.triangle_material[triangle]];
   there = material.opacity > 0 ? point.opacity / material.opacity : 0;
+  surfel.group = material.group;
   if (material.opacity < 1) surfel.transparency = transparencyOf(double(material.opacity));
   if (is_two_sided_ || material.is_two_sided) showBothSides(point, seed, part, surfel);
   return surfel;

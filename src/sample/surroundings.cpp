@@ -12,6 +12,15 @@ Status checkSurroundings(const Surroundings& surroundings) {
     return Status::invalidArgument(
         fmt::format("light samples {}: expected 1 to 65536", surroundings.lights.samples));
   }
+  const Lights& lights = surroundings.lights;
+  if (!(lights.falloff >= 0) || !(lights.falloff <= 8)) {
+    return Status::invalidArgument(
+        fmt::format("falloff of lights {}: expected 0 (none) to 8; 2 is physical", lights.falloff));
+  }
+  if (!(lights.falloff_distance > 0) || !std::isfinite(lights.falloff_distance)) {
+    return Status::invalidArgument(fmt::format(
+        "falloff distance of lights {}: expected a positive length", lights.falloff_distance));
+  }
   if (!(surroundings.curves.width >= 0) || !std::isfinite(surroundings.curves.width)) {
     return Status::invalidArgument(
         fmt::format("curves of width {}: expected a positive length", surroundings.curves.width));
@@ -46,9 +55,9 @@ Status checkSurroundings(const Surroundings& surroundings) {
 }
 
 Result<Mesh> loadScene(const std::vector<std::string>& meshes, const Surroundings& surroundings,
-                       Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(
-      Mesh mesh, loadMeshes(meshes, surroundings.default_albedo, progress, surroundings.curves));
+                       Progress& progress, SampleGroups groups) {
+  SURFEIT_ASSIGN_OR_RETURN(Mesh mesh, loadMeshes(meshes, surroundings.default_albedo, progress,
+                                                 surroundings.curves, groups));
   addGroundPlane(surroundings.ground, mesh);
   return mesh;
 }

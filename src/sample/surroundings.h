@@ -17,6 +17,6 @@ Status checkSurroundings(const Surroundings& surroundings);
 
 // The meshes (loadMeshes) on their ground, as the surroundings have it.
 Result<Mesh> loadScene(const std::vector<std::string>& meshes, const Surroundings& surroundings,
-                       Progress& progress);
+                       Progress& progress, SampleGroups groups = SampleGroups::kNone);
 
 }  // namespace surfeit

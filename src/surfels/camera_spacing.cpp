@@ -27,6 +27,15 @@ Status checkDensity(const CameraDensity& density) {
   SURFEIT_RETURN_IF_ERROR(checkValue("max solid angle", density.max_solid_angle, 1e-9, 1));
   SURFEIT_RETURN_IF_ERROR(checkValue("width", density.width, 1, 1 << 20));
   SURFEIT_RETURN_IF_ERROR(checkValue("height", density.height, 1, 1 << 20));
+  if (density.crop) {
+    const PixelWindow& crop = *density.crop;
+    if (crop.isEmpty() || crop.x0 < 0 || crop.y0 < 0 || crop.x1 > density.width ||
+        crop.y1 > density.height) {
+      return Status::invalidArgument(fmt::format(
+          "crop {},{},{},{}: expected columns x0 < x1 and rows y0 < y1 of a picture of {}x{}",
+          crop.x0, crop.y0, crop.x1, crop.y1, density.width, density.height));
+    }
+  }
   return checkValue("stereo", density.stereo, 0, 1e30);
 }
 
@@ -54,6 +63,39 @@ double distanceToPyramid(const glm::dvec3& place, double slope_x, double slope_y
   // Else the edge between the two, or the eye where it begins
   const glm::dvec3 edge = glm::normalize(glm::dvec3(slope_x, slope_y, 1));
   return glm::distance(p, std::max(0.0, glm::dot(p, edge)) * edge);
+}
+
+double distanceToWindow(const glm::dvec3& place, const glm::dvec2& least, const glm::dvec2& most) {
+  double nearest = std::numeric_limits<double>::infinity();
+  bool is_inside = place.z >= 0;
+  // The sides, where the foot of the perpendicular lies on them
+  for (int axis = 0; axis < 2; ++axis) {
+    const int other = 1 - axis;
+    for (const double sign : {-1.0, 1.0}) {
+      const double slope = sign < 0 ? least[axis] : most[axis];
+      const double beyond = sign * (place[axis] - slope * place.z) / std::sqrt(1 + slope * slope);
+      if (!(beyond > 0)) continue;
+      is_inside = false;
+      glm::dvec3 normal(0, 0, -sign * slope);
+      normal[axis] = sign;
+      const glm::dvec3 foot = place - beyond * glm::normalize(normal);
+      if (foot.z >= 0 && foot[other] >= least[other] * foot.z &&
+          foot[other] <= most[other] * foot.z) {
+        nearest = std::min(nearest, beyond);
+      }
+    }
+  }
+  if (is_inside) return 0;
+
+  // The edges, or the eye where they begin
+  for (const double x : {least.x, most.x}) {
+    for (const double y : {least.y, most.y}) {
+      const glm::dvec3 edge = glm::normalize(glm::dvec3(x, y, 1));
+      const double along = std::max(0.0, glm::dot(place, edge));
+      nearest = std::min(nearest, glm::distance(place, along * edge));
+    }
+  }
+  return nearest;
 }
 
 Result<CameraSpacing> CameraSpacing::create(const CameraDensity& density, UpAxis up,
@@ -85,6 +127,16 @@ Result<CameraSpacing> CameraSpacing::create(const CameraDensity& density, UpAxis
     camera.up = glm::cross(camera.right, camera.forward);
     camera.slope_y = std::tan(0.5 * given.fov_degrees * std::numbers::pi / 180);
     camera.slope_x = camera.slope_y * density.width / density.height;
+    if (density.crop) {
+      const PixelWindow& crop = *density.crop;
+      const auto slope = [](double edge, double pixel, double pixels) {
+        return edge * (2 * pixel / pixels - 1);
+      };
+      camera.window = {{slope(camera.slope_x, crop.x0, density.width),
+                        -slope(camera.slope_y, crop.y1, density.height)},
+                       {slope(camera.slope_x, crop.x1, density.width),
+                        -slope(camera.slope_y, crop.y0, density.height)}};
+    }
     const double pixel_edge = density.pixels * 2 * camera.slope_y / density.height;
     camera.pixel_area = pixel_edge * pixel_edge;
     for (const double side : {-0.5, 0.5}) {
@@ -101,7 +153,9 @@ CameraSpacing::Distances CameraSpacing::distances(const Camera& camera, const gl
   const glm::dvec3 from_eye = place - camera.eye;
   const glm::dvec3 p(glm::dot(from_eye, camera.right), glm::dot(from_eye, camera.up),
                      glm::dot(from_eye, camera.forward));
-  return {glm::length(from_eye), distanceToPyramid(p, camera.slope_x, camera.slope_y)};
+  const double view = camera.window ? distanceToWindow(p, camera.window->least, camera.window->most)
+                                    : distanceToPyramid(p, camera.slope_x, camera.slope_y);
+  return {glm::length(from_eye), view};
 }
 
 double CameraSpacing::area(const Camera& camera, const Distances& distances) const {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "surfeit/camera_density.h"
@@ -14,6 +16,10 @@ namespace surfeit {
 
 // Distance from a place to the pyramid |x| <= slope_x z, |y| <= slope_y z, z >= 0; 0 within.
 double distanceToPyramid(const glm::dvec3& place, double slope_x, double slope_y);
+
+// The same to the pyramid of all (x z, y z, z) with z >= 0, least.x <= x <= most.x and least.y <= y
+// <= most.y: a window of a picture.
+double distanceToWindow(const glm::dvec3& place, const glm::dvec2& least, const glm::dvec2& most);
 
 // With P the pixels, w the solid angle of the middle pixel, W the largest solid angle, d the
 // distance to the eye and d' the distance to the view, which is 0 in view, a camera allows
@@ -42,6 +48,11 @@ class CameraSpacing {
     glm::dvec3 eye{0}, right{0}, up{0}, forward{0};
     double slope_x = 0, slope_y = 0;
     double pixel_area = 0;  // P^2 w
+    // Slopes of the window that is in view; absent: all is
+    struct Window {
+      glm::dvec2 least{0}, most{0};
+    };
+    std::optional<Window> window;
   };
   struct Distances {
     double eye = 0, view = 0;

@@ -29,6 +29,7 @@ class RowSurfelSource final : public SurfelSource {
   CloudChannels channels() const override { return mapping_.channels(); }
   void setOrigin(const glm::dvec3& origin) override { mapping_.setOrigin(origin); }
   UpAxis up() const override { return statedUpAxis(reader_->comments()).value_or(kDefaultUpAxis); }
+  std::vector<std::string> comments() const override { return reader_->comments(); }
   bool hasFloatPositions() const override { return mapping_.hasFloatPositions(); }
   bool hasCoverage() const override { return mapping_.hasCoverage(); }
   const SurfelDefects& defects() const override { return defects_; }

@@ -38,6 +38,8 @@ class SurfelSource {
   virtual void setOrigin(const glm::dvec3& origin) = 0;
   // The axis that the cloud says is up.
   virtual UpAxis up() const { return kDefaultUpAxis; }
+  // Lines of text that the cloud has (core/up_comment.h, core/group_comment.h).
+  virtual std::vector<std::string> comments() const { return {}; }
   // Whether the records hold positions as floats.
   virtual bool hasFloatPositions() const { return false; }
 

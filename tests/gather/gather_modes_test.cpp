@@ -78,6 +78,11 @@ class GatherModes : public testing::Test {
                    rules.outputs = kMost;
                    surround(rules);
                  }),
+        makeCase("by brightness", kOcclusion,
+                 [&](GatherRules& rules) {
+                   surround(rules);
+                   rules.weights.by_brightness = true;
+                 }),
         makeCase("bent normal", kOcclusion,
                  [](GatherRules& rules) { rules.outputs |= kOutputBentNormal; }),
         makeCase("uniform", kOcclusion,

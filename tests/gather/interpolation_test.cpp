@@ -226,6 +226,38 @@ TEST_F(Interpolation, SmoothLightStaysWithinTheVariation) {
   EXPECT_LT(light.rms, double(kVariation) / 2);
 }
 
+// On a floor, where nothing needs more samples, one of N x N receivers is one.
+TEST_F(Interpolation, SamplesLieAsCloseAsPixelsAreAllowedTo) {
+  Table receivers = receiversOf(0);
+  constexpr int kSide = 96;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    receivers.rows.push_back({.02 * (i % kSide) - 1, .02 * (i / kSide) - 1, 0, 0, 0, 1, double(i)});
+  }
+  Table cloud = floorAndSphere(40);
+  for (std::vector<double>& row : cloud.rows) {
+    row[2] += row[2] > 0 ? 20 : 0;  // a sphere that is far away
+  }
+  make(cloud, receivers);
+  double before = 1;
+  for (const int pixels : {1, 2, 3, 4, 8}) {
+    options_.quality.max_pixel_distance = pixels;
+    const Gathered found = gather(kVariation);
+    const double gathered = 1 - interpolatedPart(found);
+    std::printf("%d pixels: %.4f gathered\n", pixels, gathered);
+    EXPECT_GE(gathered, .9 / (pixels * pixels));
+    if (pixels == 1) {
+      EXPECT_EQ(gathered, 1);
+    }
+    EXPECT_LE(gathered, before);
+    before = gathered;
+  }
+  EXPECT_LT(before, .1);  // 8 pixels
+  options_.quality.max_pixel_distance = 9;
+  Progress progress;
+  const Status status = gatherCloud(scene_, receivers_, result_, options_, progress).status();
+  EXPECT_NE(status.message().find("max pixel distance is 9, expected 1 to 8"), std::string::npos);
+}
+
 TEST_F(Interpolation, ContactShadowsAndCornersAreSubdivided) {
   make(roomCloud(150), roomReceivers(40000));
   const Gathered exact = gather(0), found = gather(kVariation);

@@ -54,6 +54,70 @@ TEST(CameraSpacing, DistanceToThePyramidIsThatOfAlternateProjections) {
   EXPECT_EQ(distanceToPyramid({0.9, -0.9, 1}, 1, 1), 0);
 }
 
+// To the nearest of many rays of the window.
+double slowWindowDistance(const glm::dvec3& place, const glm::dvec2& least,
+                          const glm::dvec2& most) {
+  double nearest = glm::length(place);
+  constexpr int kSteps = 120;
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int k = 0; k <= kSteps; ++k) {
+      const double x = least.x + (most.x - least.x) * i / kSteps;
+      const double y = least.y + (most.y - least.y) * k / kSteps;
+      const glm::dvec3 ray = glm::normalize(glm::dvec3(x, y, 1));
+      nearest = std::min(nearest, glm::distance(place, std::max(0.0, glm::dot(place, ray)) * ray));
+    }
+  }
+  return nearest;
+}
+
+TEST(CameraSpacing, DistanceToAWindowIsThatOfItsNearestPlace) {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int inside = 0, sides = 0;
+  for (int i = 0; i < 400; ++i) {
+    const glm::dvec3 place(unit(random), unit(random), unit(random));
+    const glm::dvec2 least(unit(random), unit(random));
+    const glm::dvec2 most = least + .1 + glm::dvec2(std::abs(unit(random)), std::abs(unit(random)));
+    const double expected = slowWindowDistance(place, least, most);
+    const double found = distanceToWindow(place, least, most);
+    ASSERT_NEAR(found, expected, 5e-3);
+    ASSERT_LE(found, expected + 1e-12);
+    inside += found == 0;
+    sides += found > 0 && found < 0.999 * glm::length(place);
+  }
+  EXPECT_GT(inside, 3);
+  EXPECT_GT(sides, 100);
+  // A window in the middle is the pyramid
+  for (int i = 0; i < 1000; ++i) {
+    const glm::dvec3 place(unit(random), unit(random), unit(random));
+    const double x = .1 + std::abs(unit(random)), y = .1 + std::abs(unit(random));
+    ASSERT_NEAR(distanceToWindow(place, {-x, -y}, {x, y}), distanceToPyramid(place, x, y), 1e-12);
+  }
+}
+
+TEST(CameraSpacing, ACropIsInViewAndWhatIsBesideItIsNot) {
+  CameraDensity density;
+  density.cameras.push_back({{0, 0, 0}, {0, 0, -1}, {}, 90});
+  density.width = density.height = 100;
+  const auto whole = CameraSpacing::create(density, UpAxis::kY, glm::dvec3(0), 1e-3);
+  density.crop = PixelWindow{50, 0, 100, 25};  // the right half of the upper quarter
+  const auto crop = CameraSpacing::create(density, UpAxis::kY, glm::dvec3(0), 1e-3);
+  ASSERT_TRUE(whole.ok() && crop.ok());
+  for (const glm::dvec3& in : {glm::dvec3(.5, .75, -1), glm::dvec3(.01, .51, -1)}) {
+    EXPECT_EQ(crop->areaAt(in), whole->areaAt(in));
+  }
+  for (const glm::dvec3& out :
+       {glm::dvec3(-.5, .75, -1), glm::dvec3(.5, .2, -1), glm::dvec3(.5, -.75, -1)}) {
+    EXPECT_GT(crop->areaAt(out), 2 * whole->areaAt(out));
+  }
+  for (const PixelWindow& wrong : {PixelWindow{-1, 0, 5, 5}, PixelWindow{0, 0, 101, 5},
+                                   PixelWindow{5, 0, 5, 5}, PixelWindow{0, 9, 5, 3}}) {
+    density.crop = wrong;
+    EXPECT_EQ(CameraSpacing::create(density, UpAxis::kY, glm::dvec3(0), 1e-3).status().code(),
+              StatusCode::kInvalidArgument);
+  }
+}
+
 TEST(CameraSpacing, LeastAreaBoundsTheAreasOfASphere) {
   CameraDensity density;
   density.cameras.push_back({{0, 0, 0}, {0, 0, -1}, {}, 40});

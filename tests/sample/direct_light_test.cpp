@@ -52,6 +52,53 @@ TEST_F(Lighting, PointLightFollowsTheInverseSquareAndTheCosine) {
   EXPECT_EQ(irradiance(lights, {0, 0, 0}), 0);  // lit on its normal's side only
 }
 
+TEST_F(Lighting, PointLightFollowsTheFalloffAskedFor) {
+  load(write("floor.ply", floorPly(10)));
+  Lights lights;
+  lights.points.push_back({{0, 2, 0}, glm::vec3(8)});
+  lights.directionals.push_back({{0, -1, 0}, glm::vec3(.25f)});  // which has none
+  for (const float falloff : {0.f, 1.f, 2.f, 3.5f}) {
+    lights.falloff = falloff;
+    for (const float x : {0.f, 1.f, 4.f}) {
+      const float distance = std::sqrt(4 + x * x), cosine = 2 / distance;
+      lights.falloff_distance = 1;
+      const float expected = 8 * cosine / std::pow(distance, falloff) + .25f;
+      EXPECT_NEAR(irradiance(lights, {x, 0, 0}), expected, 1e-5f * expected) << falloff << " " << x;
+      // Where the falloffs meet they give what physics has
+      lights.falloff_distance = double(distance);
+      const float physical = 8 * cosine / (distance * distance) + .25f;
+      EXPECT_NEAR(irradiance(lights, {x, 0, 0}), physical, 1e-5f * physical);
+    }
+  }
+}
+
+// A small rectangle is a point of intensity L A cos; beyond it a large one, whose falloff has no
+// closed form, is the sum of small ones.
+TEST_F(Lighting, RectanglesFollowTheFalloffAskedFor) {
+  load(write("floor.ply", floorPly(10)));
+  Lights small;
+  small.areas.push_back({{0, 2, 0}, {.01f, 0, 0}, {0, 0, .01f}, glm::vec3(1000)});
+  for (const float falloff : {0.f, 1.f, 3.f}) {
+    small.falloff = falloff;
+    const float distance = std::sqrt(4 + 9.f), cosine = 2 / distance;
+    const float expected = 1000 * 4e-4f * cosine * cosine / std::pow(distance, falloff);
+    EXPECT_NEAR(irradiance(small, {3, 0, 0}, 64), expected, 1e-3f * expected) << falloff;
+  }
+
+  Lights large;
+  large.areas.push_back({{0, 2, 0}, {2, 0, 0}, {0, 0, 2}, glm::vec3(1)});
+  large.falloff = 1;
+  double sum = 0;
+  constexpr int kCells = 400;
+  for (int i = 0; i < kCells * kCells; ++i) {
+    const double x = ((i % kCells) + .5) / kCells * 4 - 2, z = ((i / kCells) + .5) / kCells * 4 - 2;
+    const double distance_sq = x * x + z * z + 4;
+    sum += 16. / (kCells * kCells) * 4 / distance_sq / std::sqrt(distance_sq);
+  }
+  EXPECT_NEAR(irradiance(large, {0, 0, 0}, 65536), sum, 2e-3 * sum);
+  EXPECT_GT(sum, double(kPi));  // more than a physical light can give
+}
+
 TEST_F(Lighting, DirectionalLightFollowsTheCosine) {
   load(write("floor.ply", floorPly(10)));
   Lights lights;

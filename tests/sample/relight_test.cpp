@@ -150,6 +150,27 @@ TEST_F(Relighting, EqualsTheMeshSampledWithTheLight) {
   }
 }
 
+// The formula at each surfel: albedo I cos / d^F, scaled to be physical at the falloff distance.
+TEST_F(Relighting, PointLightsFallOffAsAsked) {
+  const std::string mesh = write("floor.ply", floorPly(8));
+  SampleOptions dark;
+  dark.count = 3000;
+  const std::string scene = sampled(mesh, "dark.sft", dark, true);
+  RelightOptions options;
+  options.meshes = {mesh};
+  options.lights.points.push_back({{0.5, 1.5, -1}, glm::vec3(6, 5, 4)});
+  options.lights.falloff_distance = 3;
+  for (const float falloff : {0.f, 1.f, 2.f, 4.f}) {
+    options.lights.falloff = falloff;
+    for (const Surfel& surfel : relit(scene, options)) {
+      const glm::dvec3 towards = glm::dvec3(0.5, 1.5, -1) - glm::dvec3(surfel.position);
+      const double distance = glm::length(towards), cosine = towards.y / distance;
+      const double part = cosine / 9 * std::pow(3 / distance, double(falloff));
+      ASSERT_NEAR(surfel.radiosity.r, 6 * double(surfel.albedo.r) * part, 2e-5 * 6 * part);
+    }
+  }
+}
+
 TEST_F(Relighting, AllOtherBytesOfThePagesStay) {
   const std::string mesh = boxOnFloor();
   SampleOptions lit;

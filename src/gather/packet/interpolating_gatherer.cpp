@@ -20,6 +20,12 @@ namespace {
 // costs as much as 5 to 10 neighbours.
 constexpr std::array<std::size_t, 2> kCellSizes = {64, 16};
 
+// The receivers of a cell that is so many pixels wide, where there is one in each.
+std::size_t mostCellSize(const GatherRules& rules) {
+  const auto edge = static_cast<std::size_t>(rules.quality.max_pixel_distance);
+  return edge * edge;
+}
+
 // Mean error of the samples of a fit in parts of the variation: some of them are twice as far off.
 constexpr float kTolerance = 0.5f;
 
@@ -313,7 +319,12 @@ Status InterpolatingGatherer::gather(std::span<const LocalReceiver> receivers, W
                                      std::span<GatherResult> results) {
   SURFEIT_ASSERT(!receivers.empty() && receivers.size() <= kGroupReceivers);
   begin(receivers);
-  for (const std::size_t size : kCellSizes) {
+  const std::size_t most_size = mostCellSize(rules_);
+  std::size_t before = std::numeric_limits<std::size_t>::max();
+  for (const std::size_t usual_size : kCellSizes) {
+    const std::size_t size = std::min(usual_size, most_size);
+    if (size == before) break;
+    before = size;
     // More samples, where they are needed
     divideOpenCells(size);
     chosen_.clear();

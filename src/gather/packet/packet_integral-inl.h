@@ -42,8 +42,10 @@ class Integral {
         lane_(lane),
         channels_(PacketCanvas::channels(rules_)),
         receivers_(*canvas.lanes, lane),
-        frames_(*canvas.lanes, lane) {
-    weight_sum_ = covered_ = radiosity_.x = radiosity_.y = radiosity_.z = hn::Zero(D());
+        frames_(*canvas.lanes, lane),
+        by_brightness_(rules_.weights.by_brightness && rules_.environment != nullptr) {
+    weight_sum_ = bright_sum_ = covered_ = radiosity_.x = radiosity_.y = radiosity_.z =
+        hn::Zero(D());
   }
 
   void AddFace(std::size_t face) {
@@ -60,9 +62,10 @@ class Integral {
       const V direction_weight = WeightOf(pixel.direction);
       const V weight = hn::Mul(direction_weight, Splat(pixel.solid_angle));
       weight_sum_ = hn::Add(weight_sum_, weight);
+      const V cover_weight = by_brightness_ ? AddBrightness(i, weight) : weight;
       if (!has_near && !has_more) return;
       const PixelSight sight = has_near ? Look(near_.at(in_face)) : NothingSeen();
-      covered_ = hn::MulAdd(weight, sight.occlusion, covered_);
+      covered_ = hn::MulAdd(cover_weight, sight.occlusion, covered_);
       radiosity_.x = hn::MulAdd(weight, sight.radiosity.x, radiosity_.x);
       radiosity_.y = hn::MulAdd(weight, sight.radiosity.y, radiosity_.y);
       radiosity_.z = hn::MulAdd(weight, sight.radiosity.z, radiosity_.z);
@@ -90,7 +93,7 @@ class Integral {
     const D d;
     alignas(64) float lanes[5][kPacketReceivers];
     hn::Store(weight_sum_, d, lanes[0]);
-    hn::Store(covered_, d, lanes[1]);
+    hn::Store(by_brightness_ ? InDirections(covered_) : covered_, d, lanes[1]);
     hn::Store(radiosity_.x, d, lanes[2]);
     hn::Store(radiosity_.y, d, lanes[3]);
     hn::Store(radiosity_.z, d, lanes[4]);
@@ -194,6 +197,20 @@ class Integral {
     return {hn::Load(d, lanes[0]), hn::Load(d, lanes[1]), hn::Load(d, lanes[2])};
   }
 
+  // The weight of a pixel by what light would come through it.
+  V AddBrightness(std::size_t i, V weight) {
+    const V bright = hn::Mul(weight, Dot(EnvironmentAt(i), kLuminance));
+    bright_sum_ = hn::Add(bright_sum_, bright);
+    return bright;
+  }
+
+  // A part of the light as the sum over directions that is the same part of all of them.
+  V InDirections(V sum) const {
+    const M is_bright = hn::Gt(bright_sum_, hn::Zero(D()));
+    const V divisor = hn::IfThenElse(is_bright, bright_sum_, Splat(1));
+    return hn::IfThenElseZero(is_bright, hn::Mul(hn::Div(sum, divisor), weight_sum_));
+  }
+
   void AddMore(std::size_t i, V direction_weight, V weight, const PixelSight& sight) {
     const D d;
     const RasterGeometry::Pixel& pixel = canvas_.geometry->pixels()[i];
@@ -239,7 +256,8 @@ class Integral {
   const Receivers receivers_;
   const Frames frames_;
   FaceLanes near_;  // of the face
-  V weight_sum_, covered_;
+  const bool by_brightness_;
+  V weight_sum_, bright_sum_, covered_;
   V3 radiosity_;
   std::array<Sum, kMore> more_;
 };

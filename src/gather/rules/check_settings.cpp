@@ -16,6 +16,18 @@ Status refuse(const char* what, auto found, const std::string& expected) {
   return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
 }
 
+Status checkBrightness(const GatherSettings& settings, bool has_environment) {
+  if (!has_environment) {
+    return Status::invalidArgument(
+        "occlusion by brightness needs an environment (--environment), which it weighs by");
+  }
+  if (!GatherRules(settings).has(kOutputOcclusion)) {
+    return Status::invalidArgument(
+        "occlusion by brightness: found no output occlusion, expected it among --outputs");
+  }
+  return {};
+}
+
 Status checkWeights(const GatherSettings& settings) {
   const GatherWeights& weights = settings.weights;
   if (!(weights.cone_angle >= 0 && weights.cone_angle <= kHemisphere + 1e-3f)) {
@@ -59,6 +71,10 @@ Status checkGatherSettings(const GatherSettings& settings, bool has_environment)
   if (!isFromZero(quality.max_variation)) {
     return refuse("max variation", quality.max_variation, "0 or more");
   }
+  constexpr int kMost = 8;
+  if (quality.max_pixel_distance < 1 || quality.max_pixel_distance > kMost) {
+    return refuse("max pixel distance", quality.max_pixel_distance, fmt::format("1 to {}", kMost));
+  }
   SURFEIT_RETURN_IF_ERROR(checkWeights(settings));
   if ((settings.outputs & ~kAllOutputs) != 0) {
     return refuse("set of outputs", settings.outputs, "GatherOutput values");
@@ -66,6 +82,7 @@ Status checkGatherSettings(const GatherSettings& settings, bool has_environment)
   if ((settings.outputs & kOutputEnvironment) != 0 && !has_environment) {
     return Status::invalidArgument("output environment needs an environment (--environment)");
   }
+  if (settings.weights.by_brightness) return checkBrightness(settings, has_environment);
   return {};
 }
 
