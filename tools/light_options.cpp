@@ -103,8 +103,8 @@ void addLightOptions(CLI::App& command, GatherOptions& options) {
       ->default_str("what the mode gives");
   command
       .add_option("--max-variation,--maxvariation", options.quality.max_variation,
-                  "Interpolate where results of neighbours differ by less than this, such as 0.02; "
-                  "0: gather at every receiver")
+                  "Interpolate between receivers, off by at most this at 99 % of them, such as "
+                  "0.02; 0: gather at every receiver")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str()
       ->group("Quality");
