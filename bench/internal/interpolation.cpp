@@ -67,13 +67,13 @@ Result<Groups> scatteredGroups(const SceneFile& file, int runs) {
 }
 
 Result<Groups> makeGroups(const InterpolationOptions& options, const std::string& set,
-                          const GatherScene& scene, const SceneFile& file) {
+                          const std::string& scene, const SceneFile& file) {
   if (set == "dense") return consecutiveGroups(file, options.runs);
   if (set == "scattered") return scatteredGroups(file, options.runs);
   SceneOptions place = options.place;
-  place.surfels = options.finer * file.header().surfel_count;
+  place.surfels *= options.finer;
   Progress quiet;
-  SURFEIT_ASSIGN_OR_RETURN(const GatherScene finer, GatherScene::open(scene.name(), place, quiet));
+  SURFEIT_ASSIGN_OR_RETURN(const GatherScene finer, GatherScene::open(scene, place, quiet));
   SURFEIT_ASSIGN_OR_RETURN(const SceneFile finer_file, SceneFile::open(finer.octreePath()));
   return consecutiveGroups(finer_file, options.runs);
 }
@@ -167,7 +167,7 @@ Status runScene(const InterpolationOptions& options, const std::string& name) {
   SURFEIT_ASSIGN_OR_RETURN(const GatherScene scene, GatherScene::open(name, options.place, quiet));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree, scene.openOctree(1));
   for (const std::string& set : options.sets) {
-    SURFEIT_ASSIGN_OR_RETURN(const Groups groups, makeGroups(options, set, scene, octree->file()));
+    SURFEIT_ASSIGN_OR_RETURN(const Groups groups, makeGroups(options, set, name, octree->file()));
     for (const GatherMode mode : {GatherMode::kOcclusion, GatherMode::kBleeding}) {
       SURFEIT_RETURN_IF_ERROR(measure(options, name, set, groups, mode, *octree));
     }
