@@ -122,16 +122,16 @@ void addLightOptions(CLI::App& command, GatherOptions& options) {
       ->default_str("what the mode gives");
   command
       .add_option("--max-variation,--maxvariation", options.quality.max_variation,
-                  "Interpolate where results of neighbours differ by less than this, such as 0.02; "
-                  "0: gather at every receiver")
+                  "Interpolate between receivers, off by at most this at 99 % of them, such as "
+                  "0.02; 0: gather at every receiver")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str()
       ->group("Quality");
   command
       .add_option("--max-pixel-dist,--maxpixeldist", options.quality.max_pixel_distance,
                   "With --max-variation, at most about so many pixels, or receivers, between "
-                  "samples, 1 to 8")
-      ->check(CLI::Range(1, 8))
+                  "samples, 4 and more (0: no limit)")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str()
       ->group("Quality");
   addDirectionOptions(command, options);

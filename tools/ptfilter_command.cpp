@@ -245,7 +245,7 @@ void addGatherWords(CLI::App& command, PtfilterArguments& arguments) {
   addWeightWords(command, options.weights);
   command
       .add_option("--maxvariation", options.quality.max_variation,
-                  "Interpolate where results of neighbours differ by less; 0: nowhere")
+                  "Interpolate, off by at most this at 99 % of the receivers; 0: nowhere")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command.add_option("--envmap", options.environment.path,

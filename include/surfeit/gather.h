@@ -103,10 +103,10 @@ struct GatherQuality {
   // interpolated. The limit is absolute for occlusion, relative to the brightest receiver nearby
   // for lights, and a part of half a turn for directions (app note 2.2). 0: off.
   float max_variation = 0;
-  // With max_variation, no more than about so many receivers lie between neighbouring samples, 1 to
-  // 8: pixels where receivers are those of a picture (app note 2.2, maxpixeldist). 8 is the most
-  // that there is.
-  int max_pixel_distance = 8;
+  // With max_variation, no more than about so many receivers lie between neighbouring samples, from
+  // 4 on: pixels where receivers are those of a picture (app note 2.2, maxpixeldist). 0: no limit,
+  // which is the same as 23 and more.
+  int max_pixel_distance = 0;
 };
 
 // Settings from measured tables (docs/benchmarks.md, "Errors and rates"). Standard is the default.

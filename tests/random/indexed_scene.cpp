@@ -134,12 +134,16 @@ Result<std::vector<GatherResult>> IndexedScene::gatherAlone(
   return results;
 }
 
+CurveKey IndexedScene::keyOf(const glm::vec3& position) const {
+  return curveKey(position, octree_->file().header().cube);
+}
+
 Result<std::vector<GatherResult>> IndexedScene::gatherTogether(
     std::span<const LocalReceiver> receivers, const GatherRules& rules) {
   // Along the curve, equal keys in the order of the input
   std::vector<std::pair<CurveKey, std::size_t>> order;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
-    order.emplace_back(curveKey(receivers[i].position, octree_->file().header().cube), i);
+    order.emplace_back(keyOf(receivers[i].position), i);
   }
   std::sort(order.begin(), order.end());
   std::vector<LocalReceiver> sorted;

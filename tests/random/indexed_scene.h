@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/curve_key.h"
 #include "gather/rules/gather_rules.h"
 #include "gather/rules/receiver.h"
 #include "octree/read/paged_octree.h"
@@ -42,6 +43,8 @@ class IndexedScene {
                                                    const GatherRules& rules);
 
   PagedOctree::Reader& reader() { return *reader_; }
+  // Of a place: receivers are ordered by it.
+  CurveKey keyOf(const glm::vec3& position) const;
 
  private:
   explicit IndexedScene(std::unique_ptr<PagedOctree> octree)

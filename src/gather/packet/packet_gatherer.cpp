@@ -33,9 +33,9 @@ void PacketGatherer::endPhase(double& seconds) {
   phase_begin_ = now;
 }
 
-Status PacketGatherer::gatherPacket(std::span<const LocalReceiver> receivers,
-                                    std::span<const std::uint16_t> places, WorldReader& world,
-                                    std::span<GatherResult> results) {
+Status PacketGatherer::gatherTogether(std::span<const LocalReceiver> receivers,
+                                      std::span<const std::uint16_t> places, WorldReader& world,
+                                      std::span<GatherResult> results) {
   const PacketView view = viewPacket(receivers, rules_);
   raster_.begin(receivers, view);
   SURFEIT_RETURN_IF_ERROR(walk_.walk(view, receivers, world, DrawCut{raster_}));
@@ -56,22 +56,36 @@ Status PacketGatherer::gatherPacket(std::span<const LocalReceiver> receivers,
   return {};
 }
 
-Status PacketGatherer::gather(std::span<const LocalReceiver> receivers, WorldReader& world,
-                              std::span<GatherResult> results) {
+Status PacketGatherer::foresee(const PacketCluster& cluster, WorldReader& world, PacketCost& cost) {
   double ignored = 0;
   endPhase(ignored);
-  const PacketCluster cluster(receivers);
-  cost_.begin(cluster.receivers(0)[0].position);
   const std::span<const LocalReceiver> first = cluster.receivers(0).first(1);
-  SURFEIT_RETURN_IF_ERROR(walk_.walk(viewPacket(first, rules_), first, world, cost_));
+  cost.begin(first[0].position);
+  SURFEIT_RETURN_IF_ERROR(walk_.walk(viewPacket(first, rules_), first, world, cost));
+  endPhase(work_.walk_seconds);
+  return {};
+}
+
+Status PacketGatherer::gatherPacket(const PacketCluster& cluster, std::size_t i,
+                                    const PacketCost& cost, WorldReader& world,
+                                    std::span<GatherResult> results) {
+  double ignored = 0;
+  endPhase(ignored);
+  const std::span<const LocalReceiver> packet = cluster.receivers(i);
+  const std::span<const std::uint16_t> places = cluster.places(i);
+  return cost.forEachPart(packet, cluster.mostPacketRadius(),
+                          [&](std::size_t begin, std::size_t count) {
+                            return gatherTogether(packet.subspan(begin, count),
+                                                  places.subspan(begin, count), world, results);
+                          });
+}
+
+Status PacketGatherer::gather(std::span<const LocalReceiver> receivers, WorldReader& world,
+                              std::span<GatherResult> results) {
+  const PacketCluster cluster(receivers);
+  SURFEIT_RETURN_IF_ERROR(foresee(cluster, world, cost_));
   for (std::size_t i = 0; i < cluster.packetCount(); ++i) {
-    const std::span<const LocalReceiver> packet = cluster.receivers(i);
-    const std::span<const std::uint16_t> places = cluster.places(i);
-    SURFEIT_RETURN_IF_ERROR(cost_.forEachPart(
-        packet, cluster.mostPacketRadius(), [&](std::size_t begin, std::size_t count) {
-          return gatherPacket(packet.subspan(begin, count), places.subspan(begin, count), world,
-                              results);
-        }));
+    SURFEIT_RETURN_IF_ERROR(gatherPacket(cluster, i, cost_, world, results));
   }
   return {};
 }

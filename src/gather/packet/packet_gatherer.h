@@ -40,6 +40,12 @@ class PacketGatherer {
     return gather(receivers, world, results);
   }
 
+  // The same by parts: packet i of a cluster, whose results are those of all of the cluster, after
+  // the cost of its packets was foreseen.
+  Status foresee(const PacketCluster& cluster, WorldReader& world, PacketCost& cost);
+  Status gatherPacket(const PacketCluster& cluster, std::size_t i, const PacketCost& cost,
+                      WorldReader& world, std::span<GatherResult> results);
+
   // What all gathers so far took, for benches and tests.
   struct Work {
     std::size_t packets = 0;  // drawn, of whatever size
@@ -59,9 +65,9 @@ class PacketGatherer {
   }
 
  private:
-  Status gatherPacket(std::span<const LocalReceiver> receivers,
-                      std::span<const std::uint16_t> places, WorldReader& world,
-                      std::span<GatherResult> results);
+  Status gatherTogether(std::span<const LocalReceiver> receivers,
+                        std::span<const std::uint16_t> places, WorldReader& world,
+                        std::span<GatherResult> results);
   void endPhase(double& seconds);
 
   const GatherRules rules_;

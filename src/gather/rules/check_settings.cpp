@@ -71,9 +71,10 @@ Status checkGatherSettings(const GatherSettings& settings, bool has_environment)
   if (!isFromZero(quality.max_variation)) {
     return refuse("max variation", quality.max_variation, "0 or more");
   }
-  constexpr int kMost = 8;
-  if (quality.max_pixel_distance < 1 || quality.max_pixel_distance > kMost) {
-    return refuse("max pixel distance", quality.max_pixel_distance, fmt::format("1 to {}", kMost));
+  constexpr int kLeast = 4;  // a packet
+  if (quality.max_pixel_distance != 0 && quality.max_pixel_distance < kLeast) {
+    return refuse("max pixel distance", quality.max_pixel_distance,
+                  fmt::format("0, or {} and more", kLeast));
   }
   SURFEIT_RETURN_IF_ERROR(checkWeights(settings));
   if ((settings.outputs & ~kAllOutputs) != 0) {

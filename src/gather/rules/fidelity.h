@@ -1,7 +1,7 @@
 // The numbers that decide how true a gather is: what it may leave out, how patches look and how
 // they cover pixels. Beside them count the options of the caller, the kinds of nodes (octree/node)
-// and what is interpolated (packet/interpolating_gatherer.cpp, local_fit.cpp). docs/algorithm.md
-// has the rules, and bench/internal/sensitivity.cpp measures the worth of each number.
+// and what is interpolated (interpolation_limits.h). docs/algorithm.md has the rules, and
+// bench/internal/sensitivity.cpp measures the worth of each number.
 #pragma once
 
 namespace surfeit {
