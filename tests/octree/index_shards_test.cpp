@@ -110,7 +110,7 @@ class IndexShards : public SceneTest {
 };
 
 TEST_F(IndexShards, AnyNumberOfThemHasTheBytesOfOneMachine) {
-  const std::vector<Surfel> cloud = unevenCloud(isThreadSanitized() ? 200000 : 480000);
+  const std::vector<Surfel> cloud = unevenCloud(isThreadSanitized() ? 200000 : 360000);
   writeInput("a.ply", std::span(cloud).first(cloud.size() / 3));
   writeInput("b.ply", std::span(cloud).subspan(cloud.size() / 3));
   for (const int count : {1, 2, 7}) {
@@ -159,8 +159,9 @@ TEST_F(IndexShards, TilesThatRepeatEachOtherAreThinnedInRanges) {
 // Of 560,000 surfels before the cut 5,000 are left, which are less than a brick.
 TEST_F(IndexShards, CutsThroughBricksThatWereThinnedAreRefused) {
   options_.repeats = Repeats::kThin;
-  std::vector<Surfel> crowd = moved(sphereCloud(5000), 0.1f, glm::vec3(0.2f)), rest = crowd;
-  for (Surfel& surfel : rest) surfel.position += glm::vec3(3);
+  const std::vector<Surfel> crowd = moved(sphereCloud(5000), 0.1f, glm::vec3(0.2f));
+  // Samples of both shards see the crowd: as many places as the rest
+  std::vector<Surfel> rest = moved(sphereCloud(10000), 0.1f, glm::vec3(3.2f));
   for (int tile = 0; tile < 112; ++tile) rest.insert(rest.end(), crowd.begin(), crowd.end());
   writeInput("a.ply", rest);
   for (const IndexPass which : kPasses) {
