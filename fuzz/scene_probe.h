@@ -7,7 +7,8 @@
 namespace surfeit {
 
 // A scene whose checksums are made right first, so that what stands behind them is probed: verified
-// from end to end, told by info, and looked at from three places.
+// from end to end, and told by info. (A gather would need the kernels, which take half an hour to
+// compile with sanitizers; HostileScene of gather_test gathers in hostile scenes.)
 void probeScene(const std::string& path);
 
 // Payloads of pages: the first byte is the form, PageForm; the rest is decoded, and again with

@@ -108,6 +108,11 @@ class Indexer {
   Status buildWithNeighbours(std::unique_ptr<BucketStream> buckets, SceneWriter& writer);
   SceneDescription describe(const std::optional<NormalRule>& rule) const;
   std::string provenance() const;
+  // Nothing more is planned, and building has a use for the memory.
+  void freeSamples() {
+    sample_ = std::vector<Surfel>();
+    totals_.sample = std::vector<Surfel>();
+  }
 
   const GroupPlan groups_;
   GroupNames group_names_;
@@ -131,6 +136,7 @@ class Indexer {
 Result<IndexStats> Indexer::run() {
   SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
   noteIndexRules(totals_, *reader_, options_, progress_);
+  freeSamples();
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
   SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
@@ -150,6 +156,7 @@ Result<IndexStats> Indexer::run() {
 
 Result<SceneFile> Indexer::runUnnamed() {
   SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
+  freeSamples();
   if (!estimatesNormals()) return buildPlaces(std::move(buckets));
   SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(unnamedPath(), true));
   SURFEIT_RETURN_IF_ERROR(buildWithNeighbours(std::move(buckets), *writer));
@@ -163,9 +170,6 @@ Result<std::unique_ptr<BucketStream>> Indexer::readBuckets() {
   if (options_.cube) pinned_.emplace(*options_.cube);
   SURFEIT_RETURN_IF_ERROR(openInputs());
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<SurfelStore> store, readInputs());
-  // Nothing more is planned, and building has a use for the memory
-  sample_ = std::vector<Surfel>();
-  totals_.sample = std::vector<Surfel>();
   stats_.skipped_records = totals_.skipped;
   auto buckets = std::make_unique<BucketStream>(
       std::move(store),
