@@ -159,35 +159,6 @@ Status GatherInput::sort(ReceiverOrder order, const SceneHeader& scene, bool str
   }
 }
 
-Result<RowBlocks> GatherInput::findBlocks(ReceiverOrder order, const SceneHeader& scene,
-                                          std::span<const OrderPlace> begins, Progress& progress) {
-  SURFEIT_RETURN_IF_ERROR(rewind());
-  RowBlocks found;
-  found.shards.assign(blockCount(receiverCount()), 0);
-  const int shards = static_cast<int>(begins.size()) - 1;
-  SurfelDefects ignored;
-  mapping_.setOrigin(scene.origin);
-  for (;;) {
-    std::uint64_t record = row_;
-    SURFEIT_ASSIGN_OR_RETURN(const Bytes slice, readSlice(progress));
-    const std::size_t count = slice.size() / receivers().row_bytes;
-    if (count == 0) break;
-    std::uint64_t& block = found.shards[record / blockRows(receiverCount())];
-    for (std::size_t i = 0; i < count; ++i, ++record) {
-      LocalReceiver receiver;
-      const std::byte* const row = slice.data() + i * receivers().row_bytes;
-      if (!mapping_.decode(row, record, receiver, ignored)) continue;
-      const OrderPlace place = {keyOf(receiver.position, record, order, scene.cube), record};
-      const auto next = std::upper_bound(begins.begin(), begins.end() - 1, place);
-      const int shard = static_cast<int>(next - begins.begin());
-      block |= shardBits(shard, shard, shards);
-    }
-    progress.advance(count);
-  }
-  found.checksums = blocks_.checksums;
-  return found;
-}
-
 Status GatherInput::write(const ResultRows& rows, ResultStore& results, RowWriter& writer,
                           Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(rewind());

@@ -72,11 +72,8 @@ class GatherInput {
 
   // Of the rows, all of which the last sort or write has read, or knew of blocks passed over.
   std::uint64_t checksum() const { return blocks_.checksum(); }
-  // Reads all rows once more, and finds the shards that have receivers in each block, by the places
-  // where shards begin, and the end.
-  Result<RowBlocks> findBlocks(ReceiverOrder order, const SceneHeader& scene,
-                               std::span<const OrderPlace> begins, Progress& progress);
-
+  // Checksums of the same, without shards.
+  const RowBlocks& blocks() const { return blocks_; }
   // Writes all receivers with their results, in the order of the input. The caller finishes the
   // writer.
   Status write(const ResultRows& rows, ResultStore& results, RowWriter& writer, Progress& progress);

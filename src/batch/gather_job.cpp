@@ -109,16 +109,6 @@ Result<std::unique_ptr<ExternalSorter>> GatherJob::sort(const SceneHeader& scene
   return sorter;
 }
 
-Result<RowBlocks> GatherJob::findBlocks(const SceneHeader& scene,
-                                        std::span<const OrderPlace> begins) {
-  if (options_.strict || !input_.reader().isSeekable()) return RowBlocks();
-  progress_->beginPhase("find blocks", input_.receiverCount(), "receivers");
-  Result<RowBlocks> blocks = RowBlocks();
-  withThreads(options_.threads,
-              [&] { blocks = input_.findBlocks(options_.order, scene, begins, *progress_); });
-  return blocks;
-}
-
 Result<std::unique_ptr<RowWriter>> GatherJob::createWriter(const ResultRows& rows) {
   RowWriterOptions writing;
   writing.properties = rows.properties();

@@ -57,9 +57,6 @@ class GatherJob {
                                                const OrderRange& range = {},
                                                const RowBlocks* blocks = nullptr,
                                                std::uint64_t wanted = 0);
-  // The shards that have receivers in each block of rows; none where that saves no reading.
-  Result<RowBlocks> findBlocks(const SceneHeader& scene, std::span<const OrderPlace> begins);
-
   // Writes the receivers with their results (finished) as rows of the result. `checksum`: of the
   // receivers' rows, where it is known; kCorruption when they have changed since.
   Result<std::unique_ptr<RowWriter>> createWriter(const ResultRows& rows);

@@ -75,7 +75,9 @@ class ShardGather {
       if (sorter_ != nullptr) return {};
       const OrderRange range = missing_.empty() ? OrderRange{OrderRange::kEnd, OrderRange::kEnd}
                                                 : plan_.range(missing_.front(), missing_.back());
-      const RowBlocks* const blocks = plan_.blocks.shards.empty() ? nullptr : &plan_.blocks;
+      // What is strict looks at all rows
+      const RowBlocks* const blocks =
+          plan_.blocks.shards.empty() || job_.options().strict ? nullptr : &plan_.blocks;
       SURFEIT_ASSIGN_OR_RETURN(sorter_, job_.sort(scene.header(), range, blocks,
                                                   plan_.bits(shards_.first, shards_.last)));
       if (blocks != nullptr && !is_new && plan_.invalid_receivers > 0) {
@@ -103,26 +105,12 @@ class ShardGather {
     SURFEIT_ASSIGN_OR_RETURN(ShardPlan plan,
                              planShards(std::move(again), job_, *sorter, shards_.count, progress_));
     plan.job = identity_;
-    if (!takes_all && shards_.count > 1) {
-      SURFEIT_RETURN_IF_ERROR(findBlocks(scene, plan));
-    }
     if (begin) {
       SURFEIT_RETURN_IF_ERROR(sorter->reset(*begin));
       sorter_ = std::move(sorter);
       sorted_from_ = 1;
     }
     return plan;
-  }
-
-  Status findBlocks(const SceneFile& scene, ShardPlan& plan) {
-    std::vector<OrderPlace> begins;
-    for (const ShardPlan::Boundary& boundary : plan.boundaries) begins.push_back(boundary.place);
-    SURFEIT_ASSIGN_OR_RETURN(plan.blocks, job_.findBlocks(scene.header(), begins));
-    if (plan.blocks.checksums.empty() || plan.blocks.checksum() == plan.receivers_checksum) {
-      return {};
-    }
-    return Status::corruption(
-        fmt::format("{}: changed while it was read", job_.input().reader().path()));
   }
 
   Status findMissing() {

@@ -164,6 +164,26 @@ std::optional<ShardPlan> fromJson(const json& text, int count) {
   return plan;
 }
 
+// The shards of which each block of `rows` rows has receivers; reads the sorter to the end.
+Result<std::vector<std::uint64_t>> shardsOfBlocks(ExternalSorter& sorter, const ShardPlan& plan,
+                                                  std::uint64_t rows, Progress& progress) {
+  std::vector<std::uint64_t> shards(blockCount(rows), 0);
+  std::vector<SortedReceiver> block(kQueueReceivers);
+  int shard = 1;
+  std::uint64_t rank = 0;
+  for (std::size_t read = 1; read > 0;) {
+    if (progress.isCancelled()) return Status::interrupted();
+    SURFEIT_ASSIGN_OR_RETURN(read, sorter.next(block));
+    for (const SortedReceiver& receiver : std::span(block).first(read)) {
+      while (plan.firstRank(shard) + plan.results(shard) <= rank) ++shard;
+      shards[receiver.index / blockRows(rows)] |= plan.bits(shard, shard);
+      ++rank;
+    }
+    progress.advance(read);
+  }
+  return shards;
+}
+
 }  // namespace
 
 Result<ShardPlan> planShards(SceneFile scene, const GatherJob& job, ExternalSorter& sorter,
@@ -173,7 +193,9 @@ Result<ShardPlan> planShards(SceneFile scene, const GatherJob& job, ExternalSort
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(scene), memory));
   ShardPlan plan;
-  progress.beginPhase("plan shards", sorter.count(), "receivers");
+  const bool has_blocks = count > 1 && job.input().reader().isSeekable();
+  progress.beginPhase("plan shards", (has_blocks ? 2 : 1) * sorter.count(), "receivers");
+  const ExternalSorter::Mark begin = sorter.mark();
   {
     Sampling sampling(*octree, GatherRules(job.options()), sorter.count(), count);
     std::vector<SortedReceiver> block(kQueueReceivers);
@@ -185,6 +207,12 @@ Result<ShardPlan> planShards(SceneFile scene, const GatherJob& job, ExternalSort
     }
     plan.valid_receivers = sampling.count();
     plan.boundaries = sampling.boundaries(count);
+  }
+  if (has_blocks) {
+    SURFEIT_RETURN_IF_ERROR(sorter.reset(begin));
+    plan.blocks.checksums = job.input().blocks().checksums;
+    SURFEIT_ASSIGN_OR_RETURN(plan.blocks.shards,
+                             shardsOfBlocks(sorter, plan, job.input().receiverCount(), progress));
   }
   plan.receivers_checksum = job.input().checksum();
   plan.invalid_receivers = job.input().defects().total();

@@ -13,11 +13,6 @@ namespace {
 
 constexpr std::uint32_t kUnitVectors = kOutputBentNormal | kOutputIlluminationDirection;
 
-// The weight of samples falls off to this where their number ends.
-constexpr float kLeastWeight = 0.01f;
-// As far as this many times the squared distance of the last sample, when there are no more.
-constexpr float kReachBeyond = 1.5f;
-
 // Packets of the cells that have one sample at first: a power of 2, of no more receivers than a
 // square of so many in a row.
 std::size_t widestCell(const GatherRules& rules) {
@@ -213,8 +208,7 @@ PacketInterpolation::Near PacketInterpolation::findNear(std::size_t packet) cons
                                               : packet < other.packet;
     }
   };
-  // One more than are used: its distance is where weights end
-  constexpr std::size_t kMost = kInterpolation.most_samples + 1;
+  constexpr std::size_t kMost = kInterpolation.most_samples;
   std::array<Found, kMost> found;
   std::size_t count = 0;
   const Packet& about = packets_[packet];
@@ -231,14 +225,15 @@ PacketInterpolation::Near PacketInterpolation::findNear(std::size_t packet) cons
 
   Near near;
   if (count < kInterpolation.least_samples) return near;
-  near.count = std::min(count, kInterpolation.most_samples);
-  const float reach_sq = found[count - 1].distance_sq * (count == kMost ? 1 : kReachBeyond);
+  near.count = count;
+  // Weights end where one more sample would be: on a surface squared distances grow as the number
+  const float reach_sq = found[count - 1].distance_sq * float(count + 1) / float(count);
   if (!(reach_sq > 0)) return Near{};
   near.reach = std::sqrt(reach_sq);
   for (std::size_t i = 0; i < near.count; ++i) {
     const float fade = 1 - found[i].distance_sq / reach_sq;
     near.packets[i] = found[i].packet;
-    near.weights[i] = fade * fade + kLeastWeight;
+    near.weights[i] = fade * fade;
   }
   return near;
 }

@@ -35,7 +35,7 @@ struct SortedBatch {
   void resize(std::size_t count) {
     const std::size_t bytes = count * sizeof(Surfel);
     if (memory_.capacity() > bytes + bytes / kMostSpare) {
-      memory_ = AlignedBuffer(bytes);
+      memory_ = AlignedBuffer();
       tickets = std::vector<Ticket>();
     }
     tickets.resize(count);
