@@ -1,13 +1,10 @@
 #include "fuzz/scene_probe.h"
 
-#include <xxhash.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <glm/vec3.hpp>
 #include <iterator>
@@ -28,55 +25,18 @@
 #include "surfeit/scene.h"
 #include "surfels/generated/scene_generator.h"
 #include "surfels/generated/scene_recipe.h"
+#include "tests/io/page_file_damage.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 512, kFooterBytes = 64, kEntryBytes = 24;
-constexpr std::size_t kChecksumAt = 504, kIdentityAt = 16;
-constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15;
+constexpr std::size_t kHeaderBytes = 512;
 // Where a file declares pages that this does not hold, the message says what would do
 constexpr std::uint64_t kMemory = 128 << 20;
 
 std::string contentsOf(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
-}
-
-template <typename T>
-T valueAt(const std::string& file, std::size_t at) {
-  T value;
-  std::memcpy(&value, file.data() + at, sizeof value);
-  return value;
-}
-
-// Writes the checksum of [begin, end) at `at`.
-void seal(std::string& file, std::size_t begin, std::size_t end, std::uint64_t seed,
-          std::size_t at) {
-  const std::uint64_t checksum = XXH3_64bits_withSeed(file.data() + begin, end - begin, seed);
-  std::memcpy(file.data() + at, &checksum, sizeof checksum);
-}
-
-// Makes all checksums right (docs/format.md, "Container") that lie where the footer says.
-bool sealAll(std::string& file) {
-  if (file.size() < kHeaderBytes + kFooterBytes) return false;
-  const std::size_t footer = file.size() - kFooterBytes;
-  const auto identity = valueAt<std::uint64_t>(file, kIdentityAt);
-  const auto provenance = valueAt<std::uint64_t>(file, footer);
-  const auto directory = valueAt<std::uint64_t>(file, footer + 8);
-  if (provenance <= directory && directory <= footer) {
-    for (std::size_t at = directory; at + kEntryBytes <= footer; at += kEntryBytes) {
-      const auto offset = valueAt<std::uint64_t>(file, at);
-      const auto bytes = valueAt<std::uint32_t>(file, at + 8);
-      if (offset > file.size() || bytes > file.size() - offset) continue;
-      seal(file, offset, offset + bytes, identity ^ (offset * kGolden), at + 16);
-    }
-    seal(file, provenance, directory, identity, footer + 16);
-    seal(file, directory, footer, identity, footer + 24);
-  }
-  seal(file, footer, footer + 48, identity, footer + 48);
-  seal(file, 0, kChecksumAt, 0, kChecksumAt);
-  return true;
 }
 
 void checkSceneRefusal(const Status& status) {
@@ -98,7 +58,9 @@ PageForm formOf(std::byte first) {
 
 void probeScene(const std::string& path) {
   std::string file = contentsOf(path);
-  if (!sealAll(file)) return;
+  if (file.size() < kHeaderBytes + kFooterBytes) return;
+  sealPages(file);
+  sealFile(file);
   std::ofstream(path, std::ios::binary | std::ios::trunc) << file;
 
   Progress progress;

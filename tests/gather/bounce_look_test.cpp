@@ -13,10 +13,9 @@
 #include <vector>
 
 #include "gather/test_clouds.h"
-#include "octree/read/scene_file.h"
+#include "octree/indexed_surfels.h"
 #include "surfeit/bake.h"
 #include "surfeit/bounce.h"
-#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {
@@ -81,18 +80,12 @@ std::vector<Surfel> wallsOnFloor() {
 class BounceLookTest : public testing::Test {
  protected:
   std::string index(const std::vector<Surfel>& cloud, const std::string& name) {
-    const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file(name);
+    const std::string path = directory_.file(name);
     CloudChannels channels;
     channels.normal = channels.radius = channels.area = channels.radiosity = channels.albedo = true;
     channels.two_sided = channels.group = true;
-    Result<SurfelWriter> writer = SurfelWriter::create(cloud_path, channels);
-    EXPECT_TRUE(writer.ok()) << writer.status().message();
-    EXPECT_TRUE(writer->write(cloud).ok());
-    EXPECT_TRUE(writer->finish().ok());
-    IndexOptions options;
-    options.full_precision = true;
-    const auto stats = indexClouds({cloud_path}, path, options, progress_);
-    EXPECT_TRUE(stats.ok()) << stats.status().message();
+    indexSurfels(cloud, path, channels, /* full_precision= */ true);
+    origin_ = SceneFile::open(path)->header().origin;
     return path;
   }
   static BounceOptions optionsFor(int bounces) {
@@ -106,19 +99,6 @@ class BounceLookTest : public testing::Test {
     const auto stats = bounceScene(scene, directory_.file("bounced.sft"), options, progress_);
     EXPECT_TRUE(stats.ok()) << stats.status().message();
     return stats.ok() ? surfelsOf(directory_.file("bounced.sft")) : std::vector<Surfel>();
-  }
-  std::vector<Surfel> surfelsOf(const std::string& path) {
-    Result<SceneFile> scene = SceneFile::open(path);
-    EXPECT_TRUE(scene.ok()) << scene.status().message();
-    origin_ = scene->header().origin;
-    SceneFile::Scratch scratch;
-    std::vector<Surfel> all, page(scene->header().surfel_group_capacity);
-    for (std::uint32_t i = 0; i < scene->surfelPageCount(); ++i) {
-      const Result<std::uint32_t> count = scene->decodeSurfels(i, scratch, page);
-      EXPECT_TRUE(count.ok()) << count.status().message();
-      all.insert(all.end(), page.begin(), page.begin() + *count);
-    }
-    return all;
   }
   // Expects that two results are those of equal surfels and equal light.
   static void expectSameLight(const std::vector<Surfel>& found,

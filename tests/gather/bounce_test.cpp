@@ -3,7 +3,6 @@
 // some hundredths of what a closed room sends, where disks leave gaps; a bounce then misses as much
 // of what the bounce before had gained. So with a part d missing, B_k is e times the sum of the
 // (rho (1 - d))^j, and the tests state d.
-#include "surfeit/bake.h"
 #include "surfeit/bounce.h"
 
 #include <fmt/format.h>
@@ -21,9 +20,9 @@
 #include <vector>
 
 #include "gather/test_clouds.h"
-#include "octree/read/scene_file.h"
+#include "octree/indexed_surfels.h"
+#include "surfeit/bake.h"
 #include "surfeit/scene.h"
-#include "surfels/surfel_writer.h"
 
 namespace surfeit {
 namespace {
@@ -103,16 +102,8 @@ class BounceTest : public testing::Test {
  protected:
   std::string index(const std::vector<Surfel>& cloud, const std::string& name,
                     const CloudChannels& channels = kEverything, bool full_precision = false) {
-    const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file(name);
-    Result<SurfelWriter> writer = SurfelWriter::create(cloud_path, channels);
-    EXPECT_TRUE(writer.ok()) << writer.status().message();
-    EXPECT_TRUE(writer->write(cloud).ok());
-    EXPECT_TRUE(writer->finish().ok());
-    IndexOptions options;
-    options.full_precision = full_precision;
-    const auto stats = indexClouds({cloud_path}, path, options, progress_);
-    EXPECT_TRUE(stats.ok()) << stats.status().message();
-    std::filesystem::remove(cloud_path);
+    const std::string path = directory_.file(name);
+    indexSurfels(cloud, path, channels, full_precision);
     return path;
   }
 
@@ -134,19 +125,6 @@ class BounceTest : public testing::Test {
     EXPECT_TRUE(stats.ok()) << stats.status().message();
     if (stats.ok()) stats_ = *stats;
     return stats.ok() ? surfelsOf(directory_.file("bounced.sft")) : std::vector<Surfel>();
-  }
-
-  static std::vector<Surfel> surfelsOf(const std::string& path) {
-    Result<SceneFile> scene = SceneFile::open(path);
-    EXPECT_TRUE(scene.ok()) << scene.status().message();
-    SceneFile::Scratch scratch;
-    std::vector<Surfel> all, page(scene->header().surfel_group_capacity);
-    for (std::uint32_t i = 0; i < scene->surfelPageCount(); ++i) {
-      const Result<std::uint32_t> count = scene->decodeSurfels(i, scratch, page);
-      EXPECT_TRUE(count.ok()) << count.status().message();
-      all.insert(all.end(), page.begin(), page.begin() + *count);
-    }
-    return all;
   }
 
   std::vector<std::string> findingsOf(const std::string& path) {

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "storage/page_file.h"
+
 namespace surfeit {
 
 inline constexpr std::size_t kHeaderChecksumAt = 504;
@@ -60,6 +62,21 @@ inline void sealFile(std::string& file) {
   setAt(file, footer + kFooterChecksumAt,
         hashOf(file, footer, footer + kFooterChecksumAt, identity));
   setAt(file, kHeaderChecksumAt, hashOf(file, 0, kHeaderChecksumAt, 0));
+}
+
+// Makes the checksums of those pages valid that lie in the file where the directory says. The
+// footer must be there.
+inline void sealPages(std::string& file) {
+  const std::size_t footer = footerAt(file);
+  const std::uint64_t identity = getAt<std::uint64_t>(file, 16);
+  const std::uint64_t directory = getAt<std::uint64_t>(file, footer + kDirectoryOffsetAt);
+  if (directory > footer) return;
+  for (std::size_t at = directory; at + kEntryBytes <= footer; at += kEntryBytes) {
+    const auto offset = getAt<std::uint64_t>(file, at);
+    const auto bytes = getAt<std::uint32_t>(file, at + 8);
+    if (offset > file.size() || bytes > file.size() - offset) continue;
+    setAt(file, at + 16, hashOf(file, offset, offset + bytes, pageSeed(identity, offset)));
+  }
 }
 
 // Gives the file at `path` these bytes. In place: a file system may sync a file that is truncated

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <glm/geometric.hpp>
 
+#include "octree/indexed_surfels.h"
 #include "octree/read/scene_file.h"
 #include "sample/scene_files.h"
 #include "surfeit/index.h"
@@ -77,19 +78,6 @@ class Relighting : public SceneFiles {
     const Status status = relightScene(scene, path("none.sft"), options, notes_).status();
     EXPECT_FALSE(std::filesystem::exists(path("none.sft")));
     return status;
-  }
-
-  static std::vector<Surfel> surfelsOf(const std::string& path) {
-    Result<SceneFile> scene = SceneFile::open(path);
-    EXPECT_TRUE(scene.ok()) << scene.status().message();
-    SceneFile::Scratch scratch;
-    std::vector<Surfel> all, page(scene->header().surfel_group_capacity);
-    for (std::uint32_t i = 0; i < scene->surfelPageCount(); ++i) {
-      const Result<std::uint32_t> count = scene->decodeSurfels(i, scratch, page);
-      EXPECT_TRUE(count.ok()) << count.status().message();
-      all.insert(all.end(), page.begin(), page.begin() + *count);
-    }
-    return all;
   }
 
   // Surfels that differ in anything but the radiosity.
