@@ -155,6 +155,22 @@ TEST_F(Shards, RowsOfOthersAreNotRead) {
   expectSameBytes();
 }
 
+// An invalid receiver in rows of another shard, which a task that is not strict passes over.
+TEST_F(Shards, StrictOnesReadAllRows) {
+  Table receivers = receiversOf(20'000);
+  for (std::size_t i = 0; i < receivers.rows.size(); ++i) {
+    receivers.rows[i][0] = -1 + 2 * double(i) / double(receivers.rows.size());
+  }
+  receivers.rows.back()[1] = std::numeric_limits<double>::quiet_NaN();
+  writeTable(receivers, receivers_);
+  ASSERT_TRUE(gatherShard(1, 5).ok());
+  ASSERT_TRUE(gatherShard(2, 5).ok());
+  EXPECT_THAT(notes_.text, HasSubstr("no result (NaN) at invalid receivers: 1"));
+  GatherOptions strict = coarseOptions();
+  strict.strict = true;
+  EXPECT_THAT(std::string(gatherShard(3, 5, strict).message()), HasSubstr("record 19999"));
+}
+
 TEST_F(Shards, EveryOrderModeAndInterpolationHaveTheBytesOfOneGather) {
   GatherOptions morton = coarseOptions(), input = coarseOptions(), varied = coarseOptions();
   morton.order = ReceiverOrder::kMorton;
