@@ -138,65 +138,78 @@ void printTable(const ReceiverSet& set, const std::vector<Row>& rows) {
   }
 }
 
+double errorOf(const Row& row) {
+  return row.isBleeding() ? row.errors.color_rmse : row.errors.rmse;
+}
+
+// The error that no number of rays takes away (disks are not the true geometry), from the two
+// largest numbers n: error^2 = floor^2 + c / n.
+double errorFloor(const std::vector<const Row*>& rows) {
+  const Row &fewer = *rows[rows.size() - 2], &more = *rows.back();
+  const double part =
+      more.rays * errorOf(more) * errorOf(more) - fewer.rays * errorOf(fewer) * errorOf(fewer);
+  return std::sqrt(std::max(0.0, part / (more.rays - fewer.rays)));
+}
+
 // The rate at which a ray tracer has that error, from its rates and errors at some ray counts, by
 // straight lines in logarithms. Beyond the counts measured the lines go on, but never steeper than
 // rays that are not stratified would have it, rate ~ error^2: where more rays do not help any more,
-// that is in the peer's favour.
+// that is in the peer's favour. 0: it never has it.
 double rateAtError(const std::vector<const Row*>& rows, double error) {
-  if (rows.size() < 2) return std::numeric_limits<double>::quiet_NaN();
+  if (errorFloor(rows) > error) return 0;
   std::size_t k = 1;
-  while (k + 1 < rows.size() && rows[k]->errors.rmse > error) ++k;
+  while (k + 1 < rows.size() && errorOf(*rows[k]) > error) ++k;
   const Row &from = *rows[k - 1], &to = *rows[k];
   constexpr double kSteepest = 2;
-  const double fall = std::log(from.errors.rmse / to.errors.rmse);
+  const double fall = std::log(errorOf(from) / errorOf(to));
   const double slope =
       fall > 0 ? std::min(kSteepest, std::log(from.rate() / to.rate()) / fall) : kSteepest;
-  const Row& nearest = error < to.errors.rmse ? to : from;
-  return nearest.rate() * std::pow(error / nearest.errors.rmse, slope);
+  const Row& nearest = error < errorOf(to) ? to : from;
+  return nearest.rate() * std::pow(error / errorOf(nearest), slope);
 }
 
-// Occlusion against triangles at equal error: the better of those with and without fronts only.
-void printTriangleRatio(const Row& engine, const std::vector<Row>& rows) {
-  double best_rate = 0;
-  std::string best;
-  bool is_beyond = false;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const PeerScene* peer = rows[i].peer;
-    const bool is_new = peer != nullptr && (i == 0 || rows[i - 1].peer != peer);
-    if (!is_new || peer->exact == nullptr) continue;
+// The best rate of the peers of true triangles, or of disks, at the error of one of our engines.
+// NaN: no such peer, or one number of rays alone.
+double bestRateAtError(const Row& engine, const std::vector<Row>& rows, bool has_true_geometry) {
+  std::vector<const PeerScene*> seen;
+  double best = std::numeric_limits<double>::quiet_NaN();
+  for (const Row& first : rows) {
+    const PeerScene* peer = first.peer;
+    if (peer == nullptr || (peer->exact != nullptr) != has_true_geometry) continue;
+    if (std::find(seen.begin(), seen.end(), peer) != seen.end()) continue;
+    seen.push_back(peer);
     std::vector<const Row*> points;
     for (const Row& row : rows) {
-      if (row.peer == peer && !row.isBleeding()) points.push_back(&row);
+      if (row.peer == peer && row.mode == engine.mode) points.push_back(&row);
     }
-    const double rate = rateAtError(points, engine.errors.rmse);
-    if (!(rate > best_rate)) continue;
-    best_rate = rate;
-    best = peer->name;
-    is_beyond = engine.errors.rmse > points.front()->errors.rmse ||
-                engine.errors.rmse < points.back()->errors.rmse;
+    if (points.size() > 1) best = std::fmax(best, rateAtError(points, errorOf(engine)));
   }
-  if (best_rate == 0) return;
-  fmt::print("  {} over Embree {} at equal occlusion RMSE {:.5f}: {:.2f}x ({:.0f} over {:.0f}{})\n",
-             engine.name, best, engine.errors.rmse, engine.rate() / best_rate, engine.rate(),
-             best_rate, is_beyond ? ", beyond the ray counts measured" : "");
+  return best;
 }
 
-// Colour against disks with 256 rays.
-void printDiskRatio(const Row& engine, const std::vector<Row>& rows) {
-  constexpr int kRays = 256;
+std::string ratioText(double rate, double peer_rate) {
+  if (std::isnan(peer_rate)) return "-";
+  return peer_rate > 0 ? fmt::format("{:.2f}", rate / peer_rate) : "never";
+}
+
+// Our rate over the rates that rays have at our error.
+void printEqualErrors(const std::string& scene, const ReceiverSet& set,
+                      const std::vector<Row>& rows) {
   for (const Row& row : rows) {
-    if (row.peer == nullptr || row.peer->exact != nullptr) continue;
-    if (!row.isBleeding() || row.rays != kRays) continue;
-    fmt::print("  {} over Embree {}, {} rays, color: {:.2f}x, color RMSE {:.4f} against {:.4f}\n",
-               engine.name, row.name, kRays, engine.rate() / row.rate(), engine.errors.color_rmse,
-               row.errors.color_rmse);
+    if (row.peer != nullptr) continue;
+    fmt::print("  at equal error: {:<9} {:<9} {:<7} {:<9} {:>7.0f}/s, RMSE {:.4f} ({:+.4f}); ",
+               scene, set.name, row.name, row.isBleeding() ? "color" : "occlusion", row.rate(),
+               errorOf(row), row.isBleeding() ? row.errors.color_bias : row.errors.bias);
+    fmt::print("{} x rays at triangles, {} at disks\n",
+               ratioText(row.rate(), bestRateAtError(row, rows, true)),
+               ratioText(row.rate(), bestRateAtError(row, rows, false)));
   }
 }
 
 // One set of receivers: all methods, all rounds.
-Status compare(const VersusOptions& options, const std::list<PeerScene>& peers,
-               const ReceiverSet& set, const std::vector<GatherResult>& truth,
-               PagedOctree& octree) {
+Status compare(const std::string& name, const VersusOptions& options,
+               const std::list<PeerScene>& peers, const ReceiverSet& set,
+               const std::vector<GatherResult>& truth, PagedOctree& octree) {
   std::list<RayDirections> directions;
   for (const int rays : options.rays) directions.emplace_back(rays);
   std::vector<Row> rows;
@@ -210,14 +223,7 @@ Status compare(const VersusOptions& options, const std::list<PeerScene>& peers,
     }
   }
   printTable(set, rows);
-  for (const Row& row : rows) {
-    if (row.peer != nullptr) continue;
-    if (row.isBleeding()) {
-      printDiskRatio(row, rows);
-    } else {
-      printTriangleRatio(row, rows);
-    }
-  }
+  printEqualErrors(name, set, rows);
   return {};
 }
 
@@ -239,7 +245,7 @@ Status runScene(const std::string& name, const SceneOptions& place, const Versus
     if (!std::exchange(has_peers, true)) {
       SURFEIT_ASSIGN_OR_RETURN(peers, makePeers(options, scene, octree->file(), set, truth));
     }
-    SURFEIT_RETURN_IF_ERROR(compare(options, peers, set, truth, *octree));
+    SURFEIT_RETURN_IF_ERROR(compare(name, options, peers, set, truth, *octree));
   }
   return {};
 }
@@ -269,6 +275,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.footer(
       "Rates are receivers per second of one thread's processor time, medians of the rounds.\n"
+      "At equal error: our rate over the rate that rays have at our error; never: no number of\n"
+      "rays has it, for disks are not the true geometry.\n"
       "Examples:\n"
       "  versus_embree --scene spheres --keep scenes\n"
       "  versus_embree --scene all --data ../shared/data --keep scenes > versus.txt\n"
