@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -289,15 +290,50 @@ std::vector<std::uint32_t> trianglesAlongCurve(const Mesh& mesh) {
 }
 
 DicePlan::DicePlan(const Mesh& mesh, std::uint64_t count)
-    : mesh_(mesh), count_(count), order_(trianglesAlongCurve(mesh)) {
+    : mesh_(mesh),
+      count_(count),
+      order_(trianglesAlongCurve(mesh)),
+      is_adopted_(mesh.triangle.size()) {
   // Always summed in this order: next() must come to the same total, to the last bit
   for (const std::uint32_t triangle : order_) total_area_ += triangleArea(mesh, triangle);
+  std::vector<bool> has_surfels(mesh.triangle.size());
   double area = 0;
   for (std::uint64_t i = 0; i < order_.size(); ++i) {
     const double before = area;
     area += triangleArea(mesh, order_[i]);
-    if (surfelsUpTo(area) > surfelsUpTo(before)) last_bearer_ = i;
+    if (surfelsUpTo(area) == surfelsUpTo(before)) continue;
+    has_surfels[order_[i]] = true;
+    last_bearer_ = i;
   }
+  findAdopted(has_surfels);
+}
+
+void DicePlan::findAdopted(const std::vector<bool>& has_surfels) {
+  constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  std::vector<std::uint32_t> bearer_at(mesh_.position.size(), kNone);
+  for (std::uint32_t triangle = 0; triangle < has_surfels.size(); ++triangle) {
+    if (!has_surfels[triangle]) continue;
+    for (int k = 0; k < 3; ++k) bearer_at[mesh_.triangle[triangle][k]] = triangle;
+  }
+  glm::dvec3 next(std::numeric_limits<double>::infinity());  // with surfels
+  double next_radius = 0;
+  for (std::uint64_t i = order_.size(); i-- > 0;) {
+    const std::uint32_t triangle = order_[i];
+    const Micropolygon polygon = wholeTriangle(mesh_, triangle);
+    if (has_surfels[triangle]) {
+      next = polygon.centroid();
+      next_radius = polygon.radius();
+      continue;
+    }
+    if (glm::distance(polygon.centroid(), next) - next_radius <= spacing()) continue;
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t bearer = bearer_at[mesh_.triangle[triangle][k]];
+      if (bearer == kNone || is_adopted_[triangle]) continue;
+      adopted_.emplace_back(bearer, triangle);
+      is_adopted_[triangle] = true;
+    }
+  }
+  std::sort(adopted_.begin(), adopted_.end());
 }
 
 double DicePlan::spacing() const { return std::sqrt(total_area_ / double(count_)); }
@@ -318,12 +354,16 @@ bool DicePlan::next(DiceJob& job) {
     // Small triangles hand their area on to the next with pieces; those after the last, back to it
     job.triangle = order_[i];
     job.area = area;
-    job.carried_begin = carried_begin_;
-    job.carried_end = i;
-    carried_begin_ = i + 1;
-    if (i == last_bearer_ && i + 1 < order_.size()) {
-      job.carried_end = order_.size();  // the range then includes the triangle itself, skipped
-      cursor_ = order_.size();
+    job.carried.clear();
+    const std::uint64_t end = i == last_bearer_ ? order_.size() : i;
+    for (std::uint64_t k = carried_begin_; k < end; ++k) {
+      if (k != i && !is_adopted_[order_[k]]) job.carried.push_back(order_[k]);
+    }
+    carried_begin_ = cursor_ = end == i ? i + 1 : end;
+    const auto first = std::make_pair(job.triangle, std::uint32_t{0});
+    for (auto at = std::lower_bound(adopted_.begin(), adopted_.end(), first);
+         at != adopted_.end() && at->first == job.triangle; ++at) {
+      job.carried.push_back(at->second);
     }
     return true;
   }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <utility>
 #include <vector>
 
 #include "sample/mesh.h"
@@ -84,9 +85,8 @@ struct DiceJob {
   double area = 0;                 // of the triangle
   std::uint64_t piece_count = 0;   // >= 1
   std::uint64_t first_surfel = 0;  // number of its first piece in the whole cloud
-  // Triangles too small for surfels of their own that hand this one their area: a range of
-  // DicePlan::order().
-  std::uint64_t carried_begin = 0, carried_end = 0;
+  // Triangles too small for surfels of their own that hand this one their area.
+  std::vector<std::uint32_t> carried;
 };
 
 // All triangles along the Hilbert curve of their centroids, ties in the order of the file.
@@ -94,8 +94,9 @@ std::vector<std::uint32_t> trianglesAlongCurve(const Mesh& mesh);
 
 // Shares a number of surfels out to triangles in proportion to area: systematic rounding of the
 // summed area, so that the counts add up exactly and never stray by more than one. Triangles are
-// taken along the Hilbert curve, so one that is left without a surfel hands its area to a
-// neighbour, and the cloud comes out coherent. One thread at a time.
+// taken along the Hilbert curve, so one that is left without a surfel hands its area to the next
+// with some, and the cloud comes out coherent. If that one is a spacing away, it hands it to one
+// that shares a corner, for otherwise a surface would have a hole there. One thread at a time.
 class DicePlan {
  public:
   // `count` >= 1 surfels. The mesh must outlive the plan.
@@ -113,6 +114,7 @@ class DicePlan {
 
  private:
   std::uint64_t surfelsUpTo(double area) const;
+  void findAdopted(const std::vector<bool>& has_surfels);
 
   const Mesh& mesh_;
   std::uint64_t count_;
@@ -121,6 +123,9 @@ class DicePlan {
   std::uint64_t last_bearer_ = 0;  // position in order_ of the last triangle with pieces
   std::uint64_t cursor_ = 0, carried_begin_ = 0;
   double area_before_ = 0;
+  // Those handed to one that shares a corner, by triangles: the latter first
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> adopted_;
+  std::vector<bool> is_adopted_;  // by triangle
 };
 
 }  // namespace surfeit

@@ -1,6 +1,8 @@
 // Surfels by count: the pieces of a DicePlan.
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <utility>
+#include <vector>
 
 #include "sample/surfel_maker.h"
 
@@ -23,51 +25,42 @@ class PlanTask final : public SurfelTask {
   }
 
  private:
-  // Area and reach of the triangles that have no surfels of their own.
+  // A triangle that has no surfels of its own, and the piece that takes it over: the nearest one.
   struct Carried {
-    double area = 0;
-    glm::dvec3 centroid{0};
-    std::uint64_t piece = 0;  // that takes them over: the one nearest to their centroid
+    std::uint64_t piece = 0;
+    std::uint32_t triangle = 0;
+    glm::vec3 centroid{0};
   };
 
-  Carried gatherCarried(const DiceJob& job, const TriangleDice& dice) const {
-    Carried carried;
-    for (std::uint64_t i = job.carried_begin; i < job.carried_end; ++i) {
-      const std::uint32_t triangle = plan_.order()[i];
-      if (triangle == job.triangle) continue;
-      const double area = triangleArea(mesh_, triangle);
-      carried.area += area;
-      carried.centroid += area * wholeTriangle(mesh_, triangle).centroid();
+  // By piece.
+  std::vector<Carried> gatherCarried(const DiceJob& job, const TriangleDice& dice) const {
+    std::vector<Carried> all;
+    for (const std::uint32_t triangle : job.carried) {
+      const glm::dvec3 centroid = wholeTriangle(mesh_, triangle).centroid();
+      all.push_back({dice.pieceNear(centroid), triangle, glm::vec3(centroid)});
     }
-    if (carried.area > 0) {
-      carried.centroid /= carried.area;
-      carried.piece = dice.pieceNear(carried.centroid);
-    }
-    return carried;
+    std::sort(all.begin(), all.end(), [](const Carried& a, const Carried& b) {
+      return std::pair(a.piece, a.triangle) < std::pair(b.piece, b.triangle);
+    });
+    return all;
   }
 
-  // Gives the carried area to the nearest of the surfels from `begin`, and widens its disk over the
-  // carried triangles, so that they leave no holes. Those far away (the curve jumps now and then)
-  // are left: a hole of their size is better than so large a disk.
-  void takeOver(const DiceJob& job, const Carried& carried, std::vector<Surfel>& surfels,
-                std::size_t begin) const {
-    const glm::vec3 centroid(carried.centroid);
-    Surfel& surfel = *std::min_element(
-        surfels.begin() + std::ptrdiff_t(begin), surfels.end(), [&](const auto& a, const auto& b) {
-          return glm::distance(a.position, centroid) < glm::distance(b.position, centroid);
-        });
-    surfel.area = float(double(surfel.area) + carried.area);
-    const float reach = float(2 * plan_.spacing());
-    for (std::uint64_t i = job.carried_begin; i < job.carried_end; ++i) {
-      const std::uint32_t triangle = plan_.order()[i];
-      if (triangle == job.triangle) continue;
-      float radius = 0;
-      for (int k = 0; k < 3; ++k) {
-        const glm::vec3& corner = mesh_.position[mesh_.triangle[triangle][k]];
-        radius = std::max(radius, glm::distance(corner, surfel.position));
-      }
-      if (radius <= reach) surfel.radius = std::max(surfel.radius, radius);
+  // Gives its area to the nearest of the surfels from `begin`, and widens the disk of that one over
+  // it, so that it leaves no hole. One far away, which shares no corner with a triangle that has
+  // surfels, is left: a hole of its size is better than so large a disk.
+  void takeOver(const Carried& carried, std::vector<Surfel>& surfels, std::size_t begin) const {
+    Surfel& surfel = *std::min_element(surfels.begin() + std::ptrdiff_t(begin), surfels.end(),
+                                       [&](const auto& a, const auto& b) {
+                                         return glm::distance(a.position, carried.centroid) <
+                                                glm::distance(b.position, carried.centroid);
+                                       });
+    surfel.area = float(double(surfel.area) + triangleArea(mesh_, carried.triangle));
+    float radius = 0;
+    for (int k = 0; k < 3; ++k) {
+      const glm::vec3& corner = mesh_.position[mesh_.triangle[carried.triangle][k]];
+      radius = std::max(radius, glm::distance(corner, surfel.position));
     }
+    if (radius <= float(2 * plan_.spacing())) surfel.radius = std::max(surfel.radius, radius);
   }
 
   void addPieces(const PieceRange& range, SurfelBatch& batch) const {
@@ -75,7 +68,9 @@ class PlanTask final : public SurfelTask {
     std::vector<Surfel>& surfels = batch.surfels;
     const Micropolygon whole = wholeTriangle(mesh_, job.triangle);
     const TriangleDice dice(whole, job.area, job.piece_count, plan_.spacing());
-    const Carried carried = gatherCarried(job, dice);
+    const std::vector<Carried> carried = gatherCarried(job, dice);
+    auto next = std::find_if(carried.begin(), carried.end(),
+                             [&](const Carried& one) { return one.piece >= range.begin; });
     std::vector<PiecePart> parts;
     std::vector<float> there;
     for (std::uint64_t i = range.begin; i < range.end; ++i) {
@@ -87,7 +82,7 @@ class PlanTask final : public SurfelTask {
         const std::uint64_t seed = ((job.first_surfel + i) << kMaxSlabBits) + k;
         surfels.push_back(maker_.make(job.triangle, parts[k], seed, there[k]));
       }
-      if (carried.area > 0 && i == carried.piece) takeOver(job, carried, surfels, begin);
+      for (; next != carried.end() && next->piece == i; ++next) takeOver(*next, surfels, begin);
       maker_.applyMasks(there, begin, batch);
     }
   }

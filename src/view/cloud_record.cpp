@@ -38,6 +38,7 @@ Result<RecordDecoder> RecordDecoder::create(const RowLayout& element, const std:
     decoder.radius_ = RowField::find(element, name);
     decoder.radius_scale_ = std::string_view(name) == "width" ? 0.5 : 1;
   }
+  decoder.area_ = RowField::find(element, "area");
   return decoder;
 }
 
@@ -59,6 +60,8 @@ bool RecordDecoder::decode(const std::byte* row, CloudRecord& record) const {
     record.radius = float(radius_scale_ * radius_.read(row));
     can_draw = can_draw && isInReach(double(record.radius)) && record.radius > 0;
   }
+  const double area = area_.exists() ? area_.read(row) : 0;
+  record.area = area > 0 && isInReach(area) ? float(area) : 0;
   return can_draw;
 }
 

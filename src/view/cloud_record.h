@@ -16,10 +16,11 @@ struct CloudRecord {
   glm::dvec3 position{0};
   glm::vec3 normal{0};  // unit; zero: a sphere
   float radius = 0;     // 0: the cloud has none
+  float area = 0;       // of its piece of the surface; 0: the cloud has none
 };
 
-// Reads the geometry of a row: x y z, nx ny nz, and radius, pscale or width (twice the radius).
-// Immutable; safe from any thread.
+// Reads the geometry of a row: x y z, nx ny nz, area, and radius, pscale or width (twice the
+// radius). Immutable; safe from any thread.
 class RecordDecoder {
  public:
   // kCorruption when x, y or z is missing.
@@ -34,7 +35,7 @@ class RecordDecoder {
 
  private:
   std::array<RowField, 3> position_, normal_;
-  RowField radius_;
+  RowField radius_, area_;
   double radius_scale_ = 1;
 };
 

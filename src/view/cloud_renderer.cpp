@@ -50,10 +50,13 @@ bool CloudRenderer::projectRow(const std::byte* row, ScreenSurfel& surfel,
   } else {
     if (style_.fixed_radius > 0) {
       record.radius = style_.fixed_radius;
+      record.area = 0;
     } else if (style_.radius_estimate != nullptr) {
       record.radius = style_.radius_estimate->radiusAt(record.position);
+      record.area = 0;
     }
     record.radius *= style_.radius_scale;
+    record.area *= style_.radius_scale * style_.radius_scale;
     projected = projectDisk(record, camera_);
   }
   if (!projected || (style_.cull_back && projected->is_back)) return false;
@@ -115,14 +118,18 @@ void CloudRenderer::findFront(std::span<const std::byte> rows) {
       const ScreenSurfel& surfel = surfels_[i];
       const int y_end = std::min(surfel.box.y_end, band_end);
       for (int y = std::max(surfel.box.y_begin, band_begin); y < y_end; ++y) {
-        const std::span<float> limit = framebuffer_.limitRow(y);
+        const std::span<Framebuffer::Front> fronts = framebuffer_.frontRow(y);
         visitFragments(surfel, camera_, y, [&](const Fragment& fragment) {
-          float& l = limit[std::size_t(fragment.x)];
-          l = std::min(l, fragment.depth + surfel.thickness);
+          fronts[std::size_t(fragment.x)].add(fragment.depth, surfel.thickness, fragment.is_core);
         });
       }
     }
   });
+}
+
+void CloudRenderer::closeFront() {
+  const float step = camera_.slopeStep();
+  tbb::parallel_for(0, framebuffer_.height(), [&](int y) { framebuffer_.closeRow(y, step); });
 }
 
 RenderCounts CloudRenderer::accumulate(std::span<const std::byte> rows) {
@@ -136,10 +143,13 @@ RenderCounts CloudRenderer::accumulate(std::span<const std::byte> rows) {
       const float side_weight = surfel.is_back ? kBackWeight : 1;
       const int y_end = std::min(surfel.box.y_end, band_end);
       for (int y = std::max(surfel.box.y_begin, band_begin); y < y_end; ++y) {
-        const std::span<float> limit = framebuffer_.limitRow(y);
+        const std::span<const Framebuffer::Front> fronts = framebuffer_.frontRow(y);
         const std::span<Framebuffer::Sample> samples = framebuffer_.row(y);
         visitFragments(surfel, camera_, y, [&](const Fragment& fragment) {
-          if (!(fragment.depth <= limit[std::size_t(fragment.x)])) return;
+          const float limit = fronts[std::size_t(fragment.x)].limit;
+          if (!(fragment.depth <= limit)) return;
+          // The rim of something before the front surface, which ends beside this sample
+          if (!fragment.is_core && fragment.depth < limit - 2 * surfel.thickness) return;
           glm::vec3 value = surfel.value;
           if (has_hit_normal) {
             const glm::vec3 hit = fragment.depth * fragment.slope - surfel.centre;

@@ -50,8 +50,10 @@ class CloudRenderer {
  public:
   CloudRenderer(const RenderStyle& style, const Camera& camera, Framebuffer& framebuffer);
 
-  // First pass: finds each sample's depth limit. Over all batches before the second begins.
+  // First pass: finds each sample's depth limit. Over all batches, and then closed, before the
+  // second begins.
   void findFront(std::span<const std::byte> rows);
+  void closeFront();
   // Second pass, over the same batches: averages the values before the limits. Returns counts of
   // this batch.
   RenderCounts accumulate(std::span<const std::byte> rows);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "core/spherical_harmonics.h"
+
 namespace surfeit {
 namespace {
 
@@ -46,6 +48,13 @@ bool isBesideFrustum(const glm::vec3& c, float radius, const Camera& camera) {
          std::abs(c.y) - slope_y * c.z > radius * std::sqrt(1 + slope_y * slope_y);
 }
 
+// Of a disk of the area of the record's piece. All of a sphere is core, and of a disk whose piece
+// is not known.
+float coreRho(const CloudRecord& record) {
+  if (!(record.area > 0) || record.normal == glm::vec3(0)) return 1;
+  return std::min(1.f, record.area / (float(kPi) * record.radius * record.radius));
+}
+
 // Where the centre of a surfel that lies before the eye is seen.
 void placeCentre(ScreenSurfel& surfel, const Camera& camera) {
   surfel.screen_x = camera.screenX(surfel.centre.x / surfel.centre.z);
@@ -59,6 +68,7 @@ std::optional<ScreenSurfel> projectDisk(const CloudRecord& record, const Camera&
   surfel.centre = camera.cameraFromWorld(record.position);
   surfel.normal = camera.cameraFromWorldDirection(record.normal);
   surfel.radius = record.radius;
+  surfel.core_rho = coreRho(record);
   surfel.value = glm::vec3(0);
   const bool is_sphere = record.normal == glm::vec3(0);
   surfel.shape = is_sphere ? ScreenSurfel::Shape::kSphere : ScreenSurfel::Shape::kDisk;
@@ -99,7 +109,7 @@ std::optional<ScreenSurfel> projectSquare(const CloudRecord& record, const Camer
   ScreenSurfel surfel;
   surfel.centre = camera.cameraFromWorld(record.position);
   surfel.normal = camera.cameraFromWorldDirection(record.normal);
-  surfel.radius = 1;
+  surfel.radius = surfel.core_rho = 1;
   surfel.value = glm::vec3(0);
   surfel.shape = ScreenSurfel::Shape::kSquare;
   surfel.is_back = glm::dot(surfel.normal, surfel.centre) > 0;

@@ -5,6 +5,9 @@
 // exact bounds come from its dual conic C* = r^2 (I - n n^T) - c c^T: lines of slope u = const
 // that touch it satisfy C*_00 - 2 u C*_02 + u^2 C*_22 = 0. A sphere is the same with n = 0.
 //
+// A disk circumscribes its piece of the surface, and reaches beyond the edges of things. Its core,
+// as large as the piece, hardly does: the framebuffer decides where a rim is seen.
+//
 // So that disks smaller than a sample do not fall between samples, a disk also covers samples
 // within half a sample's diagonal of its centre (Botsch et al. 2005, "High-Quality Surface
 // Splatting on Today's GPUs", screen-space filter).
@@ -34,6 +37,7 @@ struct ScreenSurfel {
   glm::vec3 normal;  // towards or away from the eye, as the surfel has it; zero for spheres
   glm::vec3 value;   // what it shows
   float radius;
+  float core_rho;            // within which a fragment is of the core, see Fragment::rho
   float screen_x, screen_y;  // of the centre
   float thickness;           // depth within which it belongs to one surface with its neighbours
   bool is_back;              // seen from behind
@@ -54,6 +58,7 @@ struct Fragment {
   int x = 0;
   float depth = 0;
   float rho = 0;  // squared distance from the centre over squared radius, 0..1
+  bool is_core = true;
   glm::vec3 slope{0, 0, 1};
 };
 
@@ -93,11 +98,13 @@ void visitFragments(const ScreenSurfel& surfel, const Camera& camera, int y, Vis
       depth = middle - std::sqrt(std::max(surfel.radius * surfel.radius - distance_sq, 0.f) / d_sq);
     }
     fragment.rho = distance_sq * inverse_radius_sq;
+    fragment.is_core = fragment.rho <= surfel.core_rho;
 
     // An edge-on plane gives no number at all: every test is written to fail then
     if (!(fragment.rho <= 1 && depth > camera.nearDepth())) {
       const float offset_x = float(x) + 0.5f - surfel.screen_x;
       fragment.rho = (offset_x * offset_x + offset_y * offset_y) / kFilterRadiusSq;
+      fragment.is_core = true;
       depth = c.z;
       if (!(fragment.rho <= 1 && depth > camera.nearDepth())) continue;
     }

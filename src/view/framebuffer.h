@@ -7,11 +7,16 @@
 // there, where a disk is about as thick as its radius. The second pass averages the values of the
 // fragments before that limit, weighted towards the centres of their disks. Both are independent
 // of the order of the disks, the second up to rounding.
+//
+// Rims of disks fill the gaps between the cores of a surface, but also reach beyond its edges. So a
+// rim that is before all cores at its sample counts only where it lies on the line between two
+// cores on either side of the sample, in a row, a column or a diagonal, as near as disks are wide.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -30,6 +35,20 @@ class Framebuffer {
     float depth_sum = 0;  // of weight * depth
   };
 
+  // What the first pass finds in a sample.
+  struct Front {
+    struct Rim {
+      float limit = std::numeric_limits<float>::infinity();
+      float thickness = 0;
+      float depth() const { return limit - thickness; }
+    };
+    float core = std::numeric_limits<float>::infinity();   // limit by cores
+    Rim rims[2];                                           // the nearest, and what begins behind it
+    float limit = std::numeric_limits<float>::infinity();  // that counts, once closed
+
+    void add(float depth, float thickness, bool is_core);
+  };
+
   // `samples` along each edge of a pixel.
   Framebuffer(int width, int height, int samples);
 
@@ -40,8 +59,11 @@ class Framebuffer {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  std::span<float> limitRow(int y) { return std::span(limit_).subspan(rowOffset(y), rowSize()); }
+  std::span<Front> frontRow(int y) { return std::span(fronts_).subspan(rowOffset(y), rowSize()); }
   std::span<Sample> row(int y) { return std::span(samples_).subspan(rowOffset(y), rowSize()); }
+
+  // Decides the limits of a row, once all fronts are known. `slope_step`: the slope of a sample.
+  void closeRow(int y, float slope_step);
 
   // Forgets the values, not the limits: for a second pass with other values.
   void clearValues();
@@ -53,8 +75,10 @@ class Framebuffer {
   std::size_t rowOffset(int y) const { return std::size_t(y) * std::size_t(width_); }
   std::size_t rowSize() const { return std::size_t(width_); }
 
+  bool isBetweenCores(int x, int y, const Front::Rim& rim, int reach) const;
+
   int width_, height_, samples_per_edge_;
-  std::vector<float> limit_;
+  std::vector<Front> fronts_;
   std::vector<Sample> samples_;
 };
 

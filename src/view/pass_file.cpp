@@ -86,6 +86,7 @@ class PassRenderer {
       SURFEIT_RETURN_IF_ERROR(
           streamRows(rows_, "depth", progress_,
                      [&](std::span<const std::byte> batch) { renderer.findFront(batch); }));
+      renderer.closeFront();
     }
     SURFEIT_RETURN_IF_ERROR(drawValues("normal"));
     keep([&](PassPixel& pixel, const glm::vec3& value, float depth, const glm::vec3& ray) {

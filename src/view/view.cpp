@@ -141,6 +141,7 @@ Status drawPicture(const std::string& picture_path, CloudRows& rows, const Rende
   SURFEIT_RETURN_IF_ERROR(
       streamRows(rows, "depth", progress,
                  [&](std::span<const std::byte> batch) { renderer.findFront(batch); }));
+  renderer.closeFront();
   RenderCounts counts;
   SURFEIT_RETURN_IF_ERROR(streamRows(
       rows, "values", progress,

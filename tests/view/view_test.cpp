@@ -101,6 +101,48 @@ TEST_F(View, NearDiskHidesTheFarOneInEitherOrder) {
   }
 }
 
+// Pieces of a square of 2 by 2, of any shape: disks circumscribe them, and their areas are known.
+// Before a far wall, they end where the square ends, and nothing of the wall shines through.
+TEST_F(View, DisksEndAtTheEdgesOfTheirSurface) {
+  options_.width = options_.height = 256;
+  const double half_fov = options_.camera.fov_degrees * 3.14159265358979 / 360;
+  const double edge = 128 * 0.1 / std::tan(half_fov);  // of the square, pixels from the middle
+  for (const double slant : {0.0, 0.3, 1.0}) {
+    std::vector<std::string> rows = {"0 0 -5 0 0 1 40 5000 0 0 1"};
+    constexpr int kPieces = 8;
+    for (int i = 0; i < kPieces * kPieces; ++i) {
+      // Squares, or halves of parallelograms
+      const double side = 2.0 / kPieces, x = -1 + (i % kPieces + 0.5) * side;
+      const double y = -1 + (i / kPieces + 0.5) * side;
+      const double shift = slant * side / 6;
+      const double radius = side * (slant > 0 ? 0.75 : 0.7072), area = side * side / 2;
+      if (slant > 0) {
+        rows.push_back(
+            fmt::format("{} {} 0 0 0 1 {} {} 1 0 0", x - shift, y - shift, radius, area));
+        rows.push_back(
+            fmt::format("{} {} 0 0 0 1 {} {} 1 0 0", x + shift, y + shift, radius, area));
+      } else {
+        rows.push_back(fmt::format("{} {} 0 0 0 1 {} {} 1 0 0", x, y, radius, 2 * area));
+      }
+    }
+    const ExrPicture picture =
+        draw(writePly("x y z nx ny nz radius area radiosity_r radiosity_g radiosity_b", rows));
+    int most_beyond = 0;
+    for (int y = 0; y < 256; ++y) {
+      for (int x = 0; x < 256; ++x) {
+        const double off = std::max(std::abs(x + 0.5 - 128), std::abs(y + 0.5 - 128));
+        const std::size_t at = picture.at(x, y);
+        if (off < edge - 3) {
+          EXPECT_EQ(picture.b[at], 0) << x << " " << y << " slant " << slant;
+        }
+        if (picture.r[at] > 0) most_beyond = std::max(most_beyond, int(std::ceil(off - edge)));
+      }
+    }
+    // Circles around the pieces reach .2 to .5 sides beyond, 2 to 5 pixels
+    EXPECT_LE(most_beyond, 1) << slant;
+  }
+}
+
 TEST_F(View, OverlappingNeighboursOfOneSurfaceBlend) {
   const ExrPicture picture =
       draw(writePly(kDisk, {"-0.5 0 0.01 0 0 1 2 1 0 0", "0.5 0 0 0 0 1 2 0 0 1"}));
