@@ -46,6 +46,7 @@ if [[ -z ${SURFEIT_BUILD:-} ]]; then
   cmake --build --preset release --parallel "$(nproc)" \
     --target surfeit_program cornell_scene studio_scene
 fi
+SURFEIT_BUILD=$(realpath "$SURFEIT_BUILD")
 PATH=$SURFEIT_BUILD/bin:$SURFEIT_BUILD/examples:$PATH
 pictures=$PWD/docs/gallery
 mkdir -p "$pictures" out/gallery
@@ -357,6 +358,8 @@ chapters=("$@")
 if ((${#chapters[@]} == 0)); then
   chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube
     camera caustics translucent hair screen relit looked_up look brightness)
+  scenes
+elif [[ ! -e black_receivers.ply ]]; then
   scenes
 fi
 for chapter in "${chapters[@]}"; do "$chapter"; done

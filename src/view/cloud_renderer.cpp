@@ -56,7 +56,6 @@ bool CloudRenderer::projectRow(const std::byte* row, ScreenSurfel& surfel,
       record.area = 0;
     }
     record.radius *= style_.radius_scale;
-    record.area *= style_.radius_scale * style_.radius_scale;
     projected = projectDisk(record, camera_);
   }
   if (!projected || (style_.cull_back && projected->is_back)) return false;

@@ -45,7 +45,8 @@ bool Framebuffer::isBetweenCores(int x, int y, const Front::Rim& rim, int reach)
     }
     return nearest;
   };
-  constexpr int kDirections[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
+  constexpr int kDirections[8][2] = {{1, 0}, {0, 1}, {1, 1},  {1, -1},
+                                     {2, 1}, {1, 2}, {2, -1}, {1, -2}};
   return std::any_of(std::begin(kDirections), std::end(kDirections), [&](const int(&step)[2]) {
     const auto [limit, distance] = coreOn(step[0], step[1]);
     const auto [other_limit, other_distance] = coreOn(-step[0], -step[1]);
