@@ -34,12 +34,15 @@ void Framebuffer::Front::add(float depth, float thickness, bool is_core) {
 }
 
 bool Framebuffer::isBetweenCores(int x, int y, const Front::Rim& rim, int reach) const {
-  // The nearest to the eye on one side, and how far away it is
+  // The nearest to the eye on one side, and how far away it is. The surface goes on beyond the
+  // picture
   const auto coreOn = [&](int step_x, int step_y) {
     std::pair<float, int> nearest = {std::numeric_limits<float>::infinity(), 1};
     for (int i = 1; i <= reach; ++i) {
       const int at_x = x + i * step_x, at_y = y + i * step_y;
-      if (at_x < 0 || at_x >= width_ || at_y < 0 || at_y >= height_) break;
+      if (at_x < 0 || at_x >= width_ || at_y < 0 || at_y >= height_) {
+        return std::min(nearest, {rim.limit, i});
+      }
       const float core = fronts_[rowOffset(at_y) + std::size_t(at_x)].core;
       if (core < nearest.first) nearest = {core, i};
     }
