@@ -55,7 +55,7 @@ mesh_scene sponza "$data/scenes/sponza/sponza.obj" \
 
 printf '\n== sponza, in a tenth of its decoded size\n'
 surfeit gather "$out/sponza.sft" "$out/sponza.receivers.ply" -o "$out/sponza.small.ply" \
-  --mode bleeding --memory 26M
+  --mode bleeding --memory 32M
 cmp "$out/sponza.baked.ply" "$out/sponza.small.ply" && echo "the same bytes"
 
 cloud_scene takanawa "$data/points/lion_takanawa.ply" \

@@ -129,6 +129,7 @@ void CloudRenderer::findFront(std::span<const std::byte> rows) {
 void CloudRenderer::closeFront() {
   const float step = camera_.slopeStep();
   tbb::parallel_for(0, framebuffer_.height(), [&](int y) { framebuffer_.closeRow(y, step); });
+  framebuffer_.beginValues();
 }
 
 RenderCounts CloudRenderer::accumulate(std::span<const std::byte> rows) {
@@ -142,10 +143,10 @@ RenderCounts CloudRenderer::accumulate(std::span<const std::byte> rows) {
       const float side_weight = surfel.is_back ? kBackWeight : 1;
       const int y_end = std::min(surfel.box.y_end, band_end);
       for (int y = std::max(surfel.box.y_begin, band_begin); y < y_end; ++y) {
-        const std::span<const Framebuffer::Front> fronts = framebuffer_.frontRow(y);
+        const std::span<const float> limits = framebuffer_.limitRow(y);
         const std::span<Framebuffer::Sample> samples = framebuffer_.row(y);
         visitFragments(surfel, camera_, y, [&](const Fragment& fragment) {
-          const float limit = fronts[std::size_t(fragment.x)].limit;
+          const float limit = limits[std::size_t(fragment.x)];
           if (!(fragment.depth <= limit)) return;
           // The rim of something before the front surface, which ends beside this sample
           if (!fragment.is_core && fragment.depth < limit - 2 * surfel.thickness) return;

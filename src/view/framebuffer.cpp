@@ -7,44 +7,60 @@
 #include <utility>
 
 namespace surfeit {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+}  // namespace
 
 Framebuffer::Framebuffer(int width, int height, int samples)
     : width_(width * samples),
       height_(height * samples),
       samples_per_edge_(samples),
       fronts_(std::size_t(width_) * std::size_t(height_)),
-      samples_(fronts_.size()) {}
+      limits_(fronts_.size()) {}
 
 std::uint64_t Framebuffer::bytes(int width, int height, int samples) {
   const std::uint64_t pixels = std::uint64_t(width) * std::uint64_t(height);
   const std::uint64_t per_pixel = std::uint64_t(samples) * std::uint64_t(samples);
-  return pixels * (per_pixel * (sizeof(Front) + sizeof(Sample)) + sizeof(Picture::Pixel));
+  return pixels * (per_pixel * (sizeof(float) + std::max(sizeof(Front), sizeof(Sample))) +
+                   sizeof(Picture::Pixel));
 }
 
 void Framebuffer::Front::add(float depth, float thickness, bool is_core) {
-  const float limit_of_it = depth + thickness;
+  const Rim rim = {depth + thickness, thickness};
   if (is_core) {
-    core = std::min(core, limit_of_it);
-  } else if (limit_of_it < rims[0].limit) {
-    if (limit_of_it < rims[0].depth()) rims[1] = rims[0];
-    rims[0] = {limit_of_it, thickness};
-  } else if (depth > rims[0].limit && limit_of_it < rims[1].limit) {
-    rims[1] = {limit_of_it, thickness};
+    core = std::min(core, rim.limit);
+    return;
+  }
+  for (std::size_t i = 0; i < std::size(rims); ++i) {
+    if (rim.limit < rims[i].depth()) {  // a surface before this one
+      std::copy_backward(rims + i, std::end(rims) - 1, std::end(rims));
+      rims[i] = rim;
+      return;
+    }
+    if (depth <= rims[i].limit) {
+      if (rim.limit < rims[i].limit) rims[i] = rim;
+      return;
+    }
   }
 }
 
 bool Framebuffer::isBetweenCores(int x, int y, const Front::Rim& rim, int reach) const {
+  constexpr int kLooks = 16;  // at most: cores of large disks are large
+  const int stride = std::max(1, reach / kLooks);
   // The nearest to the eye on one side, and how far away it is. The surface goes on beyond the
   // picture
   const auto coreOn = [&](int step_x, int step_y) {
-    std::pair<float, int> nearest = {std::numeric_limits<float>::infinity(), 1};
-    for (int i = 1; i <= reach; ++i) {
+    std::pair<float, int> nearest = {kInfinity, 1};
+    for (int i = stride; i <= reach; i += stride) {
       const int at_x = x + i * step_x, at_y = y + i * step_y;
       if (at_x < 0 || at_x >= width_ || at_y < 0 || at_y >= height_) {
         return std::min(nearest, {rim.limit, i});
       }
       const float core = fronts_[rowOffset(at_y) + std::size_t(at_x)].core;
       if (core < nearest.first) nearest = {core, i};
+      if (core <= rim.limit) break;
     }
     return nearest;
   };
@@ -61,18 +77,24 @@ bool Framebuffer::isBetweenCores(int x, int y, const Front::Rim& rim, int reach)
 
 void Framebuffer::closeRow(int y, float slope_step) {
   for (int x = 0; x < width_; ++x) {
-    Front& front = fronts_[rowOffset(y) + std::size_t(x)];
-    front.limit = front.core;
+    const Front& front = fronts_[rowOffset(y) + std::size_t(x)];
+    float& limit = limits_[rowOffset(y) + std::size_t(x)];
+    limit = front.core;
     for (const Front::Rim& rim : front.rims) {
       if (!(rim.limit < front.core)) break;
       // As wide as a disk as thick looks
       const float reach = 2 * rim.thickness / (slope_step * std::max(rim.depth(), 1e-30f));
       if (isBetweenCores(x, y, rim, int(std::min(std::ceil(reach), float(width_))))) {
-        front.limit = rim.limit;
+        limit = rim.limit;
         break;
       }
     }
   }
+}
+
+void Framebuffer::beginValues() {
+  fronts_ = {};
+  samples_.resize(limits_.size());
 }
 
 void Framebuffer::clearValues() { std::fill(samples_.begin(), samples_.end(), Sample()); }

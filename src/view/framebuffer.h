@@ -42,9 +42,8 @@ class Framebuffer {
       float thickness = 0;
       float depth() const { return limit - thickness; }
     };
-    float core = std::numeric_limits<float>::infinity();   // limit by cores
-    Rim rims[2];                                           // the nearest, and what begins behind it
-    float limit = std::numeric_limits<float>::infinity();  // that counts, once closed
+    float core = std::numeric_limits<float>::infinity();  // limit by cores
+    Rim rims[3];  // of surfaces behind each other, the nearest first
 
     void add(float depth, float thickness, bool is_core);
   };
@@ -59,11 +58,17 @@ class Framebuffer {
   int width() const { return width_; }
   int height() const { return height_; }
 
+  // Until the values begin.
   std::span<Front> frontRow(int y) { return std::span(fronts_).subspan(rowOffset(y), rowSize()); }
+  std::span<const float> limitRow(int y) const {
+    return std::span(limits_).subspan(rowOffset(y), rowSize());
+  }
   std::span<Sample> row(int y) { return std::span(samples_).subspan(rowOffset(y), rowSize()); }
 
   // Decides the limits of a row, once all fronts are known. `slope_step`: the slope of a sample.
   void closeRow(int y, float slope_step);
+  // Gives the memory of the fronts to the values, once all rows are closed.
+  void beginValues();
 
   // Forgets the values, not the limits: for a second pass with other values.
   void clearValues();
@@ -79,6 +84,7 @@ class Framebuffer {
 
   int width_, height_, samples_per_edge_;
   std::vector<Front> fronts_;
+  std::vector<float> limits_;
   std::vector<Sample> samples_;
 };
 
