@@ -3,6 +3,8 @@
     pip install ./python                                  # builds the library, which takes minutes
     SURFEIT_BUILD_DIR=build/release pip install ./python  # takes the module that is built there
 
+SURFEIT_WITHOUT=sample,view leaves out components of the library and what they need: Embree, libpng.
+
 Add --no-build-isolation --no-index where setuptools and numpy are Debian's.
 """
 
@@ -26,11 +28,14 @@ def version() -> str:
 
 
 def build_with_cmake(build_dir: Path) -> None:
+    without = os.environ.get("SURFEIT_WITHOUT", "").split(",")
     options = {
         "CMAKE_BUILD_TYPE": "Release",
         "SURFEIT_BUILD_TOOLS": "OFF",
         "SURFEIT_BUILD_TESTS": "OFF",
         "SURFEIT_BUILD_BENCH": "OFF",
+        "SURFEIT_BUILD_SAMPLE": "OFF" if "sample" in without else "ON",
+        "SURFEIT_BUILD_VIEW": "OFF" if "view" in without else "ON",
         "SURFEIT_PYTHON": "ON",
         "Python3_EXECUTABLE": sys.executable,
     }

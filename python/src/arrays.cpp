@@ -130,7 +130,10 @@ ReceiverColumns::ReceiverColumns(const py::object& positions, const py::object& 
     if ((outputs & shape.output) == 0) continue;
     const std::string word = describeOutputs(shape.output);
     py::array array = outputArray(given, word, shapeOf(count(), shape.floats));
-    targets_.push_back({static_cast<float*>(array.mutable_data()), shape.floats, shape.begin});
+    auto* const data = static_cast<float*>(array.mutable_data());
+    targets_.push_back({data, shape.floats, shape.begin});
+    static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
+    if (shape.output == kOutputIrradiance) irradiance_ = reinterpret_cast<glm::vec3*>(data);
     results_[word.c_str()] = std::move(array);
   }
 }

@@ -64,6 +64,8 @@ class ReceiverColumns : public ReceiverArray {
 
   // Arrays by the words of the outputs: float32, (n,), (n, 3) or (n, 9, 3).
   const py::dict& results() const { return results_; }
+  // The irradiance among them, in the order of the receivers; null where it is no output.
+  glm::vec3* irradiance() const { return irradiance_; }
 
  private:
   struct Target {
@@ -75,6 +77,7 @@ class ReceiverColumns : public ReceiverArray {
   Vectors positions_, normals_, views_;
   py::dict results_;
   std::vector<Target> targets_;
+  glm::vec3* irradiance_ = nullptr;
 };
 
 // Columns as a list of (name, array of one dimension), all of one length. Holds references.

@@ -18,6 +18,7 @@
 #include "errors.h"
 #include "options.h"
 #include "records.h"
+#include "surfeit/apply_look.h"
 
 namespace surfeit::python {
 namespace {
@@ -27,18 +28,22 @@ constexpr std::size_t kFewReceivers = 512;
 // Receivers that are copied to structs at a time, whole groups of a gatherer.
 constexpr std::size_t kCopiedReceivers = 4096;
 
-// A gatherer and what it has results for.
+// A gatherer, what it has results for, and a place near them.
 class WorldGatherer {
  public:
-  WorldGatherer(Gatherer gatherer, std::uint32_t outputs)
-      : gatherer_(std::move(gatherer)), outputs_(outputs) {}
+  WorldGatherer(Gatherer gatherer, std::uint32_t outputs, const glm::dvec3& origin)
+      : gatherer_(std::move(gatherer)), outputs_(outputs), origin_(origin) {}
 
+  // `look_given`: options of the look of bounce light.
   py::dict gather(const py::object& positions, const py::object& normals, const py::object& views,
-                  const py::object& out, bool keeps_order, int threads, const py::object& watcher) {
+                  const py::object& out, bool keeps_order, int threads, const py::dict& look_given,
+                  const py::object& watcher) {
+    const BounceLook look = checkedLook(look_given);
     ReceiverColumns columns(positions, normals, views, outputs_, out);
-    const auto work = [&](Progress& progress) {
-      return keeps_order ? gatherInOrder(columns, progress)
-                         : gatherer_.gatherAll(columns, progress, threads);
+    const auto work = [&](Progress& progress) -> Status {
+      SURFEIT_RETURN_IF_ERROR(keeps_order ? gatherInOrder(columns, progress)
+                                          : gatherer_.gatherAll(columns, progress, threads));
+      return look.isOff() ? Status() : applyTo(columns, look);
     };
     if (columns.count() > kFewReceivers) {
       run(watcher, work);
@@ -49,7 +54,8 @@ class WorldGatherer {
   }
 
   WorldGatherer another() const {
-    return {runFor<Gatherer>(py::none(), [&](Progress&) { return gatherer_.another(); }), outputs_};
+    return {runFor<Gatherer>(py::none(), [&](Progress&) { return gatherer_.another(); }), outputs_,
+            origin_};
   }
 
   void pause() { gatherer_.pause(); }
@@ -62,6 +68,33 @@ class WorldGatherer {
     const py::gil_scoped_release release;
     Progress progress;
     return work(progress);
+  }
+
+  // Before any work.
+  BounceLook checkedLook(const py::dict& given) const {
+    Options options(given);
+    BounceLook look;
+    takeLook(options, look);
+    options.finish();
+    check(applyLook(look, origin_, nullptr, 0, nullptr));
+    if (!look.isOff() && (outputs_ & kOutputIrradiance) == 0) {
+      throw py::value_error(
+          "look of bounce light: found no output irradiance that it changes, expected mode "
+          "bleeding or glossy, or irradiance among the outputs");
+    }
+    return look;
+  }
+
+  Status applyTo(const ReceiverColumns& columns, const BounceLook& look) const {
+    std::vector<Receiver> receivers;
+    for (std::size_t begin = 0; begin < columns.count(); begin += kCopiedReceivers) {
+      const std::size_t end = std::min(columns.count(), begin + kCopiedReceivers);
+      receivers.clear();
+      for (std::size_t i = begin; i < end; ++i) receivers.push_back(columns.receiver(i));
+      SURFEIT_RETURN_IF_ERROR(applyLook(look, origin_, receivers.data(), receivers.size(),
+                                        columns.irradiance() + begin));
+    }
+    return {};
   }
 
   // Clusters are of consecutive receivers.
@@ -83,6 +116,7 @@ class WorldGatherer {
 
   Gatherer gatherer_;
   std::uint32_t outputs_;
+  glm::dvec3 origin_;
 };
 
 Engine makeEngine(std::uint64_t memory_bytes, int threads, bool direct_io) {
@@ -114,6 +148,15 @@ std::uint32_t outputsOf(const GatherSettings& settings, bool has_environment) {
 
 using Matrix = std::array<double, 12>;
 
+// The origin of a scene, where it stands in the world.
+glm::dvec3 originOf(const std::vector<std::pair<Scene, Matrix>>& scenes) {
+  if (scenes.empty()) return glm::dvec3(0);
+  const auto& [scene, m] = scenes.front();
+  const glm::dvec3 o = scene.info().origin;
+  return {m[0] * o.x + m[1] * o.y + m[2] * o.z + m[3], m[4] * o.x + m[5] * o.y + m[6] * o.z + m[7],
+          m[8] * o.x + m[9] * o.y + m[10] * o.z + m[11]};
+}
+
 WorldGatherer makeGatherer(Engine& engine, const std::vector<std::pair<Scene, Matrix>>& given,
                            const py::dict& settings_given) {
   Options options(settings_given);
@@ -126,7 +169,7 @@ WorldGatherer makeGatherer(Engine& engine, const std::vector<std::pair<Scene, Ma
   Gatherer gatherer = runFor<Gatherer>(py::none(), [&](Progress&) {
     return engine.gatherer(instances, settings, environment.get());
   });
-  return {std::move(gatherer), outputsOf(settings, environment.get() != nullptr)};
+  return {std::move(gatherer), outputsOf(settings, environment.get() != nullptr), originOf(given)};
 }
 
 }  // namespace

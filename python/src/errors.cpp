@@ -55,8 +55,9 @@ void raise(const Status& status) {
       raiseAs(PyExc_MemoryError, message);
     case StatusCode::kInterrupted:
       raiseAs(PyExc_KeyboardInterrupt, message);
-    case StatusCode::kOk:
     case StatusCode::kIncomplete:
+      raiseAs(py::module_::import("surfeit._errors").attr("Incomplete").ptr(), message);
+    case StatusCode::kOk:
     case StatusCode::kFailed:
       break;
   }

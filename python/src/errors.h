@@ -13,8 +13,8 @@ namespace surfeit::python {
 namespace py = pybind11;
 
 // Raises what a failure stands for: ValueError (an argument), OSError with errno and filename where
-// the message has them, DamagedFile, MemoryError (a budget), KeyboardInterrupt, else RuntimeError.
-// Needs the GIL.
+// the message has them, DamagedFile, MemoryError (a budget), KeyboardInterrupt, Incomplete
+// (shards), else RuntimeError. Needs the GIL.
 [[noreturn]] void raise(const Status& status);
 
 inline void check(const Status& status) {

@@ -12,7 +12,13 @@ PYBIND11_MODULE(_surfeit, module) {
   module.def("memory_limit", &surfeit::memoryLimitBytes);
   module.def("peak_resident", &surfeit::peakResidentBytes);
   module.def("default_threads", &surfeit::defaultThreadCount);
+  module.def("set_read_retries", &surfeit::setReadRetries);
+  surfeit::python::addBakes(module);
   surfeit::python::addClouds(module);
   surfeit::python::addEngine(module);
+  surfeit::python::addGathering(module);
+  surfeit::python::addIndexing(module);
   surfeit::python::addJobs(module);
+  surfeit::python::addMeshes(module);
+  surfeit::python::addPictures(module);
 }

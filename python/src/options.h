@@ -9,8 +9,11 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "surfeit/bake.h"
+#include "surfeit/bounce_look.h"
+#include "surfeit/camera_density.h"
 #include "surfeit/engine.h"
 #include "surfeit/gather.h"
 #include "surfeit/job.h"
@@ -68,14 +71,18 @@ class Options {
   py::dict left_;
 };
 
+// Three numbers.
+void takeVector(Options& options, const char* name, glm::vec3& vector);
+void takePlace(Options& options, const char* name, glm::dvec3& place);
 void takeUp(Options& options, const char* name, std::optional<UpAxis>& up);
 // memory (bytes), threads, strict, temporary_directory.
 void takeJob(Options& options, JobOptions& job);
+void takeColorRange(Options& options, ColorRange& range);
 // channels, part, filter, color_range.
 void takeReading(Options& options, ReadOptions& reading);
 // quality, then what it sets and the rest of GatherQuality.
 void takeQuality(Options& options, GatherQuality& quality);
-// groups: "0,2-5", or a sequence of numbers.
+// groups: "0,2-5"; names are numbers by now.
 void takeGroups(Options& options, std::uint64_t& groups);
 // mode, outputs, groups, eye, quality and weights.
 void takeSettings(Options& options, GatherSettings& settings);
@@ -83,6 +90,13 @@ void takeSettings(Options& options, GatherSettings& settings);
 void takePlacement(Options& options, EnvironmentPlacement& placement);
 // All of a job on files; `environment` is a path.
 void takeGather(Options& options, GatherOptions& gather);
+// bounce_gain, bounce_saturation, bounce_tint, bounce_filter: a list of dicts.
+void takeLook(Options& options, BounceLook& look);
+// group_corrections: a list of dicts.
+void takeGroupCorrections(Options& options, std::vector<GroupCorrection>& corrections);
+// camera: a list of seven numbers each, the last NaN where `fov` counts; camera_file: a list of
+// paths; pixels, max_solid_angle, stereo, size, camera_crop.
+void takeDensity(Options& options, CameraDensity& density);
 // toward, sensor, trajectory, thin.
 void takeEstimation(Options& options, NormalEstimation& estimation);
 

@@ -10,8 +10,6 @@ namespace {
 
 using namespace py::literals;
 
-py::tuple place(const glm::dvec3& v) { return py::make_tuple(v.x, v.y, v.z); }
-
 py::list channelNames(const CloudChannels& channels) {
   py::list names;
   for (const auto& [name, is_there] :
@@ -23,12 +21,6 @@ py::list channelNames(const CloudChannels& channels) {
     if (is_there) names.append(name);
   }
   return names;
-}
-
-py::dict phases(const std::vector<std::pair<std::string, double>>& seconds) {
-  py::dict dict;
-  for (const auto& [name, value] : seconds) dict[name.c_str()] = value;
-  return dict;
 }
 
 py::dict record(const TuneCache& cache) {
@@ -57,6 +49,14 @@ py::list record(const std::vector<TuneRow>& rows) {
 }
 
 }  // namespace
+
+py::tuple place(const glm::dvec3& v) { return py::make_tuple(v.x, v.y, v.z); }
+
+py::dict phases(const std::vector<std::pair<std::string, double>>& seconds) {
+  py::dict dict;
+  for (const auto& [name, value] : seconds) dict[name.c_str()] = value;
+  return dict;
+}
 
 py::dict record(const GatherCacheStats& stats) {
   return py::dict("requests"_a = stats.requests, "hits"_a = stats.hits,
@@ -198,14 +198,14 @@ py::dict record(const BounceStats& stats) {
 }
 
 py::dict record(const LookupStats& stats) {
-  return py::dict("is_brick_map"_a = stats.is_brick_map, "channels"_a = stats.channels,
-                  "points"_a = stats.points, "skipped_points"_a = stats.skipped_points,
-                  "spacing"_a = stats.spacing, "max_distance"_a = stats.max_distance,
-                  "receivers"_a = stats.receivers, "invalid_receivers"_a = stats.invalid_receivers,
-                  "missing_receivers"_a = stats.missing_receivers,
-                  "page_loads"_a = stats.page_loads, "threads"_a = stats.threads,
-                  "memory_bytes"_a = stats.memory_bytes,
-                  "temporary_bytes"_a = stats.temporary_bytes);
+  return py::dict(
+      "is_brick_map"_a = stats.is_brick_map, "channels"_a = stats.channels,
+      "points"_a = stats.points, "skipped_points"_a = stats.skipped_points,
+      "spacing"_a = stats.spacing, "max_distance"_a = stats.max_distance,
+      "receivers"_a = stats.receivers, "invalid_receivers"_a = stats.invalid_receivers,
+      "missing_receivers"_a = stats.missing_receivers, "page_loads"_a = stats.page_loads,
+      "threads"_a = stats.threads, "memory_bytes"_a = stats.memory_bytes,
+      "temporary_bytes"_a = stats.temporary_bytes, "phase_seconds"_a = phases(stats.phase_seconds));
 }
 
 py::dict record(const TuneReport& report) {
@@ -224,6 +224,66 @@ py::dict record(const VerifyReport& report) {
   return py::dict("pages_checked"_a = report.pages_checked,
                   "bytes_checked"_a = report.bytes_checked, "findings"_a = report.findings,
                   "finding_count"_a = report.finding_count);
+}
+
+py::dict record(const IndexShardStats& stats) {
+  return py::dict("done_shards"_a = stats.done_shards, "finished_shards"_a = stats.finished_shards,
+                  "memory_bytes"_a = stats.memory_bytes, "records"_a = stats.records,
+                  "surfels"_a = stats.surfels, "file_bytes"_a = stats.file_bytes,
+                  "temporary_bytes"_a = stats.temporary_bytes);
+}
+
+py::dict record(const IndexForecast& forecast) {
+  return py::dict("records"_a = forecast.records, "sampled_surfels"_a = forecast.sampled_surfels,
+                  "input_bytes"_a = forecast.input_bytes, "memory_bytes"_a = forecast.memory_bytes,
+                  "temporary_bytes"_a = forecast.temporary_bytes,
+                  "file_bytes"_a = forecast.file_bytes, "seconds"_a = forecast.seconds);
+}
+
+py::dict record(const ShardStats& stats) {
+  py::dict dict = record(static_cast<const GatherStats&>(stats));
+  dict["gathered_shards"] = stats.gathered_shards;
+  dict["finished_shards"] = stats.finished_shards;
+  return dict;
+}
+
+py::dict record(const MergeStats& stats) {
+  return py::dict("shards"_a = stats.shards, "receivers"_a = stats.receivers,
+                  "invalid_receivers"_a = stats.invalid_receivers,
+                  "memory_bytes"_a = stats.memory_bytes,
+                  "temporary_bytes"_a = stats.temporary_bytes);
+}
+
+py::dict record(const GatherForecast& forecast) {
+  return py::dict("receivers"_a = forecast.receivers,
+                  "sampled_receivers"_a = forecast.sampled_receivers,
+                  "threads"_a = forecast.threads, "memory_bytes"_a = forecast.memory_bytes,
+                  "least_memory_bytes"_a = forecast.least_memory_bytes,
+                  "recommended_memory_bytes"_a = forecast.recommended_memory_bytes,
+                  "temporary_bytes"_a = forecast.temporary_bytes,
+                  "result_bytes"_a = forecast.result_bytes, "seconds"_a = forecast.seconds);
+}
+
+py::dict record(const BrickStats& stats) {
+  return py::dict("memory_bytes"_a = stats.memory_bytes, "points"_a = stats.points,
+                  "skipped_points"_a = stats.skipped_points, "channels"_a = stats.channels,
+                  "voxel_size"_a = stats.voxel_size, "level_voxels"_a = stats.level_voxels,
+                  "file_bytes"_a = stats.file_bytes, "temporary_bytes"_a = stats.temporary_bytes,
+                  "threads"_a = stats.threads, "phase_seconds"_a = phases(stats.phase_seconds));
+}
+
+py::dict record(const RadianceStats& stats) {
+  return py::dict(
+      "photons"_a = stats.photons, "skipped_photons"_a = stats.skipped_photons,
+      "surfels"_a = stats.surfels, "sparse_surfels"_a = stats.sparse_surfels, "area"_a = stats.area,
+      "power"_a = place(stats.power), "reflected_power"_a = place(stats.reflected_power),
+      "mean_radius"_a = stats.mean_radius, "max_radius"_a = stats.max_radius,
+      "temporary_bytes"_a = stats.temporary_bytes, "memory_bytes"_a = stats.memory_bytes,
+      "threads"_a = stats.threads, "phase_seconds"_a = phases(stats.phase_seconds));
+}
+
+py::dict record(const GenerateStats& stats) {
+  return py::dict("surfels"_a = stats.surfels, "area"_a = stats.area);
 }
 
 }  // namespace surfeit::python

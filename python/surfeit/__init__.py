@@ -10,11 +10,15 @@ docs/python.md is an introduction.
 """
 
 from . import settings
-from ._errors import DamagedFile, DataWarning
-from ._surfeit import __version__
+from ._errors import DamagedFile, DataWarning, Incomplete
+from ._surfeit import __version__, set_read_retries
+from .bakes import BrickMap, brick, generate, radiance
 from .clouds import read, read_chunks, write
 from .engine import Engine, Gatherer, Scene
-from .jobs import bounce, convert, cube, gather, index, info, lookup, normals, tune, verify
+from .gathers import cube, gather, merge, tune
+from .jobs import bounce, convert, index, info, lookup, normals, verify
+from .meshes import relight, sample
+from .pictures import composite, view
 
 # Words of the outputs of a gather.
 OUTPUTS = ("occlusion", "irradiance", "bent_normal", "illumination_direction", "environment",
@@ -24,7 +28,8 @@ OUTPUTS = ("occlusion", "irradiance", "bent_normal", "illumination_direction", "
 CUBE_KINDS = ("nothing", "flat node", "facet", "rough node", "patch", "traced")
 
 __all__ = [
-    "CUBE_KINDS", "DamagedFile", "DataWarning", "Engine", "Gatherer", "OUTPUTS", "Scene",
-    "__version__", "bounce", "convert", "cube", "gather", "index", "info", "lookup", "normals",
-    "read", "read_chunks", "settings", "tune", "verify", "write",
+    "BrickMap", "CUBE_KINDS", "DamagedFile", "DataWarning", "Engine", "Gatherer", "Incomplete",
+    "OUTPUTS", "Scene", "__version__", "bounce", "brick", "composite", "convert", "cube", "gather",
+    "generate", "index", "info", "lookup", "merge", "normals", "radiance", "read", "read_chunks",
+    "relight", "sample", "set_read_retries", "settings", "tune", "verify", "view", "write",
 ]

@@ -9,6 +9,7 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from . import _surfeit
+from ._looks import look_of
 
 PathLike = Union[str, "os.PathLike[str]"]
 Memory = Union[int, str, None]
@@ -69,6 +70,28 @@ def matrix_of(transform: Any, name: str = "transform") -> Tuple[float, ...]:
     return tuple(float(value) for value in matrix.ravel())
 
 
+# Metres of units, as `surfeit convert --units` has them.
+_METRES = {"m": 1, "cm": 0.01, "mm": 0.001, "km": 1000, "in": 0.0254, "ft": 0.3048,
+           "us-ft": 1200 / 3937}
+
+
+def scaled(transform: Any, units: Optional[str]) -> Any:
+    """The transform of what is scaled before, by "ft:m"."""
+    if units is None:
+        return transform
+    try:
+        before, after = (_METRES[word] if word in _METRES else float(word)
+                         for word in units.split(":"))
+    except (AttributeError, ValueError):
+        before = after = 0
+    if not (0 < before < float("inf") and 0 < after < float("inf")):
+        raise ValueError(f"units: found {units!r}, expected FROM:TO, each {', '.join(_METRES)} or the "
+                         "metres of a unit, such as ft:m or 0.5:m")
+    matrix = np.array(matrix_of(transform)).reshape(3, 4)
+    matrix[:, :3] *= before / after
+    return matrix
+
+
 def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
     """Options for the binding: without None, paths as text, arrays of few numbers as lists."""
     taken = {**options, **more}
@@ -77,7 +100,7 @@ def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
     for name in ("transform", "from_space", "to_space"):
         if taken.get(name) is not None:
             taken[name] = matrix_of(taken[name], name)
-    for name in ("temporary_directory", "trajectory", "like"):
+    for name in ("temporary_directory", "trajectory", "like", "passes", "brick", "caustic_photons"):
         if taken.get(name) is not None:
             taken[name] = path_of(taken[name])
     for name in ("origin", "cube", "eye", "sensor", "crop"):
@@ -85,6 +108,10 @@ def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
             taken[name] = taken[name].tolist()
     if isinstance(taken.get("environment"), os.PathLike):
         taken["environment"] = path_of(taken["environment"])
+    if taken.get("text") is not None:
+        text = f"--text={taken.pop('text')}"
+        taken["channels"] = f"{taken['channels']},{text}" if taken.get("channels") else text
+    look_of(taken)
     return {name: value for name, value in taken.items() if value is not None}
 
 
@@ -150,6 +177,36 @@ def paths_of(source: Any) -> Optional[List[str]]:
     if isinstance(source, (list, tuple)) and source and all(is_path(each) for each in source):
         return [path_of(each) for each in source]
     return None
+
+
+def listed(source: Any, name: str) -> List[str]:
+    """A path or several as a list of paths."""
+    paths = paths_of(source)
+    if paths is None:
+        raise TypeError(f"{name}: found {type(source).__name__}, expected a path or several")
+    return paths
+
+
+def shard_of(shard: Any) -> Tuple[int, int, int]:
+    """First, last and count of (3, 16) or "3/16"."""
+    words = shard.split("/") if isinstance(shard, str) else shard
+    try:
+        number, count = (int(word) for word in words)
+    except (TypeError, ValueError):
+        number = count = 0
+    if not 1 <= number <= count:
+        raise ValueError(f'shard: found {shard!r}, expected (I, N) or "I/N", such as "3/16", with I '
+                         "from 1 to N")
+    return number, number, count
+
+
+def component(name: str, function: str) -> Any:
+    """A function of the binding that needs a component of the library."""
+    found = getattr(_surfeit, function, None)
+    if found is None:
+        raise NotImplementedError(f"{function}: this build of surfeit lacks the component {name}: "
+                                  f"build it with -D SURFEIT_BUILD_{name.upper()}=ON")
+    return found
 
 
 def leading_shape(positions: Any) -> Tuple[np.ndarray, Tuple[int, ...]]:

@@ -12,6 +12,8 @@ import numpy as np
 from . import _surfeit
 from ._arguments import (Memory, PathLike, flat, leading_shape, matrix_of, memory_bytes, options_of,
                          path_of)
+from ._groups import names_of_scene, names_of_scenes, with_numbers
+from ._looks import LOOK_SETTINGS
 from ._watch import ProgressLike, Watcher
 
 if TYPE_CHECKING:
@@ -44,7 +46,7 @@ def _scene_of(engine: "Engine", path: str, matrix: Tuple[float, ...]) -> "Scene"
 
 
 def _gather_into(gatherer: Any, positions: Any, normals: Any, views: Any, out: Any, order: str,
-                 threads: int, watcher: Watcher) -> Dict[str, np.ndarray]:
+                 threads: int, look: Dict[str, Any], watcher: Watcher) -> Dict[str, np.ndarray]:
     if order not in ("curve", "input"):
         raise ValueError(f'order: found "{order}", expected curve or input')
     places, shape = leading_shape(positions)
@@ -58,7 +60,7 @@ def _gather_into(gatherer: Any, positions: Any, normals: Any, views: Any, out: A
             if not array.flags.c_contiguous:
                 raise ValueError(f"out[{word!r}]: expected a contiguous array")
             filled[word] = array.reshape((len(places), *array.shape[len(shape):]))
-    results = gatherer.gather(places, flat(normals), flat(views), filled, order == "input", threads,
+    results = gatherer.gather(places, flat(normals), flat(views), filled, order == "input", threads, look,
                               watcher)
     if out is not None and set(out) - set(results):
         raise ValueError(f"out: {', '.join(sorted(set(out) - set(results)))}: no such output")
@@ -111,9 +113,10 @@ class Engine:
         For settings see surfeit.settings.EngineSettings.
         """
         placed = [scenes] if isinstance(scenes, Scene) else list(scenes)
+        world, look = _split(settings)
         made = self._engine.gatherer([(scene._scene, scene._matrix) for scene in placed],
-                                     options_of(settings))
-        return Gatherer(self, made)
+                                     _settings_of(world, placed))
+        return Gatherer(self, made, look)
 
     @property
     def stats(self) -> Dict[str, Any]:
@@ -170,6 +173,11 @@ class Scene:
         """Contents of the file: counts, bytes, bounds in the cloud's coordinates."""
         return self._scene.info
 
+    @property
+    def group_names(self) -> Dict[int, str]:
+        """Names of object groups by number. Reads the file again: not of a scene from bytes."""
+        return dict(names_of_scene(self.path))
+
     def placed(self, transform: Any) -> "Scene":
         """The same open scene in another place. Takes no memory."""
         return Scene(self._engine, self._scene, matrix_of(transform))
@@ -198,12 +206,13 @@ class Scene:
         the scene has a transform or results are interpolated. Other companions change a result by
         less than .004.
         """
-        key = _key_of(settings)
-        gatherer = self._take(key, settings)
+        world, look = _split(settings)
+        key = _key_of(world)
+        gatherer = self._take(key, world)
         try:
             with Watcher(progress) as watcher:
                 return _gather_into(gatherer, positions, normals, views, out, "curve", threads or 0,
-                                    watcher)
+                                    look, watcher)
         finally:
             self._give(key, gatherer)
 
@@ -222,7 +231,8 @@ class Scene:
     def _make(self, key: Any, first: Any, settings: Mapping[str, Any]) -> Any:
         if first is not None:
             return first.another()
-        made = self._engine._engine.gatherer([(self._scene, self._matrix)], options_of(settings))
+        made = self._engine._engine.gatherer([(self._scene, self._matrix)],
+                                             _settings_of(settings, [self]))
         if key is not None:
             with self._lock:
                 self._worlds[key] = (made, [])
@@ -247,6 +257,19 @@ class Scene:
         return _scene_of, (self._engine, self.path, self._matrix)
 
 
+def _split(settings: Mapping[str, Any]) -> Tuple[Dict[str, Any], Dict[str, Any]]:
+    """Settings of the gather, and those of the look of its light, for the binding."""
+    world = {name: value for name, value in settings.items() if name not in LOOK_SETTINGS}
+    look = {name: value for name, value in settings.items() if name in LOOK_SETTINGS}
+    return world, options_of(look)
+
+
+def _settings_of(settings: Mapping[str, Any], scenes: Iterable["Scene"]) -> Dict[str, Any]:
+    """Settings for the binding; groups by name have the numbers that the scenes have for them."""
+    paths = {scene.path: None for scene in scenes}
+    return with_numbers(options_of(settings), lambda: names_of_scenes(paths))
+
+
 def _key_of(settings: Mapping[str, Any]) -> Any:
     """Something that is equal for equal settings; None where that is not known."""
     try:
@@ -264,9 +287,10 @@ class Gatherer:
     Two calls at once on one gatherer raise ValueError: `another()` makes one for another thread.
     """
 
-    def __init__(self, engine: Engine, gatherer: Any):
+    def __init__(self, engine: Engine, gatherer: Any, look: Optional[Dict[str, Any]] = None):
         self._engine = engine
         self._gatherer = gatherer
+        self._look = look or {}
 
     def gather(self, positions: Any, normals: Any = None, *, views: Any = None,
                out: Optional[Mapping[str, np.ndarray]] = None, order: str = "curve",
@@ -279,11 +303,11 @@ class Gatherer:
         """
         with Watcher(progress) as watcher:
             return _gather_into(self._gatherer, positions, normals, views, out, order, threads,
-                                watcher)
+                                self._look, watcher)
 
     def another(self) -> "Gatherer":
         """A gatherer of the same world and settings for another thread."""
-        return Gatherer(self._engine, self._gatherer.another())
+        return Gatherer(self._engine, self._gatherer.another(), self._look)
 
     def pause(self) -> None:
         """Releases pages in front of the caches, for a thread that does something else for long."""

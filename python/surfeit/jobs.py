@@ -12,55 +12,103 @@ import tempfile
 from typing import TYPE_CHECKING, Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
 from . import _surfeit
-from ._arguments import Memory, PathLike, columns_of, options_of, path_of, paths_of
+from ._arguments import (Memory, PathLike, columns_of, is_path, listed, options_of, path_of,
+                         paths_of, scaled, shard_of)
 from ._errors import DamagedFile
+from ._groups import group_corrections, names_of_scene, with_numbers
+from ._lights import with_cameras
 from ._watch import ProgressLike, Watcher
 from .clouds import write
 from .engine import Scene
+from .gathers import scene_path, watch
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from .settings import (GatherJobSettings, IndexSettings, JobSettings, LookupSettings, NormalSettings,
-                           QualitySettings, ReadSettings, Up)
+    from .settings import (BounceSettings, ConvertSettings, IndexSettings, JobSettings, LookupSettings,
+                           NormalsSettings, ReadSettings, Up)
 
 Stats = Dict[str, Any]
 
 
-def _scene_path(scene: Union[PathLike, Scene]) -> str:
-    return scene.path if isinstance(scene, Scene) else path_of(scene)
-
-
-def _watch(progress: ProgressLike, settings: Mapping[str, Any]) -> Watcher:
-    return Watcher(progress, bool(settings.get("strict")))
-
-
 def index(source: Union[Mapping[str, Any], PathLike, Sequence[PathLike],
                         Iterable[Mapping[str, Any]]],
-          output: PathLike, *, progress: ProgressLike = None,
-          **settings: "Unpack[IndexSettings]") -> Stats:
+          output: PathLike, *, group: Any = None, pass_: Optional[str] = None, shard: Any = None,
+          shards: Optional[int] = None, remove_shards: bool = False, dry_run: bool = False,
+          progress: ProgressLike = None, **settings: "Unpack[IndexSettings]") -> Stats:
     """Builds a scene (.sft).
 
     source: one of
         - a dict of arrays by channel: "position" (n, 3) is needed; "normal" (n, 3), "radius" (n,),
           "area" (n,), "radiosity" (n, 3), "albedo" (n, 3), "two_sided" (n,), "group" (n,),
-          "long_side" (n, 3), "color" (n, 3: uint8 or uint16 sRGB, or linear floats). They are not
-          copied and not counted in the budget;
+          "long_side" (n, 3), "opacity" (n,), "color" (n, 3: uint8 or uint16 sRGB, or linear
+          floats). They are not copied and not counted in the budget;
         - a path or several, of clouds of any format;
         - an iterable of such dicts with the same channels. They go through a temporary file.
+    group: {"lamp": path or paths, ...}, clouds whose surfels are an object group of that name, for
+        groups="lamp" of a gather; `source` may then be an empty list.
     settings: memory (default 1G), threads, normals="estimate", ...: surfeit.settings.IndexSettings.
+    dry_run: writes nothing, and returns an estimate of memory, files and time. Files alone.
+
+    An index by many processes, of files alone (docs/farm.md): pass_="count", "distribute" and
+    "build", each with shard=(1, 4) to (4, 4) or "1/4"; then pass_="merge", shards=4, with
+    remove_shards=True to remove their files.
 
     The scene depends on the surfels alone: the same arrays from a file give the same bytes. What is
     missing is filled in by the rules of docs/format.md, with a DataWarning each.
     """
-    options = options_of(settings)
-    with _watch(progress, settings) as watcher:
+    options = _index_options(settings, group)
+    with watch(progress, settings) as watcher:
+        paths = [] if group and not isinstance(source, Mapping) and source in ([], ()) else \
+            paths_of(source)
+        if paths is None and (group or pass_ or shard or shards or dry_run):
+            raise ValueError("group, pass_, shard, shards and dry_run are of clouds in files, found "
+                             "arrays: surfeit.write makes files of them")
+        if paths is not None:
+            return _index_files(paths, path_of(output), options, watcher, pass_, shard, shards,
+                                remove_shards, dry_run)
         if isinstance(source, Mapping):
             return _index_arrays(source, path_of(output), options, watcher)
-        paths = paths_of(source)
-        if paths is not None:
-            return _surfeit.index_files(paths, path_of(output), options, watcher)
         return _index_chunks(source, path_of(output), options, watcher)
+
+
+def _index_options(settings: Mapping[str, Any], group: Any) -> Stats:
+    """Named groups as pairs; the cube of another scene, and its origin, as numbers."""
+    options = options_of(settings)
+    like = options.get("cube")
+    if is_path(like) or isinstance(like, Scene):
+        info = _surfeit.scene_info(scene_path(like))
+        options["cube"] = list(info["cube"])
+        options.setdefault("origin", list(info["origin"]))
+    if group is not None:
+        if not isinstance(group, Mapping):
+            raise TypeError(f"group: found {type(group).__name__}, expected a dict of paths by name")
+        options["group"] = [(name, path) for name, source in group.items()
+                            for path in listed(source, f"group: {name}")]
+    return options
+
+
+def _index_files(paths: List[str], output: str, options: Stats, watcher: Watcher,
+                 pass_: Optional[str], shard: Any, shards: Optional[int], remove_shards: bool,
+                 dry_run: bool) -> Stats:
+    if pass_ is None:
+        if shard is not None or shards is not None or remove_shards:
+            raise ValueError("shard, shards and remove_shards are of one pass of an index in shards, "
+                             "expected pass_")
+        return (_surfeit.forecast_index if dry_run else _surfeit.index_files)(
+            paths, output, options, watcher)
+    if pass_ not in ("count", "distribute", "build", "merge"):
+        raise ValueError(f"pass_: found {pass_!r}, expected count, distribute, build or merge")
+    if dry_run:
+        raise ValueError("dry_run estimates a whole index, expected no pass_")
+    if pass_ == "merge":
+        if shard is not None or not shards:
+            raise ValueError('pass_="merge" writes the scene from all shards, expected their number '
+                             "(shards) and no shard")
+        return _surfeit.merge_index(paths, output, shards, remove_shards, options, watcher)
+    if shard is None or shards is not None or remove_shards:
+        raise ValueError(f'pass_="{pass_}" is of one shard, expected shard alone')
+    return _surfeit.index_shards(paths, output, pass_, shard_of(shard), options, watcher)
 
 
 def _index_arrays(arrays: Mapping[str, Any], output: str, options: Stats,
@@ -82,53 +130,27 @@ def _index_chunks(chunks: Any, output: str, options: Stats,
         return _surfeit.index_files([cloud], output, options, watcher)
 
 
-def gather(scene: Union[PathLike, Scene], receivers: PathLike, output: PathLike, *,
-           progress: ProgressLike = None, **settings: "Unpack[GatherJobSettings]") -> Stats:
-    """Gathers at every record of the cloud `receivers` and writes it with the outputs to `output`.
-
-    For clouds of any size: receivers and results lie in files. For receivers in arrays see
-    Engine.open and Scene.gather. Settings: surfeit.settings.GatherJobSettings.
-    """
-    with _watch(progress, settings) as watcher:
-        return _surfeit.gather(_scene_path(scene), path_of(receivers), path_of(output),
-                               options_of(settings), watcher)
-
-
-def tune(scene: Union[PathLike, Scene], receivers: PathLike, *, sample_receivers: int = 500_000,
-         check: bool = False, progress: ProgressLike = None,
-         **settings: "Unpack[GatherJobSettings]") -> Stats:
-    """Predicts cache misses and time of a gather for budgets of any size, from a sample.
-
-    Returns a dict with "rows" and a denser "curve" of budgets, each with "memory_bytes",
-    "cache_bytes" and "predicted": hit rates, bytes read and seconds; and "recommended", the
-    smallest budget whose time is within 5 % of the time with the whole scene in memory.
-    check: runs the gather in every budget; rows then have "measured".
-    """
-    options = options_of(settings, sample_receivers=sample_receivers, check=check)
-    with _watch(progress, settings) as watcher:
-        return _surfeit.tune(_scene_path(scene), path_of(receivers), options, watcher)
-
-
 def convert(inputs: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
-            every: Optional[int] = None, spacing: Optional[float] = None, transform: Any = None,
+            every: Optional[int] = None, spacing: Optional[float] = None,
+            units: Optional[str] = None, transform: Any = None,
             up: "Optional[Up]" = None, crop: Any = None, keep: Optional[Sequence[str]] = None,
             drop: Optional[Sequence[str]] = None,
             assignments: Optional[Sequence[str]] = None, like: Optional[PathLike] = None,
             memory: Memory = None, temporary_directory: Optional[PathLike] = None,
             strict: bool = False, progress: ProgressLike = None,
-            **settings: "Unpack[ReadSettings]") -> Stats:
+            **settings: "Unpack[ConvertSettings]") -> Stats:
     """Writes the records of all inputs to one cloud; its name tells the format.
 
     every: takes every n-th record. spacing: keeps one record per cell of a grid of this edge.
-    transform: affine (3, 4) or (4, 4) matrix. up: turns this axis up. crop: corners ((x, y, z),
+    units: scales from one unit to another, "ft:m"; transform: affine (3, 4) or (4, 4) matrix. up: turns this axis up. crop: corners ((x, y, z),
     (x, y, z)) of a box in the output. keep, drop: channels. assignments: channel arithmetic, such as
     "radiosity *= 0.5 where group == 3". like: a file of the output's format
-    with the data that is not in rows.
+    with the data that is not in rows. camera, camera_file, pixels, ...: thins for cameras
+    (surfeit.settings.CameraSettings).
     """
-    paths = paths_of(inputs)
-    if paths is None:
-        raise TypeError(f"inputs: found {type(inputs).__name__}, expected a path or several")
-    options = options_of(settings, every=every, spacing=spacing, transform=transform, up=up,
+    paths = listed(inputs, "inputs")
+    options = options_of(with_cameras(settings), every=every, spacing=spacing,
+                         transform=scaled(transform, units), up=up,
                          crop=crop, keep=keep, drop=drop, assignments=assignments, like=like,
                          memory=memory,
                          temporary_directory=temporary_directory)
@@ -138,30 +160,44 @@ def convert(inputs: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
 
 def normals(cloud: PathLike, output: PathLike, *, sizes: bool = False, up: "Optional[Up]" = None,
             progress: ProgressLike = None,
-            **settings: "Unpack[_NormalsSettings]") -> Stats:
+            **settings: "Unpack[NormalsSettings]") -> Stats:
     """Writes the cloud with normals from the neighbours of every point.
 
     toward: "up" (default), "outward", "consistent", "sensor" with sensor=(x, y, z), "trajectory"
     with trajectory=path. thin: "spheres" or "two-sided", for points on no surface. sizes: writes
     radius and area, too.
     """
-    with _watch(progress, settings) as watcher:
+    with watch(progress, settings) as watcher:
         return _surfeit.normals(path_of(cloud), path_of(output),
                                 options_of(settings, sizes=sizes, up=up), watcher)
 
 
 def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
-           surfels_per_receiver: Optional[int] = None, groups: Any = None,
-           progress: ProgressLike = None, **settings: "Unpack[_BounceSettings]") -> Stats:
+           surfels_per_receiver: Optional[int] = None, spare_last: bool = False, groups: Any = None,
+           group_gain: Any = None, group_saturation: Any = None, group_tint: Any = None,
+           progress: ProgressLike = None, **settings: "Unpack[BounceSettings]") -> Stats:
     """Writes the scene with the radiosity after 1 to 100 bounces of light.
 
     surfels_per_receiver: all bounces but the last are gathered at one surfel of so many, 1 to 64,
-    and interpolated.
+    and interpolated; spare_last: the last one, too.
+    groups: object groups that send light and cover, by number or name: "0,2-5", ["lamp", "tree"].
+    group_gain, group_saturation, group_tint: of the light that surfels of object groups reflect, by
+    number or name: {"walls": .5, "2,5-7": 2}, and for the tint {"curtain": (1, .9, .8)}.
+    bounce_gain, bounce_filter, ...: surfeit.settings.LookSettings.
     """
+    if spare_last and surfels_per_receiver is None:
+        raise ValueError("spare_last: found without surfels_per_receiver, by which the last bounce is "
+                         "spared")
+    path = scene_path(scene)
     options = options_of(settings, bounces=bounces, surfels_per_receiver=surfels_per_receiver,
-                         groups=groups)
-    with _watch(progress, settings) as watcher:
-        return _surfeit.bounce(_scene_path(scene), path_of(output), options, watcher)
+                         spare_last=spare_last, groups=groups)
+    options = with_numbers(options, lambda: names_of_scene(path))
+    corrections = group_corrections(path, group_gain=group_gain, group_saturation=group_saturation,
+                                    group_tint=group_tint)
+    if corrections is not None:
+        options["group_corrections"] = corrections
+    with watch(progress, settings) as watcher:
+        return _surfeit.bounce(path, path_of(output), options, watcher)
 
 
 def lookup(map: PathLike, receivers: PathLike, output: PathLike, *,
@@ -171,7 +207,7 @@ def lookup(map: PathLike, receivers: PathLike, output: PathLike, *,
     Only values count whose surface faces as the receiver does. Returns counts, among them
     "missing_receivers", which found none. Settings: surfeit.settings.LookupSettings.
     """
-    with _watch(progress, settings) as watcher:
+    with watch(progress, settings) as watcher:
         return _surfeit.lookup(path_of(map), path_of(receivers), path_of(output),
                                options_of(settings), watcher)
 
@@ -184,42 +220,15 @@ def verify(scene: Union[PathLike, Scene], *, memory: Memory = None, threads: Opt
     "bytes_checked". A sound scene has no findings.
     """
     with Watcher(progress) as watcher:
-        return _surfeit.verify(_scene_path(scene), options_of({}, memory=memory, threads=threads),
+        return _surfeit.verify(scene_path(scene), options_of({}, memory=memory, threads=threads),
                                watcher)
 
 
 def info(path: Union[PathLike, Scene], *, progress: ProgressLike = None,
          **settings: "Unpack[ReadSettings]") -> Stats:
-    """Contents and density of a scene or a cloud; "kind" is "scene" or "cloud"."""
-    with Watcher(progress) as watcher:
-        return _surfeit.info(_scene_path(path), options_of(settings), watcher)
+    """Contents and density of a scene or a cloud; "kind" is "scene" or "cloud".
 
-
-def cube(scene: Union[PathLike, Scene], at: Sequence[float], normal: Optional[Sequence[float]] = None,
-         view: Optional[Sequence[float]] = None, *, progress: ProgressLike = None,
-         **settings: "Unpack[GatherJobSettings]") -> Dict[str, Any]:
-    """The raster cube of one receiver: what it sees, pixel by pixel.
-
-    at: position; normal: default: the whole sphere; view: with glossy.
-
-    Returns arrays (faces, n, n): "coverage" and "pixel_occlusion" (0 to 1), "depth" (inf: open),
-    "solid_angle" (steradians), "weight", "layers", "filled", "kind" (surfeit.CUBE_KINDS); arrays
-    (faces, n, n, 3): "direction", "light", "pixel_environment"; "faces": forward, u and v of each
-    of the six (one for a narrow cone); and the results "occlusion", "irradiance", "environment".
+    A scene has "group_names", the names of its object groups by number.
     """
-    def numbers(vector: Any) -> Tuple[float, ...]:
-        return tuple(float(value) for value in (vector if vector is not None else (0, 0, 0)))
-
-    with _watch(progress, settings) as watcher:
-        return _surfeit.cube(_scene_path(scene), numbers(at), numbers(normal), numbers(view),
-                             options_of(settings), watcher)
-
-
-if TYPE_CHECKING:
-
-    class _NormalsSettings(NormalSettings, ReadSettings, JobSettings, total=False):
-        pass
-
-    class _BounceSettings(QualitySettings, JobSettings, total=False):
-        cache_split: float
-        direct_io: bool
+    with Watcher(progress) as watcher:
+        return _surfeit.info(scene_path(path), options_of(settings), watcher)

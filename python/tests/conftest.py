@@ -92,3 +92,34 @@ def run_program():
         subprocess.run(command, check=True, capture_output=True, text=True)
 
     return run
+
+
+_ROOM = {  # corners of each wall, by material
+    "white": ["0 0 1  1 0 1  1 0 0  0 0 0", "0 1 0  1 1 0  1 1 1  0 1 1", "0 0 0  1 0 0  1 1 0  0 1 0"],
+    "red": ["0 0 1  0 0 0  0 1 0  0 1 1"],
+    "green": ["1 0 0  1 0 1  1 1 1  1 1 0"],
+    "light": [".35 .98 .35  .65 .98 .35  .65 .98 .65  .35 .98 .65"],
+}
+_MATERIALS = """newmtl white\nKd .7 .7 .7\nnewmtl red\nKd .6 .1 .1\nnewmtl green\nKd .1 .5 .1
+newmtl light\nKd .5 .5 .5\nKe 17 15 12\n"""
+
+
+@pytest.fixture(scope="session")
+def room(tmp_path_factory, run_program):
+    """room.obj; room.ply, 3,000 surfels with its materials as groups; room.sft. By the program."""
+    directory = tmp_path_factory.mktemp("room")
+    lines = ["mtllib room.mtl"]
+    count = 0
+    for material, walls in _ROOM.items():
+        lines.append(f"usemtl {material}")
+        for wall in walls:
+            numbers = wall.split()
+            lines += ["v " + " ".join(numbers[i : i + 3]) for i in range(0, 12, 3)]
+            lines.append("f " + " ".join(str(count + i) for i in range(1, 5)))
+            count += 4
+    (directory / "room.obj").write_text("\n".join(lines) + "\n")
+    (directory / "room.mtl").write_text(_MATERIALS)
+    run_program("sample", directory / "room.obj", "-o", directory / "room.ply", "--count", 3000,
+                "--light-samples", 2, "--group-by", "material")
+    run_program("index", directory / "room.ply", "-o", directory / "room.sft")
+    return directory

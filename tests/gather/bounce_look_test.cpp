@@ -14,8 +14,10 @@
 
 #include "gather/test_clouds.h"
 #include "octree/indexed_surfels.h"
+#include "surfeit/apply_look.h"
 #include "surfeit/bake.h"
 #include "surfeit/bounce.h"
+#include "surfeit/scene.h"
 
 namespace surfeit {
 namespace {
@@ -267,6 +269,23 @@ TEST_F(BounceLookTest, AGatherHasTheLookAtItsReceivers) {
       EXPECT_NEAR(light(found, i)[c], expected[c], 2e-3 * std::abs(expected[c]) + 1e-5) << i;
     }
   }
+
+  // And a program gives it to what it has gathered itself, with the same bits
+  std::vector<Receiver> places;
+  std::vector<glm::vec3> applied;
+  for (std::size_t i = 0; i < plain.rows.size(); ++i) {
+    const std::vector<double>& row = plain.rows[i];
+    places.push_back({{row[0], row[1], row[2]}, glm::vec3(row[3], row[4], row[5])});
+    applied.push_back(glm::vec3(light(plain, i)));
+  }
+  const glm::dvec3 origin = readSceneInfo(scene)->origin;
+  ASSERT_TRUE(applyLook(options.look, origin, places.data(), places.size(), applied.data()).ok());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    EXPECT_EQ(applied[i], glm::vec3(light(found, i))) << i;
+  }
+  options.look.filters[0].outer_radius = .1f;
+  EXPECT_EQ(applyLook(options.look, origin, nullptr, 0, nullptr).code(),
+            StatusCode::kInvalidArgument);
 }
 
 TEST_F(BounceLookTest, ValuesOutOfRangeAreNamed) {
