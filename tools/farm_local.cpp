@@ -23,10 +23,10 @@ fi
 
 if [[ ${1:-} == task ]]; then
   # What would end the same way is not tried again, though parallel asks for it
-  stop=$farm/task-$2.stop
+  stop=$farm/$2-$3.stop
   if [[ -e $stop ]]; then exit "$(< "$stop")"; fi
   status=0
-  runTask "$2" 1 || status=$?
+  runTask "$2" "$3" 1 || status=$?
   case $status in 0 | 33 | 74 | 137 | 143) ;; *) echo "$status" > "$stop" ;; esac
   exit "$status"
 fi
@@ -36,12 +36,15 @@ free=$(awk '/^MemAvailable:/ { print int($2 / 1024) }' /proc/meminfo)
 most=$((free / memory < $(nproc) / threads ? free / memory : $(nproc) / threads))
 jobs=${JOBS:-$((most > 0 ? most : 1))}
 mkdir -p "$farm" || exit
-rm -f "$farm"/task-*.stop
+rm -f "$farm"/*.stop
 
-# The second round is for shards that are gone although their tasks were done
-for _ in 1 2; do
-  seq "$tasks" | parallel --quote --joblog "$farm/joblog-$shards" --resume-failed --retries 3 \
-    --jobs "$jobs" --workdir "$PWD" bash "$script" task {}
+# Further rounds are for shards that are gone although their tasks were done, and for what waited for
+# them
+for _ in 1 2 3; do
+  for pass in "${passes[@]}"; do
+    seq "$tasks" | parallel --quote --joblog "$farm/joblog-$pass-$shards" --resume-failed \
+      --retries 3 --jobs "$jobs" --workdir "$PWD" bash "$script" task "$pass" {}
+  done
   status=0
   for index in "${!frames[@]}"; do
     merged=0
@@ -49,22 +52,49 @@ for _ in 1 2; do
     if ((merged != 0 && status != 75)); then status=$merged; fi
   done
   if ((status != 75)); then break; fi
-  rm -f "$farm/joblog-$shards"
+  rm -f "$farm"/joblog-*-"$shards"
+  for stop in "$farm"/*.stop; do
+    if [[ -e $stop && $(< "$stop") == 75 ]]; then rm -f "$stop"; fi
+  done
 done
 exit "$status"
 )script";
 
 constexpr std::string_view kMakeHow = R"(#
 # make -k -j JOBS -f FILE runs JOBS tasks at a time and merges the frames that are complete; run again,
-# it goes on with what has failed. `make -f FILE task-3` is one task.
-)";
+# it goes on with what has failed. )";
 
 constexpr std::string_view kMakeScript = R"script(
 case $1 in
-  task) runTask "$2" 3 ;;
   merge) merge "$2" "$memory" ;;
+  *) runTask "$1" "$2" 3 ;;
 esac
 )script";
+
+// Targets of the tasks of a frame, from 0 on, in a pass.
+std::string frameTasks(const FarmPlan& plan, const std::string& pass, std::size_t frame) {
+  return fmt::format("$(addprefix {}-,$(shell seq {} {}))", pass,
+                     frame * std::size_t(plan.shards) + 1, (frame + 1) * std::size_t(plan.shards));
+}
+
+// The tasks of a frame wait for those of the pass before, and the merge for all.
+std::string frameRules(const FarmPlan& plan, std::size_t frame) {
+  const std::string suffix = plan.frames.empty() ? "" : fmt::format("-{}", plan.frames[frame]);
+  std::string text, before;
+  for (const std::string& pass : plan.passes()) {
+    const std::string tasks = frameTasks(plan, pass, frame);
+    if (!before.empty()) {
+      text += fmt::format(".PHONY: {0}\n{0}: {1}\n", "all-" + before + suffix,
+                          frameTasks(plan, before, frame));
+      text += fmt::format("{}: {}\n", tasks, "all-" + before + suffix);
+    }
+    before = pass;
+  }
+  return text + fmt::format(
+                    "all: {0}\n.PHONY: {0}\n{0}: {1}\n"
+                    "\t@bash -c \"$$surfeit_plan\" surfeit-plan merge {2}\n",
+                    "merge" + suffix, frameTasks(plan, before, frame), frame);
+}
 
 }  // namespace
 
@@ -80,21 +110,19 @@ std::string makefileOf(const FarmPlan& plan) {
     script += c;
     if (c == '$') script += '$';
   }
-  std::string merges;
-  for (std::size_t i = 0; i < plan.frameCount(); ++i) {
-    const std::string name =
-        plan.frames.empty() ? "merge" : fmt::format("merge-{}", plan.frames[i]);
-    merges += fmt::format(
-        "all: {0}\n.PHONY: {0}\n{0}: $(addprefix task-,$(shell seq {1} {2}))\n"
-        "\t@bash -c \"$$surfeit_plan\" surfeit-plan merge {3}\n",
-        name, i * std::size_t(plan.shards) + 1, (i + 1) * std::size_t(plan.shards), i);
+  std::string tasks, frames;
+  for (const std::string& pass : plan.passes()) {
+    tasks += fmt::format(
+        "{0}_tasks := $(addprefix {0}-,$(shell seq {1}))\n"
+        ".PHONY: $({0}_tasks)\n$({0}_tasks): {0}-%:\n"
+        "\t@bash -c \"$$surfeit_plan\" surfeit-plan {0} $*\n\n",
+        pass, plan.taskCount());
   }
-  return planComment(plan) + std::string(kMakeHow) + "define surfeit_plan\n" + script +
-         "endef\nexport surfeit_plan\n\n.PHONY: all\nall:\n\n" +
-         fmt::format("tasks := $(addprefix task-,$(shell seq {}))\n", plan.taskCount()) +
-         ".PHONY: $(tasks)\n$(tasks): task-%:\n"
-         "\t@bash -c \"$$surfeit_plan\" surfeit-plan task $*\n\n" +
-         merges;
+  for (std::size_t i = 0; i < plan.frameCount(); ++i) frames += frameRules(plan, i);
+  return planComment(plan) + std::string(kMakeHow) +
+         fmt::format("`make -f FILE {}-3` is one task.\n", plan.passes().front()) +
+         "define surfeit_plan\n" + script + "endef\nexport surfeit_plan\n\n.PHONY: all\nall:\n\n" +
+         tasks + frames;
 }
 
 }  // namespace surfeit

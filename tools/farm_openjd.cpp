@@ -29,7 +29,8 @@ std::string indented(const std::string& lines) {
 std::string jobName(const FarmPlan& plan) {
   const std::string file = std::filesystem::path(plan.result).filename().string();
   const bool fits = file.size() <= 100 && file.find("{{") == file.npos;
-  return fits ? "surfeit gather " + file : "surfeit gather";
+  const std::string command = plan.is_index ? "surfeit index" : "surfeit gather";
+  return fits ? command + " " + file : command;
 }
 
 std::string hostOf(const FarmPlan& plan) {
@@ -62,7 +63,7 @@ std::string spaceOf(const FarmPlan& plan, bool has_shards) {
   return text.empty() ? text : "    parameterSpace:\n      taskParameterDefinitions:\n" + text;
 }
 
-std::string scriptOf(const FarmPlan& plan, const std::string& args, const std::string& script) {
+std::string scriptOf(std::uint64_t minutes, const std::string& args, const std::string& script) {
   std::string text =
       "    script:\n"
       "      actions:\n"
@@ -70,7 +71,7 @@ std::string scriptOf(const FarmPlan& plan, const std::string& args, const std::s
       "          command: bash\n"
       "          args: [\"{{Task.File.Run}}\", \"{{Param.Directory}}\"" +
       args + "]\n";
-  if (plan.minutes > 0) text += fmt::format("          timeout: {}\n", 60 * plan.minutes);
+  if (minutes > 0) text += fmt::format("          timeout: {}\n", 60 * minutes);
   return text +
          "          cancelation:\n"
          "            mode: NOTIFY_THEN_TERMINATE\n"
@@ -82,13 +83,43 @@ std::string scriptOf(const FarmPlan& plan, const std::string& args, const std::s
          indented(script);
 }
 
-}  // namespace
+// "Gather"
+std::string stepName(std::string pass) {
+  pass[0] = static_cast<char>(pass[0] - 'a' + 'A');
+  return pass;
+}
 
-std::string openJdTemplate(const FarmPlan& plan) {
+// A step for each pass, behind the one before, and the merge.
+std::string stepsOf(const FarmPlan& plan) {
   const std::string head = planFunctions(plan);
   const std::string frame = plan.frames.empty() ? "" : ", \"{{Task.Param.Frame}}\"";
   const std::string frame_index = plan.frames.empty() ? "0" : "$(($2 - 1))";
   const std::string shard = plan.frames.empty() ? "$2" : "$3";
+  std::string text, before;
+  const auto begin = [&](const std::string& name) {
+    text += "  - name: " + name + "\n";
+    if (!before.empty()) text += "    dependencies:\n      - dependsOn: " + before + "\n";
+    before = name;
+    text += hostOf(plan);
+  };
+  for (const std::string& pass : plan.passes()) {
+    begin(stepName(pass));
+    text += spaceOf(plan, true) +
+            scriptOf(plan.minutes, frame + ", \"{{Task.Param.Shard}}\"",
+                     head + std::string(runTaskFunction()) + "\ncd \"$1\" || exit\n" +
+                         fmt::format("runTask {} \"$(({} * shards + {}))\" 3\n", pass, frame_index,
+                                     shard));
+  }
+  begin("Merge");
+  return text + spaceOf(plan, false) +
+         scriptOf(plan.merge_minutes, frame,
+                  head + "\ncd \"$1\" || exit\n" +
+                      fmt::format("merge \"{}\" \"$memory\"\n", frame_index));
+}
+
+}  // namespace
+
+std::string openJdTemplate(const FarmPlan& plan) {
   return planComment(plan) +
          "#\n"
          "# The parameter Directory is where names of files begin. A task tries again by itself;\n"
@@ -103,19 +134,8 @@ std::string openJdTemplate(const FarmPlan& plan) {
          "    objectType: DIRECTORY\n"
          "    dataFlow: INOUT\n"
          "    default: .\n"
-         "steps:\n"
-         "  - name: Gather\n" +
-         hostOf(plan) + spaceOf(plan, true) +
-         scriptOf(plan, frame + ", \"{{Task.Param.Shard}}\"",
-                  head + std::string(runTaskFunction()) + "\ncd \"$1\" || exit\n" +
-                      fmt::format("runTask \"$(({} * shards + {}))\" 3\n", frame_index, shard)) +
-         "  - name: Merge\n"
-         "    dependencies:\n"
-         "      - dependsOn: Gather\n" +
-         hostOf(plan) + spaceOf(plan, false) +
-         scriptOf(plan, frame,
-                  head + "\ncd \"$1\" || exit\n" +
-                      fmt::format("merge \"{}\" \"$memory\"\n", frame_index));
+         "steps:\n" +
+         stepsOf(plan);
 }
 
 }  // namespace surfeit

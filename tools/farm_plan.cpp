@@ -8,12 +8,12 @@
 namespace surfeit {
 namespace {
 
-constexpr std::string_view kFunctions = R"(
-# gather TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
-gather() {
-  local frame=${frames[($1 - 1) / shards]}
+constexpr std::string_view kGatherFunctions = R"(
+# task PASS TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
+task() {
+  local frame=${frames[($2 - 1) / shards]}
   "$surfeit" gather "$scene" "$receivers" -o "$result" ${options[@]+"${options[@]}"} \
-    --threads="$threads" --memory="$2M" --shard="$((($1 - 1) % shards + 1))/$shards" \
+    --threads="$threads" --memory="$3M" --shard="$((($2 - 1) % shards + 1))/$shards" \
     ${frame:+"--frames=$frame"}
 }
 
@@ -25,14 +25,33 @@ merge() {
 }
 )";
 
+constexpr std::string_view kIndexFunctions = R"(
+# task PASS TASK MEMORY: one shard of a pass. Tasks count the shards of the first frame, then of the
+# second.
+task() {
+  local frame=${frames[($2 - 1) / shards]}
+  "$surfeit" index ${clouds[@]+"${clouds[@]}"} -o "$result" ${options[@]+"${options[@]}"} \
+    --threads="$threads" --memory="$3M" --pass="$1" --shard="$((($2 - 1) % shards + 1))/$shards" \
+    ${frame:+"--frames=$frame"}
+}
+
+# merge INDEX MEMORY: the shards of the frame at that place of `frames`.
+merge() {
+  local frame=${frames[$1]}
+  "$surfeit" index ${clouds[@]+"${clouds[@]}"} -o "$result" ${options[@]+"${options[@]}"} \
+    --threads="$threads" --memory="$2M" --pass=merge --shards="$shards" ${remove:+--remove-shards} \
+    ${frame:+"--frames=$frame"}
+}
+)";
+
 constexpr std::string_view kRunTask = R"(
-# runTask TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
+# runTask PASS TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
 runTask() {
   local memory=$memory most status tries=0
   most=$(awk '/^MemTotal:/ { print int($2 / 1024) }' /proc/meminfo)
   while :; do
     status=0
-    gather "$1" "$memory" || status=$?
+    task "$1" "$2" "$memory" || status=$?
     case $status in
       33)
         ((2 * memory <= most)) || return 33
@@ -40,12 +59,12 @@ runTask() {
         ;;
       74 | 137 | 143)
         tries=$((tries + 1))
-        ((tries < $2)) || return "$status"
+        ((tries < $3)) || return "$status"
         sleep "${PAUSE:-5}"
         ;;
       *) return "$status" ;;
     esac
-    echo "task $1: exit status $status, again with $memory MiB" >&2
+    echo "$1 $2: exit status $status, again with $memory MiB" >&2
   done
 }
 )";
@@ -73,37 +92,48 @@ std::string planComment(const FarmPlan& plan) {
   const std::string frames =
       plan.frames.empty() ? "" : fmt::format(" for each of {} frames", plan.frames.size());
   return fmt::format(
-      "# A gather in {} shards{}: {} tasks of {} MiB and {} threads (surfeit {}, docs/farm.md).\n"
+      "# {} in {} shards{}: {}{} tasks of {} MiB and {} threads (surfeit {}, docs/farm.md).\n"
       "# Exit statuses of a task: 0 done, also where its shard was finished before; 33 too little\n"
       "# memory: again with twice as much; 74, 137 and 143 (files, killed, told to stop): again; "
       "any\n"
-      "# other, such as 2 and 3 (command line, data): not again, it would end the same way.\n",
-      plan.shards, frames, plan.taskCount(), plan.memory_mib, plan.threads, kVersion);
+      "# other, such as 2 and 3 (command line, data): not again, it would end the same way.\n{}",
+      plan.is_index ? "An index" : "A gather", plan.shards, frames,
+      plan.is_index ? "3 passes of " : "", plan.taskCount(), plan.memory_mib, plan.threads,
+      kVersion, plan.is_index ? "# 75: the pass before is not complete; again behind it.\n" : "");
 }
 
 std::string planFunctions(const FarmPlan& plan) {
-  std::string options, frames;
-  for (const std::string& option : plan.options) {
-    options += (options.empty() ? "" : " ") + shellWord(option);
-  }
+  const auto joined = [](const std::vector<std::string>& words) {
+    std::string text;
+    for (const std::string& word : words) text += (text.empty() ? "" : " ") + shellWord(word);
+    return text;
+  };
+  std::string frames;
   for (const int frame : plan.frames)
     frames += fmt::format("{}{}", frames.empty() ? "" : " ", frame);
+  const std::string inputs =
+      plan.is_index ? fmt::format("clouds=({})\n", joined(plan.inputs))
+                    : fmt::format("scene={}\nreceivers={}\n", shellWord(plan.inputs[0]),
+                                  shellWord(plan.inputs[1]));
   return fmt::format(
              "set -u\n"
              "surfeit=${{SURFEIT:-surfeit}}\n"
-             "scene={}\n"
-             "receivers={}\n"
+             "{}"
              "result={}\n"
              "options=({})\n"
              "threads={}\n"
              "memory={} # MiB\n"
              "shards={}\n"
              "frames=({})\n"
-             "tasks={}\n",
-             shellWord(plan.scene), shellWord(plan.receivers), shellWord(plan.result), options,
-             plan.threads, plan.memory_mib, plan.shards, plan.frames.empty() ? "''" : frames,
-             plan.taskCount()) +
-         std::string(kFunctions);
+             "tasks={} # of each pass\n"
+             "passes=({})\n{}",
+             inputs, shellWord(plan.result), joined(plan.options), plan.threads, plan.memory_mib,
+             plan.shards, plan.frames.empty() ? "''" : frames, plan.taskCount(),
+             joined(plan.passes()),
+             !plan.is_index        ? ""
+             : plan.removes_shards ? "remove=yes\n"
+                                   : "remove=\n") +
+         std::string(plan.is_index ? kIndexFunctions : kGatherFunctions);
 }
 
 std::string_view runTaskFunction() { return kRunTask; }

@@ -1,7 +1,8 @@
-// The jobs that `surfeit plan` prints: a gather in shards, for the schedulers of farms.
+// The jobs that `surfeit plan` prints: a gather or an index in shards, for the schedulers of farms.
 //
-// A task is one shard of one frame; all tasks are one flat array. Every script has the same rules
-// for the exit status of a task: 33 again with twice the memory; 74, 137 and 143 again; others not.
+// A task is one shard of one frame in one pass; the tasks of a pass are one flat array. A gather is
+// one pass, an index three, each behind the one before. Every script has the same rules for the
+// exit status of a task: 33 again with twice the memory; 74, 137 and 143 again; others not.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +13,25 @@
 namespace surfeit {
 
 struct FarmPlan {
-  std::string scene, receivers, result;  // as given, patterns of frames included
-  std::vector<std::string> options;      // of the gather, "--name=value"
-  std::vector<int> frames;               // empty: no sequence
+  bool is_index = false;
+  // As given, patterns of frames included
+  std::vector<std::string> inputs;  // scene and receivers of a gather, clouds of an index
+  std::string result;
+  std::vector<std::string> options;  // of the command, "--name=value"
+  bool removes_shards = false;       // when an index is complete
+  std::vector<int> frames;           // empty: no sequence
   int shards = 1;
   std::uint64_t memory_mib = 0;  // of a task, at first
   int threads = 1;
-  std::uint64_t minutes = 0;  // limit of a task; 0: none
+  std::uint64_t minutes = 0, merge_minutes = 0;  // limits of a task and of the merge; 0: none
 
   std::size_t frameCount() const { return frames.empty() ? 1 : frames.size(); }
+  // Of each pass.
   std::size_t taskCount() const { return frameCount() * std::size_t(shards); }
+  std::vector<std::string> passes() const {
+    if (is_index) return {"count", "distribute", "build"};
+    return {"gather"};
+  }
 };
 
 // A bash script: `bash FILE` submits an array, and a job behind it that merges, and submits again
@@ -38,7 +48,7 @@ std::string openJdTemplate(const FarmPlan& plan);
 std::string shellWord(std::string_view text);
 // Lines of comment: what the job is, and the rules.
 std::string planComment(const FarmPlan& plan);
-// Variables of the job, and the functions `gather` and `merge`.
+// Variables of the job, and the functions `task` and `merge`.
 std::string planFunctions(const FarmPlan& plan);
 // The function `runTask`, for schedulers that leave trying again to the task.
 std::string_view runTaskFunction();

@@ -8,9 +8,9 @@ namespace surfeit {
 namespace {
 
 constexpr std::string_view kHow = R"(#
-# bash FILE submits the tasks as a job array, and behind it a job that merges. That job submits what
-# is missing again, with a merge behind it, up to ROUNDS times. It begins after the tasks by
-# `afterany`: `afterok` would cancel it for a task that succeeds when it is tried again. Tasks are not
+# bash FILE submits the tasks as a job array for each pass, and behind them a job that merges. That job
+# submits what is missing again, with a merge behind it, up to ROUNDS times. Jobs wait for others by
+# `afterany`: `afterok` would cancel them for a task that succeeds when it is tried again. Tasks are not
 # requeued (RequeueExit, scontrol requeue): a requeued task waits until its credential expires, two
 # minutes by default, keeps its memory, and a running job cannot be given more.
 #
@@ -19,7 +19,7 @@ constexpr std::string_view kHow = R"(#
 # appears when all is over, with the exit status.
 )";
 
-constexpr std::string_view kScript = R"script(
+constexpr std::string_view kSubmit = R"script(
 farm=$result.farm
 rounds=${ROUNDS:-6}
 script=${BASH_SOURCE[0]:-}
@@ -27,71 +27,124 @@ script=${BASH_SOURCE[0]:-}
 # submit OPTION...: submits this script, and says the number of the job.
 submit() {
   local job
-  job=$(sbatch --parsable --no-requeue --time="$minutes" --cpus-per-task="$threads" \
-    --output=/dev/null "$@") || return
+  job=$(sbatch --parsable --no-requeue --cpus-per-task="$threads" --output=/dev/null "$@") || return
   echo "${job%%;*}"
 }
 
-# submitTasks MEMORY TASK...: adds the jobs to `jobs`.
+# submitTasks PASS MEMORY TASK...: behind the jobs `before`; adds the jobs to `jobs`.
 submitTasks() {
-  local memory=$1 task most offset job
+  local pass=$1 memory=$2 task most offset job
   local -A lists=()
-  shift
+  shift 2
   # The numbers of an array are below MaxArraySize, so many tasks are several arrays
   most=$(scontrol show config | sed -n -E 's/^MaxArraySize *= *([0-9]+).*/\1/p')
   most=$((${most:-1001} - 1))
   for task in "$@"; do
     # Killed, until it says otherwise
-    echo "137 $memory" > "$farm/task-$task.status"
+    echo "137 $memory" > "$farm/$pass-$task.status"
     offset=$(((task - 1) / most * most))
     lists[$offset]+=,$((task - offset))
   done
   for offset in "${!lists[@]}"; do
     # Beside its budget, a task has the shell that runs it
-    job=$(submit --job-name=surfeit-gather --array="${lists[$offset]#,}" \
-      --mem="$((memory + 64))M" "$script" task "$memory" "$offset") || return
+    job=$(submit --job-name="surfeit-$pass" --array="${lists[$offset]#,}" --time="$minutes" \
+      --mem="$((memory + 64))M" ${before:+"--dependency=afterany$before"} \
+      "$script" task "$pass" "$memory" "$offset") || return
     jobs+=:$job
   done
 }
 
-# submitMerge ROUND MEMORY: behind `jobs`.
+# submitMerge ROUND MEMORY: behind the jobs `before`.
 submitMerge() {
-  submit --job-name=surfeit-merge ${jobs:+"--dependency=afterany$jobs"} --mem="$(($2 + 64))M" \
-    "$script" merge "$1" "$2" > /dev/null
+  submit --job-name=surfeit-merge ${before:+"--dependency=afterany$before"} \
+    --time="$merge_minutes" --mem="$(($2 + 64))M" "$script" merge "$1" "$2" > /dev/null
 }
 
+# submitAll: every task of every pass.
+submitAll() {
+  local pass
+  before=
+  for pass in "${passes[@]}"; do
+    jobs=
+    # shellcheck disable=SC2046
+    submitTasks "$pass" "$memory" $(seq "$tasks") || return
+    before=$jobs
+  done
+  submitMerge 1 "$memory"
+}
+)script";
+
+constexpr std::string_view kMerge = R"script(
 # end STATUS
 end() {
   echo "$1" > "$farm/end"
   exit "$1"
 }
 
-shardFile() { printf "%s.shard-%0${#shards}d-of-%d" "${results[$1]}" "$2" "$shards"; }
+# shardFile INDEX PLACE SHARD: of a frame, and of the pass at that place.
+shardFile() {
+  printf "%s.%s-%0${#shards}d-of-%d" "${results[$1]}" "${files[$2]}" "$3" "$shards"
+}
 
-# missingTasks INDEX: adds the tasks of a frame that are to run again to `again`, by their memory. No
-# file missing: one of them is none of this job, and all tasks look.
+# missingTasks INDEX: adds the tasks of a frame that are to run again to `again`, by pass and memory.
+# Where shards are missing although none of their files is (the merge says so, or a task of the next
+# pass, by 75), one of them is none of this job, and all tasks look.
 missingTasks() {
-  local shard task status memory all=1
-  for ((shard = 1; shard <= shards; ++shard)); do
-    [[ -e $(shardFile "$1" "$shard") ]] || all=0
+  local place pass shard task status memory looks=1 fails
+  local -a absent
+  local -A own mine=()
+  for ((place = ${#passes[@]} - 1; place >= 0; --place)); do
+    pass=${passes[place]} absent=() fails=0
+    for ((shard = 1; shard <= shards; ++shard)); do
+      [[ -e $(shardFile "$1" "$place" "$shard") ]] || absent+=("$shard")
+    done
+    # shellcheck disable=SC2207
+    if ((looks && ${#absent[@]} == 0)); then absent=($(seq "$shards")); fi
+    looks=0 own=()
+    for shard in "${absent[@]}"; do
+      task=$(($1 * shards + shard))
+      read -r status memory < "$farm/$pass-$task.status"
+      case $status in
+        0 | 74 | 137 | 143) own["$pass $memory"]+=" $task" ;;
+        75) own["$pass $memory"]+=" $task" looks=1 ;;
+        33) own["$pass $((2 * memory))"]+=" $task" ;;
+        *)
+          echo "$pass $task: exit status $status, not again; see $pass-$task.log"
+          failed=1 fails=1
+          ;;
+      esac
+    done
+    # What comes behind a pass that cannot be complete is not tried
+    if ((fails)); then mine=(); fi
+    for status in "${!own[@]}"; do mine[$status]+=${own[$status]}; done
   done
-  for ((shard = 1; shard <= shards; ++shard)); do
-    if ((!all)) && [[ -e $(shardFile "$1" "$shard") ]]; then continue; fi
-    task=$(($1 * shards + shard))
-    read -r status memory < "$farm/task-$task.status"
-    case $status in
-      0 | 74 | 137 | 143) again[$memory]+=" $task" ;;
-      33) again[$((2 * memory))]+=" $task" ;;
-      *)
-        echo "task $task: exit status $status, not again; see task-$task.log"
-        failed=1
-        ;;
-    esac
+  for status in "${!mine[@]}"; do again[$status]+=${mine[$status]}; done
+}
+
+# submitAgain ROUND MEMORY: the tasks `again`, and the merge behind them.
+submitAgain() {
+  local pass kind memory task name
+  # A job within a job would inherit the memory and the processors of this one
+  for name in "${!SLURM_@}"; do [[ $name == SLURM_CONF ]] || unset "$name"; done
+  before=
+  for pass in "${passes[@]}"; do
+    jobs=
+    for kind in "${!again[@]}"; do
+      [[ $kind == "$pass "* ]] || continue
+      memory=${kind#* }
+      echo "round $1: $pass${again[$kind]} with $memory MiB"
+      # shellcheck disable=SC2086
+      submitTasks "$pass" "$memory" ${again[$kind]} && continue
+      # More memory than any node has, for example
+      for task in ${again[$kind]}; do echo "1 $memory" > "$farm/$pass-$task.status"; done
+    done
+    before=${jobs:-$before}
   done
+  submitMerge "$1" "$2"
 }
 
 mergeAll() {
-  local round=$1 merge_memory=$2 index status memory task waits=0 failed=0 name
+  local round=$1 merge_memory=$2 index status waits=0 failed=0
   local -A again=()
   for index in "${!frames[@]}"; do
     [[ ! -e $farm/merged-$index ]] || continue
@@ -110,17 +163,7 @@ mergeAll() {
     echo "given up after $round rounds"
     end 75
   fi
-  # A job within a job would inherit the memory and the processors of this one
-  for name in "${!SLURM_@}"; do [[ $name == SLURM_CONF ]] || unset "$name"; done
-  jobs=
-  for memory in "${!again[@]}"; do
-    echo "round $((round + 1)): tasks${again[$memory]} with $memory MiB"
-    # shellcheck disable=SC2086
-    submitTasks "$memory" ${again[$memory]} && continue
-    # More memory than any node has, for example
-    for task in ${again[$memory]}; do echo "1 $memory" > "$farm/task-$task.status"; done
-  done
-  submitMerge "$((round + 1))" "$merge_memory" || end 1
+  submitAgain "$((round + 1))" "$merge_memory" || end 1
 }
 
 case ${1:-submit} in
@@ -130,16 +173,14 @@ case ${1:-submit} in
       exit 2
     fi
     mkdir -p "$farm" || exit
-    rm -f "$farm"/task-* "$farm"/merge* "$farm/end"
-    jobs=
-    # shellcheck disable=SC2046
-    submitTasks "$memory" $(seq "$tasks") && submitMerge 1 "$memory"
+    rm -f "$farm"/*.status "$farm"/*.log "$farm"/merged-* "$farm/end"
+    submitAll
     ;;
   task)
-    task=$(($3 + SLURM_ARRAY_TASK_ID))
+    task=$(($4 + SLURM_ARRAY_TASK_ID))
     status=0
-    gather "$task" "$2" >> "$farm/task-$task.log" 2>&1 || status=$?
-    echo "$status $2" > "$farm/task-$task.status"
+    task "$2" "$task" "$3" >> "$farm/$2-$task.log" 2>&1 || status=$?
+    echo "$status $3" > "$farm/$2-$task.status"
     exit "$status"
     ;;
   merge) mergeAll "$2" "$3" >> "$farm/merge.log" 2>&1 ;;
@@ -155,7 +196,9 @@ std::string slurmScript(const FarmPlan& plan) {
     results += (results.empty() ? "" : " ") + shellWord(frameName(plan.result, frame));
   }
   return "#!/bin/bash\n" + planComment(plan) + std::string(kHow) + planFunctions(plan) +
-         fmt::format("\nminutes={}\nresults=({})", plan.minutes, results) + std::string(kScript);
+         fmt::format("\nminutes={}\nmerge_minutes={}\nfiles=({})\nresults=({})", plan.minutes,
+                     plan.merge_minutes, plan.is_index ? "count ranges slabs" : "shard", results) +
+         std::string(kSubmit) + std::string(kMerge);
 }
 
 }  // namespace surfeit

@@ -61,4 +61,24 @@ SURFEIT_API Result<IndexStats> mergeIndexShards(const std::vector<std::string>& 
                                                 const IndexOptions& options, int count,
                                                 bool removes_shards, Progress& progress);
 
+// An estimate of what such a job needs: files, memory and time of its tasks.
+struct IndexShardForecast {
+  std::uint64_t records = 0, sampled_surfels = 0;
+  std::uint64_t input_bytes = 0;
+  std::uint64_t scene_bytes = 0;
+  std::uint64_t shard_bytes = 0;   // of the files of all shards, beside the scene
+  std::uint64_t memory_bytes = 0;  // that serves any task, the merge included
+  double task_seconds = 0;         // the longest pass of a shard
+  double merge_seconds = 0;
+};
+
+// Indexes a sample, as forecastIndex does, and applies the rules of docs/farm.md ("Memory and time
+// of an index") to the result. Opens all inputs, and writes nothing that stays. `memory_bytes` of
+// the options is that of the sample alone. Errors: as indexShards, for what it refuses before it
+// reads; kInvalidArgument, too, for clouds without sizes.
+SURFEIT_API Result<IndexShardForecast> forecastIndexShards(const std::vector<std::string>& inputs,
+                                                           const std::string& output,
+                                                           const IndexOptions& options, int count,
+                                                           Progress& progress);
+
 }  // namespace surfeit

@@ -11,28 +11,31 @@
 #   data-I      it ends with 3, always
 #   removed-I   its shard file is gone when the merge looks for the first time
 #
-# Every call of a task is a line of faults/log: SHARD FRAME MEMORY STATUS.
+# Every call of a task is a line of faults/log: SHARD FRAME MEMORY STATUS. A shard of a pass of an
+# index has the name PASS-I, as count-3.
 
 # The program of the tests' jobs, as SURFEIT of their environment.
 makeFarmSurfeit() {
   mkdir -p faults
   printf '#!/bin/bash\nprogram=%q\nfaults=%q\n' "$surfeit" "$PWD/faults" > farm_surfeit
   cat >> farm_surfeit << 'FAULTS'
-shard='' memory='' frame=''
+shard='' memory='' frame='' pass=''
 for word in "$@"; do
   case $word in
     --shard=*) shard=${word#*=} shard=${shard%/*} ;;
     --memory=*M) memory=${word#*=} memory=${memory%M} ;;
     --frames=*) frame=${word#*=} ;;
+    --pass=*) pass=${word#*=} ;;
   esac
 done
+[[ -z $pass || -z $shard ]] || shard=$pass-$shard
 finish() {
   [[ -z $shard ]] || echo "$shard ${frame:-0} $memory $1" >> "$faults/log"
   exit "$1"
 }
-if [[ $1 == merge ]]; then
+if [[ $1 == merge || $pass == merge ]]; then
   for rule in "$faults"/removed-*; do
-    [[ -e $rule ]] || continue
+    [[ -e $rule && -e $(< "$rule") ]] || continue
     rm "$(< "$rule")" "$rule"
   done
   exec "$program" "$@"
@@ -79,4 +82,18 @@ makeFarmScene() {
   "$surfeit" index -q set.ply -o "$scene" --memory 64M
   generate "$receivers" --surfels 300 --seed 2
   "$surfeit" gather -q "$scene" "$receivers" -o expected.ply --mode bleeding --memory 64M
+}
+
+# A cloud and the scene that one machine makes of it, of more surfels than one range of the curve.
+makeFarmCloud() {
+  cloud="it's a \$(cloud) {{x}}.ply"
+  generate "$cloud" --surfels 150k
+  generate lamp.ply --surfels 1k --seed 2
+  "$surfeit" index -q "$cloud" --group lamp=lamp.ply -o one.sft --memory 128M
+}
+
+# planIndex KIND SHARDS RESULT OPTION...: a plan of an index of that cloud, in `said`.
+planIndex() {
+  run 0 plan --index "$cloud" --group lamp=lamp.ply -o "$3" --shards "$2" --memory 64M --threads 1 \
+    "--$1" "${@:4}"
 }

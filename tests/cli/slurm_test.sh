@@ -66,42 +66,35 @@ sequencesAreOneArray() {
   for frame in 1 2 3; do sameBytes expected.ply "lit.000$frame.ply"; done
 }
 
-# submitIndex SHARDS: the passes of an index as arrays behind each other, and the merge; waits for its
-# exit status, in `ended`.
-submitIndex() {
-  local shards=$1 pass job='' index
-  index="'$SURFEIT' index set.ply -o out.sft --memory=64M --threads=1"
-  local submit=(sbatch --parsable --no-requeue --mem=128M --time=5 --output=/dev/null)
-  rm -f end
-  for pass in count distribute build; do
-    job=$("${submit[@]}" ${job:+"--dependency=afterany:${job%%;*}"} --array="1-$shards" \
-      --wrap "$index --pass=$pass --shard=\$SLURM_ARRAY_TASK_ID/$shards") || fail "sbatch: $pass"
-  done
-  "${submit[@]}" --dependency="afterany:${job%%;*}" \
-    --wrap "$index --pass=merge --shards=$shards; echo \$? > end" > /dev/null || fail "sbatch: merge"
-  waitUntil 240 test -s end || fail "no end: $(squeue; tail -n 20 "$slurm"/*.log)"
-  ended=$(cat end)
+# runIndexJob SHARDS: plans and runs an index, and waits for its end.
+runIndexJob() {
+  planIndex slurm "$1" out.sft --time 5m
+  printf '%s\n' "$said" > job.sh
+  bash job.sh || fail "exit status $? of the job"
+  waitUntil 240 test -e out.sft.farm/end ||
+    fail "no end: $(squeue; cat out.sft.farm/merge.log; tail -n 20 "$slurm"/*.log)"
+  [[ $(cat out.sft.farm/end) == 0 ]] || fail "$(cat out.sft.farm/end out.sft.farm/merge.log)"
 }
 
-# An index by arrays. A task that is killed lacks in the merge, and comes again when all is submitted
-# again.
+# An index by the script of a plan: a task of each pass fails in a way of its own, and a file of the
+# build is gone when the merge looks.
 indexesGiveTheSameBytes() {
   skipWithoutSlurm
   makeFarmSurfeit
-  generate set.ply --surfels 300k
-  "$surfeit" index -q set.ply -o one.sft --memory 128M
+  makeFarmCloud
   startSlurm
   local shards
-  : > faults/killed-2
-  submitIndex 7
-  [[ $ended == 75 ]] || fail "ended with $ended though a task was killed"
-  submitIndex 7
-  [[ $ended == 0 ]] || fail "ended with $ended"
+  : > faults/killed-count-2
+  : > faults/lost-distribute-5
+  echo 100 > faults/memory-build-4
+  echo out.sft.slabs-6-of-7 > faults/removed-build-6
+  runIndexJob 7
   sameBytes one.sft out.sft
+  [[ $(calls count-2) == "64:137"* ]] || fail "calls of count 2: $(calls count-2)"
+  [[ $(calls build-4) == *"64:33"*"128:0"* ]] || fail "calls of build 4: $(calls build-4)"
   for shards in 1 2 ${FARM_SHARDS:-64}; do
     rm -f out.sft
-    submitIndex "$shards"
-    [[ $ended == 0 ]] || fail "$shards shards ended with $ended"
+    runIndexJob "$shards"
     sameBytes one.sft out.sft
   done
 }

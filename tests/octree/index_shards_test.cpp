@@ -317,6 +317,34 @@ TEST_F(IndexShards, WhatNeedsNeighboursIsRefused) {
   EXPECT_THAT(status.message(), HasSubstr("surfeit normals"));
 }
 
+// What a plan says of files is what they take, about, and its memory is enough.
+TEST_F(IndexShards, ForecastsComeTrue) {
+  const std::vector<Surfel> cloud = unevenCloud(240000);
+  writeInput("a.ply", cloud);
+  options_.temporary_directory = directory_.string();
+  const auto forecast = forecastIndexShards(inputs_, out_, options_, 3, progress_);
+  ASSERT_TRUE(forecast.ok()) << forecast.status().message();
+  EXPECT_EQ(forecast->records, cloud.size());
+  EXPECT_GT(forecast->task_seconds, 0);
+  EXPECT_GT(forecast->merge_seconds, 0);
+  options_.memory_bytes = forecast->memory_bytes;
+  EXPECT_LT(options_.memory_bytes, std::uint64_t{128} << 20);
+  indexAll(3);
+  if (HasFatalFailure()) return;
+  std::uint64_t shard_bytes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(directory_)) {
+    const bool is_shard = entry.path().string().find("-of-") != std::string::npos;
+    shard_bytes += is_shard ? entry.file_size() : 0;
+  }
+  EXPECT_NEAR(double(forecast->shard_bytes) / double(shard_bytes), 1, 0.5);
+  EXPECT_NEAR(double(forecast->scene_bytes) / double(std::filesystem::file_size(out_)), 1, 0.35);
+  // More shards need less memory and time each, and the merge as much
+  const auto more = forecastIndexShards(inputs_, out_, options_, 12, progress_);
+  ASSERT_TRUE(more.ok());
+  EXPECT_LT(more->memory_bytes, forecast->memory_bytes);
+  EXPECT_EQ(more->shard_bytes, forecast->shard_bytes);
+}
+
 TEST_F(IndexShards, BadRangesAndStreamsAreRefused) {
   writeInput("a.ply", sphereCloud(10));
   for (const ShardRange& range :

@@ -4,7 +4,7 @@
 # other, such as 2 and 3 (command line, data): not again, it would end the same way.
 #
 # make -k -j JOBS -f FILE runs JOBS tasks at a time and merges the frames that are complete; run again,
-# it goes on with what has failed. `make -f FILE task-3` is one task.
+# it goes on with what has failed. `make -f FILE gather-3` is one task.
 define surfeit_plan
 set -u
 surfeit=$${SURFEIT:-surfeit}
@@ -16,13 +16,14 @@ threads=1
 memory=512 # MiB
 shards=7
 frames=(1 4 7 -2 20)
-tasks=35
+tasks=35 # of each pass
+passes=(gather)
 
-# gather TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
-gather() {
-  local frame=$${frames[($$1 - 1) / shards]}
+# task PASS TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
+task() {
+  local frame=$${frames[($$2 - 1) / shards]}
   "$$surfeit" gather "$$scene" "$$receivers" -o "$$result" $${options[@]+"$${options[@]}"} \
-    --threads="$$threads" --memory="$$2M" --shard="$$((($$1 - 1) % shards + 1))/$$shards" \
+    --threads="$$threads" --memory="$$3M" --shard="$$((($$2 - 1) % shards + 1))/$$shards" \
     $${frame:+"--frames=$$frame"}
 }
 
@@ -33,13 +34,13 @@ merge() {
     --threads="$$threads" --memory="$$2M" --shards="$$shards" $${frame:+"--frames=$$frame"}
 }
 
-# runTask TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
+# runTask PASS TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
 runTask() {
   local memory=$$memory most status tries=0
   most=$$(awk '/^MemTotal:/ { print int($$2 / 1024) }' /proc/meminfo)
   while :; do
     status=0
-    gather "$$1" "$$memory" || status=$$?
+    task "$$1" "$$2" "$$memory" || status=$$?
     case $$status in
       33)
         ((2 * memory <= most)) || return 33
@@ -47,18 +48,18 @@ runTask() {
         ;;
       74 | 137 | 143)
         tries=$$((tries + 1))
-        ((tries < $$2)) || return "$$status"
+        ((tries < $$3)) || return "$$status"
         sleep "$${PAUSE:-5}"
         ;;
       *) return "$$status" ;;
     esac
-    echo "task $$1: exit status $$status, again with $$memory MiB" >&2
+    echo "$$1 $$2: exit status $$status, again with $$memory MiB" >&2
   done
 }
 
 case $$1 in
-  task) runTask "$$2" 3 ;;
   merge) merge "$$2" "$$memory" ;;
+  *) runTask "$$1" "$$2" 3 ;;
 esac
 endef
 export surfeit_plan
@@ -66,28 +67,28 @@ export surfeit_plan
 .PHONY: all
 all:
 
-tasks := $(addprefix task-,$(shell seq 35))
-.PHONY: $(tasks)
-$(tasks): task-%:
-	@bash -c "$$surfeit_plan" surfeit-plan task $*
+gather_tasks := $(addprefix gather-,$(shell seq 35))
+.PHONY: $(gather_tasks)
+$(gather_tasks): gather-%:
+	@bash -c "$$surfeit_plan" surfeit-plan gather $*
 
 all: merge-1
 .PHONY: merge-1
-merge-1: $(addprefix task-,$(shell seq 1 7))
+merge-1: $(addprefix gather-,$(shell seq 1 7))
 	@bash -c "$$surfeit_plan" surfeit-plan merge 0
 all: merge-4
 .PHONY: merge-4
-merge-4: $(addprefix task-,$(shell seq 8 14))
+merge-4: $(addprefix gather-,$(shell seq 8 14))
 	@bash -c "$$surfeit_plan" surfeit-plan merge 1
 all: merge-7
 .PHONY: merge-7
-merge-7: $(addprefix task-,$(shell seq 15 21))
+merge-7: $(addprefix gather-,$(shell seq 15 21))
 	@bash -c "$$surfeit_plan" surfeit-plan merge 2
 all: merge--2
 .PHONY: merge--2
-merge--2: $(addprefix task-,$(shell seq 22 28))
+merge--2: $(addprefix gather-,$(shell seq 22 28))
 	@bash -c "$$surfeit_plan" surfeit-plan merge 3
 all: merge-20
 .PHONY: merge-20
-merge-20: $(addprefix task-,$(shell seq 29 35))
+merge-20: $(addprefix gather-,$(shell seq 29 35))
 	@bash -c "$$surfeit_plan" surfeit-plan merge 4

@@ -17,13 +17,14 @@ threads=1
 memory=512 # MiB
 shards=7
 frames=(1 4 7 -2 20)
-tasks=35
+tasks=35 # of each pass
+passes=(gather)
 
-# gather TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
-gather() {
-  local frame=${frames[($1 - 1) / shards]}
+# task PASS TASK MEMORY: one shard. Tasks count the shards of the first frame, then of the second.
+task() {
+  local frame=${frames[($2 - 1) / shards]}
   "$surfeit" gather "$scene" "$receivers" -o "$result" ${options[@]+"${options[@]}"} \
-    --threads="$threads" --memory="$2M" --shard="$((($1 - 1) % shards + 1))/$shards" \
+    --threads="$threads" --memory="$3M" --shard="$((($2 - 1) % shards + 1))/$shards" \
     ${frame:+"--frames=$frame"}
 }
 
@@ -34,13 +35,13 @@ merge() {
     --threads="$threads" --memory="$2M" --shards="$shards" ${frame:+"--frames=$frame"}
 }
 
-# runTask TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
+# runTask PASS TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
 runTask() {
   local memory=$memory most status tries=0
   most=$(awk '/^MemTotal:/ { print int($2 / 1024) }' /proc/meminfo)
   while :; do
     status=0
-    gather "$1" "$memory" || status=$?
+    task "$1" "$2" "$memory" || status=$?
     case $status in
       33)
         ((2 * memory <= most)) || return 33
@@ -48,12 +49,12 @@ runTask() {
         ;;
       74 | 137 | 143)
         tries=$((tries + 1))
-        ((tries < $2)) || return "$status"
+        ((tries < $3)) || return "$status"
         sleep "${PAUSE:-5}"
         ;;
       *) return "$status" ;;
     esac
-    echo "task $1: exit status $status, again with $memory MiB" >&2
+    echo "$1 $2: exit status $status, again with $memory MiB" >&2
   done
 }
 
@@ -66,10 +67,10 @@ fi
 
 if [[ ${1:-} == task ]]; then
   # What would end the same way is not tried again, though parallel asks for it
-  stop=$farm/task-$2.stop
+  stop=$farm/$2-$3.stop
   if [[ -e $stop ]]; then exit "$(< "$stop")"; fi
   status=0
-  runTask "$2" 1 || status=$?
+  runTask "$2" "$3" 1 || status=$?
   case $status in 0 | 33 | 74 | 137 | 143) ;; *) echo "$status" > "$stop" ;; esac
   exit "$status"
 fi
@@ -79,12 +80,15 @@ free=$(awk '/^MemAvailable:/ { print int($2 / 1024) }' /proc/meminfo)
 most=$((free / memory < $(nproc) / threads ? free / memory : $(nproc) / threads))
 jobs=${JOBS:-$((most > 0 ? most : 1))}
 mkdir -p "$farm" || exit
-rm -f "$farm"/task-*.stop
+rm -f "$farm"/*.stop
 
-# The second round is for shards that are gone although their tasks were done
-for _ in 1 2; do
-  seq "$tasks" | parallel --quote --joblog "$farm/joblog-$shards" --resume-failed --retries 3 \
-    --jobs "$jobs" --workdir "$PWD" bash "$script" task {}
+# Further rounds are for shards that are gone although their tasks were done, and for what waited for
+# them
+for _ in 1 2 3; do
+  for pass in "${passes[@]}"; do
+    seq "$tasks" | parallel --quote --joblog "$farm/joblog-$pass-$shards" --resume-failed \
+      --retries 3 --jobs "$jobs" --workdir "$PWD" bash "$script" task "$pass" {}
+  done
   status=0
   for index in "${!frames[@]}"; do
     merged=0
@@ -92,6 +96,9 @@ for _ in 1 2; do
     if ((merged != 0 && status != 75)); then status=$merged; fi
   done
   if ((status != 75)); then break; fi
-  rm -f "$farm/joblog-$shards"
+  rm -f "$farm"/joblog-*-"$shards"
+  for stop in "$farm"/*.stop; do
+    if [[ -e $stop && $(< "$stop") == 75 ]]; then rm -f "$stop"; fi
+  done
 done
 exit "$status"
