@@ -15,11 +15,13 @@ void addColorRangeOption(CLI::App& command, ColorRange& color_range) {
                                                             {"16", ColorRange::k16},
                                                             {"unit", ColorRange::kUnit}};
   command
-      .add_option("--color-range", color_range,
-                  "Meaning of colors that are not bytes: 8 or 16 bits of sRGB, unit (reals are "
-                  "scene-linear), or auto: decided by a sample of the cloud (docs/files.md)")
+      .add_option_function<std::string>(
+          "--color-range",
+          [&color_range](const std::string& name) { color_range = kRanges.at(name); },
+          "Meaning of colors that are not bytes: 8 or 16 bits of sRGB, unit (reals are "
+          "scene-linear), or auto: decided by a sample of the cloud (docs/files.md)")
       ->type_name("8|16|unit|auto")
-      ->transform(CLI::CheckedTransformer(kRanges).description(""))
+      ->check(CLI::IsMember({"8", "16", "unit", "auto"}).description(""))
       ->default_str("auto");
 }
 

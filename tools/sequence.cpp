@@ -45,10 +45,18 @@ bool isLater(const timespec& a, const timespec& b) {
   return a.tv_sec > b.tv_sec || (a.tv_sec == b.tv_sec && a.tv_nsec > b.tv_nsec);
 }
 
+// Whether a file of this very name is there, or may be: the pattern is that of a directory.
+bool isPlainName(const std::string& name) {
+  struct ::stat info {};
+  if (!hasFramePattern(name) || ::stat(name.c_str(), &info) == 0) return true;
+  const std::size_t slash = name.rfind('/');
+  return slash != name.npos && !hasFramePattern(name.substr(slash + 1)) &&
+         ::stat(name.substr(0, slash + 1).c_str(), &info) == 0;
+}
+
 Status checkNoPattern(const std::vector<FileName>& names) {
   for (const FileName& file : names) {
-    struct ::stat info {};
-    if (!hasFramePattern(file.name) || ::stat(file.name.c_str(), &info) == 0) continue;
+    if (isPlainName(file.name)) continue;
     return Status::invalidArgument(fmt::format(
         "{}: this is a pattern of frames (\"{}\" is frame 1), and no file of this very name is "
         "there: give --frames, such as --frames 1-240, or a name without the pattern",

@@ -217,8 +217,8 @@ SURFEIT_API void surfeit_gatherer_pause(surfeit_gatherer* gatherer);
 typedef struct surfeit_surfel {
   double position[3];
   float normal[3];    /* of any length; zero: a sphere */
-  float radius;       /* > 0; 0: found from area, or from the neighbours */
-  float area;         /* > 0; 0: found from radius, or from the neighbours */
+  float radius;       /* > 0; 0: found from area, or, if no surfel has a size, from neighbours */
+  float area;         /* > 0; 0: found from radius, or, if no surfel has a size, from neighbours */
   float radiosity[3]; /* scene-linear, >= 0 */
   float albedo[3];    /* 0 to 1 */
   int32_t two_sided;  /* 1: both sides send and block light */
@@ -234,7 +234,8 @@ typedef struct surfeit_index_options {
 SURFEIT_API void surfeit_index_options_init(surfeit_index_options* options);
 
 /* Writes a paged octree file from surfels in memory. It appears under its name only when complete.
-   `options` may be NULL. */
+   `options` may be NULL. The first surfel that is not valid (a number that is not finite, a
+   negative size or radiosity) is refused, and the text names it. */
 SURFEIT_API surfeit_code surfeit_index_surfels(const surfeit_surfel* surfels, size_t count,
                                                const char* output,
                                                const surfeit_index_options* options);

@@ -49,6 +49,7 @@ class CSurfels : public SurfelProvider {
       }
       surfel.radius = given.radius;
       surfel.area = given.area;
+      SURFEIT_RETURN_IF_ERROR(fillSizes(first + i, surfel));
       if (given.two_sided != 0) surfel.flags = kSurfelTwoSided;
       surfel.group = std::uint8_t(given.group);
     }
@@ -56,6 +57,24 @@ class CSurfels : public SurfelProvider {
   }
 
  private:
+  // A size that others have and this surfel lacks follows from the other one.
+  Status fillSizes(std::uint64_t number, Surfel& surfel) const {
+    if (surfel.radius == 0 && surfel.area == 0 && (channels_.radius || channels_.area)) {
+      return Status::invalidArgument("surfel " + std::to_string(number) +
+                                     ": radius and area are 0, expected one of them, because other "
+                                     "surfels have sizes: give all surfels one, or none");
+    }
+    constexpr double kPi = 3.14159265358979323846;
+    const double disk_overlap = IndexOptions().disk_overlap;
+    if (channels_.radius && surfel.radius == 0 && surfel.area > 0) {
+      surfel.radius = float(std::sqrt(disk_overlap * double(surfel.area) / kPi));
+    }
+    if (channels_.area && surfel.area == 0 && surfel.radius > 0) {
+      surfel.area = float(kPi * double(surfel.radius) * double(surfel.radius) / disk_overlap);
+    }
+    return {};
+  }
+
   const surfeit_surfel* const surfels_;
   const std::size_t count_;
   CloudChannels channels_;
@@ -86,6 +105,7 @@ surfeit_code surfeit_index_surfels(const surfeit_surfel* surfels, size_t count, 
     given.memory_bytes = from.memory_bytes;
     given.threads = from.threads;
     given.full_precision = from.full_precision != 0;
+    given.strict = true;  // nobody would hear what is left out
     CSurfels provider(surfels, count);
     Progress progress;
     return indexSurfels(provider, output, given, progress).status();

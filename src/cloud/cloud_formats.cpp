@@ -35,6 +35,7 @@
 #include "core/group_comment.h"
 #include "core/up_comment.h"
 #include "storage/byte_output.h"
+#include "storage/compression.h"
 #include "storage/output_target.h"
 
 namespace surfeit {
@@ -63,12 +64,17 @@ constexpr CloudFormat kFormats[] = {
 
 // Known formats that are not read, and what to do instead.
 struct OtherFormat {
-  std::string_view magic, name, advice;
+  std::string_view magic, name, advice;  // magic: the first bytes, or the extension
 };
 using namespace std::string_view_literals;
 constexpr std::string_view kSceneMagic = "\x89SFT";
 constexpr std::string_view kPictureAdvice =
     "pictures are textures of `sample` and environments of `gather`; passes are .exr";
+constexpr std::string_view kMeshAdvice =
+    "save meshes as PLY or OBJ for `surfeit sample`, points as PLY";
+constexpr std::string_view kTableAdvice = "save the points as PLY or CSV";
+constexpr std::string_view kGridAdvice =
+    "write the points of a map of heights as text: `gdal_translate -of XYZ IN OUT.xyz`";
 constexpr OtherFormat kOtherFormats[] = {
     {kSceneMagic, "a Surfeit scene (.sft)", "give the cloud that it was indexed from"},
     {"surfeit-recipe"sv, "a recipe of `surfeit generate`", "give it to `surfeit index`"},
@@ -94,8 +100,37 @@ constexpr OtherFormat kOtherFormats[] = {
     {"\xFF\xFE"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
     {"\xFE\xFF"sv, "text in UTF-16", "save it as UTF-8 or ASCII"},
     {"PK\x03\x04"sv, "a ZIP archive", "unpack it first"},
+    {"Rar!"sv, "a RAR archive", "unpack it first"},
+    {"7z\xBC\xAF"sv, "a 7z archive", "unpack it first"},
+    {"\x04\x22\x4D\x18"sv, "lz4", "unpack it first; gzip and zstd are read as they are"},
+    {"glTF"sv, "glTF", kMeshAdvice},
+    {"solid "sv, "STL", kMeshAdvice},
+    {"OFF"sv, "OFF", kMeshAdvice},
+    {"COFF"sv, "OFF", kMeshAdvice},
+    {"Kaydara FBX"sv, "FBX", kMeshAdvice},
+    {"# vtk"sv, "VTK", kTableAdvice},
+    {"<?xml"sv, "XML", kTableAdvice},
+    {"{"sv, "JSON", kTableAdvice},
+    {"PAR1"sv, "Parquet", kTableAdvice},
+    {"\x93NUMPY"sv, "an array of NumPy",
+     "the package surfeit for Python takes arrays (docs/python.md)"},
+    {"ncols"sv, "a grid of heights (ESRI)", kGridAdvice},
+    {"II*\0"sv, "a TIFF picture", kGridAdvice},
+    {"MM\0*"sv, "a TIFF picture", kGridAdvice},
+    {"version https://git-lfs"sv, "a pointer of Git LFS", "fetch the file itself: `git lfs pull`"},
+    {"<!DOCTYPE"sv, "a web page", "download the file itself"},
+    {"<html"sv, "a web page", "download the file itself"},
     {"BZh"sv, "bzip2", "unpack it first; gzip and zstd are read as they are"},
     {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},
+};
+
+// Those that only their names tell.
+constexpr OtherFormat kOtherExtensions[] = {
+    {".splat"sv, "Gaussian splats of a viewer (.splat)",
+     "convert it to the PLY of Gaussian splats"},
+    {".ksplat"sv, "Gaussian splats of a viewer (.ksplat)",
+     "convert it to the PLY of Gaussian splats"},
+    {".stl"sv, "STL", kMeshAdvice},
 };
 
 // "PLY, PTC and PRT"
@@ -119,29 +154,40 @@ std::string extensionsWritten() {
   return text;
 }
 
-Status unknownFormat(const std::string& path, std::string_view first_bytes) {
-  for (const OtherFormat& other : kOtherFormats) {
-    if (first_bytes.starts_with(other.magic)) {
-      return Status::corruption(fmt::format("{}: found {}, which is not read as a cloud: {}", path,
-                                            other.name, other.advice));
-    }
-  }
-  return Status::corruption(fmt::format(
-      "{}: found {} at 0, expected a cloud ({}); `surfeit sample` makes one of a mesh (.obj)", path,
-      quoteText(first_bytes.substr(0, 4)), namesOfRead()));
-}
-
-// Whether a list of extensions, separated by blanks, has one that `path` ends with.
+// Whether a list of extensions, separated by blanks, has one that `path` ends with, in any case.
 bool hasExtension(std::string_view path, std::string_view extensions) {
   while (!extensions.empty()) {
     const std::size_t end = std::min(extensions.find(' '), extensions.size());
     const std::string_view extension = extensions.substr(0, end);
-    if (!extension.empty() && path.size() > extension.size() && path.ends_with(extension)) {
+    if (!extension.empty() && path.size() > extension.size() && hasEnding(path, extension)) {
       return true;
     }
     extensions.remove_prefix(std::min(end + 1, extensions.size()));
   }
   return false;
+}
+
+Status unknownFormat(const std::string& path, std::string_view first_bytes) {
+  const auto notRead = [&path](const OtherFormat& other) {
+    return Status::corruption(fmt::format("{}: found {}, which is not read as a cloud: {}", path,
+                                          other.name, other.advice));
+  };
+  for (const OtherFormat& other : kOtherFormats) {
+    if (first_bytes.starts_with(other.magic)) return notRead(other);
+  }
+  for (const OtherFormat& other : kOtherExtensions) {
+    if (hasEnding(path, other.magic)) return notRead(other);
+  }
+  if (first_bytes.empty())
+    return Status::corruption(path + ": the file is empty, expected a cloud");
+  // What the name says is text can tell the line that is none
+  if (hasExtension(withoutCompression(path), ".xyz .txt .asc .csv .pts")) {
+    const Status text = openXyz(path, {}).status();
+    if (!text.ok()) return text;
+  }
+  return Status::corruption(fmt::format(
+      "{}: found {} at 0, expected a cloud ({}); `surfeit sample` makes one of a mesh (.obj)", path,
+      quoteText(first_bytes.substr(0, 4)), namesOfRead()));
 }
 
 // Tells apart what a filter takes of files.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <string_view>
+#include <utility>
 
 namespace surfeit {
 namespace {
@@ -119,6 +120,15 @@ Result<RowTransform> RowTransform::create(const Matrix& matrix, double growth) {
         transform.determinant_));
   }
   return transform;
+}
+
+RowTransform::Matrix RowTransform::behindTurn(Matrix matrix, UpAxis from, UpAxis to) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    double& of_from = matrix[4 * row + static_cast<std::size_t>(from)];
+    double& of_to = matrix[4 * row + static_cast<std::size_t>(to)];
+    of_from = std::exchange(of_to, -of_from);
+  }
+  return matrix;
 }
 
 bool RowTransform::isIdentity() const {

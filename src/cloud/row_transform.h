@@ -11,6 +11,7 @@
 #include "cloud/channels.h"
 #include "cloud/row_layout.h"
 #include "surfeit/status.h"
+#include "surfeit/up_axis.h"
 
 namespace surfeit {
 
@@ -23,6 +24,8 @@ class RowTransform {
   // kInvalidArgument unless all values are finite and the map can be inverted. With `growth` each
   // row stands for so many: areas and powers of photons grow by it, radii by its root.
   static Result<RowTransform> create(const Matrix& matrix, double growth = 1);
+  // The matrix behind a quarter turn that brings axis `from` to axis `to`.
+  static Matrix behindTurn(Matrix matrix, UpAxis from, UpAxis to);
 
   // Whether nothing is moved; sizes may grow all the same.
   bool isIdentity() const;

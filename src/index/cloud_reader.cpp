@@ -9,11 +9,13 @@
 #include <mutex>
 #include <optional>
 
+#include "core/crs_comment.h"
 #include "core/first_failure.h"
 #include "core/group_comment.h"
 #include "core/parallel.h"
 #include "core/thread_scratch.h"
 #include "core/up_comment.h"
+#include "index/merged_comments.h"
 #include "index/row_fetcher.h"
 #include "index/scene_rows.h"
 #include "surfeit/group_names.h"
@@ -158,6 +160,7 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
                                           inputs[0]));
     }
     if (!reader.up_) reader.up_ = up;
+    reader.compareCrs(*source);
     const CloudChannels channels = source->channels();
     reader.lacks_sizes_ =
         reader.lacks_sizes_ || (!channels.radius && !channels.area) || source->hasCoverage();
@@ -169,6 +172,17 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     reader.file_bytes_ += file.size();
   }
   return reader;
+}
+
+void CloudReader::compareCrs(const SurfelSource& source) {
+  const std::vector<std::string> comments = source.comments();
+  const std::string_view crs = statedCrs(comments);
+  if (crs_.empty()) {
+    crs_ = crs;
+    crs_path_ = source.path();
+  } else if (!crs.empty() && !isSameCrs(crs, crs_)) {
+    notes_.push_back(noteOfOtherCrs(source.path(), crs, crs_path_, crs_));
+  }
 }
 
 void CloudReader::addGroupNames(const SurfelSource& source) {
@@ -305,7 +319,8 @@ std::vector<std::string> CloudReader::notesOfFloats(const CloudTotals& totals) c
   std::vector<std::string> notes;
   const double step = floatStep(movedBounds(totals.bounds, origin_));
   const double spacing = double(totals.bounds.longestSide()) / std::sqrt(double(totals.surfels));
-  if (step <= 1e-3 * spacing) return notes;  // no more than quantizing moves
+  // No more than quantizing moves, or one place
+  if (spacing == 0 || step <= 1e-3 * spacing) return notes;
   for (const std::string& path : float_inputs_) {
     notes.push_back(fmt::format(
         "{}: positions are floats, which stand {:.2g} apart so far from 0, beside a spacing of "

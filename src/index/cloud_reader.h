@@ -113,6 +113,7 @@ class CloudReader {
   Result<CloudTotals> readInput(std::size_t input, const Records& records, const Consumer& consume,
                                 Progress& progress) const;
   void addGroupNames(const SurfelSource& source);
+  void compareCrs(const SurfelSource& source);
 
   std::vector<std::string> inputs_;
   std::vector<std::uint64_t> records_;  // by input
@@ -125,6 +126,7 @@ class CloudReader {
   bool strict_ = false;
   glm::dvec3 origin_{0};
   std::optional<UpAxis> up_;
+  std::string crs_, crs_path_;  // of the first input that states one
   std::vector<std::string> float_inputs_;
   std::size_t read_bytes_ = 0;
   std::uint64_t record_count_ = 0;

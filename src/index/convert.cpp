@@ -29,6 +29,7 @@
 #include "core/program_memory.h"
 #include "core/up_comment.h"
 #include "index/grid_thinner.h"
+#include "index/merged_comments.h"
 #include "index/scene_rows.h"
 #include "storage/file.h"
 #include "storage/output_target.h"
@@ -139,16 +140,6 @@ class Cropper {
   std::array<RowProperty, 3> properties_;
 };
 
-// The transform behind a quarter turn that brings axis `from` to axis `to`.
-std::array<double, 12> behindTurn(std::array<double, 12> transform, UpAxis from, UpAxis to) {
-  for (std::size_t row = 0; row < 3; ++row) {
-    double& of_from = transform[4 * row + static_cast<std::size_t>(from)];
-    double& of_to = transform[4 * row + static_cast<std::size_t>(to)];
-    of_from = std::exchange(of_to, -of_from);
-  }
-  return transform;
-}
-
 bool isThinning(const ConvertOptions& options) {
   return options.spacing || !options.density.cameras.empty();
 }
@@ -206,10 +197,12 @@ class Converter {
       for (const std::string& note : reader->notes()) {
         progress_.note(fmt::format("{}: {}", path, note));
       }
+      merged_.add(path, reader->comments());
       SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
       stats_.input_bytes += file.size();
       if (first_ == nullptr) first_ = std::move(reader);
     }
+    for (const std::string& note : merged_.notes(options_.up.has_value())) progress_.note(note);
     return {};
   }
 
@@ -258,16 +251,16 @@ class Converter {
   // Turns up what is to be up.
   Status placeRows() {
     if (!options_.up) return {};
-    const UpAxis other = *options_.up == UpAxis::kY ? UpAxis::kZ : UpAxis::kY;
-    const UpAxis from = statedUpAxis(first_->comments()).value_or(other);
+    SURFEIT_ASSIGN_OR_RETURN(const UpAxis from, merged_.turnedFrom(*options_.up));
     if (from == *options_.up) {
       progress_.inform(
           fmt::format("{}: {} is up already: not turned", inputs_[0], upAxisName(from)));
       return {};
     }
     SURFEIT_ASSIGN_OR_RETURN(
-        transform_, RowTransform::create(behindTurn(options_.transform, from, *options_.up),
-                                         double(options_.every)));
+        transform_,
+        RowTransform::create(RowTransform::behindTurn(options_.transform, from, *options_.up),
+                             double(options_.every)));
     return {};
   }
 
@@ -278,7 +271,7 @@ class Converter {
     }
     transform_.widenTypes(writing_.properties);
     if (isThinning(options_)) RowTransform::widenSizes(writing_.properties);
-    writing_.comments = first_->comments();
+    writing_.comments = merged_.comments();
     if (options_.up) stateUpAxis(*options_.up, writing_.comments);
     if (!options_.crop && !isThinning(options_)) writing_.count = rows_to_write_;
     SURFEIT_RETURN_IF_ERROR(planMemory());
@@ -441,6 +434,7 @@ class Converter {
 
   RowReaderOptions reading_;
   RowUnion union_;
+  MergedComments merged_;
   std::unique_ptr<RowReader> first_;
   std::uint64_t rows_to_write_ = 0;  // without cropping
   std::unique_ptr<RowReader> like_;

@@ -156,6 +156,7 @@ Result<IndexStats> Indexer::run() {
 
 Result<SceneFile> Indexer::runUnnamed() {
   SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
+  noteStrays(totals_, reader_->origin(), false, progress_);
   freeSamples();
   if (!estimatesNormals()) return buildPlaces(std::move(buckets));
   SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(unnamedPath(), true));

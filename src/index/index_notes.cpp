@@ -10,13 +10,21 @@
 
 namespace surfeit {
 
+void noteStrays(const CloudTotals& totals, const glm::dvec3& origin, bool is_origin_asked,
+                Progress& progress) {
+  std::vector<glm::vec3> places;
+  for (const Surfel& surfel : totals.sample) places.push_back(surfel.position);
+  const std::string strays = strayNote(places, totals.bounds, origin);
+  if (!strays.empty()) progress.inform(strays);
+  const std::string loss =
+      lossByStrays(std::move(places), totals.bounds, origin, totals.surfels, is_origin_asked);
+  if (!loss.empty()) progress.note(loss);
+}
+
 void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
                     const IndexOptions& options, Progress& progress) {
   for (const std::string& note : reader.notesOfFloats(totals)) progress.note(note);
-  std::vector<glm::vec3> places;
-  for (const Surfel& surfel : totals.sample) places.push_back(surfel.position);
-  const std::string strays = strayNote(std::move(places), totals.bounds, reader.origin());
-  if (!strays.empty()) progress.inform(strays);
+  noteStrays(totals, reader.origin(), true, progress);
   if (totals.missing_both > 0) {
     progress.note(
         fmt::format("{} surfels have neither radius nor area: both follow from the "

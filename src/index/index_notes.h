@@ -7,6 +7,10 @@
 
 namespace surfeit {
 
+// Strays, and what they cost the others. `is_origin_asked`: the user may choose the origin.
+void noteStrays(const CloudTotals& totals, const glm::dvec3& origin, bool is_origin_asked,
+                Progress& progress);
+
 // One note for each rule by which something was made up (docs/format.md, "Rules for what is
 // missing"), and for coarse positions.
 void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,

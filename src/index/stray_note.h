@@ -2,6 +2,7 @@
 // large and its index slow.
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
@@ -15,5 +16,11 @@ namespace surfeit {
 // All are counted from `origin`.
 std::string strayNote(std::vector<glm::vec3> sample, const Bounds3& bounds,
                       const glm::dvec3& origin);
+
+// A sentence when strays put the origin so far away from the others that floats about it round
+// their positions, beside the spacing of `count` surfels. It advises --origin where that
+// `is_origin_asked`.
+std::string lossByStrays(std::vector<glm::vec3> sample, const Bounds3& bounds,
+                         const glm::dvec3& origin, std::uint64_t count, bool is_origin_asked);
 
 }  // namespace surfeit

@@ -97,8 +97,9 @@ Status loadFile(const std::string& path, const glm::vec3& default_albedo,
   }
   const std::uint64_t degenerate = builder.mesh.degenerate_faces - degenerate_before;
   if (builder.mesh.triangle.size() == triangles_before) {
-    return Status::corruption(
-        fmt::format("{}: no triangles ({} faces without area)", path, degenerate));
+    return Status::corruption(fmt::format(
+        "{}: no triangles ({} faces without area){}", path, degenerate,
+        degenerate > 0 ? "" : ": points alone are a cloud: save them as PLY or text for index"));
   }
   if (degenerate > 0) {
     progress.note(fmt::format("{}: {} faces without area skipped", path, degenerate));

@@ -30,6 +30,7 @@ struct ParsedObj {
   tinyobj::attrib_t attributes;
   std::vector<tinyobj::shape_t> shapes;
   std::vector<tinyobj::material_t> materials;
+  std::map<std::string, MaterialSource> sources;
   std::string warnings;
   std::uint64_t free_form_statements = 0;
 };
@@ -53,6 +54,7 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   SURFEIT_RETURN_IF_ERROR(lines.status());
   SURFEIT_RETURN_IF_ERROR(material_files.status());
   parsed.free_form_statements = lines.freeFormStatements();
+  parsed.sources = material_files.sources();
   if (ok) return {};
   while (!errors.empty() && errors.back() == '\n') errors.pop_back();
   return Status::corruption(fmt::format("{}: {}", path, errors));
@@ -139,16 +141,21 @@ class ObjImporter {
         if (!(material.albedo[i] >= 0)) material.albedo[i] = 0;
         if (!(material.emission[i] >= 0)) material.emission[i] = 0;
       }
+      const auto source = parsed_.sources.find(parsed.name);
+      const MaterialSource of =
+          source != parsed_.sources.end() ? source->second : MaterialSource{{}, true};
       if (!parsed.diffuse_texname.empty()) {
         noteOptions(parsed.diffuse_texname, parsed.diffuse_texopt);
-        material.texture = findPicture(parsed.diffuse_texname, mesh_.textures, textures_);
+        material.texture =
+            findPicture(parsed.diffuse_texname, of.directory, mesh_.textures, textures_);
       }
-      if (!parsed.emissive_texname.empty()) importGlow(parsed, material);
+      if (!parsed.emissive_texname.empty()) importGlow(parsed, of.directory, material);
       if (!parsed.alpha_texname.empty()) {
         noteOptions(parsed.alpha_texname, parsed.alpha_texopt);
-        material.mask = findPicture(parsed.alpha_texname, mesh_.masks, masks_);
+        material.mask = findPicture(parsed.alpha_texname, of.directory, mesh_.masks, masks_);
       }
       importScattering(parsed, material);
+      if (!of.has_kd) importWithoutKd(parsed, material);
       if (material.opacity == 0) {
         progress_.note(
             fmt::format("{}: material \"{}\" is clear (d 0 or Tr 1): its faces give no surfels and "
@@ -287,10 +294,31 @@ class ObjImporter {
     }
   }
 
+  // What a picture of colors multiplies is Kd, as of emission Ke. Without either a surface that
+  // neither shines, mirrors nor refracts is none without a material.
+  void importWithoutKd(const tinyobj::material_t& parsed, Material& material) {
+    if (!parsed.diffuse_texname.empty()) {
+      material.albedo = glm::vec3(1);
+      progress_.note(fmt::format("{}: material \"{}\" has map_Kd and no Kd: read as Kd 1 1 1",
+                                 path_, shown(parsed.name)));
+      return;
+    }
+    if (material.opacity == 0 || material.emission != glm::vec3(0) ||
+        material.scattering == Scattering::kMirror || material.scattering == Scattering::kGlass) {
+      return;
+    }
+    material.albedo = mesh_.materials[material_begin_].albedo;
+    progress_.note(
+        fmt::format("{}: material \"{}\" has no Kd: it has the color of what has no material "
+                    "(--albedo)",
+                    path_, shown(parsed.name)));
+  }
+
   // What a picture of emission multiplies is Ke; files that say only map_Ke mean the picture alone.
-  void importGlow(const tinyobj::material_t& parsed, Material& material) {
+  void importGlow(const tinyobj::material_t& parsed, const std::string& directory,
+                  Material& material) {
     noteOptions(parsed.emissive_texname, parsed.emissive_texopt);
-    material.glow = findPicture(parsed.emissive_texname, mesh_.textures, textures_);
+    material.glow = findPicture(parsed.emissive_texname, directory, mesh_.textures, textures_);
     if (material.glow == kNoTexture || material.emission != glm::vec3(0)) return;
     material.emission = glm::vec3(kPi);
     progress_.note(fmt::format(
@@ -397,26 +425,20 @@ class ObjImporter {
   }
 
   void noteOptions(const std::string& name, const tinyobj::texture_option_t& options) {
-    const bool is_plain =
-        std::all_of(options.scale, options.scale + 2, [](double scale) { return scale == 1; }) &&
-        std::all_of(options.origin_offset, options.origin_offset + 2,
-                    [](double offset) { return offset == 0; });
-    if (is_plain) return;
-    progress_.note(
-        fmt::format("{}: options -s and -o of texture {} are not applied: bake them into "
-                    "the texture coordinates",
-                    path_, name));
+    const std::string note = noteOfOptions(name, options);
+    if (!note.empty()) progress_.note(path_ + ": " + note);
   }
 
-  // Index of the picture of that name; one that cannot be read is told once and left out.
+  // Index of the picture of that name, of a material file in `directory`; one that cannot be read
+  // is told once and left out.
   template <typename Picture>
-  std::uint32_t findPicture(std::string name, std::vector<Picture>& pictures,
+  std::uint32_t findPicture(const std::string& name, const std::string& directory,
+                            std::vector<Picture>& pictures,
                             std::map<std::string, std::uint32_t>& known) {
-    const auto [found, is_new] = known.try_emplace(name, kNoTexture);
+    const std::string path = findPictureFile(name, {directoryOf(path_), directory});
+    const auto [found, is_new] = known.try_emplace(path, kNoTexture);
     if (!is_new) return found->second;
-    std::replace(name.begin(), name.end(), '\\', '/');  // written on Windows
-    Result<Picture> loaded =
-        Picture::load((std::filesystem::path(directoryOf(path_)) / name).string());
+    Result<Picture> loaded = Picture::load(path);
     if (!loaded.ok()) {
       progress_.note(fmt::format("{}: texture left out: {}", path_, loaded.status().message()));
       return kNoTexture;

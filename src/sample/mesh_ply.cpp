@@ -164,6 +164,11 @@ Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, Mes
         fmt::format("{}: {}: textures of PLY are not read (those of OBJ are)", path, comment));
   }
 
+  const RowLayout& faces = reader.header().elements[*face];
+  if (findTriple(faces, "red", "green", "blue")) {
+    progress.note(path + ": colors of faces are not read, those of vertices are: transfer them");
+  }
+
   const std::uint64_t vertex_begin = builder.position.size();
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> rows, openVertices(path, progress));
   SURFEIT_ASSIGN_OR_RETURN(const bool has_colors, readVertices(*rows, builder));
@@ -173,8 +178,8 @@ Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, Mes
   material.albedo = has_colors ? glm::vec3(1) : default_albedo;
   builder.mesh.materials.push_back(material);
   SURFEIT_RETURN_IF_ERROR(reader.seekElement(*face));
-  return readFaces(reader, reader.header().elements[*face],
-                   std::uint32_t(builder.mesh.materials.size() - 1), vertex_begin, builder);
+  return readFaces(reader, faces, std::uint32_t(builder.mesh.materials.size() - 1), vertex_begin,
+                   builder);
 }
 
 }  // namespace surfeit

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -50,7 +51,52 @@ constexpr std::string_view kNumberStatements[] = {"v",  "vn", "vt", "Ka", "Kd",
                                                   "Ks", "Ke", "d",  "Tr"};
 constexpr std::string_view kIndexStatements[] = {"f", "l", "p"};
 constexpr std::string_view kNameStatements[] = {"usemtl", "newmtl", "mtllib"};
+constexpr std::string_view kColorStatements[] = {"Ka", "Kd", "Ks", "Ke", "Tf"};
+constexpr std::string_view kPictureStatements[] = {"map_Kd", "map_Ke", "map_d"};
+constexpr std::string_view kMtlStatements[] = {"Ka",     "Kd",     "Ks",     "Ke",     "Tf",
+                                               "Tr",     "Ni",     "map_Kd", "map_Ke", "map_d",
+                                               "newmtl", "usemtl", "mtllib", "illum"};
 constexpr std::string_view kFreeFormStatements[] = {"surf", "curv", "curv2"};
+
+bool isAlike(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
+    return std::tolower(x) == std::tolower(y);
+  });
+}
+
+// An option of a picture, and the values that it may leave out.
+struct PictureOption {
+  std::string_view name;
+  std::size_t values = 1;
+  std::string_view missing;  // empty: all values are there
+};
+constexpr PictureOption kPictureOptions[] = {
+    {"-o", 3, "0"},     {"-s", 3, "1"},     {"-t", 3, "0"},      {"-blendu", 1, {}},
+    {"-blendv", 1, {}}, {"-boost", 1, {}},  {"-clamp", 1, {}},   {"-bm", 1, {}},
+    {"-type", 1, {}},   {"-texres", 1, {}}, {"-imfchan", 1, {}}, {"-colorspace", 1, {}},
+    {"-mm", 2, {}}};
+
+// The name of a picture with its options. The parser takes the name for a value that is missing.
+std::string withAllValues(std::string_view rest) {
+  std::string text;
+  while (rest.starts_with('-')) {
+    std::string_view behind = rest;
+    const std::string_view name = takeWord(behind);
+    const auto option = std::find_if(std::begin(kPictureOptions), std::end(kPictureOptions),
+                                     [&](const PictureOption& of) { return of.name == name; });
+    if (option == std::end(kPictureOptions)) break;
+    text.append(name) += ' ';
+    for (std::size_t i = 0; i < option->values; ++i) {
+      std::string_view after = behind;
+      std::string_view value = takeWord(after);
+      const bool is_there = option->missing.empty() || isNumber(value);
+      if (is_there) behind = after;
+      text.append(is_there ? value : option->missing) += ' ';
+    }
+    rest = behind;
+  }
+  return text.append(rest);
+}
 
 }  // namespace
 
@@ -125,6 +171,7 @@ bool ObjLines::readLine() {
 }
 
 void ObjLines::rewriteLine() {
+  spellStatement();
   dropComment();
   std::string_view rest = trimmed(line_);
   const std::string_view word = takeWord(rest);
@@ -135,14 +182,47 @@ void ObjLines::rewriteLine() {
       if (kBlanks.find(c) != std::string_view::npos) c = kNameBlank;
       if (c == '\\') c = '/';  // written on Windows
     }
+    const bool is_material = word == "newmtl";
     line_ = std::string(word) + " " + name;
-  } else if (isOneOf(word, kNumberStatements)) {
-    if (word == "d" && rest.starts_with("-halo")) {
-      takeWord(rest);
-      line_ = "d " + std::string(rest);
-      rest = std::string_view(line_).substr(2);
-    }
-    checkNumbers(rest);
+    if (is_material) noteMaterial("newmtl", name);
+  } else if (isOneOf(word, kPictureStatements)) {
+    line_ = std::string(word) + " " + withAllValues(rest);
+  } else if (word == "d" && rest.starts_with("-halo")) {
+    takeWord(rest);
+    line_ = "d " + std::string(rest);
+    checkNumbers(std::string_view(line_).substr(2));
+  } else if (isOneOf(word, kNumberStatements) && checkNumbers(rest)) {
+    noteMaterial(word, rest);
+    completeColor(word, rest);
+  } else if (word == "Tf") {
+    completeColor(word, rest);
+  }
+}
+
+// One value is that of all three colors.
+void ObjLines::completeColor(std::string_view word, std::string_view rest) {
+  const std::string_view value = takeWord(rest);
+  if (!rest.empty() || !isOneOf(word, kColorStatements)) return;
+  line_ = fmt::format("{0} {1} {1} {1}", word, value);
+}
+
+// The parser knows one spelling of a statement.
+void ObjLines::spellStatement() {
+  std::string_view rest = trimmed(line_);
+  const std::string_view word = takeWord(rest);
+  for (const std::string_view known : kMtlStatements) {
+    if (word == known || !isAlike(word, known)) continue;
+    line_.replace(std::size_t(word.data() - line_.data()), word.size(), known);
+    return;
+  }
+}
+
+void ObjLines::noteMaterial(std::string_view word, std::string_view rest) {
+  if (word == "newmtl") {
+    const auto [material, is_new] = materials_.try_emplace(std::string(rest), false);
+    has_kd_ = is_new ? &material->second : nullptr;
+  } else if (word == "Kd" && has_kd_ != nullptr) {
+    *has_kd_ = true;
   }
 }
 

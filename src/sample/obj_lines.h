@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <streambuf>
 #include <string>
 #include <string_view>
@@ -16,7 +17,8 @@ namespace surfeit {
 inline constexpr char kNameBlank = '\x01';
 
 // Feeds a parser: lines that a backslash continues are one, names of materials and their files hold
-// kNameBlank for blanks, line ends are \n and a byte order mark is gone. Numbers are looked at,
+// kNameBlank for blanks, line ends are \n and a byte order mark is gone. Statements of MTL may have
+// any case, and the values that they may leave out are there. Numbers are looked at,
 // since the parser takes what is none as 0 (decimal commas most often): status() then names file
 // and line, and reading ends there, as it does when the file cannot be read.
 class ObjLines final : public std::streambuf {
@@ -25,6 +27,8 @@ class ObjLines final : public std::streambuf {
 
   const Status& status() const { return status_; }
   std::uint64_t freeFormStatements() const { return free_form_; }
+  // Materials that the file defines, and whether they have a Kd; of several of one name the first.
+  const std::map<std::string, bool>& materials() const { return materials_; }
 
  protected:
   int_type underflow() override;
@@ -33,7 +37,10 @@ class ObjLines final : public std::streambuf {
   bool readPhysicalLine();
   bool readLine();
   void rewriteLine();
+  void spellStatement();
+  void completeColor(std::string_view word, std::string_view rest);
   void dropComment();
+  void noteMaterial(std::string_view word, std::string_view rest);
   bool checkNumbers(std::string_view numbers);
 
   ByteInput input_;
@@ -44,6 +51,8 @@ class ObjLines final : public std::streambuf {
   std::string physical_, line_;  // as read; what the parser gets
   std::uint64_t number_ = 0;     // of the last line read, from 1
   std::uint64_t free_form_ = 0;
+  std::map<std::string, bool> materials_;
+  bool* has_kd_ = nullptr;  // of the material that is being defined
   bool is_at_end_ = false;
 };
 

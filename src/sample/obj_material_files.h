@@ -6,6 +6,7 @@
 #include <istream>
 #include <map>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,7 @@
 
 #include "sample/obj_lines.h"
 #include "storage/byte_input.h"
+#include "storage/file.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -35,12 +37,47 @@ inline std::string shown(std::string name) {
   return name;
 }
 
+// What is not applied of the options of a picture; empty when all is.
+inline std::string noteOfOptions(const std::string& name,
+                                 const tinyobj::texture_option_t& options) {
+  const bool is_moved = options.scale[0] != 1 || options.scale[1] != 1 ||
+                        options.origin_offset[0] != 0 || options.origin_offset[1] != 0;
+  const bool is_changed = options.brightness != 0 || options.contrast != 1 || options.clamp;
+  if (!is_moved && !is_changed) return {};
+  return "options " + std::string(is_moved ? "-s and -o" : "-mm and -clamp") + " of texture " +
+         name + " are not applied: bake them into the " +
+         (is_moved ? "texture coordinates" : "picture");
+}
+
+// Where the picture is: in one of the directories, under its path or its name alone. Nowhere: its
+// path in the first.
+inline std::string findPictureFile(std::string name, const std::vector<std::string>& directories) {
+  std::replace(name.begin(), name.end(), '\\', '/');  // written on Windows
+  const std::filesystem::path given(name);
+  std::error_code ignored;
+  for (const std::filesystem::path& path : {given, given.filename()}) {
+    for (const std::string& directory : directories) {
+      const std::filesystem::path file = std::filesystem::path(directory) / path;
+      if (std::filesystem::is_regular_file(file, ignored)) return file.string();
+    }
+  }
+  return (std::filesystem::path(directories.front()) / given).string();
+}
+
+// Where a material comes from, and what the parser does not tell of it.
+struct MaterialSource {
+  std::string directory;
+  bool has_kd = false;
+};
+
 // Finds material files beside the OBJ file: a name with blanks may be that of one, or of several.
 class MaterialFiles final : public tinyobj::MaterialReader {
  public:
   explicit MaterialFiles(std::string directory) : directory_(std::move(directory)) {}
 
   const Status& status() const { return status_; }
+  // By name.
+  const std::map<std::string, MaterialSource>& sources() const { return sources_; }
 
   bool operator()(const std::string& names, std::vector<tinyobj::material_t>* materials,
                   std::map<std::string, int>* ids, std::string* warnings,
@@ -89,9 +126,13 @@ class MaterialFiles final : public tinyobj::MaterialReader {
     *warnings += warned;
     *errors += failed;
     if (!lines.status().ok()) status_ = lines.status();
+    for (const auto& [name, has_kd] : lines.materials()) {
+      sources_.try_emplace(name, MaterialSource{directoryOf(path), has_kd});
+    }
   }
 
   std::string directory_;
+  std::map<std::string, MaterialSource> sources_;
   Status status_;
 };
 

@@ -63,6 +63,13 @@ Result<Picture> loadPicture(const std::string& path) {
     return Status::corruption(
         fmt::format("{}: {} x {} texels, expected at most 2^28", path, width, height));
   }
+  // The library would cut light at 1 and code it by a curve that is not sRGB's
+  if (stbi_is_hdr(path.c_str()) != 0) {
+    return Status::corruption(fmt::format(
+        "{}: found a Radiance picture, which textures are not made of, expected 8 bits a color: "
+        "save it as PNG, with the largest value at white, and multiply by that in Kd or Ke",
+        path));
+  }
   unsigned char* const texels = stbi_load(path.c_str(), &width, &height, &channels, 4);
   if (texels == nullptr) {
     return Status::corruption(fmt::format("{}: not a picture: {}", path, stbi_failure_reason()));

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <limits>
 #include <utility>
 
@@ -179,8 +180,16 @@ Compression compressionOf(Bytes first_bytes) {
 }
 
 Compression compressionOf(std::string_view path) {
-  if (path.ends_with(".gz")) return Compression::kGzip;
-  return path.ends_with(".zst") ? Compression::kZstd : Compression::kNone;
+  if (hasEnding(path, ".gz")) return Compression::kGzip;
+  return hasEnding(path, ".zst") ? Compression::kZstd : Compression::kNone;
+}
+
+bool hasEnding(std::string_view name, std::string_view ending) {
+  if (name.size() < ending.size()) return false;
+  name.remove_prefix(name.size() - ending.size());
+  return std::equal(name.begin(), name.end(), ending.begin(), [](unsigned char a, unsigned char b) {
+    return std::tolower(a) == std::tolower(b);
+  });
 }
 
 Result<std::unique_ptr<Decompressor>> Decompressor::create(Compression compression) {

@@ -20,7 +20,10 @@ std::int64_t writtenNs(const struct ::stat& info) {
 }  // namespace
 
 Result<InputFile> InputFile::open(const std::string& path, Access access) {
-  FileDescriptor descriptor(system_calls::open(inputPath(path).c_str(), O_RDONLY | O_CLOEXEC));
+  FileDescriptor descriptor = openKnownSpool(inputPath(path));
+  if (!descriptor.isOpen()) {
+    descriptor = FileDescriptor(system_calls::open(inputPath(path).c_str(), O_RDONLY | O_CLOEXEC));
+  }
   if (!descriptor.isOpen()) return systemError(path, "open");
   struct ::stat info {};
   if (system_calls::fstat(descriptor.get(), &info) != 0) return systemError(path, "stat");

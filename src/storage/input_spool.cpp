@@ -24,6 +24,29 @@ struct Spool {
   FileDescriptor file;
 };
 
+// Of this process.
+struct Spools {
+  std::mutex mutex;
+  std::vector<Spool> all;
+
+  const Spool* find(const struct ::stat& info) const {
+    for (const Spool& one : all) {
+      if (one.device == info.st_dev && one.inode == info.st_ino) return &one;
+    }
+    return nullptr;
+  }
+};
+
+Spools& spools() {
+  static Spools spools;
+  return spools;
+}
+
+FileDescriptor openAgain(const Spool& spool) {
+  const std::string self = "/proc/self/fd/" + std::to_string(spool.file.get());
+  return FileDescriptor(system_calls::open(self.c_str(), O_RDONLY | O_CLOEXEC));
+}
+
 Result<FileDescriptor> createSpool() {
   const std::string directory = spoolDirectory();
   FileDescriptor file(system_calls::open(directory.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
@@ -57,24 +80,26 @@ Status copyAll(int from, int to, const std::string& path) {
 std::string inputPath(const std::string& path) { return path == "-" ? "/dev/stdin" : path; }
 
 Result<FileDescriptor> openSpooled(int descriptor, const std::string& path) {
-  static std::mutex mutex;
-  static std::vector<Spool> spools;
   struct ::stat info {};
   if (system_calls::fstat(descriptor, &info) != 0) return systemError(path, "stat");
-  const std::lock_guard lock(mutex);
-  const Spool* spool = nullptr;
-  for (const Spool& one : spools) {
-    if (one.device == info.st_dev && one.inode == info.st_ino) spool = &one;
-  }
+  const std::lock_guard lock(spools().mutex);
+  const Spool* spool = spools().find(info);
   if (spool == nullptr) {
     SURFEIT_ASSIGN_OR_RETURN(FileDescriptor file, createSpool());
     SURFEIT_RETURN_IF_ERROR(copyAll(descriptor, file.get(), path));
-    spool = &spools.emplace_back(Spool{info.st_dev, info.st_ino, std::move(file)});
+    spool = &spools().all.emplace_back(Spool{info.st_dev, info.st_ino, std::move(file)});
   }
-  const std::string self = "/proc/self/fd/" + std::to_string(spool->file.get());
-  FileDescriptor again(system_calls::open(self.c_str(), O_RDONLY | O_CLOEXEC));
+  FileDescriptor again = openAgain(*spool);
   if (!again.isOpen()) return systemError(path, "open what was read");
   return again;
+}
+
+FileDescriptor openKnownSpool(const std::string& path) {
+  struct ::stat info {};
+  if (::stat(path.c_str(), &info) != 0 || !S_ISFIFO(info.st_mode)) return {};
+  const std::lock_guard lock(spools().mutex);
+  const Spool* const spool = spools().find(info);
+  return spool != nullptr ? openAgain(*spool) : FileDescriptor();
 }
 
 }  // namespace surfeit

@@ -16,4 +16,8 @@ std::string inputPath(const std::string& path);
 // first time. Later calls about the same pipe open the same bytes again. Safe from any thread.
 Result<FileDescriptor> openSpooled(int descriptor, const std::string& path);
 
+// The same of a FIFO with that name, if it was read before; else not open. To open the FIFO itself
+// would wait for another writer.
+FileDescriptor openKnownSpool(const std::string& path);
+
 }  // namespace surfeit

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "cloud/channels.h"
 #include "view/srgb.h"
 
 namespace surfeit {
@@ -35,6 +36,17 @@ float displayScale(ValueType type) {
     default:
       return 0;
   }
+}
+
+// Whether a property is one of three that code a color; other integers are numbers.
+bool isCode(const RowLayout& element, std::string_view name) {
+  for (const RowChannel& channel : channelsOf(element)) {
+    if (!isCodedColor(channel)) continue;
+    for (const std::size_t i : channel.properties) {
+      if (element.properties[i].name == name) return true;
+    }
+  }
+  return false;
 }
 
 bool findFields(const RowLayout& element, const std::array<std::string, 3>& names,
@@ -117,7 +129,7 @@ Result<Channel> Channel::find(const RowLayout& element, const std::string& name,
   const RowField scalar = RowField::find(element, name);
   if (scalar.exists()) {
     channel.value_.fields = {scalar, scalar, scalar};
-    if (scalar.type == ValueType::kUint8) {
+    if (scalar.type == ValueType::kUint8 && (isCode(element, name) || name == "occlusion")) {
       channel.value_.display_scale = displayScale(scalar.type);
     } else if (name != "occlusion") {
       channel.kind_ = ValueKind::kScalar;

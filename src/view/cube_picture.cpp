@@ -293,6 +293,9 @@ Status writeCubePicture(const std::string& path, const CubeViews& cubes,
   return guarded(path, [&]() -> Status {
     SURFEIT_ASSIGN_OR_RETURN(const PictureFormat format, pictureFormat(path));
     if (format == PictureFormat::kExr) return writeCubeExr(path, cubes, options.up);
+    if (!std::isfinite(options.exposure)) {
+      return Status::invalidArgument("the exposure must be finite");
+    }
     const std::uint64_t needed = programBytes(1) + cubePictureBytes(cubes, options);
     const std::uint64_t budget = memory_bytes > 0 ? memory_bytes : defaultMemoryBytes();
     if (budget < needed) {

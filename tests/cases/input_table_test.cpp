@@ -117,6 +117,10 @@ void addText(std::vector<Case>& cases) {
   add(kind, "CloudCompare", "a.txt", "//X Y Z\n418.446 50.29 4.725\n1 2 3\n", places(2, first));
   add(kind, "hash", "a.xyz", "# x y z\n418.446 50.29 4.725\n1 2 3\n", places(2, first));
   add(kind, "other order", "a.csv", "z,y,x\n4.725,50.29,418.446\n1,2,3\n", places(2, first));
+  add(kind, "separator named", "a.csv", "sep=;\nx;y;z\n418,446;50,290;4,725\n1,5;2,5;3,5\n",
+      places(2, first));
+  add(kind, "separator named in quotes", "a.csv",
+      "\"sep=,\"\r\nx,y,z\r\n418.446,50.29,4.725\r\n1,2,3\r\n", places(2, first));
   add(kind, "no places", "a.csv", "height,width\n1,2\n3,4\n", refused("x"));
 
   kind = "line ends";
@@ -169,6 +173,9 @@ void addText(std::vector<Case>& cases) {
   add(kind, "nx ny nz", "a.csv", "x,y,z,nx,ny,nz\n418.446,50.29,4.725,0,0,1\n1,2,3,1,0,0\n",
       facing(2, first, {0, 0, 1}));
   add(kind, "Nx Ny Nz", "a.txt", "//X Y Z Nx Ny Nz\n418.446 50.29 4.725 0 0 1\n1 2 3 1 0 0\n",
+      facing(2, first, {0, 0, 1}));
+  add(kind, "nan where there is none", "a.xyz",
+      "418.446 50.29 4.725 0 0 1\nnan 2 3 0 0 0\n1 2 3 nan nan nan\n4 5 6 0.6 0 0.8\n",
       facing(2, first, {0, 0, 1}));
   add(kind, "normals:0", "a.csv",
       "\"Points:0\",\"Points:1\",\"Points:2\",\"Normals:0\",\"Normals:1\",\"Normals:2\"\n"

@@ -84,8 +84,13 @@ inputsMayBePipes() {
   "$surfeit" convert -q city.ply -o - | "$surfeit" convert -q - -o through.csv
   run 0 convert city.ply -o plain.csv
   sameBytes through.csv plain.csv
+  # A FIFO, whose writer comes once
+  mkfifo fifo.ply
+  cat city.ply > fifo.ply &
+  timeout 60 "$surfeit" index -q fifo.ply -o fifo.sft || fail "a FIFO"
+  wait
   local scene
-  for scene in piped named file; do
+  for scene in piped named file fifo; do
     run 0 verify "$scene.sft"
     [[ $("$surfeit" info city.sft | sed -n 's/^ *surfels *//p') == \
       $("$surfeit" info "$scene.sft" | sed -n 's/^ *surfels *//p') ]] || fail "other surfels"

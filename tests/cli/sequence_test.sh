@@ -138,6 +138,12 @@ patternsAndFramesMustFit() {
   says "street.####.ply: this is a pattern of frames" "--frames 1-240" '"street.0001.ply"'
   run 2 gather set.sft street.0001.ply -o lit.%04d.ply
   says "lit.%04d.ply: this is a pattern"
+  # A directory whose name has a pattern
+  mkdir 'take#2'
+  run 0 gather set.sft street.0001.ply -o 'take#2/lit.ply'
+  rm -r 'take#2'
+  run 2 gather set.sft street.0001.ply -o 'take#3/lit.ply'
+  says "take#3/lit.ply: this is a pattern"
   run 2 gather set.sft street.####.ply -o lit.ply --frames 1-2
   says "lit.ply: with --frames every frame would replace this output" "####"
   run 2 gather set.sft street.####.ply -o lit.####.ply --stats stats.json --frames 1-2

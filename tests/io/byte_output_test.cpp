@@ -136,6 +136,7 @@ TEST(WithoutCompression, TakesTheLastExtensionOff) {
   EXPECT_EQ(withoutCompression("a.ply.zst"), "a.ply");
   EXPECT_EQ(withoutCompression("a.ply"), "a.ply");
   EXPECT_EQ(withoutCompression("gz"), "gz");
+  EXPECT_EQ(withoutCompression("A.PLY.GZ"), "A.PLY");
 }
 
 }  // namespace

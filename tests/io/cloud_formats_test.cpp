@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <set>
 #include <string>
 #include <utility>
@@ -39,7 +40,7 @@ TEST_F(CloudFormatsTest, UnknownFilesAreToldWhatIsRead) {
     EXPECT_THAT(message, HasSubstr(std::string(format.name)));
   }
   EXPECT_THAT(refusal(gzipped("\x01 no cloud")), HasSubstr("expected a cloud (PLY"));
-  EXPECT_THAT(refusal(""), HasSubstr("expected a cloud (PLY"));
+  EXPECT_THAT(refusal(""), HasSubstr("the file is empty"));
 }
 
 TEST_F(CloudFormatsTest, FormatsThatAreNotReadAreToldWhatToDo) {
@@ -48,6 +49,19 @@ TEST_F(CloudFormatsTest, FormatsThatAreNotReadAreToldWhatToDo) {
   EXPECT_THAT(refusal("PXR-USDC...."), HasSubstr("found USD"));
   EXPECT_THAT(refusal(zstdPacked("NGSP....")), HasSubstr("found SPZ"));
   EXPECT_THAT(refusal("\xFF\xD8\xFF...."), HasSubstr("found a JPEG picture"));
+  EXPECT_THAT(refusal("solid a\nfacet normal 0 0 1\n"), HasSubstr("found STL"));
+  EXPECT_THAT(refusal("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n"), HasSubstr("found OFF"));
+  EXPECT_THAT(refusal("ncols 2\nnrows 2\nxllcorner 0\n1 2\n"), HasSubstr("gdal_translate"));
+  EXPECT_THAT(refusal("version https://git-lfs.github.com/spec/v1\noid sha256:a\nsize 1\n"),
+              HasSubstr("git lfs pull"));
+  EXPECT_THAT(refusal("<!DOCTYPE html>\n<html>"), HasSubstr("a web page"));
+  EXPECT_THAT(refusal("{\"points\": [1, 2, 3]}"), HasSubstr("found JSON"));
+  write("a.csv", "% of a program\n1|2|3\n");
+  EXPECT_THAT(openRowReader(path("a.csv")).status().message(),
+              HasSubstr("line 2: found '1|2|3', expected three numbers or names"));
+  write("a.splat", std::string(96, '\x01'));
+  EXPECT_THAT(openRowReader(path("a.splat")).status().message(),
+              HasSubstr("PLY of Gaussian splats"));
   EXPECT_THAT(refusal("surfeit-recipe 1\nkind city\n"), HasSubstr("`surfeit index`"));
   EXPECT_THAT(refusal(gzipped("\x76\x2f\x31\x01....")), HasSubstr("OpenEXR compressed as a whole"));
   EXPECT_THAT(refusal("# no cloud\no cube\nv 0 0 0\n"), HasSubstr("`surfeit sample`"));
@@ -115,6 +129,24 @@ TEST_F(CloudFormatsTest, NamesThatTellNoFormatAreRefused) {
     ASSERT_FALSE(writer.ok()) << name;
     EXPECT_EQ(writer.status().code(), StatusCode::kInvalidArgument);
     EXPECT_THAT(writer.status().message(), HasSubstr("ends with one of .ply"));
+  }
+}
+
+TEST_F(CloudFormatsTest, ExtensionsMayHaveAnyCase) {
+  for (const std::string name : {"a.ply", "a.csv", "a.las", "a.ptc", "a.ply.gz", "a.xyz.zst"}) {
+    std::string upper = name;
+    for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    RowWriterOptions options;
+    for (const char* property : {"x", "y", "z"}) {
+      options.properties.emplace_back();
+      options.properties.back().name = property;
+    }
+    for (const std::string& file : {name, upper}) {
+      const auto writer = createRowWriter(path(file), options);
+      ASSERT_TRUE(writer.ok()) << writer.status().message();
+      ASSERT_TRUE((*writer)->finish().ok());
+    }
+    EXPECT_EQ(contents(name), contents(upper)) << name;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <clocale>
 #include <string>
 #include <vector>
 
@@ -164,6 +165,18 @@ TEST_F(PictureReaderTest, ExposureIsUndone) {
   EXPECT_EQ(read("a.hdr").values[0], glm::vec3(2, 4, 6));
   write("a.hdr", hdr("-Y 1 +X 1", "\x10\x20\x30\x88", "EXPOSURE=0\n"));
   EXPECT_THAT(failure("a.hdr").message(), HasSubstr("exposure '0', expected a positive number"));
+}
+
+// Hosts choose locales, and many have decimal commas.
+TEST_F(PictureReaderTest, ExposureDoesNotDependOnTheLocale) {
+  write("a.hdr", hdr("-Y 1 +X 1", "\x10\x20\x30\x88", "EXPOSURE= 2.5\n"));
+  EXPECT_FLOAT_EQ(read("a.hdr").values[0].x, 6.4f);
+  const std::string before = std::setlocale(LC_NUMERIC, nullptr);
+  for (const char* name : {"de_DE.UTF-8", "fr_FR.UTF-8", "de_DE", "fr_FR"}) {
+    if (std::setlocale(LC_NUMERIC, name) == nullptr) continue;
+    EXPECT_FLOAT_EQ(read("a.hdr").values[0].x, 6.4f) << name;
+  }
+  std::setlocale(LC_NUMERIC, before.c_str());
 }
 
 TEST_F(PictureReaderTest, NamesWhatIsWrongWithRadianceFiles) {

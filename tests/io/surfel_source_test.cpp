@@ -199,7 +199,7 @@ TEST_F(SurfelSourceTest, OtherFormatsAreRefusedByTheirFirstBytes) {
   write("a.abc", "what\x01is this?");
   EXPECT_THAT(refusal(path("a.abc")), HasSubstr("found 'what' at 0, expected a cloud (PLY"));
   write("empty", "");
-  EXPECT_THAT(refusal(path("empty")), HasSubstr("found '' at 0, expected a cloud (PLY"));
+  EXPECT_THAT(refusal(path("empty")), HasSubstr("the file is empty, expected a cloud"));
   EXPECT_EQ(openSurfelSource(path("missing"), false).status().code(), StatusCode::kIoError);
 }
 

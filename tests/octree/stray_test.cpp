@@ -1,10 +1,12 @@
 // Clouds of bare positions with strays: all but a few positions lie in one cell of the curve.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <fstream>
 #include <random>
 #include <string>
 #include <thread>
@@ -139,6 +141,27 @@ TEST(ContentOrder, WordsCompareAsContentDoes) {
       EXPECT_EQ(contentLess(a, b), is_less);
     }
   }
+}
+
+// A scanner's point at 0 beside a cloud on a map.
+TEST_F(StrayTest, DigitsThatAStrayTakesAreTold) {
+  std::string text = "0 0 0\n";
+  for (int i = 0; i < 2000; ++i) {
+    text += fmt::format("{:.4f} {:.4f} 100\n", 500000 + .01 * (i % 50), 5000000 + .01 * (i / 50));
+  }
+  std::ofstream(path("map.xyz")) << text;
+  class Notes : public Progress {
+   public:
+    void note(const std::string& message) override { notes.push_back(message); }
+    std::vector<std::string> notes;
+  } told, untold;
+  IndexOptions options;
+  ASSERT_TRUE(indexClouds({path("map.xyz")}, path("map.sft"), options, told).ok());
+  EXPECT_THAT(told.notes, Contains(AllOf(HasSubstr("positions are rounded to 0.5"),
+                                         HasSubstr("--origin 500000,5000000,100"))));
+  options.origin = glm::dvec3(500000, 5000000, 100);
+  ASSERT_TRUE(indexClouds({path("map.xyz")}, path("near.sft"), options, untold).ok());
+  EXPECT_THAT(untold.notes, testing::Not(Contains(HasSubstr("rounded"))));
 }
 
 }  // namespace

@@ -60,6 +60,107 @@ TEST_F(ObjFiles, MissingTextureIsToldAndKdRemains) {
   EXPECT_THAT(notes_.notes[0], HasSubstr("gone.png"));
 }
 
+// The parser makes it .6 in the first material of a file and 0 in the others.
+TEST_F(ObjFiles, PicturesWithoutKdAreTheColor) {
+  write("t.ppm", ppm());
+  write("m.mtl",
+        "newmtl a\nmap_Kd t.ppm\nnewmtl b\nKd .5 .5 .5\nnewmtl c\nmap_Kd t.ppm\n"
+        "newmtl d\nmap_Kd t.ppm\nKd .25 .25 .25\n");
+  const Result<Mesh> mesh =
+      load(write("m.obj",
+                 "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.75 0.5\nusemtl a\n"
+                 "f 1/1 2/1 3/1\nusemtl c\nf 1/1 2/1 3/1\nusemtl d\nf 1/1 2/1 3/1\n"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  const float expected[] = {1, 1, .25f};
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(surfacePoint(*mesh, i, .3f, .3f).albedo.x, expected[i], 1e-5f) << i;
+  }
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(
+                                HasSubstr("material \"a\" has map_Kd and no Kd: read as Kd 1 1 1"),
+                                HasSubstr("material \"c\" has map_Kd and no Kd")));
+}
+
+TEST_F(ObjFiles, MaterialsWithoutKdHaveTheDefaultAndAreTold) {
+  write("m.mtl",
+        "newmtl dull paint\nKa 0 0 0\nNs 10\nnewmtl lamp\nKe 1 1 1\nnewmtl mirror\nillum 3\nKs 1 1 "
+        "1\nnewmtl black\nKd 0 0 0\n");
+  const Result<Mesh> mesh =
+      load(write("m.obj",
+                 "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl dull paint\nf 1 2 3\n"
+                 "usemtl lamp\nf 1 2 3\nusemtl mirror\nf 1 2 3\nusemtl black\nf 1 2 3\n"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  const float expected[] = {.5f, 0, 0, 0};
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(surfacePoint(*mesh, i, .3f, .3f).albedo, glm::vec3(expected[i])) << i;
+  }
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("material \"dull paint\" has no Kd")));
+}
+
+TEST_F(ObjFiles, OneValueOfAColorIsThatOfAllThree) {
+  write("m.mtl", "newmtl a\nKd 0.5\nKe 2 # bright\n");
+  const Result<Mesh> mesh =
+      load(write("m.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_EQ(surfacePoint(*mesh, 0, .3f, .3f).albedo, glm::vec3(.5f));
+  EXPECT_NEAR(surfacePoint(*mesh, 0, .3f, .3f).emission.z, 2 * 3.14159265f, 1e-5f);
+}
+
+TEST_F(ObjFiles, StatementsOfMaterialsMayHaveAnyCase) {
+  write("t.ppm", ppm());
+  write("m.mtl", "newmtl a\nkd 0.5 0.25 1 # blue\nNEWMTL b\nKD 1 1 1\nMAP_KD t.ppm\n");
+  const Result<Mesh> mesh =
+      load(write("m.obj",
+                 "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt .25 .5\nusemtl a\n"
+                 "f 1/1 2/1 3/1\nusemtl b\nf 1/1 2/1 3/1\n"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_EQ(surfacePoint(*mesh, 0, .3f, .3f).albedo, glm::vec3(.5f, .25f, 1));
+  EXPECT_NEAR(surfacePoint(*mesh, 1, .3f, .3f).albedo.x, 0.2158605f, 1e-5f);
+  EXPECT_TRUE(notes_.notes.empty());
+}
+
+// The parser takes the name for a value that an option leaves out.
+TEST_F(ObjFiles, OptionsOfPicturesMayLeaveOutValues) {
+  write("my t.ppm", ppm());
+  for (const std::string options :
+       {"", "-o 0 0 ", "-s 1 1 1 ", "-s 1 ", "-blendu on -s 1 1 -imfchan m ", "-o 0.0 -t 0 0 "}) {
+    write("m.mtl", "newmtl a\nKd 1 1 1\nmap_Kd " + options + "my t.ppm\n");
+    const Result<Mesh> mesh =
+        load(write("m.obj",
+                   "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt .25 .5\nusemtl a\n"
+                   "f 1/1 2/1 3/1\n"));
+    ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+    EXPECT_NEAR(surfacePoint(*mesh, 0, .3f, .3f).albedo.x, 0.2158605f, 1e-5f) << options;
+  }
+  EXPECT_TRUE(notes_.notes.empty());
+  write("m.mtl",
+        "newmtl a\nKd 1 1 1\nmap_Kd -s 2 2 -mm 0 .5 my t.ppm\nnewmtl b\nKd 1 1 1\n"
+        "map_Kd -mm 0 .5 my t.ppm\n");
+  ASSERT_TRUE(
+      load(write("m.obj", std::string("mtllib m.mtl\n") + "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"))
+          .ok());
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("-s and -o of texture my t.ppm"),
+                                                 HasSubstr("-mm and -clamp of texture my t.ppm")));
+}
+
+TEST_F(ObjFiles, PicturesLieBesideTheObjOrTheMaterialFile) {
+  std::filesystem::create_directory(path("paints"));
+  std::filesystem::create_directory(path("maps"));
+  write("paints/inner.ppm", ppm());
+  write("maps/outer.ppm", ppm());
+  write("flat.ppm", ppm());
+  for (const std::string name : {"inner.ppm", "maps/outer.ppm", "maps\\outer.ppm",
+                                 "C:\\work\\tex\\flat.ppm", "/elsewhere/inner.ppm"}) {
+    write("paints/m.mtl", "newmtl a\nKd 1 1 1\nmap_Kd " + name + "\n");
+    const Result<Mesh> mesh =
+        load(write("m.obj",
+                   "mtllib paints/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt .25 .5\nusemtl a\n"
+                   "f 1/1 2/1 3/1\n"));
+    ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+    EXPECT_NEAR(surfacePoint(*mesh, 0, .3f, .3f).albedo.x, 0.2158605f, 1e-5f) << name;
+  }
+  EXPECT_TRUE(notes_.notes.empty());
+}
+
 TEST_F(ObjFiles, MissingMaterialFileIsTold) {
   const Result<Mesh> mesh =
       load(write("m.obj", "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n"));
@@ -171,8 +272,8 @@ TEST_F(ObjFiles, DissolveAndMasksSayHowMuchIsThere) {
   // Left texel there, right one not: as lightness, and as alpha would be
   write("mask.ppm", std::string("P6\n2 1\n255\n\xff\xff\xff") + std::string(3, '\0'));
   write("m.mtl",
-        "newmtl glass\nKd 1 1 1\nd 0.3\nnewmtl old\nTr 0.25\nnewmtl halo\nd -halo 0.5\n"
-        "newmtl leaf\nd 0.5\nmap_d mask.ppm\n");
+        "newmtl glass\nKd 1 1 1\nd 0.3\nnewmtl old\nKd 1 1 1\nTr 0.25\nnewmtl halo\nKd 1 1 1\n"
+        "d -halo 0.5\nnewmtl leaf\nKd 1 1 1\nd 0.5\nmap_d mask.ppm\n");
   const Result<Mesh> mesh = load(
       write("m.obj",
             std::string("mtllib m.mtl\n") + kSquare +

@@ -148,6 +148,17 @@ TEST_F(MeshFiles, VerticesAreReadAsThoseOfClouds) {
   }
 }
 
+TEST_F(MeshFiles, ColorsOfFacesAreTold) {
+  const Result<Mesh> mesh = load({write(
+      "m.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty "
+      "uchar "
+      "green\nproperty uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 200 0 0\n")});
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("colors of faces are not read")));
+}
+
 TEST_F(MeshFiles, FacesOfWhichEdgesCrossAreTold) {
   const Result<Mesh> mesh =
       load({write("m.ply", plyText({{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0, 2, 0}, {-1, 1, 0}},

@@ -41,5 +41,13 @@ TEST_F(TextureFiles, MissingIsAnIoErrorAndGarbageIsCorruption) {
   EXPECT_NE(garbage.status().message().find("garbage.png"), std::string::npos);
 }
 
+TEST_F(TextureFiles, LightWithoutALimitIsRefusedWithTheWayOut) {
+  const std::string picture =
+      "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n" + std::string("\x80\x80\x80\x85");
+  const Result<Texture> light = Texture::load(write("light.hdr", picture));
+  EXPECT_EQ(light.status().code(), StatusCode::kCorruption);
+  EXPECT_NE(light.status().message().find("save it as PNG"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace surfeit

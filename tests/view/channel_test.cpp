@@ -102,6 +102,28 @@ TEST(Channel, EightBitColorsAreSrgb) {
   EXPECT_NEAR(value.z, 1, 1e-6);
 }
 
+// Classes, returns and groups of scans are numbers, and far from 255.
+TEST(Channel, BytesThatAreNoColorsAreNumbers) {
+  RowLayout element = floats({"x", "y", "z"});
+  for (const char* name : {"classification", "red", "green", "blue"}) {
+    RowProperty property;
+    property.name = name;
+    property.type = ValueType::kUint8;
+    property.offset = element.row_bytes++;
+    element.properties.push_back(property);
+  }
+  const unsigned char row[16] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 6, 188, 0, 0};
+  const auto bytes = std::as_bytes(std::span(row));
+  const Result<Channel> number = Channel::find(element, "classification", "cloud.ply");
+  ASSERT_TRUE(number.ok());
+  EXPECT_EQ(number->kind(), ValueKind::kScalar);
+  EXPECT_EQ(number->value(bytes.data()).x, 6);
+  const Result<Channel> code = Channel::find(element, "red", "cloud.ply");
+  ASSERT_TRUE(code.ok());
+  EXPECT_EQ(code->kind(), ValueKind::kLight);
+  EXPECT_NEAR(code->value(bytes.data()).x, 0.5029f, 1e-3);
+}
+
 TEST(Channel, UnknownNameListsWhatThereIs) {
   const Result<Channel> channel = Channel::find(floats(kGathered), "colour", "cloud.ply");
   ASSERT_EQ(channel.status().code(), StatusCode::kInvalidArgument);

@@ -157,6 +157,18 @@ TEST(CubePicture, LegendNamesTheColors) {
 
 class CubeExr : public DirectoryTest {};
 
+TEST_F(CubeExr, PicturesOfNoExposureAreRefused) {
+  const CubeImage cube = emptyCube(2, {0, 1, 0});
+  CubePictureOptions options;
+  for (const float exposure :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    options.exposure = exposure;
+    const Status status = writeCubePicture(path("cube.png"), {&cube, nullptr}, options, 0);
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(status.message(), HasSubstr("exposure must be finite"));
+  }
+}
+
 TEST_F(CubeExr, HoldsTheValues) {
   CubeImage cube = emptyCube(2, {0, 1, 0});
   double expected = 0;

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <string_view>
 #include <utility>
@@ -51,6 +51,14 @@ class ByteCursor {
   std::uint64_t buffer_offset_ = 0;
   std::size_t next_ = 0, end_ = 0;
 };
+
+// The number in front of a text, 0 for none, in whatever locale the caller is.
+float numberIn(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(" \t+"), text.size()));
+  float number = 0;
+  std::from_chars(text.data(), text.data() + text.size(), number);
+  return number;
+}
 
 class RgbePicture final : public PictureReader {
  public:
@@ -119,8 +127,8 @@ class RgbePicture final : public PictureReader {
                                             line.substr(kFormat.size())));
     }
     if (line.starts_with(kExposure)) {
-      const std::string value(line.substr(kExposure.size()));
-      scale_ /= std::strtof(value.c_str(), nullptr);
+      const std::string_view value = line.substr(kExposure.size());
+      scale_ /= numberIn(value);
       if (!(scale_ > 0) || !std::isfinite(scale_)) {
         return Status::corruption(
             fmt::format("{}: exposure '{}', expected a positive number", path(), value));

@@ -205,8 +205,9 @@ Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string
   }
   const std::vector<RowLayout>& elements = header.elements;
   return Status::corruption(fmt::format(
-      "{}: found {} elements, first {}, expected one named vertex, point, points or surfel", path,
-      elements.size(), elements.empty() ? "none" : elements.front().name));
+      "{}: found {} elements, first {}, expected one named vertex, point, points or surfel{}", path,
+      elements.size(), elements.empty() ? "none" : elements.front().name,
+      elements.empty() ? "" : " (--part " + elements.front().name + " takes that one)"));
 }
 
 Result<PlyHeader> parsePlyHeader(std::string_view text, const std::string& path) {

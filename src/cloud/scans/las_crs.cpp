@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "cloud/scans/las_format.h"
+#include "core/crs_comment.h"
 #include "storage/byte_coding.h"
 
 namespace surfeit {

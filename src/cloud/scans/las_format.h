@@ -78,7 +78,4 @@ struct LasRecord {
 Result<std::vector<LasRecord>> findLasRecords(ByteInput& input, const LasHeader& header,
                                               bool& is_whole);
 
-// What a comment says of the coordinates, as LasHeader::crs has it: a text that begins so.
-inline constexpr std::string_view kCrsComment = "crs ";
-
 }  // namespace surfeit

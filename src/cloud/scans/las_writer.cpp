@@ -15,6 +15,7 @@
 #include "cloud/scans/las_plan.h"
 #include "cloud/scans/las_reader.h"
 #include "core/assert.h"
+#include "core/crs_comment.h"
 #include "core/up_comment.h"
 #include "storage/byte_coding.h"
 #include "storage/byte_output.h"

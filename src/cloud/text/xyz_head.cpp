@@ -24,6 +24,14 @@ bool namesNumbers(std::string_view line) {
   return !has_digits && !parseXyzHeader(line).file_names.empty();
 }
 
+// The line by which spreadsheets tell each other what parts values: "sep=;".
+bool isSeparatorLine(std::string_view line) {
+  if (line.starts_with('"') && line.ends_with('"') && line.size() > 1) {
+    line = line.substr(1, line.size() - 2);
+  }
+  return line.size() <= 5 && (line.starts_with("sep=") || line.starts_with("SEP="));
+}
+
 std::string textOfComment(std::string_view line) {
   line = line.substr(0, kMaxCommentChars);
   while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
@@ -61,7 +69,7 @@ bool XyzHead::isDataOf(std::span<const std::string_view> words) const {
 
 XyzHead::Line XyzHead::take(std::string_view line) {
   line = trimmedLine(line);
-  if (line.empty()) return Line::kHead;
+  if (line.empty() || (isSeparatorLine(line) && !hasNames())) return Line::kHead;
   if (isTextComment(line)) {
     endNames();
     named_in_comment_ = true;

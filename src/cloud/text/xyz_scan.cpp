@@ -121,7 +121,8 @@ class XyzScanner {
       if (!table_.are_unit_vectors[i]) continue;
       const double square = values_[i] * values_[i] + values_[i + 1] * values_[i + 1] +
                             values_[i + 2] * values_[i + 2];
-      if (square == 0) continue;
+      // Points without a normal have zeros or nan
+      if (square == 0 || std::isnan(square)) continue;
       has_any_vector_[i] = true;
       table_.are_unit_vectors[i] = std::abs(std::sqrt(square) - 1) <= 0.01;
     }

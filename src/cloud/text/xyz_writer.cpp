@@ -11,6 +11,7 @@
 #include "cloud/row_layout.h"
 #include "core/up_comment.h"
 #include "storage/byte_output.h"
+#include "storage/compression.h"
 
 namespace surfeit {
 namespace {
@@ -144,7 +145,7 @@ Result<std::unique_ptr<RowWriter>> createXyz(const std::string& path,
   element.properties = options.properties;
   packRow(element);
   SURFEIT_RETURN_IF_ERROR(checkProperties(path, element));
-  const char separator = withoutCompression(path).ends_with(".csv") ? ',' : ' ';
+  const char separator = hasEnding(withoutCompression(path), ".csv") ? ',' : ' ';
   SURFEIT_ASSIGN_OR_RETURN(ByteOutput output, ByteOutput::create(path, options.progress));
   auto writer = std::make_unique<XyzWriter>(std::move(output), std::move(element), separator);
   SURFEIT_RETURN_IF_ERROR(writer->writeHead(options.comments));

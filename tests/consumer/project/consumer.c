@@ -53,6 +53,28 @@ static void make_scene(const char* path) {
   free(surfels);
 }
 
+/* Surfels of which some lack a size that others have, and surfels that are not valid. */
+static void index_odd_surfels(const char* path) {
+  surfeit_surfel surfels[4];
+  int i;
+  memset(surfels, 0, sizeof surfels);
+  for (i = 0; i < 4; ++i) {
+    surfels[i].position[0] = i;
+    surfels[i].normal[1] = -1;
+    if (i % 2 == 0) surfels[i].radius = .5f;
+    if (i % 2 == 1) surfels[i].area = .4f;
+  }
+  expect(surfeit_index_surfels(surfels, 4, path, NULL) == SURFEIT_OK, "some sizes");
+  surfels[2].radius = 0;
+  expect(surfeit_index_surfels(surfels, 4, path, NULL) == SURFEIT_INVALID_ARGUMENT &&
+             strstr(surfeit_last_error(), "surfel 2") != NULL,
+         "a surfel without the sizes that others have");
+  surfels[2].radius = -1;
+  expect(surfeit_index_surfels(surfels, 4, path, NULL) == SURFEIT_CORRUPTION &&
+             strstr(surfeit_last_error(), "record 2") != NULL,
+         "a surfel that is not valid");
+}
+
 static void* read_all(const char* path, size_t* size) {
   FILE* file = fopen(path, "rb");
   void* bytes;
@@ -126,7 +148,7 @@ static void gather_from(surfeit_engine* engine, const surfeit_scene* scene) {
 }
 
 int main(int argc, char** argv) {
-  char path[4096];
+  char path[4096], odd[4096];
   surfeit_engine_options options;
   surfeit_engine* engine = NULL;
   surfeit_scene *scene = NULL, *held = NULL;
@@ -139,6 +161,8 @@ int main(int argc, char** argv) {
   expect(strcmp(surfeit_last_error(), "") == 0, "an error before anything was done");
   expect(strchr(surfeit_version(), '.') != NULL, "version");
   make_scene(path);
+  snprintf(odd, sizeof odd, "%s/odd.sft", argv[1]);
+  index_odd_surfels(odd);
 
   surfeit_engine_options_init(&options);
   options.memory_bytes = 64 << 20;
@@ -155,6 +179,11 @@ int main(int argc, char** argv) {
   expect(surfeit_scene_get_info(scene, &info) == SURFEIT_INVALID_ARGUMENT, "no size");
   info.size = sizeof info;
   expect(surfeit_scene_get_info(scene, &info) == SURFEIT_OK && info.surfels == EDGE * EDGE, "info");
+
+  expect(surfeit_scene_open(engine, odd, &held) == SURFEIT_OK &&
+             surfeit_scene_get_info(held, &info) == SURFEIT_OK && info.surfels == 4,
+         "surfels with some sizes");
+  surfeit_scene_release(held);
 
   bytes = read_all(path, &size);
   expect(surfeit_scene_open_bytes(engine, bytes, size, "held", &held) == SURFEIT_OK, "bytes");

@@ -1,0 +1,39 @@
+// The coordinate reference system among the comments of a cloud: "crs EPSG:32610", or "crs " and
+// well-known text.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace surfeit {
+
+inline constexpr std::string_view kCrsComment = "crs ";
+
+// What the first comment of that form says; empty when none does.
+inline std::string_view statedCrs(std::span<const std::string> comments) {
+  for (const std::string& comment : comments) {
+    if (comment.starts_with(kCrsComment)) {
+      return std::string_view(comment).substr(kCrsComment.size());
+    }
+  }
+  return {};
+}
+
+// The digits of the EPSG code; empty where there is none. Well-known text names those of its parts
+// before its own.
+inline std::string_view epsgCodeOf(std::string_view crs) {
+  constexpr std::string_view kDigits = "0123456789";
+  const std::size_t name = crs.rfind("EPSG");
+  if (name == crs.npos) return {};
+  const std::size_t begin = crs.find_first_of(kDigits, name);
+  if (begin == crs.npos) return {};
+  return crs.substr(begin, crs.find_first_not_of(kDigits, begin) - begin);
+}
+
+// Whether two systems are one, as far as their texts tell: text and keys of one system differ.
+inline bool isSameCrs(std::string_view a, std::string_view b) {
+  return a == b || (!epsgCodeOf(a).empty() && epsgCodeOf(a) == epsgCodeOf(b));
+}
+
+}  // namespace surfeit

@@ -1,0 +1,75 @@
+#include "index/merged_comments.h"
+
+#include <fmt/format.h>
+
+#include "core/crs_comment.h"
+#include "core/group_comment.h"
+#include "core/up_comment.h"
+
+namespace surfeit {
+namespace {
+
+constexpr std::size_t kMostCrsChars = 60;  // of well-known text: its name stands in front
+
+}  // namespace
+
+void MergedComments::add(const std::string& path, std::span<const std::string> comments) {
+  const bool is_first = ups_.empty();
+  ups_.push_back({path, statedUpAxis(comments)});
+  if (is_first) comments_.assign(comments.begin(), comments.end());
+
+  const std::string_view crs = statedCrs(comments);
+  if (crs_.first.empty()) {
+    crs_ = {std::string(crs), path};
+  } else if (!crs.empty() && !isSameCrs(crs, crs_.first)) {
+    notes_.push_back(noteOfOtherCrs(path, crs, crs_.second, crs_.first));
+  }
+
+  for (const std::string& comment : comments) {
+    const std::optional<StatedGroupName> stated = statedGroupName(comment);
+    if (!stated) continue;
+    const auto [known, is_new] = names_.emplace(stated->group, stated->name);
+    if (is_new && !is_first) comments_.push_back(comment);
+    if (is_new || known->second == stated->name) continue;
+    notes_.push_back(
+        fmt::format("{}: group {} is \"{}\", but \"{}\" in a cloud before it, and keeps that name",
+                    path, stated->group, stated->name, known->second));
+  }
+}
+
+std::vector<std::string> MergedComments::notes(bool are_turned) const {
+  std::vector<std::string> notes = notes_;
+  if (are_turned) return notes;
+  for (const Up& up : ups_) {
+    const UpAxis axis = up.axis.value_or(kDefaultUpAxis);
+    const UpAxis first = ups_.front().axis.value_or(kDefaultUpAxis);
+    if (axis == first) continue;
+    notes.push_back(
+        fmt::format("{}: {} is up, but {} in {}: nothing is turned, and the output has the latter",
+                    up.path, upAxisName(axis), upAxisName(first), ups_.front().path));
+  }
+  return notes;
+}
+
+Result<UpAxis> MergedComments::turnedFrom(UpAxis to) const {
+  const UpAxis other = to == UpAxis::kY ? UpAxis::kZ : UpAxis::kY;
+  const UpAxis first = ups_.front().axis.value_or(other);
+  for (const Up& up : ups_) {
+    const UpAxis axis = up.axis.value_or(other);
+    if (axis == first) continue;
+    return Status::invalidArgument(fmt::format(
+        "{}: {} is up, but {} in {}, expected one axis, because all clouds are turned alike: "
+        "convert them one by one with --up {}, then merge the results",
+        up.path, upAxisName(axis), upAxisName(first), ups_.front().path, upAxisName(to)));
+  }
+  return first;
+}
+
+std::string noteOfOtherCrs(const std::string& path, std::string_view crs,
+                           const std::string& other_path, std::string_view other_crs) {
+  return fmt::format(
+      "{}: the coordinate reference system is {}, but {} in {}: positions are taken as they are",
+      path, crs.substr(0, kMostCrsChars), other_crs.substr(0, kMostCrsChars), other_path);
+}
+
+}  // namespace surfeit
