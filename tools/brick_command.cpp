@@ -11,6 +11,7 @@
 #include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/number_checks.h"
 
 namespace surfeit {
 namespace {
@@ -68,14 +69,14 @@ void addBrickOptions(CLI::App& command, BrickOptions& options) {
                   "Divide a voxel where a value differs by more than this within it, in the units "
                   "of the channel; 0 keeps all voxels of the finest level")
       ->type_name("E")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(kNonNegativeNumber.description(""))
       ->capture_default_str();
   command
       .add_option("--voxel-size", options.voxel_size,
                   "Edge of the finest voxels, scene units (default: twice the spacing of the "
                   "points)")
       ->type_name("S")
-      ->check(CLI::PositiveNumber.description(""));
+      ->check(kPositiveNumber.description(""));
   addFilterOption(command, options.filter);
   addColorRangeOption(command, options.color_range);
   addTemporaryOption(command, options.temporary_directory);
@@ -140,7 +141,7 @@ void addBrickmakeCommand(CLI::App& app, CommandContext& context) {
   command
       ->add_option("--maxerror", arguments->options.max_error,
                    "Divide a voxel where a value differs by more than this (brick --max-error)")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(kNonNegativeNumber.description(""))
       ->capture_default_str();
   addUnusedWord(*command, "maxdepth",
                 "the finest voxels follow from the points (brick --voxel-size)", arguments->unused);

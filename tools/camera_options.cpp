@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "tools/number_checks.h"
 #include "tools/number_list.h"
 
 namespace surfeit {
@@ -131,7 +132,7 @@ std::vector<CLI::Option*> addDensityOptions(CLI::App& app, DensityArguments& arg
   detail(app.add_option("--stereo", density.stereo,
                         "Every camera is two eyes, that far apart, which look in parallel"))
       ->type_name("DISTANCE")
-      ->check(CLI::PositiveNumber.description(""));
+      ->check(kPositiveNumber.description(""));
   detail(app.add_option("--fov", arguments.fov_degrees,
                         "Vertical field of view of cameras without their own, degrees"))
       ->type_name("DEGREES")

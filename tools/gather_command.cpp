@@ -1,6 +1,7 @@
 // surfeit gather: occlusion and color bleeding at receivers.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -85,8 +86,30 @@ std::string describeShards(const GatherArguments& arguments, const ShardStats& s
   return text;
 }
 
+// Options that only count beside others.
+void noteUnusedOptions(const GatherOptions& options, Progress& progress) {
+  const GatherWeights& weights = options.weights;
+  const GatherEnvironment& environment = options.environment;
+  const auto note = [&](bool is_unused, const char* option, const char* needed) {
+    if (is_unused) progress.note(fmt::format("{} has no effect without {}", option, needed));
+  };
+  const bool is_glossy = options.mode == GatherMode::kGlossy;
+  note(!is_glossy && weights.roughness != GatherWeights{}.roughness, "--roughness",
+       "--mode glossy");
+  note(!is_glossy && !std::isnan(options.eye.x), "--camera", "--mode glossy");
+  note(weights.falloff == 0 && weights.falloff_mode != GatherWeights{}.falloff_mode,
+       "--falloff-mode", "--falloff");
+  note(environment.path.empty() && environment.rotation != 0, "--environment-rotation",
+       "--environment");
+  note(environment.path.empty() && environment.intensity != 1, "--environment-intensity",
+       "--environment");
+  note(options.quality.max_variation == 0 && options.quality.max_pixel_distance > 0,
+       "--max-pixel-dist", "--max-variation");
+}
+
 Status runGather(GatherArguments& arguments, CommandContext& context) {
   GatherOptions& options = arguments.options;
+  noteUnusedOptions(options, context.progress());
   options.threads = context.threads();
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;

@@ -8,6 +8,7 @@
 #include "surfeit/scene.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/number_checks.h"
 
 namespace surfeit {
 namespace {
@@ -61,7 +62,7 @@ void addQualityOptions(CLI::App& command, GatherQuality& quality) {
   command
       .add_option("--max-dist,--maxdist", quality.max_distance,
                   "Surfels farther away do not count, in scene units")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositiveNumber)
       ->group(kGroup);
   addChoice<GatherSides>(
       command, "--sides", quality.sides, "Sides of surfels that cover",

@@ -8,6 +8,7 @@
 #include "tools/camera_options.h"
 #include "tools/gather_options.h"
 #include "tools/look_options.h"
+#include "tools/number_checks.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
 
@@ -30,7 +31,7 @@ void addDirectionOptions(CLI::App& command, GatherOptions& options) {
   command
       .add_option("--falloff", weights.falloff,
                   "Occlusion fades with distance at this rate; 0: not at all")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegativeNumber)
       ->capture_default_str()
       ->group(kGroup);
   addChoice<FalloffMode>(command, "--falloff-mode,--falloffmode", weights.falloff_mode,
@@ -83,7 +84,7 @@ void addEnvironmentOptions(CLI::App& command, GatherEnvironment& environment) {
       ->default_str("0")
       ->group(kGroup);
   command.add_option("--environment-intensity", environment.intensity, "Factor of its light")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegativeNumber)
       ->capture_default_str()
       ->group(kGroup);
   addUpOption(command, environment.up, "Axis that points up", "the scene's")->group(kGroup);
@@ -131,7 +132,7 @@ void addLightOptions(CLI::App& command, GatherOptions& options) {
       .add_option("--max-pixel-dist,--maxpixeldist", options.quality.max_pixel_distance,
                   "With --max-variation, at most about so many pixels, or receivers, between "
                   "samples, 4 and more (0: no limit)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegativeNumber)
       ->capture_default_str()
       ->group("Quality");
   addDirectionOptions(command, options);

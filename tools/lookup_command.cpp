@@ -11,6 +11,7 @@
 #include "tools/command.h"
 #include "tools/gather_options.h"
 #include "tools/matrix_option.h"
+#include "tools/number_checks.h"
 
 namespace surfeit {
 namespace {
@@ -74,14 +75,14 @@ void addMapOptions(CLI::App& command, LookupOptions& options) {
   command
       .add_option("--max-distance", options.max_distance,
                   "Points of a cloud farther away do not count (default: 8 times their spacing)")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(kPositiveNumber.description(""))
       ->type_name("D")
       ->default_str("")
       ->group(kGroup);
   command
       .add_option("--filter-width", options.filter_width,
                   "Width to average over in a brick map (default: its finest voxels)")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(kNonNegativeNumber.description(""))
       ->type_name("W")
       ->default_str("")
       ->group(kGroup);

@@ -23,6 +23,7 @@
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/gather_options.h"
+#include "tools/number_checks.h"
 
 namespace surfeit {
 namespace {
@@ -213,7 +214,7 @@ void addWeightWords(CLI::App& command, GatherWeights& weights) {
       ->check(CLI::Range(0.0, 1.571))
       ->default_str("pi / 2");
   command.add_option("--falloff", weights.falloff, "Occlusion fades with distance at this rate")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegativeNumber)
       ->capture_default_str();
   addChoice<FalloffMode>(command, "--falloffmode", weights.falloff_mode,
                          "0: exp(-falloff * distance); 1: (1 - distance / maxdist) ^ falloff",
@@ -238,7 +239,7 @@ void addGatherWords(CLI::App& command, PtfilterArguments& arguments) {
       ->default_str("16");
   command
       .add_option("--maxdist", options.quality.max_distance, "Surfels farther away do not count")
-      ->check(CLI::PositiveNumber);
+      ->check(kPositiveNumber);
   addChoice<GatherSides>(
       command, "--hitsides", options.quality.sides, "Sides of surfels that cover (gather --sides)",
       {{"both", GatherSides::kBoth}, {"front", GatherSides::kFront}, {"back", GatherSides::kBack}});

@@ -10,6 +10,7 @@
 #include "surfeit/radiance.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/number_checks.h"
 #include "tools/number_list.h"
 
 namespace surfeit {
@@ -65,7 +66,7 @@ void addEstimateOptions(CLI::App& command, RadianceOptions& options) {
       .add_option("--max-radius", options.max_radius,
                   "Photons farther away do not count, in scene units (default: 16 times the median "
                   "radius)")
-      ->check(CLI::PositiveNumber);
+      ->check(kPositiveNumber);
   command
       .add_option_function<std::string>(
           "--albedo",

@@ -12,6 +12,7 @@
 #include "surfeit/process.h"
 #include "surfeit/relight.h"
 #include "tools/command.h"
+#include "tools/number_checks.h"
 #include "tools/sample_options.h"
 
 namespace surfeit {
@@ -149,7 +150,7 @@ void addShadowOptions(CLI::App& command, RelightOptions& options) {
       .add_option("--shadow-bias", options.shadow_bias,
                   "Distance above a surfel at which its shadow rays start, at least; more where "
                   "surfels do not lie on the meshes")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegativeNumber)
       ->capture_default_str()
       ->group(kGroup);
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tools/channel_options.h"
+#include "tools/number_checks.h"
 #include "tools/number_list.h"
 
 namespace surfeit {
@@ -77,7 +78,7 @@ void addFalloffOptions(CLI::App& app, Lights& lights) {
   app.add_option("--falloff-distance", lights.falloff_distance,
                  "Distance at which all falloffs give the same light, scene units")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber)
+      ->check(kPositiveNumber)
       ->group("Light");
 }
 
@@ -116,7 +117,7 @@ void addGroundOptions(CLI::App& app, GroundPlane& ground) {
   app.add_option("--ground-size", ground.size,
                  "Edge of the ground, as a multiple of the scene's diagonal")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber)
+      ->check(kPositiveNumber)
       ->group("Ground");
   app.add_option_function<std::string>("--ground-albedo",
                                        reflectance("--ground-albedo", ground.albedo),
@@ -143,12 +144,12 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
                  "Diameter of hair (.hair) and of the lines of OBJ files, scene units; without it "
                  "that of the file, and lines of OBJ files are left out")
       ->type_name("W")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(kPositiveNumber.description(""))
       ->group("Hair and curves");
   app.add_option("--strands", curves.strands,
                  "At most so many strands of each file, wider by as much as keeps their total area")
       ->type_name("N")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(kPositiveNumber.description(""))
       ->group("Hair and curves");
 
   addGroundOptions(app, surroundings.ground);
@@ -169,11 +170,11 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
       app.add_option("--count", arguments.options.count,
                      "Number of surfels, distributed by area; long thin triangles add some")
           ->capture_default_str()
-          ->check(CLI::PositiveNumber);
+          ->check(kPositiveNumber);
   CLI::Option* const spacing =
       app.add_option("--spacing", arguments.options.spacing,
                      "Distance between surfels in scene units, instead of a count")
-          ->check(CLI::PositiveNumber)
+          ->check(kPositiveNumber)
           ->excludes(count);
   const std::vector<CLI::Option*> cameras = addDensityOptions(app, arguments.cameras);
   addCameraCropOption(app, arguments.cameras);
@@ -182,7 +183,7 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
       app.add_option("--photons", arguments.photons,
                      "Instead of surfels, trace this many photons from the lights and write where "
                      "they arrive, for surfeit radiance")
-          ->check(CLI::PositiveNumber)
+          ->check(kPositiveNumber)
           ->excludes(count)
           ->excludes(spacing);
   for (CLI::Option* const camera : cameras) camera->excludes(photons);

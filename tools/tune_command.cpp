@@ -13,6 +13,7 @@
 #include "tools/command.h"
 #include "tools/gather_options.h"
 #include "tools/light_options.h"
+#include "tools/number_checks.h"
 
 namespace surfeit {
 namespace {
@@ -196,7 +197,7 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
   command
       ->add_option("--sample", options.sample_receivers,
                    "Receivers whose look-ups are followed; 0: all")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegativeNumber)
       ->capture_default_str();
   command->add_flag(
       "--check", options.check,

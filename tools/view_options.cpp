@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tools/camera_options.h"
+#include "tools/number_checks.h"
 #include "tools/number_list.h"
 
 namespace surfeit {
@@ -131,23 +132,23 @@ void addSurfelOptions(CLI::App& app, ViewOptions& options) {
                  "Width over which --brick averages, scene units; 0: the finest level there "
                  "(default: the diameter of the surfel)")
       ->type_name("W")
-      ->check(CLI::NonNegativeNumber.description(""))
+      ->check(kNonNegativeNumber.description(""))
       ->group(kSurfelGroup);
   addRange(app, options.range, kSurfelGroup);
   app.add_option("--radius", options.radius,
                  "Radius of every surfel, scene units. Default: the cloud's own, else from the "
                  "density of the cloud")
       ->type_name("R")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(kPositiveNumber.description(""))
       ->group(kSurfelGroup);
   app.add_option("--radius-scale", options.radius_scale, "Multiplies every radius (default 1)")
       ->type_name("FACTOR")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(kPositiveNumber.description(""))
       ->group(kSurfelGroup);
   app.add_option("--point-size", options.point_size,
                  "Edge of a square in pixels, with --mode points (default 1)")
       ->type_name("PIXELS")
-      ->check(CLI::PositiveNumber.description(""))
+      ->check(kPositiveNumber.description(""))
       ->group(kSurfelGroup);
   app.add_flag("--cull-back", options.cull_back, "Leave out disks that are seen from behind")
       ->group(kSurfelGroup);

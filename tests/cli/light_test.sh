@@ -301,4 +301,18 @@ sparedBouncesAreNearTheWholeOnes() {
   leavesNothing none
 }
 
+# What counts only beside another option is told, and refused by --strict.
+optionsWithoutOthersAreTold() {
+  makeScene 2000
+  local option
+  for option in "--roughness .3" "--camera 0,0,1" "--falloff-mode polynomial" "--environment-rotation 20" \
+    "--environment-intensity 2" "--max-pixel-dist 8"; do
+    run 0 gather cornell.sft cornell.ply -o out.ply --quality draft $option
+    says "${option%% *} has no effect without --"
+    run 3 gather cornell.sft cornell.ply -o strict.ply --quality draft --strict $option
+    leavesNothing strict.ply
+  done
+  run 0 gather cornell.sft cornell.ply -o out.ply --quality draft --strict --max-variation .02 --max-pixel-dist 8 --falloff 1
+}
+
 runCase
