@@ -140,9 +140,10 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
       ->type_name("\"r g b\"");
 
   CurveOptions& curves = surroundings.curves;
-  app.add_option("--curve-width", curves.width,
-                 "Diameter of hair (.hair) and of the lines of OBJ files, scene units; without it "
-                 "that of the file, and lines of OBJ files are left out")
+  app.add_option(
+         "--curve-width", curves.width,
+         "Diameter of hair (.hair), curves (.bgeo) and the lines of OBJ files, scene units; "
+         "without it that of the file, and lines of OBJ files are left out")
       ->type_name("W")
       ->check(kPositiveNumber.description(""))
       ->group("Hair and curves");
@@ -162,8 +163,9 @@ void addSurroundingsOptions(CLI::App& app, Surroundings& surroundings) {
 }
 
 void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
-  app.add_option("MESH", arguments.meshes,
-                 "Triangle meshes: PLY, or OBJ with MTL; hair: .hair (cyHair)")
+  app.add_option(
+         "MESH", arguments.meshes,
+         "Triangle meshes: PLY, or OBJ with MTL; hair: .hair (cyHair), curves of Houdini (.bgeo)")
       ->required();
   addCloudOutputOption(app, arguments.output, "Cloud to write");
   CLI::Option* const count =

@@ -2,11 +2,11 @@
 // 08-01, section 3.1); and the rays that a raster cube is held to. Needs the component `sample`,
 // which links Embree (docs/engine.md).
 //
-// Meshes are PLY files, OBJ files with their MTL, or hair (.hair, of cyHair); several are taken as
-// one. Lengths are scene units. Exitance and irradiance are in W/m2, radiance in W/(m2 sr), all
-// scene-linear rgb. Calls are independent, so threads may call at once; each uses the threads that
-// it is given. Meshes are held whole, some 100 bytes a triangle: nothing but limitProcess
-// (surfeit/process.h) bounds that.
+// Meshes are PLY files, OBJ files with their MTL, or hair (.hair, of cyHair; curves of Houdini in
+// .bgeo); several are taken as one. Lengths are scene units. Exitance and irradiance are in W/m2,
+// radiance in W/(m2 sr), all scene-linear rgb. Calls are independent, so threads may call at once;
+// each uses the threads that it is given. Meshes are held whole, some 100 bytes a triangle: nothing
+// but limitProcess (surfeit/process.h) bounds that.
 #pragma once
 
 #include <cstdint>

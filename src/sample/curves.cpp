@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "core/resident_limit.h"
 #include "core/split_mix.h"
 
 namespace surfeit {
@@ -101,6 +102,58 @@ Status CurveRibbons::add(std::span<const CurvePoint> points, std::uint64_t stran
   for (std::uint64_t corner = first; corner + 3 < builder_.position.size(); corner += 2) {
     const std::array<std::uint64_t, 4> quad{corner, corner + 1, corner + 3, corner + 2};
     SURFEIT_RETURN_IF_ERROR(builder_.addFace(quad, material_, 0, path_, strand));
+  }
+  return {};
+}
+
+Status addStrands(const std::string& path, std::uint64_t count, const CurveOptions& options,
+                  const std::function<Status(const StrandVisit& visit)>& for_each,
+                  MeshBuilder& builder, Progress& progress) {
+  const StrandChoice choice(count, options.strands);
+
+  // Growth of the strands that stand for others, so that the sum of areas stays; this looks at all
+  double growth = 1, area = 0, kept_area = 0;
+  SURFEIT_RETURN_IF_ERROR(
+      for_each([&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
+        const double own = curveArea(points);
+        area += own;
+        if (choice.keeps(strand)) kept_area += own;
+        return {};
+      }));
+  if (!(area > 0) || !std::isfinite(area)) {
+    return Status::corruption(fmt::format(
+        "{}: strands have no width, or places are not finite, expected a thickness (--curve-width "
+        "gives one)",
+        path));
+  }
+  if (!choice.keepsAll()) {
+    if (!(kept_area > 0)) {
+      return Status::corruption(fmt::format("{}: none of {} strands kept has a length: keep more",
+                                            path, choice.keptCount()));
+    }
+    growth = area / kept_area;
+    progress.inform(fmt::format("{}: {} of {} strands stand for all, {:.3g} times as wide", path,
+                                choice.keptCount(), count, growth));
+  }
+
+  Mesh& mesh = builder.mesh;
+  mesh.color.resize(builder.position.size(), glm::vec3(1));
+  Material material;
+  material.albedo = glm::vec3(1);  // times the color of its points
+  material.is_two_sided = true;
+  mesh.materials.push_back(material);
+  CurveRibbons ribbons(builder, std::uint32_t(mesh.materials.size() - 1), true, path);
+  const auto add = [&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
+    if (!choice.keeps(strand)) return {};
+    if (strand % 4096 == 0) {
+      const double part = double(strand + 1) / double(count);
+      SURFEIT_RETURN_IF_ERROR(checkResidentBytes(path, 0, part, kHeldTimes));
+    }
+    return ribbons.add(points, strand, growth);
+  };
+  SURFEIT_RETURN_IF_ERROR(for_each(add));
+  if (ribbons.pointlike() > 0) {
+    progress.note(fmt::format("{}: {} strands without length skipped", path, ribbons.pointlike()));
   }
   return {};
 }

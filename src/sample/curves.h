@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "sample/mesh_builder.h"
+#include "surfeit/progress.h"
 #include "surfeit/sample.h"
 #include "surfeit/status.h"
 
@@ -63,5 +65,16 @@ class CurveRibbons {
   std::vector<CurvePoint> points_;
   std::uint64_t pointlike_ = 0;
 };
+
+// Takes strand number `strand`; the points last as long as the call.
+using StrandVisit = std::function<Status(std::uint64_t strand, std::span<const CurvePoint> points)>;
+
+// Appends all strands of a file, or those that stand for them (CurveOptions::strands), as ribbons
+// of a material of their own, whose albedo is the color of the points. `for_each` visits every
+// strand in order, and is called twice. Notes tell of strands without length. kCorruption where all
+// strands together have no area, naming --curve-width; else the failures of `for_each`.
+Status addStrands(const std::string& path, std::uint64_t count, const CurveOptions& options,
+                  const std::function<Status(const StrandVisit& visit)>& for_each,
+                  MeshBuilder& builder, Progress& progress);
 
 }  // namespace surfeit

@@ -54,9 +54,9 @@ Status groupByFile(const std::string& path, std::size_t first_material, MeshBuil
   return {};
 }
 
-enum class MeshFormat { kPly, kObj, kHair, kUnknown };
+enum class MeshFormat { kPly, kObj, kHair, kHoudini, kUnknown };
 
-// PLY and hair by their magic; OBJ has none, so that its name must tell.
+// PLY and hair by their magic; OBJ has none, and Houdini several, so that the name must tell.
 Result<MeshFormat> recogniseMesh(const std::string& path) {
   SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
   char magic[4] = {};
@@ -65,6 +65,14 @@ Result<MeshFormat> recogniseMesh(const std::string& path) {
   const std::string_view begin(magic, count);
   if (begin.starts_with("ply")) return MeshFormat::kPly;
   if (begin == "HAIR") return MeshFormat::kHair;
+  const std::string name = std::filesystem::path(path).filename().string();
+  if (begin == "\x7fNSJ" ||
+      begin ==
+          "\x7f"
+          "bJS" ||
+      name.find(".bgeo") != name.npos || name.find(".geo") != name.npos) {
+    return MeshFormat::kHoudini;
+  }
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension == ".obj" || extension == ".OBJ") return MeshFormat::kObj;
   return MeshFormat::kUnknown;
@@ -87,9 +95,14 @@ Status loadFile(const std::string& path, const glm::vec3& default_albedo,
     case MeshFormat::kHair:
       SURFEIT_RETURN_IF_ERROR(loadHairMesh(path, curves, builder, progress));
       break;
+    case MeshFormat::kHoudini:
+      SURFEIT_RETURN_IF_ERROR(loadHoudiniMesh(path, default_albedo, curves, builder, progress));
+      break;
     case MeshFormat::kUnknown:
       return Status::corruption(fmt::format(
-          "{}: not a mesh that we read: expected PLY, hair or a name ending in .obj", path));
+          "{}: not a mesh that we read: expected PLY, hair, curves of Houdini (.bgeo) or a name "
+          "ending in .obj",
+          path));
   }
   const bool has_own_groups = format == MeshFormat::kObj && builder.groups != SampleGroups::kFile;
   if (builder.groups != SampleGroups::kNone && !has_own_groups) {

@@ -50,5 +50,8 @@ Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo,
                    const CurveOptions& curves, MeshBuilder& builder, Progress& progress);
 Status loadHairMesh(const std::string& path, const CurveOptions& options, MeshBuilder& builder,
                     Progress& progress);
+// The curves of a .bgeo file. `default_albedo` is of points without color.
+Status loadHoudiniMesh(const std::string& path, const glm::vec3& default_albedo,
+                       const CurveOptions& options, MeshBuilder& builder, Progress& progress);
 
 }  // namespace surfeit

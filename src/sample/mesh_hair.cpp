@@ -18,7 +18,6 @@
 #include <span>
 #include <vector>
 
-#include "core/resident_limit.h"
 #include "sample/curves.h"
 #include "sample/mesh_builder.h"
 #include "storage/byte_coding.h"
@@ -132,8 +131,7 @@ class HairFile {
   std::uint64_t bytesBehind() const { return file_->size() - end_; }
 
   // Calls visit(strand, points) for each; the points are overwritten by the next.
-  template <typename Visit>
-  Status forEachStrand(const Progress& progress, Visit&& visit) const {
+  Status forEachStrand(const Progress& progress, const StrandVisit& visit) const {
     const auto stream = [&](HairArray array, std::size_t i, std::uint64_t bytes) {
       return HairStream(*file_, offset_[i], header_.has(array) ? bytes : 0);
     };
@@ -219,54 +217,10 @@ Status loadHairMesh(const std::string& path, const CurveOptions& options, MeshBu
     progress.note(
         fmt::format("{}: {} bytes behind the last array are ignored", path, hair.bytesBehind()));
   }
-  const HairHeader& header = hair.header();
-  const StrandChoice choice(header.strands, options.strands);
-
-  // Growth of the strands that stand for others, so that the sum of areas stays; this looks at all
-  double growth = 1, area = 0, kept_area = 0;
-  const auto measure = [&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
-    const double own = curveArea(points);
-    area += own;
-    if (choice.keeps(strand)) kept_area += own;
-    return {};
-  };
-  SURFEIT_RETURN_IF_ERROR(hair.forEachStrand(progress, measure));
-  if (!(area > 0) || !std::isfinite(area)) {
-    return Status::corruption(fmt::format(
-        "{}: strands have no width, or places are not finite, expected a thickness (--curve-width "
-        "gives one)",
-        path));
-  }
-  if (!choice.keepsAll()) {
-    if (!(kept_area > 0)) {
-      return Status::corruption(fmt::format("{}: none of {} strands kept has a length: keep more",
-                                            path, choice.keptCount()));
-    }
-    growth = area / kept_area;
-    progress.inform(fmt::format("{}: {} of {} strands stand for all, {:.3g} times as wide", path,
-                                choice.keptCount(), header.strands, growth));
-  }
-
-  Mesh& mesh = builder.mesh;
-  mesh.color.resize(builder.position.size(), glm::vec3(1));
-  Material material;
-  material.albedo = glm::vec3(1);  // times the color of its points
-  material.is_two_sided = true;
-  mesh.materials.push_back(material);
-  CurveRibbons ribbons(builder, std::uint32_t(mesh.materials.size() - 1), true, path);
-  const auto add = [&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
-    if (!choice.keeps(strand)) return {};
-    if (strand % 4096 == 0) {
-      const double part = double(strand + 1) / header.strands;
-      SURFEIT_RETURN_IF_ERROR(checkResidentBytes(path, 0, part, kHeldTimes));
-    }
-    return ribbons.add(points, strand, growth);
-  };
-  SURFEIT_RETURN_IF_ERROR(hair.forEachStrand(progress, add));
-  if (ribbons.pointlike() > 0) {
-    progress.note(fmt::format("{}: {} strands without length skipped", path, ribbons.pointlike()));
-  }
-  return {};
+  return addStrands(
+      path, hair.header().strands, options,
+      [&](const StrandVisit& visit) { return hair.forEachStrand(progress, visit); }, builder,
+      progress);
 }
 
 }  // namespace surfeit

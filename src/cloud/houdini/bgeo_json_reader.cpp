@@ -6,13 +6,11 @@
 #include <limits>
 #include <utility>
 
-#include "cloud/houdini/bgeo_json_cursor.h"
+#include "cloud/houdini/bgeo_json_walk.h"
 #include "cloud/parts/column_rows.h"
 
 namespace surfeit {
 namespace {
-
-using Kind = JsonToken::Kind;
 
 constexpr std::size_t kMaxAttributes = 1024, kMaxComponents = 256, kMaxRowBytes = 16 << 10;
 // Houdini has 1024; smaller pages cost memory for their flags, larger ones let a few bytes stand
@@ -39,9 +37,10 @@ struct Attribute {
   std::vector<NumberArray> arrays;  // by component
 };
 
-class BgeoJsonReader final : public ColumnRowReader {
+class BgeoJsonReader final : public ColumnRowReader, private BgeoJsonWalk {
  public:
-  explicit BgeoJsonReader(SpooledInput input) : ColumnRowReader(std::move(input)), cursor_(input_) {
+  explicit BgeoJsonReader(SpooledInput input)
+      : ColumnRowReader(std::move(input)), BgeoJsonWalk(input_) {
     path_ = input_.path();
     element_.name = "vertex";
     format_name_ = "BGEO (binary JSON)";
@@ -74,62 +73,6 @@ class BgeoJsonReader final : public ColumnRowReader {
   }
 
  private:
-  // --- JSON ---
-
-  Status skipValue() {
-    JsonToken token;
-    SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
-    return cursor_.skip(token);
-  }
-
-  // A map, or an array of keys and values in turn; visit(key) reads the value.
-  template <typename Visit>
-  Status readPairs(Visit visit) {
-    JsonToken token;
-    SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
-    if (token.kind != Kind::kArrayBegin && token.kind != Kind::kMapBegin) {
-      return cursor_.damaged("expected keys and values");
-    }
-    while (true) {
-      SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
-      if (token.kind == Kind::kArrayEnd || token.kind == Kind::kMapEnd) return {};
-      if (token.kind != Kind::kText) return cursor_.damaged("expected a key");
-      SURFEIT_RETURN_IF_ERROR(visit(token.text));
-    }
-  }
-
-  // An array; visit(token) reads the item that begins with the token.
-  template <typename Visit>
-  Status readItems(Visit visit) {
-    JsonToken token;
-    SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
-    if (token.kind != Kind::kArrayBegin) return cursor_.damaged("expected an array");
-    while (true) {
-      SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
-      if (token.kind == Kind::kArrayEnd) return {};
-      if (token.kind == Kind::kEnd) return cursor_.damaged("file ends early, inside an array");
-      SURFEIT_RETURN_IF_ERROR(visit(token));
-    }
-  }
-
-  Status readCount(std::uint64_t& count) {
-    JsonToken token;
-    SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
-    if (token.kind != Kind::kInteger || token.integer < 0) {
-      return cursor_.damaged("expected a number, 0 or more");
-    }
-    count = static_cast<std::uint64_t>(token.integer);
-    return {};
-  }
-
-  Status readText(std::string& text) {
-    JsonToken token;
-    SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
-    if (token.kind != Kind::kText) return cursor_.damaged("expected a text");
-    text = token.text;
-    return {};
-  }
-
   // --- Attributes ---
 
   Status readAttributes() {
@@ -444,7 +387,6 @@ class BgeoJsonReader final : public ColumnRowReader {
     return {};
   }
 
-  BgeoJsonCursor cursor_;
   std::vector<Attribute> attributes_;
   std::vector<std::byte> pending_;  // of the spool
   std::vector<double> numbers_;
