@@ -25,6 +25,7 @@
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/bake.h"
+#include "surfeit/process.h"
 
 namespace {
 
@@ -83,6 +84,7 @@ Outcome gather(const Arguments& arguments, const Setting& setting) {
     GatherOptions options = arguments.options;
     options.order = kOrders.at(setting.order);
     options.memory_bytes = setting.memory_bytes;
+    limitProcess(setting.memory_bytes);
     Progress progress;
     const Result<GatherStats> stats =
         gatherCloud(arguments.scene, arguments.receivers, arguments.result, options, progress);
