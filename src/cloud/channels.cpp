@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "cloud/srgb_curve.h"
+#include "core/text_case.h"
 
 namespace surfeit {
 namespace {
@@ -83,13 +84,6 @@ constexpr Alias kAliases[] = {
     {"light_group", "group"},
 };
 
-bool isSame(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
-    return std::tolower(static_cast<unsigned char>(x)) ==
-           std::tolower(static_cast<unsigned char>(y));
-  });
-}
-
 const KnownChannel* findKnown(std::string_view name) {
   for (const KnownChannel& channel : kKnownChannels) {
     if (channel.name == name) return &channel;
@@ -109,10 +103,10 @@ std::string_view nameByTable(std::string_view name) {
     if (row.alias == name) return row.name;
   }
   for (const KnownChannel& channel : kKnownChannels) {
-    if (isSame(channel.name, name)) return channel.name;
+    if (isSameInAnyCase(channel.name, name)) return channel.name;
   }
   for (const Alias& row : kAliases) {
-    if (isSame(row.alias, name)) return row.name;
+    if (isSameInAnyCase(row.alias, name)) return row.name;
   }
   return name;
 }

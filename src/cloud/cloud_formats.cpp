@@ -33,6 +33,7 @@
 #include "cloud/vdb/vdb_reader.h"
 #include "cloud/vdb/vdb_writer.h"
 #include "core/group_comment.h"
+#include "core/text_case.h"
 #include "core/up_comment.h"
 #include "storage/byte_output.h"
 #include "storage/compression.h"
@@ -178,8 +179,9 @@ Status unknownFormat(const std::string& path, std::string_view first_bytes) {
   for (const OtherFormat& other : kOtherExtensions) {
     if (hasEnding(path, other.magic)) return notRead(other);
   }
-  if (first_bytes.empty())
+  if (first_bytes.empty()) {
     return Status::corruption(path + ": the file is empty, expected a cloud");
+  }
   // What the name says is text can tell the line that is none
   if (hasExtension(withoutCompression(path), ".xyz .txt .asc .csv .pts")) {
     const Status text = openXyz(path, {}).status();

@@ -9,13 +9,11 @@
 #include <mutex>
 #include <optional>
 
-#include "core/crs_comment.h"
 #include "core/first_failure.h"
 #include "core/group_comment.h"
 #include "core/parallel.h"
 #include "core/thread_scratch.h"
 #include "core/up_comment.h"
-#include "index/merged_comments.h"
 #include "index/row_fetcher.h"
 #include "index/scene_rows.h"
 #include "surfeit/group_names.h"
@@ -160,7 +158,8 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
                                           inputs[0]));
     }
     if (!reader.up_) reader.up_ = up;
-    reader.compareCrs(*source);
+    std::string other_crs = reader.crs_.compare(source->path(), source->comments());
+    if (!other_crs.empty()) reader.notes_.push_back(std::move(other_crs));
     const CloudChannels channels = source->channels();
     reader.lacks_sizes_ =
         reader.lacks_sizes_ || (!channels.radius && !channels.area) || source->hasCoverage();
@@ -172,17 +171,6 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     reader.file_bytes_ += file.size();
   }
   return reader;
-}
-
-void CloudReader::compareCrs(const SurfelSource& source) {
-  const std::vector<std::string> comments = source.comments();
-  const std::string_view crs = statedCrs(comments);
-  if (crs_.empty()) {
-    crs_ = crs;
-    crs_path_ = source.path();
-  } else if (!crs.empty() && !isSameCrs(crs, crs_)) {
-    notes_.push_back(noteOfOtherCrs(source.path(), crs, crs_path_, crs_));
-  }
 }
 
 void CloudReader::addGroupNames(const SurfelSource& source) {

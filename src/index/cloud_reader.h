@@ -14,6 +14,7 @@
 
 #include "cloud/cloud_formats.h"
 #include "core/bounds.h"
+#include "index/merged_comments.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
@@ -113,7 +114,6 @@ class CloudReader {
   Result<CloudTotals> readInput(std::size_t input, const Records& records, const Consumer& consume,
                                 Progress& progress) const;
   void addGroupNames(const SurfelSource& source);
-  void compareCrs(const SurfelSource& source);
 
   std::vector<std::string> inputs_;
   std::vector<std::uint64_t> records_;  // by input
@@ -126,7 +126,7 @@ class CloudReader {
   bool strict_ = false;
   glm::dvec3 origin_{0};
   std::optional<UpAxis> up_;
-  std::string crs_, crs_path_;  // of the first input that states one
+  FirstCrs crs_;
   std::vector<std::string> float_inputs_;
   std::size_t read_bytes_ = 0;
   std::uint64_t record_count_ = 0;

@@ -65,12 +65,8 @@ json expectedCount(const IndexShardJob& job, int shard, int round) {
 Status checkAlone(const CloudTotals& totals) {
   const std::uint64_t lacking = totals.missing_both + totals.covering;
   if (lacking == 0) return {};
-  return Status::invalidArgument(fmt::format(
-      "{} surfels have no area of their own: it follows from neighbours, which lie in other "
-      "shards; "
-      "index on one machine, or give every piece areas first (surfeit index PIECE -o PIECE.sft "
-      "--precision full, surfeit convert PIECE.sft -o PIECE.ply)",
-      lacking));
+  return Status::invalidArgument(
+      fmt::format("{} surfels have no area of their own: {}", lacking, kNeighboursElsewhere));
 }
 
 class ShardCount {

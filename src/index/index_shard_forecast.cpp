@@ -62,9 +62,7 @@ void setSeconds(double seconds, bool is_seekable, int count, IndexShardForecast&
 Status checkSizes(const IndexShardJob& job) {
   if (!job.reader.lacksSizes()) return {};
   return Status::invalidArgument(
-      "an input has neither radii nor areas: they follow from neighbours, which lie in other "
-      "shards; index on one machine, or give every piece areas first (surfeit index PIECE -o "
-      "PIECE.sft --precision full, surfeit convert PIECE.sft -o PIECE.ply)");
+      fmt::format("an input has neither radii nor areas: {}", kNeighboursElsewhere));
 }
 
 }  // namespace

@@ -22,6 +22,13 @@
 
 namespace surfeit {
 
+// Why shards refuse surfels without sizes, and the way out.
+inline constexpr const char* kNeighboursElsewhere =
+    "sizes follow from neighbours, which lie in other shards: index on one machine, or give every "
+    "piece areas first (surfeit index PIECE -o PIECE.sft --precision full, surfeit convert "
+    "PIECE.sft "
+    "-o PIECE.ply)";
+
 // A job with its inputs open. What is read of them is counted from the origin of the reader.
 struct IndexShardJob {
   GroupPlan groups;

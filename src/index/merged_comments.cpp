@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <string_view>
+#include <utility>
+
 #include "core/crs_comment.h"
 #include "core/group_comment.h"
 #include "core/up_comment.h"
@@ -13,16 +16,26 @@ constexpr std::size_t kMostCrsChars = 60;  // of well-known text: its name stand
 
 }  // namespace
 
+std::string FirstCrs::compare(const std::string& path, std::span<const std::string> comments) {
+  const std::string_view crs = statedCrs(comments);
+  if (crs_.empty()) {
+    crs_ = crs;
+    path_ = path;
+    return {};
+  }
+  if (crs.empty() || isSameCrs(crs, crs_)) return {};
+  return fmt::format(
+      "{}: the coordinate reference system is {}, but {} in {}: positions are taken as they are",
+      path, crs.substr(0, kMostCrsChars), crs_.substr(0, kMostCrsChars), path_);
+}
+
 void MergedComments::add(const std::string& path, std::span<const std::string> comments) {
   const bool is_first = ups_.empty();
   ups_.push_back({path, statedUpAxis(comments)});
   if (is_first) comments_.assign(comments.begin(), comments.end());
 
-  const std::string_view crs = statedCrs(comments);
-  if (crs_.first.empty()) {
-    crs_ = {std::string(crs), path};
-  } else if (!crs.empty() && !isSameCrs(crs, crs_.first)) {
-    notes_.push_back(noteOfOtherCrs(path, crs, crs_.second, crs_.first));
+  if (std::string note = crs_.compare(path, comments); !note.empty()) {
+    notes_.push_back(std::move(note));
   }
 
   for (const std::string& comment : comments) {
@@ -63,13 +76,6 @@ Result<UpAxis> MergedComments::turnedFrom(UpAxis to) const {
         up.path, upAxisName(axis), upAxisName(first), ups_.front().path, upAxisName(to)));
   }
   return first;
-}
-
-std::string noteOfOtherCrs(const std::string& path, std::string_view crs,
-                           const std::string& other_path, std::string_view other_crs) {
-  return fmt::format(
-      "{}: the coordinate reference system is {}, but {} in {}: positions are taken as they are",
-      path, crs.substr(0, kMostCrsChars), other_crs.substr(0, kMostCrsChars), other_path);
 }
 
 }  // namespace surfeit

@@ -6,14 +6,22 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
-#include <utility>
 #include <vector>
 
 #include "surfeit/status.h"
 #include "surfeit/up_axis.h"
 
 namespace surfeit {
+
+// The coordinate reference system of the first cloud that states one.
+class FirstCrs {
+ public:
+  // A note when the comments of a later cloud state another one; else empty.
+  std::string compare(const std::string& path, std::span<const std::string> comments);
+
+ private:
+  std::string crs_, path_;
+};
 
 // All comments of the first cloud, and the names of object groups of the others. One thread at a
 // time.
@@ -37,13 +45,9 @@ class MergedComments {
     std::optional<UpAxis> axis;
   };
   std::vector<Up> ups_;
-  std::pair<std::string, std::string> crs_;  // of the first cloud that has one, and its path
+  FirstCrs crs_;
   std::map<std::uint32_t, std::string> names_;
   std::vector<std::string> comments_, notes_;
 };
-
-// What to tell of a cloud whose coordinate reference system is not that of a cloud before it.
-std::string noteOfOtherCrs(const std::string& path, std::string_view crs,
-                           const std::string& other_path, std::string_view other_crs);
 
 }  // namespace surfeit

@@ -11,7 +11,10 @@
 #include <string_view>
 #include <utility>
 
+#include "cloud/houdini/bgeo_json_cursor.h"
+#include "core/text_case.h"
 #include "sample/polygon.h"
+#include "storage/byte_output.h"
 #include "storage/file.h"
 #include "surfeit/surfel.h"
 
@@ -56,22 +59,20 @@ Status groupByFile(const std::string& path, std::size_t first_material, MeshBuil
 
 enum class MeshFormat { kPly, kObj, kHair, kHoudini, kUnknown };
 
-// PLY and hair by their magic; OBJ has none, and Houdini several, so that the name must tell.
+// PLY, hair and Houdini's curves by their magic. OBJ has none, nor other files of Houdini, which
+// are refused with the way out: there the name tells.
 Result<MeshFormat> recogniseMesh(const std::string& path) {
   SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
-  char magic[4] = {};
+  char magic[8] = {};
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
                            file.readSome(0, std::as_writable_bytes(std::span(magic))));
   const std::string_view begin(magic, count);
   if (begin.starts_with("ply")) return MeshFormat::kPly;
-  if (begin == "HAIR") return MeshFormat::kHair;
-  const std::string name = std::filesystem::path(path).filename().string();
-  if (begin == "\x7fNSJ" ||
-      begin ==
-          "\x7f"
-          "bJS" ||
-      name.find(".bgeo") != name.npos || name.find(".geo") != name.npos) {
-    return MeshFormat::kHoudini;
+  if (begin.starts_with("HAIR")) return MeshFormat::kHair;
+  if (startsBinaryJson(begin)) return MeshFormat::kHoudini;
+  const std::string_view name = withoutCompression(path);
+  for (const char* const extension : {".bgeo", ".geo", ".bgeo.sc"}) {
+    if (hasEnding(name, extension)) return MeshFormat::kHoudini;
   }
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension == ".obj" || extension == ".OBJ") return MeshFormat::kObj;

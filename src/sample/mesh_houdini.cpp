@@ -146,9 +146,8 @@ Status checkFormat(const std::string& path) {
   const bool is_classic = first.starts_with("Bgeo") || first.starts_with("PGEOMETR");
   const bool is_text = first.starts_with("[") || first.starts_with("{");
   return Status::corruption(
-      fmt::format("{}: found {}, expected binary .bgeo of Houdini 12 or later, whose curves are "
-                  "read: save it as "
-                  "that, plain or compressed by gzip or zstd",
+      fmt::format("{}: found {}, expected binary .bgeo of Houdini 12 or later: save it as that, "
+                  "plain or compressed by gzip or zstd",
                   path,
                   is_classic ? "geometry of version 5"
                   : is_text  ? "geometry as text (.geo)"

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <span>
 
 #include "core/resident_limit.h"
+#include "core/text_case.h"
 #include "sample/mesh_builder.h"
 
 namespace surfeit {
@@ -57,12 +57,6 @@ constexpr std::string_view kMtlStatements[] = {"Ka",     "Kd",     "Ks",     "Ke
                                                "Tr",     "Ni",     "map_Kd", "map_Ke", "map_d",
                                                "newmtl", "usemtl", "mtllib", "illum"};
 constexpr std::string_view kFreeFormStatements[] = {"surf", "curv", "curv2"};
-
-bool isAlike(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {
-    return std::tolower(x) == std::tolower(y);
-  });
-}
 
 // An option of a picture, and the values that it may leave out.
 struct PictureOption {
@@ -211,7 +205,7 @@ void ObjLines::spellStatement() {
   std::string_view rest = trimmed(line_);
   const std::string_view word = takeWord(rest);
   for (const std::string_view known : kMtlStatements) {
-    if (word == known || !isAlike(word, known)) continue;
+    if (word == known || !isSameInAnyCase(word, known)) continue;
     line_.replace(std::size_t(word.data() - line_.data()), word.size(), known);
     return;
   }

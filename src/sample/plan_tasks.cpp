@@ -69,8 +69,8 @@ class PlanTask final : public SurfelTask {
     const Micropolygon whole = wholeTriangle(mesh_, job.triangle);
     const TriangleDice dice(whole, job.area, job.piece_count, plan_.spacing());
     const std::vector<Carried> carried = gatherCarried(job, dice);
-    auto next = std::find_if(carried.begin(), carried.end(),
-                             [&](const Carried& one) { return one.piece >= range.begin; });
+    auto next = std::partition_point(carried.begin(), carried.end(),
+                                     [&](const Carried& one) { return one.piece < range.begin; });
     std::vector<PiecePart> parts;
     std::vector<float> there;
     for (std::uint64_t i = range.begin; i < range.end; ++i) {

@@ -7,9 +7,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <limits>
 #include <utility>
+
+#include "core/text_case.h"
 
 namespace surfeit {
 namespace {
@@ -182,14 +183,6 @@ Compression compressionOf(Bytes first_bytes) {
 Compression compressionOf(std::string_view path) {
   if (hasEnding(path, ".gz")) return Compression::kGzip;
   return hasEnding(path, ".zst") ? Compression::kZstd : Compression::kNone;
-}
-
-bool hasEnding(std::string_view name, std::string_view ending) {
-  if (name.size() < ending.size()) return false;
-  name.remove_prefix(name.size() - ending.size());
-  return std::equal(name.begin(), name.end(), ending.begin(), [](unsigned char a, unsigned char b) {
-    return std::tolower(a) == std::tolower(b);
-  });
 }
 
 Result<std::unique_ptr<Decompressor>> Decompressor::create(Compression compression) {

@@ -20,8 +20,6 @@ enum class Compression { kNone, kGzip, kZstd };
 Compression compressionOf(Bytes first_bytes);
 // By the extension of its name: .gz or .zst, in any case.
 Compression compressionOf(std::string_view path);
-// Whether a name ends so, in any case.
-bool hasEnding(std::string_view name, std::string_view ending);
 
 // Turns compressed bytes into what they stand for. One thread at a time.
 class Decompressor {

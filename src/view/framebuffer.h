@@ -10,7 +10,8 @@
 //
 // Rims of disks fill the gaps between the cores of a surface, but also reach beyond its edges. So a
 // rim that is before all cores at its sample counts only where it lies on the line between two
-// cores on either side of the sample, in a row, a column or a diagonal, as near as disks are wide.
+// cores on either side of the sample, in one of eight directions, as near as disks are wide. Rims
+// of one surface count as one, so their order may matter where surfaces touch.
 #pragma once
 
 #include <cstddef>

@@ -101,28 +101,38 @@ TEST_F(View, NearDiskHidesTheFarOneInEitherOrder) {
   }
 }
 
-// Pieces of a square of 2 by 2, of any shape: disks circumscribe them, and their areas are known.
-// Before a far wall, they end where the square ends, and nothing of the wall shines through.
+// Pieces of a square of 2 by 2, of any shape, turned by an angle, at any scale: disks circumscribe
+// them, and their areas are known. Before a far wall, they end where the square ends, and nothing
+// of the wall shines through.
 TEST_F(View, DisksEndAtTheEdgesOfTheirSurface) {
   options_.width = options_.height = 256;
   const double half_fov = options_.camera.fov_degrees * 3.14159265358979 / 360;
   const double edge = 128 * 0.1 / std::tan(half_fov);  // of the square, pixels from the middle
-  for (const double slant : {0.0, 0.3, 1.0}) {
-    std::vector<std::string> rows = {"0 0 -5 0 0 1 40 5000 0 0 1"};
-    constexpr int kPieces = 8;
+  constexpr int kPieces = 8;
+  constexpr double kSide = 2.0 / kPieces;
+  struct Case {
+    double slant, turn, scale;
+  };
+  for (const Case& one : {Case{0, 0, 1}, Case{0.3, 0, 1}, Case{1, 0, 1}, Case{1, 0.4, 1},
+                          Case{0, 1.1, 1e-4}, Case{1, 0.7, 1e5}}) {
+    const double cosine = std::cos(one.turn), sine = std::sin(one.turn), scale = one.scale;
+    options_.camera.eye = glm::dvec3(0, 0, 10 * scale);
+    std::vector<std::string> rows = {
+        fmt::format("0 0 {} 0 0 1 {} {} 0 0 1", -5 * scale, 40 * scale, 5000 * scale * scale)};
+    const auto add = [&](double x, double y, double radius, double area) {
+      rows.push_back(fmt::format("{} {} 0 0 0 1 {} {} 1 0 0", scale * (cosine * x - sine * y),
+                                 scale * (sine * x + cosine * y), scale * radius,
+                                 scale * scale * area));
+    };
     for (int i = 0; i < kPieces * kPieces; ++i) {
-      // Squares, or halves of parallelograms
-      const double side = 2.0 / kPieces, x = -1 + (i % kPieces + 0.5) * side;
-      const double y = -1 + (i / kPieces + 0.5) * side;
-      const double shift = slant * side / 6;
-      const double radius = side * (slant > 0 ? 0.75 : 0.7072), area = side * side / 2;
-      if (slant > 0) {
-        rows.push_back(
-            fmt::format("{} {} 0 0 0 1 {} {} 1 0 0", x - shift, y - shift, radius, area));
-        rows.push_back(
-            fmt::format("{} {} 0 0 0 1 {} {} 1 0 0", x + shift, y + shift, radius, area));
+      // Squares, or their halves
+      const double x = -1 + (i % kPieces + 0.5) * kSide, y = -1 + (i / kPieces + 0.5) * kSide;
+      const double shift = one.slant * kSide / 6, area = kSide * kSide;
+      if (one.slant > 0) {
+        add(x - shift, y - shift, 0.75 * kSide, area / 2);
+        add(x + shift, y + shift, 0.75 * kSide, area / 2);
       } else {
-        rows.push_back(fmt::format("{} {} 0 0 0 1 {} {} 1 0 0", x, y, radius, 2 * area));
+        add(x, y, 0.7072 * kSide, area);
       }
     }
     const ExrPicture picture =
@@ -130,16 +140,18 @@ TEST_F(View, DisksEndAtTheEdgesOfTheirSurface) {
     int most_beyond = 0;
     for (int y = 0; y < 256; ++y) {
       for (int x = 0; x < 256; ++x) {
-        const double off = std::max(std::abs(x + 0.5 - 128), std::abs(y + 0.5 - 128));
+        const double u = x + 0.5 - 128, v = 128 - (y + 0.5);
+        const double off =
+            std::max(std::abs(cosine * u + sine * v), std::abs(cosine * v - sine * u));
         const std::size_t at = picture.at(x, y);
         if (off < edge - 3) {
-          EXPECT_EQ(picture.b[at], 0) << x << " " << y << " slant " << slant;
+          EXPECT_EQ(picture.b[at], 0) << x << " " << y << " turned " << one.turn;
         }
         if (picture.r[at] > 0) most_beyond = std::max(most_beyond, int(std::ceil(off - edge)));
       }
     }
     // Circles around the pieces reach .2 to .5 sides beyond, 2 to 5 pixels
-    EXPECT_LE(most_beyond, 1) << slant;
+    EXPECT_LE(most_beyond, 1) << one.slant << " turned " << one.turn << " scale " << scale;
   }
 }
 

@@ -42,8 +42,9 @@ class CurveReader : private BgeoJsonWalk {
     SURFEIT_RETURN_IF_ERROR(readPairs([&](const std::string& key) -> Status {
       if (key == "pointcount") return readCount(point_count_);
       if (key == "topology") return readTopology();
-      if (key == "primitives")
-        return readItems([&](const JsonToken& t) { return readPrimitive(t); });
+      if (key == "primitives") {
+        return readItems([&](const JsonToken& token) { return readPrimitive(token); });
+      }
       return skipValue();
     }));
     for (const PolygonRun& run : runs_) SURFEIT_RETURN_IF_ERROR(resolve(run));
@@ -115,9 +116,8 @@ class CurveReader : private BgeoJsonWalk {
     const std::string& type = head.type == "run" ? head.run_type : head.type;
     if (isSpline(type)) {
       return Status::corruption(
-          fmt::format("{}: found a primitive of type {}, expected polygon curves: a Resample or "
-                      "Convert node in "
-                      "Houdini makes polygon curves of NURBS and Bezier curves",
+          fmt::format("{}: found a primitive of type {}, expected polygon curves: a node Resample "
+                      "or Convert of Houdini makes them of NURBS and Bezier curves",
                       path_, type));
     }
     if (type == "PolygonCurve_run" || type == "c_r") {
@@ -235,8 +235,9 @@ class CurveReader : private BgeoJsonWalk {
       const std::uint32_t times = run.is_rle ? run.numbers[i + 1] : 1;
       // Each takes a vertex at least, so that the vertices that there are bound the loop
       for (std::uint32_t k = 0; k < times; ++k, ++count, vertex += corners) {
-        if (corners == 0 || vertex + corners > topology_.size())
+        if (corners == 0 || vertex + corners > topology_.size()) {
           return noSuchVertices(vertex, corners);
+        }
         for (std::uint32_t v = 0; v < corners; ++v) {
           SURFEIT_RETURN_IF_ERROR(addVertex(vertex + v));
         }

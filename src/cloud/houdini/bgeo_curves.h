@@ -1,9 +1,9 @@
 // The curves of Houdini's geometry since version 12, binary JSON, which stand beside its points
 // (cloud/houdini/bgeo_json_reader.h):
 //
-//   [ ..., "pointcount", n, ..., "topology", [ "pointref", [ "indices", [ point of a vertex, ... ]
-//   ] ],
-//     ..., "primitives", [ [ [ "type", TYPE, ... ], BODY ], ... ], ... ]
+//   [ ..., "pointcount", n, ...,
+//     "topology", [ "pointref", [ "indices", [ point of a vertex, ... ] ] ], ...,
+//     "primitives", [ [ [ "type", TYPE, ... ], BODY ], ... ], ... ]
 //
 //   TYPE                     BODY
 //   PolygonCurve_run or c_r  [ "startvertex", v, "nprimitives", n, "nvertices", [ vertices, ... ] ]
