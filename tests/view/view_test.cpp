@@ -150,8 +150,8 @@ TEST_F(View, DisksEndAtTheEdgesOfTheirSurface) {
         if (picture.r[at] > 0) most_beyond = std::max(most_beyond, int(std::ceil(off - edge)));
       }
     }
-    // Circles around the pieces reach .2 to .5 sides beyond, 2 to 5 pixels
-    EXPECT_LE(most_beyond, 1) << one.slant << " turned " << one.turn << " scale " << scale;
+    // Circles around the pieces reach 3 to 5 pixels beyond
+    EXPECT_LE(most_beyond, 2) << one.slant << " turned " << one.turn << " scale " << scale;
   }
 }
 
