@@ -97,3 +97,43 @@ planIndex() {
   run 0 plan --index "$cloud" --group lamp=lamp.ply -o "$3" --shards "$2" --memory 64M --threads 1 \
     "--$1" "${@:4}"
 }
+
+# A scheduler that runs every job when it is submitted: sbatch runs its tasks one after the other.
+makeFakeSlurm() {
+  mkdir -p bin spool
+  cat > bin/scontrol << 'FAKE'
+#!/bin/bash
+echo "MaxArraySize            = ${MOST_ARRAY:-1001}"
+FAKE
+  cat > bin/sbatch << 'FAKE'
+#!/bin/bash
+spool=$(dirname "$0")/../spool
+id=$((100 + $(ls "$spool" | wc -l)))
+array='' depends=''
+while [[ $1 == -* ]]; do
+  case $1 in
+    --array=*) array=${1#*=} ;;
+    --dependency=*) depends=${1#*=} ;;
+    --mem=*)
+      memory=${1//[!0-9]/}
+      ((memory <= ${MOST_MEMORY:-9999999})) || { echo "sbatch: no node has $memory" >&2; exit 1; }
+      echo "$id $1" >> "$spool.memory"
+      ;;
+  esac
+  shift
+done
+cp "$1" "$spool/$id" # as slurmd does
+shift
+echo "$id;cluster"
+[[ -z $depends ]] || echo "$id $depends" >> "$spool.depends"
+export SLURM_JOB_ID=$id SLURM_MEM_PER_NODE=1
+for index in ${array//,/ }; do
+  ((index < ${MOST_ARRAY:-1001})) || exit 1
+  SLURM_ARRAY_TASK_ID=$index bash "$spool/$id" "$@" > /dev/null 2>&1 < /dev/null
+done
+[[ -n $array ]] || bash "$spool/$id" "$@" > /dev/null 2>&1 < /dev/null
+exit 0
+FAKE
+  chmod +x bin/*
+  export PATH=$PWD/bin:$PATH
+}
