@@ -262,5 +262,13 @@ TEST_F(HoudiniCurvesMesh, EveryTruncationIsRefusedAndNoFlippedByteDoesHarm) {
   }
 }
 
+// The end of a name counts, not what stands within.
+TEST_F(HoudiniCurvesMesh, NamesOfMeshesMayHoldItsExtension) {
+  write("wall.geometry.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const auto mesh = loadMeshes({path("wall.geometry.obj")}, glm::vec3(0.5f), notes_);
+  ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+  EXPECT_EQ(mesh->triangle.size(), 1u);
+}
+
 }  // namespace
 }  // namespace surfeit
