@@ -1,6 +1,7 @@
 #include "sample/dice.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
@@ -305,16 +306,23 @@ DicePlan::DicePlan(const Mesh& mesh, std::uint64_t count)
     has_surfels[order_[i]] = true;
     last_bearer_ = i;
   }
+  if (std::find(has_surfels.begin(), has_surfels.end(), false) == has_surfels.end()) return;
   findAdopted(has_surfels);
 }
 
 void DicePlan::findAdopted(const std::vector<bool>& has_surfels) {
-  constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  std::vector<std::uint32_t> bearer_at(mesh_.position.size(), kNone);
+  // Corners by place, because files may have a vertex for each face
+  using Place = std::array<float, 3>;
+  const auto placeOf = [&](std::uint32_t triangle, int k) {
+    const glm::vec3& at = mesh_.position[mesh_.triangle[triangle][k]];
+    return Place{at.x, at.y, at.z};
+  };
+  std::vector<std::pair<Place, std::uint32_t>> corners;
   for (std::uint32_t triangle = 0; triangle < has_surfels.size(); ++triangle) {
     if (!has_surfels[triangle]) continue;
-    for (int k = 0; k < 3; ++k) bearer_at[mesh_.triangle[triangle][k]] = triangle;
+    for (int k = 0; k < 3; ++k) corners.emplace_back(placeOf(triangle, k), triangle);
   }
+  std::sort(corners.begin(), corners.end());
   glm::dvec3 next(std::numeric_limits<double>::infinity());  // with surfels
   double next_radius = 0;
   for (std::uint64_t i = order_.size(); i-- > 0;) {
@@ -326,12 +334,23 @@ void DicePlan::findAdopted(const std::vector<bool>& has_surfels) {
       continue;
     }
     if (glm::distance(polygon.centroid(), next) - next_radius <= spacing()) continue;
+    // The nearest of those around its corners
+    double nearest = std::numeric_limits<double>::infinity();
+    std::uint32_t bearer = 0;
     for (int k = 0; k < 3; ++k) {
-      const std::uint32_t bearer = bearer_at[mesh_.triangle[triangle][k]];
-      if (bearer == kNone || is_adopted_[triangle]) continue;
-      adopted_.emplace_back(bearer, triangle);
-      is_adopted_[triangle] = true;
+      const Place place = placeOf(triangle, k);
+      auto at = std::lower_bound(corners.begin(), corners.end(), std::pair(place, 0u));
+      for (; at != corners.end() && at->first == place; ++at) {
+        const glm::dvec3 centroid = wholeTriangle(mesh_, at->second).centroid();
+        const double distance = glm::distance(centroid, polygon.centroid());
+        if (!(distance < nearest)) continue;
+        nearest = distance;
+        bearer = at->second;
+      }
     }
+    if (!std::isfinite(nearest)) continue;
+    adopted_.emplace_back(bearer, triangle);
+    is_adopted_[triangle] = true;
   }
   std::sort(adopted_.begin(), adopted_.end());
 }

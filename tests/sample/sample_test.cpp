@@ -49,8 +49,8 @@ class Sampling : public SceneFiles {
     return missing;
   }
 
-  // A bumpy grid of n x n quads, so 2 n^2 triangles of like size.
-  static std::string gridPly(int n) {
+  // A bumpy grid of n x n quads, so 2 n^2 triangles of like size; or with vertices of each quad.
+  static std::string gridPly(int n, bool is_split = false) {
     std::vector<glm::vec3> vertices;
     std::vector<std::vector<int>> faces;
     for (int i = 0; i <= n; ++i) {
@@ -64,6 +64,16 @@ class Sampling : public SceneFiles {
         const int a = i * (n + 1) + k;
         faces.push_back({a, a + 1, a + n + 2, a + n + 1});
       }
+    }
+    if (is_split) {
+      std::vector<glm::vec3> own;
+      for (std::vector<int>& face : faces) {
+        for (int& vertex : face) {
+          own.push_back(vertices[std::size_t(vertex)]);
+          vertex = int(own.size()) - 1;
+        }
+      }
+      vertices = own;
     }
     return plyText(vertices, faces);
   }
@@ -109,6 +119,7 @@ TEST_F(Sampling, FewSurfelsOnManyTrianglesKeepTheArea) {
 TEST_F(Sampling, DisksLeaveNoHoles) {
   const std::string cube = write("cube.ply", cubePly(false));
   const std::string grid = write("grid.ply", gridPly(30));
+  const std::string split = write("split.ply", gridPly(30, true));
   SampleOptions options;
   options.count = 5000;  // more than triangles: the pieces' own circles
   EXPECT_EQ(holes(cube, sample(cube, options), 2000), 0);
@@ -117,6 +128,7 @@ TEST_F(Sampling, DisksLeaveNoHoles) {
   for (const int count : {1700, 1000, 300}) {
     options.count = std::uint64_t(count);
     EXPECT_EQ(holes(grid, sample(grid, options), 20000), 0) << count;
+    EXPECT_EQ(holes(split, sample(split, options), 20000), 0) << count;
   }
 }
 
