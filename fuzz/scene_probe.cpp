@@ -51,7 +51,8 @@ PageForm formOf(std::byte first) {
           .has_groups = has(2),
           .has_long_sides = has(3),
           .has_bounds = has(4),
-          .has_opacity = has(5)};
+          .has_opacity = has(5),
+          .has_lobes = has(6)};
 }
 
 }  // namespace
@@ -85,7 +86,9 @@ void probeSurfelPage(const std::string& path) {
     radiosity[i] = surfels[i].radiosity;
   }
   std::vector<std::byte> replaced;
-  const Result<std::size_t> front = replaceSurfelRadiosity(payload, form, radiosity, replaced);
+  const std::vector<Lobe> lobes(form.has_lobes ? *count : 0);
+  const Result<std::size_t> front =
+      replaceSurfelRadiosity(payload, form, radiosity, replaced, lobes);
   SURFEIT_CHECK(front.ok() && *front <= replaced.size());
   const Result<std::uint32_t> again = decodeSurfelGroup(replaced, form, surfels);
   SURFEIT_CHECK(again.ok() && *again == *count);

@@ -2,7 +2,7 @@
 # Makes the pictures of docs/gallery.md, in docs/gallery/, from scenes that it makes itself. Clouds
 # and scenes go to out/gallery/. Minutes on two cores. Chapters may be named to make only these:
 #
-#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics translucent hair screen relit looked_up look brightness]
+#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics translucent hair screen relit looked_up look brightness shiny]
 #
 # SURFEIT_BUILD names a build directory to take the programs from; else build/release is built.
 set -euo pipefail
@@ -354,10 +354,46 @@ brightness() {
   draw occlusion_by_brightness bright.ply --channel ao "${studio_view[@]}"
 }
 
+# A lamp in a square tube that points at the floor, before a wall
+shiny() {
+  say "A shiny tile that throws a patch of light onto the wall"
+  printf '%s\n' "newmtl room" "Kd .5 .5 .5" "newmtl tile" "Kd .9 .8 .65" "newmtl lamp" "Kd 0 0 0" \
+    "Ke 200 190 170" > shiny.mtl
+  printf '%s\n' "mtllib shiny.mtl" "usemtl tile" "v -.45 .01 .75" "v .45 .01 .75" "v .45 .01 -.15" \
+    "v -.45 .01 -.15" "f 1 2 3 4" > shiny_tile.obj
+  printf '%s\n' "mtllib shiny.mtl" "usemtl room" "v -2.5 0 -2" "v 2.5 0 -2" "v 2.5 3 -2" \
+    "v -2.5 3 -2" "v -2.5 0 3" "v 2.5 0 3" "f 1 2 3 4" "f 5 6 2 1" > shiny_room.obj
+  printf '%s\n' "mtllib shiny.mtl" "usemtl lamp" "v -.1 1.5 2.1" "v .1 1.5 2.1" "v .1 1.5 2.3" \
+    "v -.1 1.5 2.3" "f 1 2 3 4" > shiny_lamp.obj
+  sample shiny_tile.obj -o tile.ply --count 20000
+  sample shiny_room.obj -o room.ply --count $receivers
+  sample shiny_lamp.obj -o lamp.ply --count 3000 --emission
+  index room.ply --group tile=tile.ply --group lamp=lamp.ply -o hall.sft
+  timed surfeit bounce hall.sft -o matt.sft
+  timed surfeit bounce hall.sft -o shiny.sft --glossy tile=.9,.12
+  local fine=(--mode bleeding --max-solid-angle .01 --raster-resolution 32) eye="1.9 1.6 5.4"
+  local view=(--channel radiosity --exposure 2 --eye "$eye" --look-at "0 1.1 -.6" --fov 36 --size 480x360)
+  local kind part
+  for kind in matt shiny; do
+    gather $kind.sft room.ply -o room_$kind.ply "${fine[@]}" --gain lamp=0
+    gather $kind.sft tile.ply -o tile_$kind.ply "${fine[@]}"
+    for part in room tile; do
+      timed surfeit convert ${part}_$kind.ply -o ${part}_lit.ply --set "radiosity = albedo * irradiance"
+    done
+    clouds join $kind.ply room_lit.ply tile_lit.ply
+    draw shiny_$kind $kind.ply "${view[@]}"
+  done
+  # The tile as the camera sees it: a tenth even, the rest its mirror image
+  gather shiny.sft tile_shiny.ply -o tile_mirror.ply --mode glossy --roughness .12 --camera "${eye// /,}"
+  timed surfeit convert tile_mirror.ply -o tile_lit.ply --set "radiosity = albedo * (.1 * irradiance + .9 * reflection)"
+  clouds join shiny.ply room_lit.ply tile_lit.ply
+  draw shiny_mirror shiny.ply "${view[@]}"
+}
+
 chapters=("$@")
 if ((${#chapters[@]} == 0)); then
   chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube
-    camera caustics translucent hair screen relit looked_up look brightness)
+    camera caustics translucent hair screen relit looked_up look brightness shiny)
   scenes
 elif [[ ! -e black_receivers.ply ]]; then
   scenes

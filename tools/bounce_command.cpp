@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "surfeit/bounce.h"
 #include "surfeit/process.h"
@@ -30,6 +31,14 @@ nlohmann::json passJson(const BouncePass& pass) {
           {"surfel_cache", cacheJson(pass.surfel_cache)}};
 }
 
+nlohmann::json glossyJson(const std::vector<GroupGloss>& glossy) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const GroupGloss& of : glossy) {
+    json.push_back({{"group", of.group}, {"share", of.share}, {"roughness", of.roughness}});
+  }
+  return json;
+}
+
 std::string passLine(std::size_t bounce, const BouncePass& pass) {
   return fmt::format(
       "bounce {}: {:.1f} s and {:.1f} s to write, {} receivers/s; mean radiosity {:.4g} {:.4g} "
@@ -46,6 +55,7 @@ Status runBounce(BounceArguments& arguments, CommandContext& context) {
   options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(options.group_corrections,
                            arguments.of_groups.corrections(arguments.scene));
+  SURFEIT_ASSIGN_OR_RETURN(options.glossy, arguments.of_groups.gloss(arguments.scene));
   SURFEIT_ASSIGN_OR_RETURN(const BounceStats stats, bounceScene(arguments.scene, arguments.result,
                                                                 options, context.progress()));
   std::string lines;
@@ -64,6 +74,7 @@ Status runBounce(BounceArguments& arguments, CommandContext& context) {
                              {"bounces", options.bounces},
                              {"surfels_per_receiver", options.surfels_per_receiver},
                              {"spare_last", options.spare_last},
+                             {"glossy", glossyJson(options.glossy)},
                              {"max_solid_angle", options.quality.max_solid_angle},
                              {"raster_resolution", options.quality.raster_resolution},
                              {"near_field_radii", options.quality.near_field_radii},
@@ -112,12 +123,15 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
   command->footer(
       "The result holds the same surfels, pages and nodes with new radiosities. A gather from it\n"
       "adds one more bounce at its receivers: after --bounces 1, --mode bleeding shows two.\n"
+      "With --glossy surfels send a part of what they reflect in a lobe: a shiny floor throws a\n"
+      "bright patch onto the wall. What shines there must be surfels, sampled with --emission.\n"
       "A scene without albedo is refused: index clouds with albedo_r albedo_g albedo_b, which\n"
       "surfeit sample writes.\n"
       "Examples:\n"
       "  surfeit bounce cornell.sft -o cornell_b2.sft --bounces 2\n"
       "  surfeit bounce city.sft -o city_b3.sft --bounces 3 --surfels-per-receiver 8 --memory 2G\n"
       "  surfeit bounce city.sft -o look.sft --quality draft --stats bounce.json\n"
+      "  surfeit bounce hall.sft -o shiny.sft --bounces 2 --glossy floor=.8,.2\n"
       "  surfeit bounce room.sft -o warm.sft --bounce-gain 1.2 --group-saturation curtain=.4 \\\n"
       "      --bounce-filter \"centre=0,1,2 radius=1,3 gain=.5 tint=1,.9,.8\"");
   command->callback(

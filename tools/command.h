@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "surfeit/kept_scene.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "tools/console_progress.h"
@@ -49,7 +50,8 @@ class CommandContext {
   CommonOptions common;
   int exit_status = 0;
   SequenceOptions sequence;
-  std::vector<std::string> words;  // of the command line
+  KeptScene* kept_scene = nullptr;  // of a sequence: the scene of the frame before
+  std::vector<std::string> words;   // of the command line
 
   // Of a command that has run: it is a sequence, so its frames are to run, each by a context of its
   // own, and nothing was done yet.

@@ -230,6 +230,7 @@ void addCubeCommand(CLI::App& app, CommandContext& context) {
   addQualityOptions(*command, arguments->options.quality);
   addDirectionOptions(*command, arguments->options);
   addSubsetOption(*command, arguments->options.groups, arguments->scene);
+  addGainOption(*command, arguments->options.gains, arguments->scene);
   addCubePictureOptions(*command, *arguments);
   context.addCommonOptions(*command);
   command->footer(

@@ -67,6 +67,12 @@ Result<ShardStats> gatherAsAsked(const GatherArguments& arguments, CommandContex
     return gatherResumable(scene, receivers, result, options, shards, context.progress());
   }
   ShardStats stats;
+  if (context.kept_scene != nullptr) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        static_cast<GatherStats&>(stats),
+        gatherCloud(scene, receivers, result, options, context.progress(), *context.kept_scene));
+    return stats;
+  }
   SURFEIT_ASSIGN_OR_RETURN(static_cast<GatherStats&>(stats),
                            gatherCloud(scene, receivers, result, options, context.progress()));
   return stats;
@@ -190,6 +196,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
   addGatherOptions(*command, arguments->options);
   addLightOptions(*command, arguments->options);
   addSubsetOption(*command, arguments->options.groups, arguments->scene);
+  addGainOption(*command, arguments->options.gains, arguments->scene);
   command->add_option("--cache-series", arguments->series,
                       "Write statistics of the caches over time to this file, .csv or .json");
   command->add_flag("--dry-run", arguments->is_dry_run,

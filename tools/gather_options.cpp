@@ -6,9 +6,11 @@
 
 #include "surfeit/group_names.h"
 #include "surfeit/scene.h"
+#include "surfeit/surfel.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
 #include "tools/number_checks.h"
+#include "tools/number_list.h"
 
 namespace surfeit {
 namespace {
@@ -97,6 +99,44 @@ void addSubsetOption(CLI::App& command, std::uint64_t& groups, const std::string
           "other surfels are ignored")
       ->type_name("GROUPS")
       ->default_str("all");
+}
+
+namespace {
+
+// "key=2,fill,3=.5": of groups, by number or name, that have no value of their own that of the
+// next.
+std::vector<GroupGain> parseGains(const std::string& text, const std::string& scene) {
+  const auto refuse = [](const std::string& why) { return CLI::ValidationError("--gain", why); };
+  std::vector<GroupGain> gains;
+  std::string groups;
+  for (const std::string& part : CLI::detail::split(text, ',')) {
+    const std::size_t equals = part.rfind('=');
+    groups += (groups.empty() ? "" : ",") + part.substr(0, equals);
+    if (equals == part.npos) continue;
+    const float gain =
+        float(parseNumberList<1>("--gain", part.substr(equals + 1), "NAME=GAIN, such as key=2")[0]);
+    const Result<std::uint64_t> chosen = chosenGroups(groups, scene);
+    if (!chosen.ok()) throw refuse(chosen.status().message());
+    for (std::uint32_t group = 0; group < kMaxGroups; ++group) {
+      if ((*chosen & groupBit(group)) != 0) gains.push_back({group, gain});
+    }
+    groups.clear();
+  }
+  if (gains.empty() || !groups.empty()) {
+    throw refuse("found \"" + text + "\", expected NAME=GAIN,..., such as key=2,fill=.5");
+  }
+  return gains;
+}
+
+}  // namespace
+
+void addGainOption(CLI::App& command, std::vector<GroupGain>& gains, const std::string& scene) {
+  command
+      .add_option_function<std::string>(
+          "--gain", [&gains, &scene](const std::string& text) { gains = parseGains(text, scene); },
+          "Factors of the light that object groups send, direct light included, by name or number: "
+          "key=2,fill=.5")
+      ->type_name("NAME=GAIN,...");
 }
 
 void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io) {

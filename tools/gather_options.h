@@ -46,6 +46,9 @@ void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io);
 // argument of the command that was added before.
 void addSubsetOption(CLI::App& command, std::uint64_t& groups, const std::string& scene);
 
+// --gain, of the light that groups of surfels send, likewise.
+void addGainOption(CLI::App& command, std::vector<GroupGain>& gains, const std::string& scene);
+
 // "occlusion", "bleeding", "glossy"
 const char* modeName(GatherMode mode);
 

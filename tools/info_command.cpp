@@ -104,6 +104,7 @@ nlohmann::json sceneJson(const SceneInfo& info, const std::vector<GroupName>& na
       {"leaf_capacity", info.leaf_capacity},
       {"precision", info.full_precision ? "full" : "quantized"},
       {"input_channels", channelNames(info.channels)},
+      {"lobes", info.has_lobes},
       {"bounds", {vectorJson(info.min), vectorJson(info.max)}},
       {"origin", vectorJson(info.origin)},
       {"cube", {info.cube.corner.x, info.cube.corner.y, info.cube.corner.z, info.cube.size}},
@@ -148,8 +149,9 @@ std::string sceneText(const std::string& path, const SceneInfo& info,
       info.origin == glm::dvec3(0)
           ? ""
           : fmt::format("\n  origin         {} {} {}", info.origin.x, info.origin.y, info.origin.z);
-  const std::string groups =
+  std::string more =
       info.channels.group ? fmt::format("  groups         {}\n", groupText(info, names)) : "";
+  if (info.has_lobes) more += "  lobes          of glossy bounces\n";
   return fmt::format(
       "{}: Surfeit scene, {} surfels, {} nodes\n"
       "  file           {} ({:.1f} bytes per surfel)\n"
@@ -166,7 +168,7 @@ std::string sceneText(const std::string& path, const SceneInfo& info,
       double(info.file_bytes) / double(info.surfels), placeText(info.min, info.origin),
       placeText(info.max, info.origin), origin, info.cube.corner.x, info.cube.corner.y,
       info.cube.corner.z, info.cube.size, upAxisName(info.up),
-      fmt::join(channelNames(info.channels), ", "), groups,
+      fmt::join(channelNames(info.channels), ", "), more,
       info.full_precision ? "full" : "quantized", formatCount(info.node_pages),
       formatBytes(info.node_page_bytes), formatBytes(info.node_cache_bytes),
       formatCount(info.surfel_pages), formatBytes(info.surfel_page_bytes),

@@ -22,6 +22,8 @@ namespace {
 constexpr const char* kLookGroup = "Look of bounce light";
 constexpr const char* kBounceFilter = "--bounce-filter";
 constexpr double kMostLookFactor = 1e6;
+constexpr const char* kGlossy = "--glossy";
+constexpr double kLeastRoughness = 0.05;
 
 // Numbers from 0 to kMostLookFactor.
 template <std::size_t N>
@@ -126,6 +128,27 @@ BounceFilter parseBounceFilter(const std::string& text) {
   return filter;
 }
 
+// ".8" or ".8,.2"
+GroupGloss parseGloss(const std::string& text) {
+  constexpr const char* kExpected = "SHARE or SHARE,ROUGHNESS: 0 to 1, and .05 to 1";
+  GroupGloss gloss;
+  const bool has_two = text.find(',') != text.npos;
+  std::array<double, 2> numbers = {0, double(gloss.roughness)};
+  if (has_two) {
+    numbers = parseNumberList<2>(kGlossy, text, kExpected);
+  } else {
+    numbers[0] = parseNumberList<1>(kGlossy, text, kExpected)[0];
+  }
+  const bool is_valid =
+      numbers[0] >= 0 && numbers[0] <= 1 && numbers[1] >= kLeastRoughness && numbers[1] <= 1;
+  if (!is_valid) {
+    throw CLI::ValidationError(kGlossy, fmt::format("found \"{}\", expected {}", text, kExpected));
+  }
+  gloss.share = float(numbers[0]);
+  gloss.roughness = float(numbers[1]);
+  return gloss;
+}
+
 // Repeatable; the words of each are one value.
 CLI::Option* addRepeated(CLI::App& command, const std::string& name,
                          std::function<void(const std::vector<std::string>&)> parse,
@@ -153,6 +176,29 @@ Result<std::pair<std::uint64_t, std::string>> splitGroups(const std::string& opt
   if (!set.ok()) set = parseGroupNames(groups, names);
   if (!set.ok()) return Status::invalidArgument(option + ": " + set.status().message());
   return std::pair(*set, text.substr(equals + 1));
+}
+
+// Calls set(group, value) for each group of each "GROUPS=VALUE"; no group twice.
+template <typename Set>
+Status forEachGroup(const std::string& option, const std::vector<std::string>& texts,
+                    const std::vector<GroupName>& names, Set&& set) {
+  std::uint64_t seen = 0;
+  for (const std::string& text : texts) {
+    SURFEIT_ASSIGN_OR_RETURN(const auto split, splitGroups(option, text, names));
+    if ((seen & split.first) != 0) {
+      return Status::invalidArgument(
+          fmt::format("{}: \"{}\" has a group that another value has", option, text));
+    }
+    seen |= split.first;
+    try {
+      for (std::uint32_t group = 0; group < kMaxGroups; ++group) {
+        if ((split.first & groupBit(group)) != 0) set(group, split.second);
+      }
+    } catch (const CLI::ValidationError& error) {
+      return Status::invalidArgument(error.what());
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -204,6 +250,9 @@ void addGroupLookOptions(CLI::App& command, GroupLookArguments& arguments) {
       "Saturation of that light: 0 is grey, 1 as it is; repeatable");
   add("--group-tint", arguments.tints, "GROUPS=R,G,B",
       "Factors of red, green and blue of that light; repeatable");
+  add(kGlossy, arguments.glossy, "GROUPS=SHARE[,ROUGHNESS]",
+      "The part of that light, 0 to 1, that goes into a lobe around the mirror direction, of this "
+      "roughness, .05 to 1 (default .2): floor=.8,.2; without groups 0=.8,.2; repeatable");
 }
 
 Result<std::vector<GroupCorrection>> GroupLookArguments::corrections(
@@ -214,23 +263,9 @@ Result<std::vector<GroupCorrection>> GroupLookArguments::corrections(
   std::map<std::uint32_t, ColorCorrection> of_group;
   const auto apply = [&](const std::string& option, const std::vector<std::string>& texts,
                          auto set) -> Status {
-    std::uint64_t seen = 0;
-    for (const std::string& text : texts) {
-      SURFEIT_ASSIGN_OR_RETURN(const auto split, splitGroups(option, text, names));
-      if ((seen & split.first) != 0) {
-        return Status::invalidArgument(
-            fmt::format("{}: \"{}\" has a group that another value has", option, text));
-      }
-      seen |= split.first;
-      try {
-        for (std::uint32_t group = 0; group < kMaxGroups; ++group) {
-          if ((split.first & groupBit(group)) != 0) set(of_group[group], option, split.second);
-        }
-      } catch (const CLI::ValidationError& error) {
-        return Status::invalidArgument(error.what());
-      }
-    }
-    return {};
+    return forEachGroup(option, texts, names, [&](std::uint32_t group, const std::string& text) {
+      set(of_group[group], option, text);
+    });
   };
   SURFEIT_RETURN_IF_ERROR(apply("--group-gain", gains, [](auto& of, auto& option, auto& text) {
     of.gain = parseFactor(option, text);
@@ -242,6 +277,18 @@ Result<std::vector<GroupCorrection>> GroupLookArguments::corrections(
     of.tint = parseTint(option, text);
   }));
   for (const auto& [group, correction] : of_group) result.push_back({group, correction});
+  return result;
+}
+
+Result<std::vector<GroupGloss>> GroupLookArguments::gloss(const std::string& scene) const {
+  std::vector<GroupGloss> result;
+  if (glossy.empty()) return result;
+  SURFEIT_ASSIGN_OR_RETURN(const std::vector<GroupName> names, readGroupNames(scene));
+  SURFEIT_RETURN_IF_ERROR(
+      forEachGroup(kGlossy, glossy, names, [&](std::uint32_t group, const std::string& text) {
+        result.push_back(parseGloss(text));
+        result.back().group = group;
+      }));
   return result;
 }
 

@@ -72,9 +72,11 @@ int runWords(const std::vector<std::string>& words) {
   CommandContext context;
   const int exit_status = parseAndRun(words, context);
   if (!context.isSequence()) return exit_status;
+  KeptScene kept;
   return runSequence(context.sequence.frames, context.common.quiet,
                      [&](const SequenceFrame& frame) {
                        CommandContext of_frame(frame);
+                       of_frame.kept_scene = &kept;
                        parseAndRun(words, of_frame);
                        return of_frame.frameOutcome();
                      });

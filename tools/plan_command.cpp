@@ -61,6 +61,7 @@ void addGatherPlan(CLI::App& command, CommandContext& context) {
   addGatherOptions(command, arguments->options);
   addLightOptions(command, arguments->options);
   addSubsetOption(command, arguments->options.groups, arguments->scene);
+  addGainOption(command, arguments->options.gains, arguments->scene);
   context.addCommonOptions(command, {.stats = false});
   command.footer(
       "Memory and time of a task are found from a sample, as by tune, or given: --memory is the\n"

@@ -207,6 +207,7 @@ void addTuneCommand(CLI::App& app, CommandContext& context) {
   addGatherOptions(*command, options.gather);
   addLightOptions(*command, options.gather);
   addSubsetOption(*command, options.gather.groups, arguments->scene);
+  addGainOption(*command, options.gather.gains, arguments->scene);
   context.addCommonOptions(*command);
   command->footer(
       "Follows the look-ups of a sample of the receivers, and predicts hit rates, bytes read and\n"

@@ -7,6 +7,10 @@
 // With a look (surfeit/bounce_look.h) B_k = B_0 + C_group(albedo * F(E(B_{k-1}))): F is its color
 // correction and its filters at the surfel, C_group the correction of the surfel's object group.
 //
+// Glossy surfels (BounceOptions::glossy) send a part of what they reflect in a lobe around the
+// mirror direction. B is what a surfel sends in all directions together, so lobes change it only by
+// way of other surfels.
+//
 // E is the irradiance that a gather finds at the surfel (surfeit/gather.h), in the unit of the
 // radiosity: inside a closed shell of radiosity B, E = B. A gather from the result adds one more
 // bounce at its receivers.
@@ -27,6 +31,17 @@
 
 namespace surfeit {
 
+// What surfels of an object group do with the light that they reflect (memo 9). Plain data.
+struct GroupGloss {
+  std::uint32_t group = 0;  // 0 to kMaxGroups - 1 (surfeit/surfel.h)
+  // The part of it, 0 to 1, that they send in a lobe around the mirror direction. The rest, and
+  // what they emit, goes evenly to all sides.
+  float share = 0;
+  // Width of the lobe, as GatherWeights::roughness: cos^n of the angle to the mirror direction,
+  // with n = 2 / roughness^2 - 2; .05 to 1.
+  float roughness = 0.2f;
+};
+
 // `temporary_directory` holds intermediate bounces. `strict` has no effect.
 struct BounceOptions : JobOptions {
   int bounces = 1;  // 1 to 100
@@ -43,6 +58,12 @@ struct BounceOptions : JobOptions {
   BounceLook look;  // of all bounces
   // Of what surfels of these groups reflect; no group twice. Groups that the scene lacks are told.
   std::vector<GroupCorrection> group_corrections;
+
+  // Glossy surfels: each stores one lobe, the cone of the mean direction and spread of all that it
+  // reflects; several lamps make one wide lobe. The result is then of format version 4. Two-sided
+  // surfels and spheres have no mirror direction: they send evenly, which is told. No group twice;
+  // groups that the scene lacks are told.
+  std::vector<GroupGloss> glossy;
 
   double cache_split = -1;  // as in GatherOptions (surfeit/bake.h)
   bool direct_io = false;
@@ -68,16 +89,18 @@ struct BounceStats {
 
 // Writes `result_path`: the scene with the radiosity after `options.bounces` bounces. Surfels,
 // their order, pages, nodes and references stay the same, bit for bit. Radiosities of surfels and
-// nodes and the power coefficients are new. The file appears under its name only when complete.
+// nodes and the power coefficients are new, and lobes, where surfels are glossy. The file appears
+// under its name only when complete.
 //
 // A two-sided surfel has one radiosity for both sides; it receives the mean of its two sides. A
 // sphere receives the mean over all directions. So no light is lost, and none is made.
 //
 // The result depends only on scene, bounces, quality, surfels_per_receiver, spare_last, groups,
-// look, group_corrections and the machine's instruction set, bit for bit. With albedo or gains
-// above 1 radiosity can grow without end; it is limited to 1e12. Errors: as indexClouds;
+// look, group_corrections, glossy and the machine's instruction set, bit for bit. With albedo or
+// gains above 1 radiosity can grow without end; it is limited to 1e12. Errors: as indexClouds;
 // kCorruption for a scene without albedo or radiosity; kInvalidArgument for a scene that
-// bounceScene has written, because its bounces would count twice.
+// bounceScene has written, because its bounces would count twice, and with glossy surfels for a
+// scene of format version 1.
 SURFEIT_API Result<BounceStats> bounceScene(const std::string& scene_path,
                                             const std::string& result_path,
                                             const BounceOptions& options, Progress& progress);

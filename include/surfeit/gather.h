@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "surfeit/api.h"
 #include "surfeit/status.h"
@@ -116,6 +117,12 @@ enum class QualityPreset : std::uint8_t { kDraft, kStandard, kFinal };
 // others, such as sides and distances, stay as they are.
 SURFEIT_API void setQuality(QualityPreset preset, GatherQuality& quality);
 
+// A factor of the light that surfels of an object group send.
+struct GroupGain {
+  std::uint32_t group = 0;  // 0 to kMaxGroups - 1 (surfeit/surfel.h)
+  float gain = 1;           // 0 to 1e6
+};
+
 // Everything that decides about the result at a receiver, except the scene and the environment.
 struct GatherSettings {
   GatherMode mode = GatherMode::kOcclusion;
@@ -131,6 +138,10 @@ struct GatherSettings {
   // With kGlossy, the viewpoint of receivers without a view; NaN: every receiver needs its own
   // view.
   glm::dvec3 eye{std::numeric_limits<double>::quiet_NaN()};
+  // Gains of object groups, no group twice: surfels send so many times their radiosity, and cover
+  // as ever. Groups that are not named have 1. At least one of the others must be in the scene.
+  // Nodes with surfels of several gains are opened, as those with surfels that are ignored.
+  std::vector<GroupGain> gains{};
 };
 
 // The place being lit.

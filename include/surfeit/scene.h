@@ -35,6 +35,7 @@ struct SceneInfo {
   UpAxis up = kDefaultUpAxis;
   CloudChannels channels;  // channels of the input
   bool full_precision = false;
+  bool has_lobes = false;  // surfels send a part of their light in lobes (BounceOptions::glossy)
   std::vector<std::uint32_t> level_pages;  // node pages of levels 0..21
   std::string provenance;                  // JSON
   std::uint64_t groups = 0;  // object groups with surfels, as bits; without the channel group 0

@@ -54,6 +54,7 @@ typedef struct surfeit_engine_options {
   uint64_t memory_bytes; /* budget of pages, directories, gatherers; 0: 3/4 of the job's memory */
   int32_t threads;       /* expected gatherers at a time; 0: as many as processors */
   int32_t direct_io;     /* 1: read past the page cache of the system */
+  int32_t lobes;         /* 1: room for scenes of glossy bounces, which are refused without it */
 } surfeit_engine_options;
 SURFEIT_API void surfeit_engine_options_init(surfeit_engine_options* options);
 
@@ -122,6 +123,12 @@ enum {
   SURFEIT_OUTPUT_RADIANCE_SH = 64
 };
 
+/* A factor of the light that surfels of an object group send, 0 to 1e6. */
+typedef struct surfeit_group_gain {
+  uint32_t group; /* 0 to 63 */
+  float gain;
+} surfeit_group_gain;
+
 typedef struct surfeit_settings {
   size_t size;
   int32_t mode;
@@ -142,6 +149,9 @@ typedef struct surfeit_settings {
   float roughness;      /* of SURFEIT_GLOSSY, above 0, up to 1 */
   float falloff;        /* of occlusion with distance; 0: none */
   int32_t falloff_mode;
+
+  size_t gain_count;               /* 0: every group sends its radiosity */
+  const surfeit_group_gain* gains; /* no group twice; other groups have 1; copied */
 } surfeit_settings;
 /* Occlusion at standard quality. */
 SURFEIT_API void surfeit_settings_init(surfeit_settings* settings);

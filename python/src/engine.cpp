@@ -119,11 +119,12 @@ class WorldGatherer {
   glm::dvec3 origin_;
 };
 
-Engine makeEngine(std::uint64_t memory_bytes, int threads, bool direct_io) {
+Engine makeEngine(std::uint64_t memory_bytes, int threads, bool direct_io, bool lobes) {
   EngineOptions options;
   options.memory_bytes = memory_bytes;
   options.threads = threads;
   options.direct_io = direct_io;
+  options.lobes = lobes;
   return valueOf(Engine::create(options));
 }
 

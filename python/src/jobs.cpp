@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -78,6 +79,11 @@ py::dict bounce(const std::string& scene, const std::string& result, const py::d
   options.into("spare_last", bouncing.spare_last);
   takeLook(options, bouncing.look);
   takeGroupCorrections(options, bouncing.group_corrections);
+  std::vector<std::tuple<std::uint32_t, float, float>> glossy;
+  options.into("glossy", glossy);
+  for (const auto& [group, share, roughness] : glossy) {
+    bouncing.glossy.push_back({group, share, roughness});
+  }
   options.into("cache_split", bouncing.cache_split);
   options.into("direct_io", bouncing.direct_io);
   options.finish();

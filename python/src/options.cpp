@@ -137,6 +137,9 @@ void takeSettings(Options& options, GatherSettings& settings) {
   takeQuality(options, settings.quality);
   takeWeights(options, settings.weights);
   takeGroups(options, settings.groups);
+  std::vector<std::pair<std::uint32_t, float>> gains;
+  options.into("gain", gains);
+  for (const auto& [group, gain] : gains) settings.gains.push_back({group, gain});
   takePlace(options, "eye", settings.eye);
 }
 

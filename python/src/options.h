@@ -84,7 +84,7 @@ void takeReading(Options& options, ReadOptions& reading);
 void takeQuality(Options& options, GatherQuality& quality);
 // groups: "0,2-5"; names are numbers by now.
 void takeGroups(Options& options, std::uint64_t& groups);
-// mode, outputs, groups, eye, quality and weights.
+// mode, outputs, groups, gain (pairs of group and gain), eye, quality and weights.
 void takeSettings(Options& options, GatherSettings& settings);
 // environment_rotation, environment_intensity, environment_up.
 void takePlacement(Options& options, EnvironmentPlacement& placement);

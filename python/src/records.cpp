@@ -103,8 +103,9 @@ py::dict record(const SceneInfo& info) {
       "cube"_a = py::make_tuple(info.cube.corner.x, info.cube.corner.y, info.cube.corner.z,
                                 info.cube.size),
       "up"_a = std::string(1, "xyz"[int(info.up)]), "channels"_a = channelNames(info.channels),
-      "full_precision"_a = info.full_precision, "level_pages"_a = info.level_pages,
-      "provenance"_a = info.provenance, "groups"_a = describeGroups(info.groups));
+      "full_precision"_a = info.full_precision, "has_lobes"_a = info.has_lobes,
+      "level_pages"_a = info.level_pages, "provenance"_a = info.provenance,
+      "groups"_a = describeGroups(info.groups));
 }
 
 py::dict record(const CloudDensity& density) {

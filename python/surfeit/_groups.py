@@ -45,11 +45,19 @@ def groups_of(groups: Any, names: Callable[[], Names]) -> List[int]:
 
 
 def with_numbers(options: Dict[str, Any], names: Callable[[], Names]) -> Dict[str, Any]:
-    """The same options, with `groups` as a text of numbers."""
-    groups = options.get("groups")
-    if groups is None:
-        return options
-    return {**options, "groups": ",".join(map(str, groups_of(groups, names)))}
+    """The same options, with `groups` as a text of numbers, and `gain` as pairs with them."""
+    taken = dict(options)
+    if taken.get("groups") is not None:
+        taken["groups"] = ",".join(map(str, groups_of(taken["groups"], names)))
+    if taken.get("gain") is not None:
+        given = taken["gain"]
+        if isinstance(given, str):  # "key=2,fill,3=.5"
+            given = re.findall(r"[^=]+=[^,]*(?=,|$)", given.strip(","))
+            given = [part.strip(", ") for part in given]
+        taken["gain"] = [(group, numbers_of(gain, (1,), f"gain: {groups}")[0])
+                         for groups, gain in _pairs_of(given, "gain")
+                         for group in groups_of(groups, names)]
+    return taken
 
 
 def _pairs_of(given: Any, name: str) -> List[Tuple[Any, Any]]:
@@ -63,6 +71,18 @@ def _pairs_of(given: Any, name: str) -> List[Tuple[Any, Any]]:
                              '{"walls": .5, "2,5-7": 2}')
         pairs.append(tuple(text.rsplit("=", 1)))
     return pairs
+
+
+def group_glosses(scene: str, given: Any) -> List[Tuple[int, float, float]]:
+    """Group, share and roughness of each, from {groups: share} and {groups: (share, roughness)}."""
+    found: Dict[int, Tuple[float, float]] = {}
+    for groups, value in _pairs_of(given, "glossy"):
+        numbers = numbers_of(value, (1, 2), f"glossy: {groups}")
+        for group in groups_of(groups, lambda: names_of_scene(scene)):
+            if group in found:
+                raise ValueError(f"glossy: {groups!r} has a group that another value has")
+            found[group] = (numbers[0], numbers[1] if len(numbers) == 2 else 0.2)
+    return [(group, *found[group]) for group in sorted(found)]
 
 
 def group_corrections(scene: str, **given: Any) -> Optional[List[Dict[str, Any]]]:

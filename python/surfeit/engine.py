@@ -29,11 +29,11 @@ _engines: "weakref.WeakValueDictionary[str, Engine]" = weakref.WeakValueDictiona
 _engines_lock = threading.Lock()
 
 
-def _engine_of(token: str, memory: int, threads: int, direct_io: bool) -> "Engine":
+def _engine_of(token: str, *arguments: Any) -> "Engine":
     with _engines_lock:
         engine = _engines.get(token)
         if engine is None:
-            engine = Engine(memory, threads, direct_io)
+            engine = Engine(*arguments)
             engine._token = token
             _engines[token] = engine
         return engine
@@ -75,13 +75,15 @@ class Engine:
         of what the job may hold.
     threads: threads of a gather at many receivers. Default: the processors that the job may use.
     direct_io: reads scenes past the page cache of the system.
+    lobes: room for the lobes of scenes of `bounce(glossy=...)`, which are refused without it.
 
     Raises MemoryError, which names the least budget that works.
     """
 
     def __init__(self, memory: Memory = None, threads: Optional[int] = None,
-                 direct_io: bool = False):
-        self._arguments = (memory_bytes(memory), threads or 0, bool(direct_io))
+                 direct_io: bool = False, lobes: bool = False):
+        self._arguments = (memory_bytes(memory), threads or 0, bool(direct_io),
+                           bool(lobes))
         self._engine = _surfeit.Engine(*self._arguments)
         self._token: Optional[str] = None
         self._lock = threading.Lock()
@@ -273,12 +275,18 @@ def _settings_of(settings: Mapping[str, Any], scenes: Iterable["Scene"]) -> Dict
 def _key_of(settings: Mapping[str, Any]) -> Any:
     """Something that is equal for equal settings; None where that is not known."""
     try:
-        key = tuple(sorted((name, tuple(value) if isinstance(value, (list, np.ndarray)) else value)
-                           for name, value in settings.items() if value is not None))
+        key = tuple(sorted((name, _plain(value)) for name, value in settings.items()
+                           if value is not None))
         hash(key)
         return key
     except TypeError:
         return None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return tuple(value.items())
+    return tuple(value) if isinstance(value, (list, np.ndarray)) else value
 
 
 class Gatherer:

@@ -15,7 +15,7 @@ from . import _surfeit
 from ._arguments import (Memory, PathLike, columns_of, is_path, listed, options_of, path_of,
                          paths_of, scaled, shard_of)
 from ._errors import DamagedFile
-from ._groups import group_corrections, names_of_scene, with_numbers
+from ._groups import group_corrections, group_glosses, names_of_scene, with_numbers
 from ._lights import with_cameras
 from ._watch import ProgressLike, Watcher
 from .clouds import write
@@ -175,7 +175,7 @@ def normals(cloud: PathLike, output: PathLike, *, sizes: bool = False, up: "Opti
 def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
            surfels_per_receiver: Optional[int] = None, spare_last: bool = False, groups: Any = None,
            group_gain: Any = None, group_saturation: Any = None, group_tint: Any = None,
-           progress: ProgressLike = None, **settings: "Unpack[BounceSettings]") -> Stats:
+           glossy: Any = None, progress: ProgressLike = None, **settings: "Unpack[BounceSettings]") -> Stats:
     """Writes the scene with the radiosity after 1 to 100 bounces of light.
 
     surfels_per_receiver: all bounces but the last are gathered at one surfel of so many, 1 to 64,
@@ -183,6 +183,8 @@ def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
     groups: object groups that send light and cover, by number or name: "0,2-5", ["lamp", "tree"].
     group_gain, group_saturation, group_tint: of the light that surfels of object groups reflect, by
     number or name: {"walls": .5, "2,5-7": 2}, and for the tint {"curtain": (1, .9, .8)}.
+    glossy: the part of it, 0 to 1, that goes into a lobe around the mirror direction, and the
+    roughness of the lobe, .05 to 1: {"floor": (.8, .2)}, or {"floor": .8} of roughness .2.
     bounce_gain, bounce_filter, ...: surfeit.settings.LookSettings.
     """
     if spare_last and surfels_per_receiver is None:
@@ -196,6 +198,8 @@ def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
                                     group_tint=group_tint)
     if corrections is not None:
         options["group_corrections"] = corrections
+    if glossy is not None:
+        options["glossy"] = group_glosses(path, glossy)
     with watch(progress, settings) as watcher:
         return _surfeit.bounce(path, path_of(output), options, watcher)
 

@@ -33,6 +33,8 @@ class GatherSettings(QualitySettings, total=False):
     outputs: Union[str, Sequence[str]]  # words of `surfeit.OUTPUTS`; default: by the mode
     # Object groups that send light and cover, by number or name: "0,2-5", "lamp", [0, "tree"]
     groups: Union[str, int, Sequence[Union[int, str]]]
+    # Factors of the light that object groups send: {"key": 2, 3: .5}, "key=2,fill=.5"
+    gain: Union[str, Mapping[Union[int, str], float]]
     eye: Sequence[float]  # with glossy: viewpoint of receivers without a view
     distribution: Literal["cosine", "uniform"]
     cone_angle: float  # radians, up to pi / 2; 0: the hemisphere

@@ -72,6 +72,42 @@ def test_bounces(room, tmp_path, run_program):
     assert not same_bytes(tmp_path / "plain.sft", tmp_path / "python.sft")
 
 
+def test_glossy_bounces(room, tmp_path, run_program):
+    scene, shiny = room / "room.sft", tmp_path / "python.sft"
+    run_program("bounce", scene, "-o", tmp_path / "program.sft", "--quality", "draft",
+                "--glossy", "red,3=.5,.3", "--glossy", "white=.8")
+    surfeit.bounce(scene, shiny, quality="draft", glossy={"red,3": (0.5, 0.3), "white": 0.8})
+    assert same_bytes(tmp_path / "program.sft", shiny)
+    assert surfeit.info(shiny)["has_lobes"] and not surfeit.info(scene)["has_lobes"]
+    surfeit.gather(shiny, room / "room.ply", tmp_path / "job.ply", mode="bleeding", quality="draft")
+    cloud = surfeit.read(tmp_path / "job.ply")
+    with pytest.raises(ValueError, match="lobes"):
+        surfeit.Engine(memory="128M").open(shiny)
+    opened = surfeit.Engine(memory="128M", lobes=True).open(shiny)
+    found = opened.gather(cloud["position"], cloud["normal"], mode="bleeding", quality="draft")
+    assert np.array_equal(found["irradiance"], cloud["irradiance"])
+    for wrong in ({"red": (1, 2, 3)}, {"red": 0.5, 2: 0.5}, {"rad": 0.5}, {"red": 2.0}):
+        with pytest.raises(ValueError, match="glossy|rad|share"):
+            surfeit.bounce(scene, shiny, glossy=wrong)
+
+
+def test_gains_of_groups(room, tmp_path, run_program):
+    scene, receivers = room / "room.sft", room / "room.ply"
+    run_program("gather", scene, receivers, "-o", tmp_path / "p.ply", "--mode", "bleeding",
+                "--quality", "draft", "--gain", "red,3=2,white=.5")
+    for gain in ({"red,3": 2, "white": 0.5}, "red,3=2,white=.5", {2: 2, 3: 2, 1: 0.5}):
+        surfeit.gather(scene, receivers, tmp_path / "j.ply", mode="bleeding", quality="draft",
+                       gain=gain)
+        assert same_bytes(tmp_path / "p.ply", tmp_path / "j.ply"), gain
+    cloud = surfeit.read(tmp_path / "p.ply")
+    opened = surfeit.Engine(memory="128M").open(scene)
+    found = opened.gather(cloud["position"], cloud["normal"], mode="bleeding", quality="draft",
+                          gain={"red,3": 2, "white": 0.5})
+    assert np.array_equal(found["irradiance"], cloud["irradiance"])
+    with pytest.raises(ValueError, match="expected 1 number"):
+        opened.gather(cloud["position"], mode="bleeding", gain={"red": "much"})
+
+
 def hdr_sky(path):
     """A lat-long picture of 16 by 8: bright above, dim below."""
     rows = [bytes((200, 180, 160, 130 if row < 4 else 126)) * 16 for row in range(8)]

@@ -79,12 +79,21 @@ Result<std::unique_ptr<SortedGather>> SortedGather::create(SceneFile scene,
                                                            const LoadedEnvironment* environment) {
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<PagedOctree> octree,
                            PagedOctree::create(std::move(scene), memory.caches));
-  return std::unique_ptr<SortedGather>(
-      new SortedGather(std::move(octree), memory, options, stats, progress, environment));
+  return create(std::move(octree), false, memory, options, stats, progress, environment);
 }
 
-SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, const GatherMemory& memory,
-                           const GatherOptions& options, GatherStats& stats, Progress& progress,
+std::unique_ptr<SortedGather> SortedGather::create(std::unique_ptr<PagedOctree> octree,
+                                                   bool is_warm, const GatherMemory& memory,
+                                                   const GatherOptions& options, GatherStats& stats,
+                                                   Progress& progress,
+                                                   const LoadedEnvironment* environment) {
+  return std::unique_ptr<SortedGather>(
+      new SortedGather(std::move(octree), is_warm, memory, options, stats, progress, environment));
+}
+
+SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, bool is_warm,
+                           const GatherMemory& memory, const GatherOptions& options,
+                           GatherStats& stats, Progress& progress,
                            const LoadedEnvironment* environment)
     : octree_(std::move(octree)),
       prefetch_threads_(memory.prefetch_threads),
@@ -96,6 +105,7 @@ SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, const GatherMemo
                   {.threads = stats.threads,
                    .adapts_split = options.cache_split < 0,
                    .prefetches = memory.prefetch_threads != 0,
+                   .is_warm = is_warm,
                    .memory_bytes = stats.memory_bytes,
                    .work = memory.work,
                    .receivers = stats.receivers - stats.invalid_receivers,

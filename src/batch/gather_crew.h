@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include "batch/gather_memory.h"
 #include "batch/paging_controller.h"
@@ -67,6 +68,12 @@ class SortedGather {
   static Result<std::unique_ptr<SortedGather>> create(
       SceneFile scene, const GatherMemory& memory, const GatherOptions& options, GatherStats& stats,
       Progress& progress, const LoadedEnvironment* environment = nullptr);
+  // In caches that are open; `is_warm`: that an earlier gather has used.
+  static std::unique_ptr<SortedGather> create(std::unique_ptr<PagedOctree> octree, bool is_warm,
+                                              const GatherMemory& memory,
+                                              const GatherOptions& options, GatherStats& stats,
+                                              Progress& progress,
+                                              const LoadedEnvironment* environment);
 
   // Gathers at the next `count` receivers of the sorter (finished): whole groups, unless none come
   // after them.
@@ -74,13 +81,15 @@ class SortedGather {
                 std::uint64_t count = ReceiverQueue::kAll);
   // Fills in the statistics.
   void finish();
+  // The octree, for another gather. The last call.
+  std::unique_ptr<PagedOctree> takeOctree() { return std::move(octree_); }
 
  private:
-  SortedGather(std::unique_ptr<PagedOctree> octree, const GatherMemory& memory,
+  SortedGather(std::unique_ptr<PagedOctree> octree, bool is_warm, const GatherMemory& memory,
                const GatherOptions& options, GatherStats& stats, Progress& progress,
                const LoadedEnvironment* environment);
 
-  const std::unique_ptr<PagedOctree> octree_;
+  std::unique_ptr<PagedOctree> octree_;
   const int prefetch_threads_;
   const GatherRules rules_;
   const BounceLook look_;

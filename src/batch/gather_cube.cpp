@@ -19,7 +19,6 @@
 #include "gather/packet/packet_gatherer.h"
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/gather_rules.h"
-#include "octree/read/group_set.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/cube.h"
 
@@ -163,7 +162,7 @@ Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const Receive
   const glm::dvec3 origin = scene.header().origin;
   SURFEIT_ASSIGN_OR_RETURN(const LocalReceiver receiver, checkedReceiver(given, options, origin));
   options.eye -= origin;
-  SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
+  SURFEIT_RETURN_IF_ERROR(checkGroupsFor(scene, options, progress));
   SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<const LoadedEnvironment> environment,
                            loadEnvironment(options, scene.header().up, progress));
   const GatherRules rules = gatherRules(options, environment.get());

@@ -69,6 +69,12 @@ GatherJob::GatherJob(GatherInput input, const std::string& result_path,
       temporary_directory_(surfeit::temporaryDirectory(options.temporary_directory, result_path)),
       progress_(&progress) {}
 
+// Results are not there yet.
+void GatherJob::sortBesideCaches() {
+  memory_.sorter_bytes =
+      std::min(memory_.sorter_bytes, memory_.sorter_reading_bytes + memory_.result_bytes);
+}
+
 GatherStats GatherJob::stats() const {
   GatherStats stats;
   stats.outputs = options_.outputs;

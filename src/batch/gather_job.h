@@ -45,6 +45,9 @@ class GatherJob {
   const GatherOptions& options() const { return options_; }
   const std::string& temporaryDirectory() const { return temporary_directory_; }
 
+  // Leaves the caches alone while receivers are sorted, where they hold pages already.
+  void sortBesideCaches();
+
   // Statistics of a job that has gathered at nothing yet.
   GatherStats stats() const;
 

@@ -15,6 +15,7 @@
 #include "gather/rules/gather_rules.h"
 #include "gather/rules/raster_geometry.h"
 #include "octree/read/group_set.h"
+#include "surfeit/scene.h"
 
 namespace surfeit {
 namespace {
@@ -31,6 +32,11 @@ Status checkEnvironment(const GatherEnvironment& environment) {
     return refuse("rotation of the environment", environment.rotation, "radians");
   }
   return {};
+}
+
+Status checkBeside(const std::string& scene_path, const std::string& result_path) {
+  if (result_path != scene_path) return {};
+  return Status::invalidArgument(fmt::format("{}: the result would replace the scene", scene_path));
 }
 
 }  // namespace
@@ -70,19 +76,37 @@ Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOpt
 
 Result<SceneFile> openSceneBeside(const std::string& scene_path, const std::string& result_path,
                                   Access access) {
-  if (result_path == scene_path) {
-    return Status::invalidArgument(
-        fmt::format("{}: the result would replace the scene", scene_path));
-  }
+  SURFEIT_RETURN_IF_ERROR(checkBeside(scene_path, result_path));
   return SceneFile::open(scene_path, access);
 }
 
+Status checkGroupsFor(const SceneFile& scene, const GatherOptions& options, Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
+  std::uint64_t gained = 0;
+  for (const GroupGain& of_group : options.gains) gained |= groupBit(of_group.group);
+  if (gained == 0) return {};
+  SURFEIT_RETURN_IF_ERROR(checkGroups(scene, gained));
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t present, scene.readGroups());
+  if (const std::uint64_t absent = gained & ~present; absent != 0) {
+    progress.note(fmt::format("{}: has no surfels of groups {}: their gains change nothing",
+                              scene.path(), describeGroups(absent)));
+  }
+  return {};
+}
+
+Status checkSceneFor(const SceneFile& scene, const std::string& result_path,
+                     const GatherOptions& options, Progress& progress) {
+  SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
+  SURFEIT_RETURN_IF_ERROR(checkBeside(scene.path(), result_path));
+  return checkGroupsFor(scene, options, progress);
+}
+
 Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
-                               const GatherOptions& options) {
+                               const GatherOptions& options, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
   SURFEIT_ASSIGN_OR_RETURN(SceneFile scene,
                            openSceneBeside(scene_path, result_path, sceneAccess(options)));
-  SURFEIT_RETURN_IF_ERROR(checkGroups(scene, options.groups));
+  SURFEIT_RETURN_IF_ERROR(checkGroupsFor(scene, options, progress));
   return scene;
 }
 

@@ -21,9 +21,17 @@ Status checkGatherOptions(const GatherOptions& options);
 Result<SceneFile> openSceneBeside(const std::string& scene_path, const std::string& result_path,
                                   Access access = Access::kCached);
 
-// Checks the options, and opens the scene that they are for.
+// Checks the options, and opens the scene that they are for. A note tells of groups with gains that
+// it lacks.
 Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
-                               const GatherOptions& options);
+                               const GatherOptions& options, Progress& progress);
+
+// Of options and a scene: groups and gains. Errors: as checkGroups (octree/read/group_set.h).
+Status checkGroupsFor(const SceneFile& scene, const GatherOptions& options, Progress& progress);
+
+// The same checks for a scene that is open.
+Status checkSceneFor(const SceneFile& scene, const std::string& result_path,
+                     const GatherOptions& options, Progress& progress);
 
 // With threads and memory that were left open filled in, from what the job may use.
 GatherOptions withDefaults(GatherOptions options);

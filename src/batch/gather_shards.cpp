@@ -237,7 +237,8 @@ Result<ShardStats> gatherShards(const std::string& scene_path, const std::string
                                 const ShardRange& shards, Progress& progress) {
   return guarded(result_path, [&]() -> Result<ShardStats> {
     SURFEIT_RETURN_IF_ERROR(checkShards(result_path, shards));
-    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openSceneFor(scene_path, result_path, given));
+    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene,
+                             openSceneFor(scene_path, result_path, given, progress));
     SURFEIT_ASSIGN_OR_RETURN(GatherJob job, GatherJob::open(receivers_path, result_path,
                                                             withDefaults(given), scene, progress));
     ShardGather gather(std::move(job), scene, result_path, shards, progress);

@@ -5,8 +5,10 @@
 
 #include <nlohmann/json.hpp>
 #include <span>
+#include <string>
 
 #include "batch/bounce_look.h"
+#include "gather/rules/sending_gains.h"
 #include "surfeit/version.h"
 
 namespace surfeit {
@@ -31,6 +33,9 @@ void addNewerSettings(const GatherOptions& options, json& settings) {
   const int distance = options.quality.max_pixel_distance;
   if (distance != GatherQuality().max_pixel_distance) settings["max_pixel_distance"] = distance;
   if (!options.look.isOff()) settings["look"] = identityOf(options.look);
+  if (!SendingGains(options.gains).isOff()) {
+    for (const GroupGain& of : options.gains) settings["gains"][std::to_string(of.group)] = of.gain;
+  }
 }
 
 json settingsOf(const GatherOptions& options) {

@@ -42,6 +42,7 @@ PagingController::PagingController(PagedOctree& octree, const Options& options, 
       options_(options),
       progress_(progress),
       monitor_(octree.caches(), {.adapts_split = options.adapts_split,
+                                 .is_warm = options.is_warm,
                                  .least_node_frames = options.least_node_frames,
                                  .least_surfel_frames = options.least_surfel_frames}) {
   monitor_.noteRuns(run_receivers_, prefetch_receivers_);
@@ -124,6 +125,7 @@ void PagingController::adaptPrefetch(const Tick& tick) {
 
 // Says what budget would do where this one is too small (memory_advice.h has the rule).
 void PagingController::advise() const {
+  if (options_.is_warm) return;  // look-ups of all gathers are counted together; the first has told
   const CacheMonitor::Moment now = monitor_.now();
   const SceneFile& file = octree_.file();
   if (now.nodes.repeated_loads + now.surfels.repeated_loads < kLeastMisses) return;

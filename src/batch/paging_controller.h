@@ -25,6 +25,7 @@ class PagingController {
     int threads = 1;
     bool adapts_split = true;
     bool prefetches = true;
+    bool is_warm = false;  // an earlier gather has used the caches
     // For advice: the budget of the gather, the work that it was planned for, and what the job
     // takes beside it.
     std::uint64_t memory_bytes = 0;

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -24,6 +25,7 @@
 #include "batch/paging_controller.h"
 #include "bounce/bounce_crew.h"
 #include "bounce/bounce_radiosity.h"
+#include "bounce/glossy_bounce.h"
 #include "core/guard.h"
 #include "core/parallel.h"
 #include "core/seconds_since.h"
@@ -45,6 +47,11 @@ constexpr int kMostSurfelsPerReceiver = 64;
 // What a bounced scene's provenance holds its bounces under.
 constexpr const char* kProvenanceKey = "bounce";
 
+bool isGlossy(const BounceOptions& options) {
+  return std::any_of(options.glossy.begin(), options.glossy.end(),
+                     [](const GroupGloss& of_group) { return of_group.share > 0; });
+}
+
 GatherOptions gatherOptions(const BounceOptions& options) {
   GatherOptions gather;
   gather.mode = GatherMode::kBleeding;
@@ -55,6 +62,7 @@ GatherOptions gatherOptions(const BounceOptions& options) {
   gather.cache_split = options.cache_split;
   gather.direct_io = options.direct_io;
   gather.prefetch = false;
+  if (isGlossy(options)) gather.outputs = kOutputOcclusion | kOutputIrradiance | kOutputRadianceSh;
   return gather;
 }
 
@@ -73,6 +81,7 @@ Status checkOptions(const BounceOptions& options) {
   }
   SURFEIT_RETURN_IF_ERROR(checkLook(options.look));
   SURFEIT_RETURN_IF_ERROR(checkGroupCorrections(options.group_corrections));
+  SURFEIT_RETURN_IF_ERROR(checkGlossy(options.glossy));
   return checkGatherOptions(gatherOptions(options));
 }
 
@@ -91,7 +100,9 @@ class Bouncer {
 
  private:
   Status checkScene() const;
-  Status checkCorrectedGroups() const;
+  Status checkGroupsOfOptions() const;
+  Status checkGlossyScene() const;
+  void tellLobeAngle() const;
   Status checkMemory() const;
   std::uint64_t bytesBesideGather() const;
   std::uint64_t laterGrowthBytes() const;
@@ -111,7 +122,10 @@ class Bouncer {
   const GatherOptions gather_options_;
   Progress& progress_;
   const std::string temporary_directory_;
+  const bool is_glossy_ = isGlossy(options_);
+  const GlossOfGroup gloss_ = glossByGroup(options_.glossy);
   std::optional<SceneFile> scene_;
+  std::uint64_t without_mirror_ = 0;  // of the last bounce
   BounceStats stats_;
 };
 
@@ -139,7 +153,7 @@ Result<BounceStats> Bouncer::run() {
     const std::uint64_t before_bytes = bounce > 1 ? before.fileBytes() : 0;
     SURFEIT_ASSIGN_OR_RETURN(
         BounceRadiosity radiosity,
-        BounceRadiosity::create(temporary_directory_, scene_->surfelPageCount()));
+        BounceRadiosity::create(temporary_directory_, scene_->surfelPageCount(), is_glossy_));
     SURFEIT_RETURN_IF_ERROR(gather(bounce, std::move(before), radiosity, pass));
     SURFEIT_RETURN_IF_ERROR(radiosity.finish());
     SURFEIT_ASSIGN_OR_RETURN(before, write(bounce, radiosity, pass));
@@ -154,7 +168,23 @@ Result<BounceStats> Bouncer::run() {
         "scene",
         result_path_));
   }
+  if (without_mirror_ > 0) {
+    progress_.note(fmt::format(
+        "{}: {} surfels of glossy groups are two-sided or spheres, which have no mirror direction: "
+        "they send their light evenly",
+        result_path_, without_mirror_));
+  }
+  tellLobeAngle();
   return stats_;
+}
+
+void Bouncer::tellLobeAngle() const {
+  const float angle = lobeNodeAngle(options_.glossy);
+  if (angle >= GatherQuality().max_solid_angle) return;
+  progress_.inform(fmt::format(
+      "{}: gather with --max-solid-angle {:.2g} or less: a node, which has one lobe, then fills a "
+      "fourth of the narrowest lobe at most",
+      result_path_, angle));
 }
 
 // What a scene lacks shows before any work.
@@ -179,22 +209,35 @@ Status Bouncer::checkScene() const {
                     "it was made from",
                     scene_path_));
   }
-  SURFEIT_RETURN_IF_ERROR(checkCorrectedGroups());
+  SURFEIT_RETURN_IF_ERROR(checkGroupsOfOptions());
+  SURFEIT_RETURN_IF_ERROR(checkGlossyScene());
   return checkGroups(*scene_, options_.groups);
 }
 
-// Corrections of groups that the scene lacks change nothing.
-Status Bouncer::checkCorrectedGroups() const {
-  std::uint64_t corrected = 0;
+// Corrections and gloss of groups that the scene lacks change nothing.
+Status Bouncer::checkGroupsOfOptions() const {
+  std::uint64_t corrected = 0, glossy = 0;
   for (const GroupCorrection& of : options_.group_corrections) corrected |= groupBit(of.group);
-  if (corrected == 0) return {};
-  SURFEIT_RETURN_IF_ERROR(checkGroups(*scene_, corrected));
+  for (const GroupGloss& of : options_.glossy) glossy |= groupBit(of.group);
+  if ((corrected | glossy) == 0) return {};
+  SURFEIT_RETURN_IF_ERROR(checkGroups(*scene_, corrected | glossy));
   SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t present, scene_->readGroups());
-  if (const std::uint64_t absent = corrected & ~present; absent != 0) {
-    progress_.note(fmt::format("{}: has no surfels of groups {}: their corrections change nothing",
-                               scene_path_, describeGroups(absent)));
-  }
+  const auto tell = [&](std::uint64_t absent, const char* what) {
+    if (absent == 0) return;
+    progress_.note(fmt::format("{}: has no surfels of groups {}: their {} nothing", scene_path_,
+                               describeGroups(absent), what));
+  };
+  tell(corrected & ~present, "corrections change");
+  tell(glossy & ~present, "gloss changes");
   return {};
+}
+
+// Pages of version 1 lack columns that those of later versions have.
+Status Bouncer::checkGlossyScene() const {
+  if (!is_glossy_ || scene_->header().pageForm().has_bounds) return {};
+  return Status::invalidArgument(fmt::format(
+      "{}: format version {}, expected 2 or more for glossy surfels: index the clouds again",
+      scene_path_, scene_->header().format_version));
 }
 
 GatherWork Bouncer::gatherWork() const {
@@ -208,9 +251,9 @@ std::uint64_t Bouncer::bytesBesideGather() const {
   const auto threads = static_cast<std::uint64_t>(gather_options_.threads);
   const std::uint64_t directory = scene_->pages().memoryBytes();
   return 2 * directory + BounceRadiosity::memoryBytes(scene_->surfelPageCount()) +
-         threads * BounceCrew::threadBytes(*scene_, options_.surfels_per_receiver) +
+         threads * BounceCrew::threadBytes(*scene_, options_.surfels_per_receiver, is_glossy_) +
          BlockWriter::kDefaultBlocks * BlockWriter::kBlockBytes +
-         rewriteRadiosityBytes(*scene_, gather_options_.threads);
+         rewriteRadiosityBytes(*scene_, gather_options_.threads, is_glossy_);
 }
 
 // What a gather of a later bounce may take more than one of the scene: pages may be a little
@@ -221,7 +264,13 @@ std::uint64_t Bouncer::laterGrowthBytes() const {
   const SceneHeader& header = scene_->header();
   const std::uint64_t most_colors = std::max<std::uint64_t>(
       header.surfel_group_capacity, std::uint64_t{header.node_group_capacity} * (1 + kMostFacets));
-  return static_cast<std::uint64_t>(gather_options_.threads) * 2 * most_colors * sizeof(glm::vec3);
+  // Lobes in the two pages of each cache that a thread needs, in pages as they are read, and in
+  // scratch
+  const std::uint64_t lobes = is_glossy_ ? 8 * (header.surfel_group_capacity * sizeof(Lobe) +
+                                                header.node_group_capacity * sizeof(NodeLobes))
+                                         : 0;
+  return static_cast<std::uint64_t>(gather_options_.threads) *
+         (2 * most_colors * sizeof(glm::vec3) + lobes);
 }
 
 Status Bouncer::checkMemory() const {
@@ -262,6 +311,7 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
                    .rules = GatherRules(gather_options_),
                    .look = countedFrom(options_.look, scene_->header().origin),
                    .of_groups = byGroup(options_.group_corrections),
+                   .gloss = is_glossy_ ? &gloss_ : nullptr,
                    .surfels_per_receiver = surfelsPerReceiver(bounce),
                    .threads = gather_options_.threads,
                    .radiosity = radiosity,
@@ -269,6 +319,7 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
                    .progress = progress_});
   SURFEIT_RETURN_IF_ERROR(crew.run());
   controller.finish();
+  without_mirror_ = crew.withoutMirror();
   pass.receivers = crew.receivers();
   pass.largest_change = crew.largestChange();
   pass.gather_seconds = secondsSince(begin);
@@ -290,14 +341,14 @@ Result<SceneFile> Bouncer::write(int bounce, BounceRadiosity& radiosity, BounceP
   SURFEIT_ASSIGN_OR_RETURN(
       PageFileWriter writer,
       PageFileWriter::create(is_last ? result_path_ : temporary_directory_ + "/surfeit-bounce.sft",
-                             identity, scene_->header().format_version));
+                             identity, rewrittenVersion(*scene_, is_glossy_)));
   Result<glm::dvec3> mean = Status::failed("bounce: not written");
   withThreads(gather_options_.threads, [&] {
     mean = rewriteRadiosity(*scene_, radiosity, writer, gather_options_.threads, progress_);
   });
   SURFEIT_RETURN_IF_ERROR(mean.status());
   pass.mean_radiosity = *mean;
-  const std::vector<std::byte> fields = rewrittenSceneFields(*scene_);
+  const std::vector<std::byte> fields = rewrittenSceneFields(*scene_, is_glossy_);
   if (is_last) {
     SURFEIT_RETURN_IF_ERROR(writer.finish(fields, text));
     stats_.file_bytes = writer.fileBytes();
@@ -325,6 +376,14 @@ std::string Bouncer::provenance() const {
   if (options_.spare_last) json[kProvenanceKey]["spare_last"] = true;
   if (!options_.look.isOff() || !options_.group_corrections.empty()) {
     json[kProvenanceKey]["look"] = identityOf(options_.look, options_.group_corrections);
+  }
+  if (is_glossy_) {
+    nlohmann::json& glossy = json[kProvenanceKey]["glossy"] = nlohmann::json::array();
+    std::map<std::uint32_t, GroupGloss> by_group;  // bytes do not depend on the order
+    for (const GroupGloss& of : options_.glossy) by_group[of.group] = of;
+    for (const auto& [group, of] : by_group) {
+      glossy.push_back({{"group", group}, {"share", of.share}, {"roughness", of.roughness}});
+    }
   }
   if (options_.groups != kAllGroups) {
     json[kProvenanceKey]["groups"] = describeGroups(options_.groups);

@@ -31,16 +31,20 @@ struct BounceCrew::Stretch {
   std::vector<std::size_t> ends;     // of the pages, in surfels
   std::vector<glm::vec3> radiosity;  // B_k of a page
   BounceReceivers receivers;
+  std::vector<Lobe> lobes;                              // of a page
   std::vector<glm::vec3> irradiance;                    // at the receivers
+  std::vector<glm::vec3> around, towards;               // the same of ArrivingLight
   std::array<GatherResult, kClusterReceivers> results;  // of a cluster
   SceneFile::Scratch scratch;
 };
 
-std::uint64_t BounceCrew::threadBytes(const SceneFile& scene, int surfels_per_receiver) {
+std::uint64_t BounceCrew::threadBytes(const SceneFile& scene, int surfels_per_receiver,
+                                      bool is_glossy) {
   const std::uint64_t surfels =
       std::uint64_t{pagesOfStretch(surfels_per_receiver)} * scene.header().surfel_group_capacity;
   // Vectors that grow by doubling, of up to two receivers a surfel
-  return surfels * (sizeof(Surfel) + 7 * sizeof(glm::vec3)) + sizeof(Stretch) +
+  const std::uint64_t glossy_bytes = is_glossy ? 8 * sizeof(glm::vec3) + 4 * sizeof(Lobe) : 0;
+  return surfels * (sizeof(Surfel) + 7 * sizeof(glm::vec3) + glossy_bytes) + sizeof(Stretch) +
          2 * BounceReceivers::memoryBytes(surfels) + scene.pages().maxStoredBytes() +
          scene.pages().maxPayloadBytes() + 2 * kDirectAlignment;
 }
@@ -100,6 +104,8 @@ Status BounceCrew::gather(PacketGatherer& gatherer, PagedOctree::Reader& reader,
                           Stretch& stretch) const {
   const std::span<const LocalReceiver> receivers = stretch.receivers.receivers();
   stretch.irradiance.clear();
+  stretch.around.clear();
+  stretch.towards.clear();
   const std::size_t clusters = (receivers.size() + kClusterReceivers - 1) / kClusterReceivers;
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= clusters; ++i) {
@@ -107,7 +113,13 @@ Status BounceCrew::gather(PacketGatherer& gatherer, PagedOctree::Reader& reader,
     const std::size_t count = receivers.size() * i / clusters - begin;
     const std::span<GatherResult> results = std::span(stretch.results).first(count);
     SURFEIT_RETURN_IF_ERROR(gatherer.gather(receivers.subspan(begin, count), reader, results));
-    for (const GatherResult& result : results) stretch.irradiance.push_back(result.irradiance);
+    for (const GatherResult& result : results) {
+      stretch.irradiance.push_back(result.irradiance);
+      if (setup_.gloss == nullptr) continue;
+      const ArrivingLight light = arrivingLight(result.radiance_sh);
+      stretch.around.emplace_back(light.around);
+      stretch.towards.push_back(light.towards);
+    }
     begin += count;
   }
   return {};
@@ -122,23 +134,40 @@ glm::vec3 BounceCrew::reflected(const Surfel& surfel, const glm::vec3& irradianc
   return corrected(setup_.of_groups[surfel.group], surfel.albedo * arriving);
 }
 
+// Light that arrives at neighbours is mixed as their irradiance is.
+Lobe BounceCrew::lobeOf(std::size_t i, const glm::vec3& sent, const glm::vec3& radiosity,
+                        const Stretch& stretch) {
+  const Surfel& surfel = stretch.surfels[i];
+  const Gloss& gloss = (*setup_.gloss)[surfel.group];
+  if (gloss.share == 0) return {};
+  if (surfel.isSphere() || surfel.isTwoSided()) {
+    ++without_mirror_;
+    return {};
+  }
+  const ArrivingLight light = {.around = stretch.receivers.irradiance(i, stretch.around).x,
+                               .towards = stretch.receivers.irradiance(i, stretch.towards)};
+  return mirrorLobe(gloss, light, surfel.normal, sent, radiosity);
+}
+
 // B_k = B_0 + albedo E (memo 7.4).
 Status BounceCrew::handIn(std::uint32_t first_page, Stretch& stretch) {
   float largest_change = 0;
   std::size_t i = 0;
   for (std::size_t page = 0; page < stretch.ends.size(); ++page) {
     stretch.radiosity.clear();
+    stretch.lobes.clear();
     for (; i < stretch.ends[page]; ++i) {
       const Surfel& surfel = stretch.surfels[i];
       const glm::vec3 irradiance = stretch.receivers.irradiance(i, stretch.irradiance);
-      const glm::vec3 radiosity =
-          glm::min(surfel.radiosity + reflected(surfel, irradiance), glm::vec3(kLargestColor));
+      const glm::vec3 sent = reflected(surfel, irradiance);
+      const glm::vec3 radiosity = glm::min(surfel.radiosity + sent, glm::vec3(kLargestColor));
       const glm::vec3 change = glm::abs(radiosity - stretch.before[i]);
       largest_change = std::max({largest_change, change.r, change.g, change.b});
       stretch.radiosity.push_back(radiosity);
+      if (setup_.gloss != nullptr) stretch.lobes.push_back(lobeOf(i, sent, radiosity, stretch));
     }
-    SURFEIT_RETURN_IF_ERROR(
-        setup_.radiosity.put(first_page + static_cast<std::uint32_t>(page), stretch.radiosity));
+    SURFEIT_RETURN_IF_ERROR(setup_.radiosity.put(first_page + static_cast<std::uint32_t>(page),
+                                                 stretch.radiosity, stretch.lobes));
   }
   noteChange(largest_change);
   receivers_ += stretch.receivers.receivers().size();

@@ -10,6 +10,7 @@
 #include "batch/paging_controller.h"
 #include "bounce/bounce_radiosity.h"
 #include "bounce/bounce_receivers.h"
+#include "bounce/glossy_bounce.h"
 #include "core/first_failure.h"
 #include "gather/packet/packet_gatherer.h"
 #include "gather/rules/gather_rules.h"
@@ -30,6 +31,7 @@ class BounceCrew {
     GatherRules rules;
     BounceLook look;  // about the scene's origin
     CorrectionOfGroup of_groups{};
+    const GlossOfGroup* gloss = nullptr;  // null: nothing is glossy
     int surfels_per_receiver = 1;
     int threads = 1;
     BounceRadiosity& radiosity;  // gets B_k
@@ -44,10 +46,13 @@ class BounceCrew {
 
   // After run().
   std::uint64_t receivers() const { return receivers_; }
+  // Surfels of glossy groups that send evenly: two-sided ones and spheres.
+  std::uint64_t withoutMirror() const { return without_mirror_; }
   double largestChange() const { return double(largest_change_.load()); }
 
   // Bytes of a thread beside gatherer, reader and caches.
-  static std::uint64_t threadBytes(const SceneFile& scene, int surfels_per_receiver);
+  static std::uint64_t threadBytes(const SceneFile& scene, int surfels_per_receiver,
+                                   bool is_glossy);
 
  private:
   struct Stretch;
@@ -57,12 +62,14 @@ class BounceCrew {
   Status gather(PacketGatherer& gatherer, PagedOctree::Reader& reader, Stretch& stretch) const;
   Status handIn(std::uint32_t first_page, Stretch& stretch);
   glm::vec3 reflected(const Surfel& surfel, const glm::vec3& irradiance) const;
+  Lobe lobeOf(std::size_t i, const glm::vec3& sent, const glm::vec3& radiosity,
+              const Stretch& stretch);
   void noteChange(float change);
 
   const Setup setup_;
   FirstFailure failure_;
   std::atomic<std::uint32_t> next_page_{0};
-  std::atomic<std::uint64_t> receivers_{0};
+  std::atomic<std::uint64_t> receivers_{0}, without_mirror_{0};
   std::atomic<float> largest_change_{0};
 };
 

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -56,6 +57,10 @@ Status readSettings(const surfeit_settings* given, GatherSettings& settings) {
   settings.weights.cone_angle = from.cone_angle;
   settings.weights.roughness = from.roughness;
   settings.weights.falloff = from.falloff;
+  if (from.gains == nullptr && from.gain_count > 0) return missing("gains");
+  for (const surfeit_group_gain& of : std::span(from.gains, from.gain_count)) {
+    settings.gains.push_back({of.group, of.gain});
+  }
   return {};
 }
 
@@ -150,6 +155,7 @@ surfeit_code surfeit_engine_create(const surfeit_engine_options* options, surfei
     given.memory_bytes = from.memory_bytes;
     given.threads = from.threads;
     given.direct_io = from.direct_io != 0;
+    given.lobes = from.lobes != 0;
     SURFEIT_ASSIGN_OR_RETURN(Engine made, Engine::create(given));
     *engine = new surfeit_engine{std::move(made)};
     return {};

@@ -19,9 +19,9 @@ constexpr std::size_t kSplitStep = 10;
 // Many reads repeat an earlier one. The working set is what a cache must hold to stay below that.
 constexpr double kMuchRepeated = 0.1;
 
-GatherCacheStats statsSoFar(const CacheCounters& counters, const ReuseDistances& distances,
-                            std::size_t frame_bytes) {
-  GatherCacheStats stats = statsBetween({}, counters);
+GatherCacheStats statsSoFar(const CacheCounters& first, const CacheCounters& counters,
+                            const ReuseDistances& distances, std::size_t frame_bytes) {
+  GatherCacheStats stats = statsBetween(first, counters);
   const MissRatioCurve curve = distances.curve(counters.requests);
   const double most_misses = curve.unavoidableMisses() / (1 - kMuchRepeated);
   stats.working_set_bytes =
@@ -48,7 +48,11 @@ CacheMonitor::CacheMonitor(OctreeCaches& caches, const Options& options)
             begin.seconds = 0;
             return begin;
           }(),
-          kTickSeconds) {}
+          kTickSeconds) {
+  if (!options.is_warm) return;
+  first_nodes_ = last_tick_.nodes;
+  first_surfels_ = last_tick_.surfels;
+}
 
 double CacheMonitor::seconds() const { return secondsSince(start_); }
 
@@ -155,11 +159,12 @@ void CacheMonitor::setFrames(std::size_t node_frames, std::size_t surfel_frames,
 }
 
 GatherCacheStats CacheMonitor::nodeStats() const {
-  return statsSoFar(caches_.nodes().counters(), *caches_.nodeDistances(), caches_.nodeFrameBytes());
+  return statsSoFar(first_nodes_, caches_.nodes().counters(), *caches_.nodeDistances(),
+                    caches_.nodeFrameBytes());
 }
 
 GatherCacheStats CacheMonitor::surfelStats() const {
-  return statsSoFar(caches_.surfels().counters(), *caches_.surfelDistances(),
+  return statsSoFar(first_surfels_, caches_.surfels().counters(), *caches_.surfelDistances(),
                     caches_.surfelFrameBytes());
 }
 

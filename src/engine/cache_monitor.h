@@ -23,6 +23,7 @@ class CacheMonitor {
   using Moment = WindowRecord::Moment;
   struct Options {
     bool adapts_split = true;
+    bool is_warm = false;  // what the caches did before is not of this monitor
     std::size_t least_node_frames = 1, least_surfel_frames = 1;
   };
 
@@ -86,6 +87,7 @@ class CacheMonitor {
   Options options_;
   std::size_t frame_bytes_ = 0;  // of both caches together, however they are split
   Moment last_tick_;
+  CacheCounters first_nodes_, first_surfels_;  // at the beginning, of warm caches
   std::uint64_t ticks_ = 0;
   // Bytes of the pages touched in the last kTicksPerHalving ticks
   std::uint64_t node_working_set_bytes_ = 0, surfel_working_set_bytes_ = 0;

@@ -21,14 +21,16 @@ constexpr std::size_t kTrackedPages = 1 << 16;
 // An entry of a cache's table.
 constexpr std::uint64_t kPageTableBytes = 16;
 
-OctreeCaches::Options cacheOptions(std::uint64_t bytes) {
-  return {.node_page_bytes = kDefaultNodeGroup * sizeof(Node),
-          .surfel_page_bytes = kDefaultSurfelGroup * sizeof(Surfel),
+OctreeCaches::Options cacheOptions(const EngineOptions& options) {
+  const std::size_t node_lobes = options.lobes ? sizeof(NodeLobes) : 0;
+  const std::size_t surfel_lobe = options.lobes ? sizeof(Lobe) : 0;
+  return {.node_page_bytes = kDefaultNodeGroup * (sizeof(Node) + node_lobes),
+          .surfel_page_bytes = kDefaultSurfelGroup * (sizeof(Surfel) + surfel_lobe),
           .node_pages = kNodePages,
           .surfel_pages = kSurfelPages,
           .node_frames = 1,
           .surfel_frames = 1,
-          .most_bytes = bytes,
+          .most_bytes = options.memory_bytes,
           .tracked_pages = kTrackedPages};
 }
 
@@ -77,7 +79,7 @@ Result<Engine> Engine::create(const EngineOptions& given) {
     if (options.threads == 0) options.threads = defaultThreadCount();
     if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes();
     SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<OctreeCaches> caches,
-                             OctreeCaches::create(cacheOptions(options.memory_bytes)));
+                             OctreeCaches::create(cacheOptions(options)));
     const auto state = std::make_shared<EngineState>(options, std::move(caches));
     SURFEIT_RETURN_IF_ERROR(state->take(emptyEngineBytes(), 0, "an engine without a scene"));
     return Engine(state);

@@ -128,6 +128,12 @@ Result<std::shared_ptr<const World>> World::create(std::shared_ptr<EngineState> 
     return Status::invalidArgument(fmt::format(
         "groups {:#x}: no scene has any of them, expected some of {:#x}", settings.groups, groups));
   }
+  std::uint64_t gained = 0;
+  for (const GroupGain& of_group : settings.gains) gained |= groupBit(of_group.group);
+  if (gained != 0 && (gained & groups) == 0) {
+    return Status::invalidArgument(fmt::format(
+        "gains of groups {:#x}: no scene has any of them, expected some of {:#x}", gained, groups));
+  }
   std::uint64_t decoder_bytes = 0;
   for (const PagedOctree* octree : world->octrees_) {
     decoder_bytes =

@@ -47,9 +47,16 @@ class SceneRowReader final : public RowReader {
   const RowLayout& element() const override { return element_; }
 
   std::vector<std::string> notes() const override {
-    if (scene_.header().full_precision) return {};
-    return {
-        "values have the digits that a quantized scene keeps (index --precision full keeps all)"};
+    std::vector<std::string> notes;
+    if (!scene_.header().full_precision) {
+      notes.emplace_back(
+          "values have the digits that a quantized scene keeps (index --precision full keeps all)");
+    }
+    if (scene_.header().has_lobes) {
+      notes.emplace_back(
+          "lobes of glossy bounces are left out: radiosity is that of all directions together");
+    }
+    return notes;
   }
 
   Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {

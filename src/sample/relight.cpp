@@ -53,6 +53,7 @@ class RelitRadiosity : public RadiositySource {
                  const RelightOptions& options)
       : scene_(scene), light_(light), shift_(shift), options_(options) {}
 
+  using RadiositySource::read;
   Status read(std::uint32_t surfel_page, std::span<glm::vec3> radiosity) override {
     const std::uint32_t capacity = scene_.header().surfel_group_capacity;
     LightScratch& scratch = threadScratch<LightScratch>([] {});
@@ -197,6 +198,12 @@ Status Relighter::openScene() {
                     "index clouds with albedo_r albedo_g albedo_b, as surfeit sample writes them",
                     scene_path_));
   }
+  if (scene_.header().has_lobes) {
+    progress_.note(fmt::format(
+        "{}: the lobes of the glossy bounces of {} are left out: what was sent in them is sent "
+        "evenly",
+        result_path_, scene_path_));
+  }
   return checkResidentBytes(
       fmt::format("{}: pages of {} threads", scene_path_, stats_.threads),
       rewriteRadiosityBytes(scene_, stats_.threads) + scene_.pages().memoryBytes());
@@ -235,7 +242,7 @@ Status Relighter::write(RelitRadiosity& radiosity) {
                                  XXH3_64bits(text.data(), text.size())};
   SURFEIT_ASSIGN_OR_RETURN(PageFileWriter writer,
                            PageFileWriter::create(result_path_, XXH3_64bits(parts, sizeof parts),
-                                                  scene_.header().format_version));
+                                                  rewrittenVersion(scene_)));
   Result<glm::dvec3> mean = Status::failed("relight: not written");
   withThreads(stats_.threads, [&] {
     mean = rewriteRadiosity(scene_, radiosity, writer, stats_.threads, progress_);

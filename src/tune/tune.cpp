@@ -18,7 +18,6 @@
 #include "batch/memory_advice.h"
 #include "batch/sorted_receiver.h"
 #include "core/guard.h"
-#include "octree/read/group_set.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "storage/output_target.h"
@@ -104,7 +103,7 @@ Result<TuneReport> Tuning::run() {
                                                gather_.filter, gather_.color_range));
     input_ = std::make_unique<GatherInput>(std::move(input));
   }
-  SURFEIT_RETURN_IF_ERROR(checkGroups(*scene_, gather_.groups));
+  SURFEIT_RETURN_IF_ERROR(checkGroupsFor(*scene_, gather_, progress_));
   SURFEIT_RETURN_IF_ERROR(input_->check(GatherRules(gather_)));
   work_ = gatherWork(input_->receivers(), gather_);
   sample_receivers_ = options_.sample_receivers == 0

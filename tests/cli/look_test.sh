@@ -86,6 +86,34 @@ looksHaveTheirOptions() {
   leavesNothing none
 }
 
+# The long way: radiosities changed in the cloud.
+gainsOfGroupsAreThoseOfOtherRadiosities() {
+  makeNamedScene
+  local gather=(--mode bleeding --quality draft --max-solid-angle 0 --quiet)
+  run 0 convert cornell.ply -o some.ply --every 20 --quiet
+  run 0 gather cornell.sft some.ply -o gain.ply "${gather[@]}" --gain "red,3=2.5,white=.5"
+  run 0 convert cornell.ply -o changed.ply --set "radiosity *= 2.5 where group == 2 or group == 3" \
+    --set "radiosity *= .5 where group == 1"
+  run 0 index changed.ply -o changed.sft --precision full --quiet
+  run 0 gather changed.sft some.ply -o changed_gi.ply "${gather[@]}"
+  run 0 gather cornell.sft some.ply -o plain.ply "${gather[@]}"
+  local cloud
+  for cloud in gain changed_gi plain; do
+    run 0 convert $cloud.ply -o $cloud.csv --keep irradiance --quiet
+  done
+  paste -d, gain.csv changed_gi.csv plain.csv | awk -F, '
+    NR > 1 { for (i = 4; i <= 6; i++) { d = $i - $(i + 6); if (d < 0) d = -d; if (d > 1e-5) exit 1
+             e = $i - $(i + 12); if (e * e > 1e-6) ++changed } }
+    END { exit !(changed > 300) }' || fail "the gain is not that of another radiosity"
+  run 2 gather cornell.sft cornell.ply -o none.ply --mode bleeding --gain rad=2
+  says --gain "white, red, green"
+  run 2 gather cornell.sft cornell.ply -o none.ply --mode bleeding --gain red
+  says "key=2,fill=.5"
+  run 2 gather cornell.sft cornell.ply -o none.ply --gain red=2
+  says "--mode bleeding"
+  leavesNothing none
+}
+
 # A crop is what --filter has in more words; cameras see less.
 cropsAreWindowsOfPictures() {
   makeScene 3000
@@ -171,6 +199,42 @@ groupsComeByNameFromMeshes() {
   run 0 sample cornell.obj -o none.ptc --count 100 --group-by file
   says "no place for the names of object groups"
   run 3 sample cornell.obj -o none.bgeo --count 100 --group-by file --strict
+}
+
+glossyBouncesHaveTheirOptions() {
+  makeNamedScene
+  local bounce=(bounce cornell.sft --quality draft --quiet)
+  run 0 "${bounce[@]}" -o plain.sft
+  run 0 "${bounce[@]}" -o shiny.sft --glossy "white=.8,.3" --glossy 5=.5
+  run 0 verify shiny.sft
+  run 0 info shiny.sft
+  says "lobes          of glossy bounces" '"glossy":[{"group":1,"roughness":0.3'
+  # All that is sent together is the same; what a wall gets from it is not
+  for scene in plain shiny; do
+    run 0 convert $scene.sft -o $scene.ply --quiet
+    run 0 gather $scene.sft cornell.ply -o lit_$scene.ply --mode bleeding --quality draft --quiet
+  done
+  sameBytes plain.ply shiny.ply
+  differentBytes lit_plain.ply lit_shiny.ply
+  # Lobes that go are told
+  run 0 convert shiny.sft -o told.ply
+  says "lobes of glossy bounces are left out"
+  run 0 relight shiny.sft -o relit.sft --light-point "0.5 0.8 0.5  1 1 1"
+  says "the lobes of the glossy bounces of shiny.sft are left out"
+  run 0 verify relit.sft
+  # A share of 0 changes no byte
+  run 0 "${bounce[@]}" -o off.sft --glossy white=0
+  sameBytes off.sft plain.sft
+  run 2 "${bounce[@]}" -o none.sft --glossy white=1.5
+  says '"1.5"' "SHARE or SHARE,ROUGHNESS"
+  run 2 "${bounce[@]}" -o none.sft --glossy white=.5,.01
+  run 2 "${bounce[@]}" -o none.sft --glossy .5
+  says "GROUPS=VALUE"
+  run 2 "${bounce[@]}" -o none.sft --glossy wite=.5
+  says wite
+  run 2 "${bounce[@]}" -o none.sft --glossy white=.5 --glossy 1=.6
+  says "has a group that another value has"
+  leavesNothing none
 }
 
 runCase

@@ -132,6 +132,38 @@ theLeastBudgetDoesForAllFrames() {
   fi
 }
 
+# pagesRead STATS: into both caches.
+pagesRead() {
+  awk '/"misses"|"prefetches"/ { gsub(/[^0-9]/, "", $2); sum += $2; if (++n == 4) exit }
+       END { print sum + 0 }' "$1"
+}
+
+# The scene that all frames share stays open, and its caches warm, within the budget.
+scenesStayOpenWithinTheBudget() {
+  local frame memory peak
+  generate set.ply --surfels 300k
+  "$surfeit" index -q set.ply -o set.sft --memory 128M
+  for frame in 1 2 3; do generate "r.$frame.ply" --surfels 1000 --seed 7; done
+  for memory in 48M 200M; do
+    run 0 gather set.sft r.#.ply -o lit.#.ply --memory "$memory" --threads 1 --frames 1-3 \
+      --stats s.#.json --quality draft
+    run 0 gather set.sft r.1.ply -o one.ply --memory "$memory" --threads 1 --quality draft
+    sameBytes one.ply lit.3.ply
+    peak=$(field s.3.json peak_resident_bytes)
+    if [[ -z ${SURFEIT_SANITIZED:-} ]]; then
+      ((peak <= $(numfmt --from=iec "$memory"))) || fail "peak $peak of three frames in $memory"
+    fi
+  done
+  # With room for all, the first frame alone reads
+  [[ $(pagesRead s.3.json) == 0 ]] || fail "frame 3 reads $(pagesRead s.3.json) pages"
+  # A scene of each frame is its own
+  cp set.sft set.1.sft
+  "$surfeit" index -q r.1.ply -o set.2.sft --memory 64M
+  run 0 gather set.#.sft r.#.ply -o own.#.ply --memory 64M --frames 1-2
+  run 0 gather set.2.sft r.2.ply -o one.ply --memory 64M
+  sameBytes one.ply own.2.ply
+}
+
 patternsAndFramesMustFit() {
   makeFrames 1 2
   run 2 gather set.sft street.####.ply -o lit.####.ply

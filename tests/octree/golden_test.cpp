@@ -10,7 +10,9 @@
 #include <cstddef>
 #include <cstdlib>
 #include <ostream>
+#include <vector>
 
+#include "octree/relight/radiosity_rewriter.h"
 #include "octree/test_scenes.h"
 #include "surfeit/version.h"
 
@@ -134,6 +136,88 @@ TEST_P(GoldenTest, IndexingWritesTheSameFile) {
                  << kZstdVersion;
   }
   EXPECT_TRUE(bytesOf(scene) == bytesOf(golden.path()));
+}
+
+// Lobes by the number of the surfel; radiosities stay.
+class NumberedLobes : public RadiositySource {
+ public:
+  explicit NumberedLobes(const SceneFile& scene) : scene_(scene) {}
+  Status read(std::uint32_t page, std::span<glm::vec3> radiosity) override {
+    SceneFile::Scratch scratch;
+    std::vector<Surfel> surfels(scene_.header().surfel_group_capacity);
+    SURFEIT_RETURN_IF_ERROR(scene_.decodeSurfels(page, scratch, surfels).status());
+    for (std::size_t i = 0; i < radiosity.size(); ++i) radiosity[i] = surfels[i].radiosity;
+    return {};
+  }
+  Status read(std::uint32_t page, std::span<glm::vec3> radiosity, std::span<Lobe> lobes) override {
+    for (std::size_t i = 0; i < lobes.size(); ++i) {
+      const int n = int(page) * 512 + int(i);
+      lobes[i].share = {std::uint8_t(n), std::uint8_t(7 * n), std::uint8_t(255 - n % 256)};
+      lobes[i].mean = {std::int16_t(n * 97 % 18000), std::int16_t(n * 31 % 18000),
+                       std::int16_t(-(n * 53 % 18000))};
+    }
+    return read(page, radiosity);
+  }
+  bool hasLobes() const override { return true; }
+
+ private:
+  const SceneFile& scene_;
+};
+
+class GoldenLobes : public SceneTest {
+ protected:
+  static std::string golden() { return SURFEIT_TEST_SOURCE_DIR "/golden/v4_lobes.sft"; }
+
+  // Without spheres, which make nodes rough: those have no lobes.
+  void write(const std::string& result) {
+    std::vector<Surfel> cloud = goldenCloud(kGoldens[3]);
+    std::erase_if(cloud, [](const Surfel& surfel) { return surfel.isSphere(); });
+    const Result<SceneFile> scene = SceneFile::open(index(cloud, kAllChannels));
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    NumberedLobes lobes(*scene);
+    Result<PageFileWriter> writer =
+        PageFileWriter::create(result, 4711, rewrittenVersion(*scene, true));
+    ASSERT_TRUE(writer.ok());
+    ASSERT_TRUE(rewriteRadiosity(*scene, lobes, *writer, 1, progress_).ok());
+    ASSERT_TRUE(writer->finish(rewrittenSceneFields(*scene, true), "{}").ok());
+  }
+};
+
+TEST_F(GoldenLobes, DecodeToTheSameContents) {
+  const char* update = std::getenv("SURFEIT_UPDATE_GOLDEN");
+  if (update != nullptr && std::string(update) == "1") write(golden());
+  EXPECT_THAT(findingsOf(golden()), testing::IsEmpty());
+  const Result<SceneFile> scene = SceneFile::open(golden());
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  EXPECT_EQ(scene->header().format_version, 4u);
+  EXPECT_TRUE(scene->header().has_lobes);
+  SceneFile::Scratch scratch;
+  std::uint64_t surfel_hash = 0, node_hash = 0;
+  std::vector<Surfel> surfels(scene->header().surfel_group_capacity);
+  std::vector<Lobe> lobes(surfels.size());
+  for (std::uint32_t page = 0; page < scene->surfelPageCount(); ++page) {
+    const auto count = scene->decodeSurfels(page, scratch, surfels, lobes);
+    ASSERT_TRUE(count.ok()) << count.status().message();
+    surfel_hash = XXH3_64bits_withSeed(lobes.data(), *count * sizeof(Lobe), surfel_hash);
+  }
+  std::vector<Node> nodes(scene->header().node_group_capacity);
+  std::vector<NodeLobes> node_lobes(nodes.size());
+  for (std::uint32_t page = 0; page < scene->nodePageCount(); ++page) {
+    const auto count = scene->decodeNodes(page, scratch, nodes, node_lobes);
+    ASSERT_TRUE(count.ok()) << count.status().message();
+    node_hash = XXH3_64bits_withSeed(node_lobes.data(), *count * sizeof(NodeLobes), node_hash);
+  }
+  EXPECT_EQ(surfel_hash, 11905100813347156094ull);
+  EXPECT_EQ(node_hash, 13581276191821490883ull);
+}
+
+TEST_F(GoldenLobes, RewritingGivesTheSameFile) {
+  write(path("lobes.sft"));
+  if (ZSTD_versionNumber() != kZstdVersion) {
+    GTEST_SKIP() << "zstd " << ZSTD_versionNumber() << " may compress otherwise than "
+                 << kZstdVersion;
+  }
+  EXPECT_TRUE(bytesOf(path("lobes.sft")) == bytesOf(golden()));
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, GoldenTest, testing::ValuesIn(kGoldens), [](const auto& golden) {

@@ -27,6 +27,7 @@ glm::vec3 darkness(const Surfel&) { return glm::vec3(0); }
 class LightSource : public RadiositySource {
  public:
   LightSource(const SceneFile& scene, Light light) : scene_(scene), light_(std::move(light)) {}
+  using RadiositySource::read;
   Status read(std::uint32_t page, std::span<glm::vec3> radiosity) override {
     SceneFile::Scratch scratch;
     std::vector<Surfel> surfels(scene_.header().surfel_group_capacity);

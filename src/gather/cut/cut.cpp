@@ -275,7 +275,8 @@ float riseOf(const Node& node, const glm::vec3& up) {
 // A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
 // solid angle, or that share of it. A flat square of surfels has about 0.6 of its sphere's outline
 // as area, so this is close to the memo's test on the area, but it also opens sparse nodes, whose
-// area says nothing about how far their surfels spread. Never when only some of these are seen.
+// area says nothing about how far their surfels spread. Never when only some of these are seen, or
+// when they have several gains.
 float openPart(const Node& node, const LocalReceiver& receiver, const CutRules& rules) {
   if (rules.isMixed(node) || !rules.approximates()) return 1;
   const glm::vec3 to_node = node.position - receiver.position;

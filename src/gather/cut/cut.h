@@ -15,6 +15,7 @@
 #include "gather/rules/fidelity.h"
 #include "gather/rules/gather_rules.h"
 #include "gather/rules/receiver.h"
+#include "gather/rules/sending_gains.h"
 #include "octree/node/node.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
@@ -49,13 +50,16 @@ struct CutRules {
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
   float most_coarser = 1;             // what is low may look so many times as large
   float pixel = 0;                    // slope of a pixel of the raster
+  SendingGains gains{};
 
   bool approximates() const { return max_solid_angle > 0; }
   bool seesAllGroups() const { return groups == kAllGroups; }
   bool sees(std::uint64_t some_of) const { return seesAllGroups() || (groups & some_of) != 0; }
-  // Whether surfels that are not seen lie below: what the node says is not what those seen are
-  // like.
-  bool isMixed(const Node& node) const { return (node.groups & ~groups) != 0; }
+  // Whether surfels that are not seen lie below, or surfels of several gains: what the node says is
+  // not what those seen are like.
+  bool isMixed(const Node& node) const {
+    return (node.groups & ~groups) != 0 || !gains.areAlike(node.groups);
+  }
 };
 
 // How much something counts for each receiver of a packet, 0..1.
@@ -97,8 +101,13 @@ SiblingClassifier fastestSiblingClassifier();
 class CutWalk {
  public:
   explicit CutWalk(const GatherRules& rules)
-      : rules_{maxSolidAngle(rules), rules.quality.max_distance, facingOf(rules.quality.sides),
-               rules.groups,         mostCoarser(rules),         1 / pixelsPerSlope(rules)},
+      : rules_{maxSolidAngle(rules),
+               rules.quality.max_distance,
+               facingOf(rules.quality.sides),
+               rules.groups,
+               mostCoarser(rules),
+               1 / pixelsPerSlope(rules),
+               rules.hasLight() ? rules.gains : SendingGains()},
         classify_(fastestSiblingClassifier()) {}
 
   // The octree's units are this many of the world's, in which the rules are.

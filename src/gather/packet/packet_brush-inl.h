@@ -7,8 +7,6 @@
 #endif
 
 #include <hwy/highway.h>
-// Needs the instruction set that the former chose
-#include <hwy/contrib/math/math-inl.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,6 +19,7 @@
 #include "gather/packet/packet_footprint-inl.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
+#include "gather/packet/packet_lobe-inl.h"
 #include "gather/packet/packet_rays-inl.h"
 #include "gather/rules/coverage_rules.h"
 
@@ -161,8 +160,8 @@ class Brush {
     cover.opacity = hn::Mul(part, Opacity(patch));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
-    cover.radiosity = patch.radiosity;
-    if constexpr (Kind::kFade) cover.fade = FadeAt(distance);
+    if constexpr (Kind::kColor) cover.radiosity = RadiosityTowards(patch, canvas_.lobes, sight);
+    if constexpr (Kind::kFade) cover.fade = FadeAt(*canvas_.rules, distance);
     return cover;
   }
 
@@ -170,19 +169,6 @@ class Brush {
   V Opacity(const Patch& patch) const {
     if (patch.parts == 0) return Splat(patch.opacity);
     return hn::Mul(Splat(patch.opacity), LoadLanes(canvas_.parts[patch.parts].of, lane_));
-  }
-
-  // How occlusion at a distance counts.
-  V FadeAt(V distance) const {
-    const D d;
-    const GatherWeights& weights = canvas_.rules->weights;
-    if (weights.falloff_mode == GatherWeights::FalloffMode::kExponential) {
-      return hn::Exp(d, hn::Mul(Splat(-weights.falloff), distance));
-    }
-    const float inverse = 1 / canvas_.rules->quality.max_distance;
-    const V rest = hn::NegMulAdd(distance, Splat(inverse), Splat(1));
-    const V power = hn::Mul(Splat(weights.falloff), hn::Log(d, hn::Max(rest, Splat(1e-30f))));
-    return hn::IfThenElseZero(hn::Gt(rest, Splat(1e-30f)), hn::Exp(d, power));
   }
 
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the

@@ -8,6 +8,8 @@
 #endif
 
 #include <hwy/highway.h>
+// Needs the instruction set that the former chose
+#include <hwy/contrib/math/math-inl.h>
 
 #include <algorithm>
 #include <array>
@@ -37,9 +39,22 @@ struct Cover {
   bool is_solid;  // and its hull is widened
   V opacity;
   float own;  // the part of its own that overlaps
-  glm::vec3 radiosity;
+  V3 radiosity;
   V fade;  // only when something fades
 };
+
+// How occlusion at a distance counts.
+inline V FadeAt(const GatherRules& rules, V distance) {
+  const D d;
+  const GatherWeights& weights = rules.weights;
+  if (weights.falloff_mode == GatherWeights::FalloffMode::kExponential) {
+    return hn::Exp(d, hn::Mul(Splat(-weights.falloff), distance));
+  }
+  const float inverse = 1 / rules.quality.max_distance;
+  const V rest = hn::NegMulAdd(distance, Splat(inverse), Splat(1));
+  const V power = hn::Mul(Splat(weights.falloff), hn::Log(d, hn::Max(rest, Splat(1e-30f))));
+  return hn::IfThenElseZero(hn::Gt(rest, Splat(1e-30f)), hn::Exp(d, power));
+}
 
 // What a kernel for one kind of raster draws.
 template <bool kHasColor, bool kHasFade, bool kHasFrame>
@@ -107,8 +122,8 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
     }
     if constexpr (Kind::kColor) {
       if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
-      for (int c = 0; c < 3; ++c) {
-        hn::Store(hn::MulAdd(added, Splat(cover.radiosity[c]), hn::Load(d, at)), d, at);
+      for (const V& color : {cover.radiosity.x, cover.radiosity.y, cover.radiosity.z}) {
+        hn::Store(hn::MulAdd(added, color, hn::Load(d, at)), d, at);
         at += kStep;
       }
     }

@@ -11,11 +11,14 @@ namespace {
 // Hands the cut to the raster.
 struct DrawCut {
   PacketRaster& raster;
+  const PagedOctree::Reader& octree;
   void setFrame(const InstanceFrame* frame) { raster.setFrame(frame); }
-  void node(const Node& node, const LaneParts* parts) { raster.addNode(node, parts); }
+  void node(const Node& node, const LaneParts* parts) {
+    raster.addNode(node, parts, octree.lobesOf(node));
+  }
   void leaf(const Node&) {}
   void surfels(std::span<const Surfel> run, const LaneParts* parts) {
-    raster.addSurfels(run, parts);
+    raster.addSurfels(run, parts, octree.lobesOf(run));
   }
 };
 
@@ -38,7 +41,7 @@ Status PacketGatherer::gatherTogether(std::span<const LocalReceiver> receivers,
                                       std::span<GatherResult> results) {
   const PacketView view = viewPacket(receivers, rules_);
   raster_.begin(receivers, view);
-  SURFEIT_RETURN_IF_ERROR(walk_.walk(view, receivers, world, DrawCut{raster_}));
+  SURFEIT_RETURN_IF_ERROR(walk_.walk(view, receivers, world, DrawCut{raster_, world.octree()}));
   work_.nodes_visited += walk_.nodesVisited();
   work_.surfels_visited += walk_.surfelsVisited();
   work_.patches += raster_.patchCount();

@@ -16,6 +16,7 @@
 #include "gather/rules/contribution.h"
 #include "gather/rules/coverage_rules.h"
 #include "gather/rules/gather_rules.h"
+#include "gather/rules/lobe_light.h"
 #include "gather/rules/raster_geometry.h"
 #include "gather/rules/receiver.h"
 #include "octree/node/node.h"
@@ -58,7 +59,8 @@ struct alignas(64) Patch {
   Seen seen = Seen::kFront;
   CubeKind kind = CubeKind::kPatch;  // of what it stands for
   std::uint32_t parts = 0;  // place in PacketCanvas::parts of what counts of the opacity; 0: all
-  glm::vec3 radiosity{0};
+  std::uint32_t lobe = 0;   // place in PacketCanvas::lobes; 0: it sends evenly
+  glm::vec3 radiosity{0};   // in all directions together
   float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
   float reach = 0;          // how far before and behind its middle it meets others of its layer
   float soft_peak = 0;      // of the ray traced disk, softDiskPeak
@@ -139,6 +141,7 @@ struct PacketCanvas {
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
   const SeenPixels* seen;
   const PacketParts* parts;  // of the patches
+  const LobeLight* lobes;    // of the patches
   PixelRecorder* recorder;   // of what the first receiver sees; null: nobody's
 };
 

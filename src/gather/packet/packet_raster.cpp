@@ -12,6 +12,7 @@
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
 #include "gather/rules/coverage_rules.h"
+#include "gather/rules/lobe_light.h"
 #include "gather/rules/ribbon.h"
 
 namespace surfeit {
@@ -74,6 +75,7 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
   if (pixels_ == nullptr) throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
   parts_.reserve(kReservedParts);
+  if (rules.hasLight()) lobes_.reserve(kReservedLobes);
   order_.resize(kReservedEntries);
   order_scratch_.resize(kReservedEntries);
 }
@@ -107,6 +109,7 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
   if (recorder_ != nullptr) recorder_->begin(geometry_.pixels().size());
   patches_.clear();
   parts_.resize(1);  // that of what counts wholly
+  lobes_.resize(1);  // that of what sends evenly
   order_count_ = 0;
   setFrame(nullptr);
 }
@@ -211,15 +214,17 @@ std::uint32_t PacketRaster::keepParts(const LaneParts* parts) {
   return static_cast<std::uint32_t>(parts_.size() - 1);
 }
 
-void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts) {
+void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const NodeLobes* lobes) {
   const std::uint32_t parts = keepParts(lane_parts);
+  const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
+  gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
   if (node.isRough()) return addRoughNode(node, parts);
-  if (node.isFlat()) return addFacet(facetOf(node), CubeKind::kFlatNode, parts);
+  if (node.isFlat()) return addFacet(facetOf(node), CubeKind::kFlatNode, parts, lobeOf(0));
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
-      addFacet(node.facet(i), CubeKind::kFacet, parts);
+      addFacet(node.facet(i), CubeKind::kFacet, parts, lobeOf(i));
     }
   }
 }
@@ -233,7 +238,17 @@ bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal)
   return away > normalRange(normal) * glm::length(to_facet) + local_radius_;
 }
 
-void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts) {
+// Its place among those of the patches; 0: none. `normal`: of any length.
+std::uint32_t PacketRaster::keepLobe(const Lobe* lobe, const glm::vec3& normal) {
+  const float facing = glm::length(normal);
+  if (lobe == nullptr || lobe->isEven() || !(facing > 0)) return 0;
+  LobeLight& light = lobes_.emplace_back(*lobe, normal / facing);
+  if (frame_ != nullptr) light.axis = frame_->directionToWorld(light.axis);
+  return static_cast<std::uint32_t>(lobes_.size() - 1);
+}
+
+void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts,
+                            const Lobe* lobe) {
   if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(facet.position))) return;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - local_centre_;
@@ -253,7 +268,10 @@ void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t par
   patch.shape = shapeOf(facet.covariance);
   patch.area = facet.area;
   patch.most_area = mostVisibleArea(facet);
-  if (sides != GatherSides::kBack) patch.radiosity = facet.radiosity;
+  if (sides != GatherSides::kBack) {
+    patch.radiosity = gain_ * facet.radiosity;
+    patch.lobe = keepLobe(lobe, facet.normal);
+  }
   patch.disk_area = facet.area;
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + local_radius_ / distance;
@@ -296,7 +314,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.parts = parts;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) {
-    patch.radiosity = (front / (round_area * node.opacity())) * seen.radiosity;
+    patch.radiosity = (gain_ * front / (round_area * node.opacity())) * seen.radiosity;
   }
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
@@ -307,7 +325,8 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   orderLastPatch(facesThatSee(patch));
 }
 
-void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts) {
+void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts,
+                              std::span<const Lobe> lobes) {
   const std::uint32_t parts = keepParts(lane_parts);
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
@@ -329,12 +348,16 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     }
     patch.area = patch.most_area = surfel.area;
     (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
-    patch.radiosity = surfel.radiosity;
+    patch.radiosity = rules_.gains.of(surfel.group) * surfel.radiosity;
     patch.seen = surfel.isSphere()                            ? Patch::Seen::kAllAround
                  : surfel.isTwoSided()                        ? Patch::Seen::kBoth
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
     const glm::vec3 to_surfel = surfel.position - local_centre_;
+    if (!lobes.empty()) {
+      const auto i = static_cast<std::size_t>(&stored - surfels.data());
+      patch.lobe = keepLobe(&lobes[i], surfel.normal);
+    }
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
@@ -374,6 +397,7 @@ PacketCanvas PacketRaster::canvas() const {
           .is_face_used = &is_face_used_,
           .seen = &seen_,
           .parts = parts_.data(),
+          .lobes = lobes_.data(),
           .recorder = recorder_};
 }
 
@@ -399,6 +423,7 @@ std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
          kReservedPatches * sizeof(Patch) + kReservedParts * sizeof(PacketParts) +
+         (rules.hasLight() ? kReservedLobes * sizeof(LobeLight) : 0) +
          2 * kReservedEntries * sizeof(std::uint64_t);
 }
 

@@ -32,6 +32,7 @@
 #include "gather/rules/contribution.h"
 #include "gather/rules/raster_geometry.h"
 #include "gather/rules/receiver.h"
+#include "octree/node/lobe.h"
 #include "octree/node/node.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
@@ -46,6 +47,7 @@ class PacketRaster {
  public:
   static constexpr std::size_t kReservedPatches = 4096;
   static constexpr std::size_t kReservedParts = 1024;    // of what fades
+  static constexpr std::size_t kReservedLobes = 1024;    // of what is glossy
   static constexpr std::size_t kReservedEntries = 8192;  // of the order
 
   // `rules` must be valid, as gatherCloud checks them: even resolution within its limits, the rest
@@ -60,12 +62,14 @@ class PacketRaster {
   // What is added next is in the frame of an instance; null, as at first: in that of the receivers.
   void setFrame(const InstanceFrame* frame);
   // Adds a node as a whole. All receivers must lie outside its radius.
-  // `parts`: how much it counts for each receiver; null: wholly.
-  void addNode(const Node& node, const LaneParts* parts = nullptr);
+  // `parts`: how much it counts for each receiver; null: wholly. `lobes`: null: it has none.
+  void addNode(const Node& node, const LaneParts* parts = nullptr,
+               const NodeLobes* lobes = nullptr);
   // Adds a patch as it is, in the frame of the receivers.
   void addPatch(const Patch& patch);
-  // Adds those of the surfels that some receiver may see.
-  void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr);
+  // Adds those of the surfels that some receiver may see. `lobes`: as many, or none.
+  void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr,
+                  std::span<const Lobe> lobes = {});
 
   // Sorts what was added, and draws it.
   void sort();
@@ -91,7 +95,8 @@ class PacketRaster {
  private:
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   std::uint32_t keepParts(const LaneParts* parts);
-  void addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts);
+  void addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts, const Lobe* lobe);
+  std::uint32_t keepLobe(const Lobe* lobe, const glm::vec3& normal);
   void addRoughNode(const Node& node, std::uint32_t parts);
   std::uint32_t facesThatSee(const Patch& patch) const;
   std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
@@ -120,8 +125,10 @@ class PacketRaster {
   const InstanceFrame* frame_ = nullptr;
   glm::vec3 local_centre_{0};  // of the view, in the frame of what is added
   float local_radius_ = 0;
+  float gain_ = 1;  // of the node that is added
   std::vector<Patch> patches_;
   std::vector<PacketParts> parts_;
+  std::vector<LobeLight> lobes_;
   std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling
   std::size_t order_count_ = 0;
 };

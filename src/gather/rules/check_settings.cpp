@@ -12,6 +12,8 @@
 namespace surfeit {
 namespace {
 
+constexpr float kMostGain = 1e6f;
+
 Status refuse(const char* what, auto found, const std::string& expected) {
   return Status::invalidArgument(fmt::format("{} is {}, expected {}", what, found, expected));
 }
@@ -47,6 +49,28 @@ Status checkWeights(const GatherSettings& settings) {
   return {};
 }
 
+Status checkGains(const GatherSettings& settings) {
+  std::uint64_t seen = 0;
+  for (const GroupGain& of_group : settings.gains) {
+    if (of_group.group >= kMaxGroups) {
+      return refuse("group of a gain", of_group.group, fmt::format("0 to {}", kMaxGroups - 1));
+    }
+    if (!(of_group.gain >= 0 && of_group.gain <= kMostGain)) {
+      return refuse(fmt::format("gain of group {}", of_group.group).c_str(), of_group.gain,
+                    fmt::format("0 to {:g}", kMostGain));
+    }
+    if ((seen & groupBit(of_group.group)) != 0) {
+      return Status::invalidArgument(
+          fmt::format("gain of group {}: found two, expected one", of_group.group));
+    }
+    seen |= groupBit(of_group.group);
+  }
+  if (settings.gains.empty() || GatherRules(settings).hasLight()) return {};
+  return Status::invalidArgument(
+      "gains of groups: found no output with the light of surfels, expected --mode bleeding or "
+      "glossy, or --outputs irradiance");
+}
+
 }  // namespace
 
 Status checkGatherSettings(const GatherSettings& settings, bool has_environment) {
@@ -77,6 +101,7 @@ Status checkGatherSettings(const GatherSettings& settings, bool has_environment)
                   fmt::format("0, or {} and more", kLeast));
   }
   SURFEIT_RETURN_IF_ERROR(checkWeights(settings));
+  SURFEIT_RETURN_IF_ERROR(checkGains(settings));
   if ((settings.outputs & ~kAllOutputs) != 0) {
     return refuse("set of outputs", settings.outputs, "GatherOutput values");
   }

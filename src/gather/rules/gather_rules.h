@@ -12,6 +12,7 @@
 #include "gather/rules/fidelity.h"
 #include "gather/rules/raster_geometry.h"
 #include "gather/rules/receiver.h"
+#include "gather/rules/sending_gains.h"
 #include "surfeit/gather.h"
 #include "surfeit/surfel.h"
 
@@ -62,6 +63,7 @@ struct GatherRules {
         quality(settings.quality),
         weights(withConeAngle(settings.weights, settings.mode)),
         groups(settings.groups),
+        gains(settings.gains),
         eye(glm::vec3(settings.eye)) {}
 
   GatherMode mode;
@@ -72,6 +74,7 @@ struct GatherRules {
   GatherQuality quality;
   GatherWeights weights;              // with the cone angle filled in
   std::uint64_t groups = kAllGroups;  // set of the groups of surfels that are seen
+  SendingGains gains;                 // of what they send
   glm::vec3 eye{0};                   // with kGlossy: receivers are looked at from here
 
   bool has(std::uint32_t some) const { return (outputs & some) != 0; }

@@ -7,13 +7,14 @@
 #include <cmath>
 #include <limits>
 
-#include "core/curve_key.h"
 #include "core/thread_scratch.h"
 #include "octree/node/stored_loss.h"
 #include "octree/page/column_codec.h"
 #include "octree/page/facet_columns.h"
+#include "octree/page/lobe_columns.h"
 #include "octree/page/node_bounds.h"
 #include "octree/page/node_moments.h"
+#include "octree/page/node_references.h"
 #include "octree/page/transparency_columns.h"
 #include "surfeit/surfel.h"
 
@@ -186,42 +187,6 @@ std::array<std::span<T>, kCoefficientKinds> coefficientColumns(std::size_t rough
 float coefficientScale(const Node& node, std::size_t kind) {
   if (kind == kAreaKind) return node.area;
   return node.area * node.opacity() * node.radiosity[static_cast<int>(kind) - 1];
-}
-
-// The level that a node page belongs to.
-int levelOfPage(std::span<const std::uint32_t> level_first_page, std::uint32_t page) {
-  const auto after = std::upper_bound(level_first_page.begin(), level_first_page.end(), page);
-  return static_cast<int>(after - level_first_page.begin()) - 1;
-}
-
-// Turns stored references into global ones and checks that they point at something that exists.
-Status resolveReference(const NodeLimits& limits, int level, int child_level,
-                        std::uint64_t stored_page, std::uint64_t first, Node& node) {
-  if (node.isLeaf()) {
-    if (child_level != 0) return damaged("child level");
-    if (stored_page >= limits.surfel_page_count || first >= limits.surfel_group_capacity ||
-        node.surfel_count == 0) {
-      return damaged("surfel reference");
-    }
-    // Only a leaf that begins a page may run over its end, and its pages must exist
-    const std::uint64_t pages_after = limits.surfel_page_count - stored_page;
-    if (node.surfel_count > pages_after * limits.surfel_group_capacity ||
-        (first > 0 && node.surfel_count > limits.surfel_group_capacity - first)) {
-      return damaged("surfel count");
-    }
-    node.page = static_cast<std::uint32_t>(stored_page);
-  } else {
-    if (child_level <= level || child_level > kCurveLevels) return damaged("child level");
-    const std::uint64_t begin = limits.level_first_page[static_cast<std::size_t>(child_level)];
-    const std::uint64_t end = limits.level_first_page[static_cast<std::size_t>(child_level) + 1];
-    if (stored_page >= end - begin || node.child_count > 8 || node.child_count < 2 ||
-        first > limits.node_group_capacity - node.child_count) {
-      return damaged("child reference");
-    }
-    node.page = static_cast<std::uint32_t>(begin + stored_page);
-  }
-  node.first = static_cast<std::uint16_t>(first);
-  return {};
 }
 
 // The columns of a page but for the coefficients, checked one by one: those before the radiosity,
@@ -414,11 +379,16 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
     if (kind == kAreaKind + 1) facets.putRadiosity(writer, full_precision);
     encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
   }
+  if (form.has_lobes) {
+    const auto nodeAt = [&](std::size_t i) -> const Node& { return nodes[i].node; };
+    putNodeLobes(writer, nodes.size(), nodeAt, {});
+  }
   return writer.finish();
 }
 
 Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::uint32_t page,
-                                      const NodeLimits& limits, std::span<Node> nodes) {
+                                      const NodeLimits& limits, std::span<Node> nodes,
+                                      std::span<NodeLobes> lobes) {
   const bool full_precision = form.full_precision;
   PayloadReader reader(payload);
   if (!reader.ok()) return damaged("bytes of the packed part");
@@ -444,6 +414,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
   SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
   SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
   for (Node& node : out) node.findOffPlane();
+  if (form.has_lobes && !getNodeLobes(reader, out, lobes)) return damaged("lobes");
   if (reader.remaining() != 0) {
     return Status::corruption(
         fmt::format("node group: {} bytes after the last field", reader.remaining()));
@@ -453,7 +424,8 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
 
 Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
                                          std::span<const Node> nodes,
-                                         std::vector<std::byte>& replaced) {
+                                         std::vector<std::byte>& replaced,
+                                         std::span<const NodeLobes> lobes) {
   const bool full_precision = form.full_precision;
   PayloadReader reader(payload);
   if (!reader.ok() || reader.recordCount() != nodes.size()) return damaged("number of nodes");
@@ -492,6 +464,10 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
   facets.putRadiosity(writer, full_precision);
   for (std::size_t kind = kAreaKind + 1; kind < kCoefficientKinds; ++kind) {
     encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
+  }
+  if (!lobes.empty()) {
+    const auto nodeAt = [&](std::size_t i) -> const Node& { return nodes[i]; };
+    putNodeLobes(writer, nodes.size(), nodeAt, lobes);
   }
   return writer.finish();
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/spherical_harmonics.h"
+#include "octree/node/lobe.h"
 #include "octree/node/node.h"
 #include "octree/page/page_form.h"
 #include "storage/file.h"
@@ -41,16 +42,20 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
                             std::vector<std::byte>& payload);
 
 // Decodes node page number `page` into `nodes` (the file's group capacity) and returns how many
-// there are. Children always lie on a deeper level, so that damaged links cannot form a loop. Safe
-// on arbitrary bytes; kCorruption names the field, but not the file.
+// there are. Children always lie on a deeper level, so that damaged links cannot form a loop. Their
+// lobes, where the page has some, go to `lobes`, as many as nodes, or empty: to nobody. Safe on
+// arbitrary bytes; kCorruption names the field, but not the file.
 Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::uint32_t page,
-                                      const NodeLimits& limits, std::span<Node> nodes);
+                                      const NodeLimits& limits, std::span<Node> nodes,
+                                      std::span<NodeLobes> lobes = {});
 
 // The payload of the same page with the radiosity and, for rough nodes, the power coefficients of
-// `nodes`; of the rest area and flags must be as decoded. All other columns keep their bytes.
-// Returns as encodeNodeGroup; errors as decodeNodeGroup. `replaced` is not `payload`.
+// `nodes`; of the rest area and flags must be as decoded. All other columns keep their bytes, but
+// for lobes: the page has those given, one for each node, or none when they are empty. Returns as
+// encodeNodeGroup; errors as decodeNodeGroup. `replaced` is not `payload`.
 Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
                                          std::span<const Node> nodes,
-                                         std::vector<std::byte>& replaced);
+                                         std::vector<std::byte>& replaced,
+                                         std::span<const NodeLobes> lobes = {});
 
 }  // namespace surfeit

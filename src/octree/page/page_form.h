@@ -12,6 +12,7 @@ struct PageForm {
   bool has_long_sides = false;
   bool has_bounds = true;    // slabs and cones of nodes: since format version 2
   bool has_opacity = false;  // since format version 3
+  bool has_lobes = false;    // since format version 4
 };
 
 }  // namespace surfeit

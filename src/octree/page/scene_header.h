@@ -22,6 +22,9 @@ constexpr std::uint32_t formatVersionFor(const CloudChannels& channels) {
   return channels.opacity ? 3 : 2;
 }
 
+// That of a scene with lobes.
+inline constexpr std::uint32_t kLobesFormatVersion = 4;
+
 // What the header says about the scene.
 struct SceneHeader {
   std::uint32_t format_version = formatVersionFor({});  // in the header of the container
@@ -39,12 +42,13 @@ struct SceneHeader {
   UpAxis up = kDefaultUpAxis;
   CloudChannels channels;       // what the input had, as opposed to filled in by rules
   bool full_precision = false;  // pages hold floats instead of quantized values
+  bool has_lobes = false;       // surfels and nodes have lobes (octree/node/lobe.h)
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 
   PageForm pageForm() const {
-    return {full_precision,     channels.albedo,     channels.group,
-            channels.long_side, format_version >= 2, channels.opacity};
+    return {full_precision,      channels.albedo,  channels.group, channels.long_side,
+            format_version >= 2, channels.opacity, has_lobes};
   }
 };
 

@@ -9,6 +9,7 @@
 #include "core/long_side.h"
 #include "core/thread_scratch.h"
 #include "octree/page/column_codec.h"
+#include "octree/page/lobe_columns.h"
 #include "octree/page/surfel_marks.h"
 #include "octree/page/transparency_columns.h"
 
@@ -176,11 +177,12 @@ std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& f
     for (const auto& bytes : columns.long_side) putBytes8(writer, bytes);
   }
   if (form.has_opacity) columns.transparency.put(writer);
+  if (form.has_lobes) putSurfelLobes(writer, surfels.size(), {});
   return writer.finish();
 }
 
 Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
-                                        std::span<Surfel> surfels) {
+                                        std::span<Surfel> surfels, std::span<Lobe> lobes) {
   PayloadReader reader(payload);
   if (!reader.ok()) return damaged("bytes of the packed part");
   const std::uint32_t count = reader.recordCount();
@@ -192,6 +194,7 @@ Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
   SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, columns));
   if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
   SURFEIT_RETURN_IF_ERROR(decodeOptional(reader, form, columns));
+  if (form.has_lobes && !getSurfelLobes(reader, count, lobes)) return damaged("lobes");
   if (reader.remaining() != 0) {
     return Status::corruption(
         fmt::format("surfel group: {} bytes after the last field", reader.remaining()));
@@ -202,7 +205,8 @@ Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
 
 Result<std::size_t> replaceSurfelRadiosity(Bytes payload, const PageForm& form,
                                            std::span<const glm::vec3> radiosity,
-                                           std::vector<std::byte>& replaced) {
+                                           std::vector<std::byte>& replaced,
+                                           std::span<const Lobe> lobes) {
   PayloadReader reader(payload);
   if (!reader.ok() || reader.recordCount() != radiosity.size()) return damaged("number of surfels");
   const Columns columns(radiosity.size());
@@ -219,7 +223,9 @@ Result<std::size_t> replaceSurfelRadiosity(Bytes payload, const PageForm& form,
   const PayloadReader optional = reader;
   SURFEIT_RETURN_IF_ERROR(decodeOptional(reader, form, columns));
   copyTaken(optional, reader, writer);
+  if (form.has_lobes && !getSurfelLobes(reader, radiosity.size(), {})) return damaged("lobes");
   if (reader.remaining() != 0) return damaged("end");
+  if (!lobes.empty()) putSurfelLobes(writer, radiosity.size(), lobes);
   return writer.finish();
 }
 

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "octree/node/lobe.h"
 #include "octree/node/stored_loss.h"
 #include "octree/page/page_form.h"
 #include "storage/file.h"
@@ -20,15 +21,18 @@ namespace surfeit {
 std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& form,
                               std::vector<std::byte>& payload);
 
-// Decodes into `surfels` (the file's group capacity) and returns how many there are. Safe on
-// arbitrary bytes; kCorruption names the field, but not the file.
+// Decodes into `surfels` (the file's group capacity) and returns how many there are. Their lobes,
+// where the page has some, go to `lobes`, as many, or empty: to nobody. Safe on arbitrary bytes;
+// kCorruption names the field, but not the file.
 Result<std::uint32_t> decodeSurfelGroup(Bytes payload, const PageForm& form,
-                                        std::span<Surfel> surfels);
+                                        std::span<Surfel> surfels, std::span<Lobe> lobes = {});
 
-// The payload of the same page with other radiosities, one per surfel: all other columns keep their
-// bytes. Returns as encodeSurfelGroup; errors as decodeSurfelGroup. `replaced` is not `payload`.
+// The payload of the same page with other radiosities, one per surfel, and these lobes, one per
+// surfel, or none when they are empty: all other columns keep their bytes. Returns as
+// encodeSurfelGroup; errors as decodeSurfelGroup. `replaced` is not `payload`.
 Result<std::size_t> replaceSurfelRadiosity(Bytes payload, const PageForm& form,
                                            std::span<const glm::vec3> radiosity,
-                                           std::vector<std::byte>& replaced);
+                                           std::vector<std::byte>& replaced,
+                                           std::span<const Lobe> lobes = {});
 
 }  // namespace surfeit

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
+#include <vector>
 
 #include "core/thread_scratch.h"
 #include "octree/node/node.h"
@@ -18,10 +20,21 @@ std::span<Record> writableRecords(std::span<std::byte> frame) {
   return {reinterpret_cast<Record*>(frame.data()), frame.size() / sizeof(Record)};
 }
 
-template <typename Record>
-Result<PageCache::Loaded> loaded(const Result<std::uint32_t>& count, std::uint32_t stored_bytes) {
-  if (!count.ok()) return count.status();
-  return PageCache::Loaded{stored_bytes, static_cast<std::uint32_t>(*count * sizeof(Record))};
+// Decodes a page of records into a frame, and behind them their lobes, where the scene has some:
+// decode(records, lobes).
+template <typename Record, typename RecordLobe, typename Decode>
+Result<PageCache::Loaded> load(std::span<std::byte> frame, std::size_t capacity, bool has_lobes,
+                               std::uint32_t stored_bytes, const Decode& decode) {
+  std::vector<RecordLobe>& lobes = threadScratch<std::vector<RecordLobe>>([] {});
+  lobes.resize(has_lobes ? capacity : 0);
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
+                           decode(writableRecords<Record>(frame), std::span(lobes)));
+  std::size_t bytes = count * sizeof(Record);
+  if (has_lobes) {
+    std::memcpy(frame.data() + bytes, lobes.data(), count * sizeof(RecordLobe));
+    bytes += count * sizeof(RecordLobe);
+  }
+  return PageCache::Loaded{stored_bytes, static_cast<std::uint32_t>(bytes)};
 }
 
 SceneFile::Scratch& decodeScratch() {
@@ -31,9 +44,11 @@ SceneFile::Scratch& decodeScratch() {
 Status checkPageSize(const SceneFile& file, const char* kind, std::size_t page_bytes,
                      std::size_t frame_bytes) {
   if (page_bytes <= frame_bytes) return {};
-  return Status::invalidArgument(
-      fmt::format("{}: pages of {} decode to {} bytes, those of this engine hold {}", file.path(),
-                  kind, page_bytes, frame_bytes));
+  return Status::invalidArgument(fmt::format(
+      "{}: pages of {} decode to {} bytes, those of this engine hold {}{}", file.path(), kind,
+      page_bytes, frame_bytes,
+      file.header().has_lobes ? ": the scene has lobes, for which EngineOptions::lobes makes room"
+                              : ""));
 }
 
 }  // namespace
@@ -81,9 +96,12 @@ Result<std::unique_ptr<OctreeCaches>> OctreeCaches::create(const Options& option
   SURFEIT_ASSIGN_OR_RETURN(
       caches->nodes_, PageCache::create(nodes, [self](PageNumber page, std::span<std::byte> frame) {
         const auto [scene, first] = self->nodeOwner(page);
-        return loaded<Node>(
-            scene->decodeNodes(page - first, decodeScratch(), writableRecords<Node>(frame)),
-            scene->nodePageBytes(page - first));
+        const SceneHeader& header = scene->header();
+        return load<Node, NodeLobes>(
+            frame, header.node_group_capacity, header.has_lobes, scene->nodePageBytes(page - first),
+            [scene = scene, at = page - first](auto records, auto lobes) {
+              return scene->decodeNodes(at, decodeScratch(), records, lobes);
+            });
       }));
   PageCache::Options surfels{.page_count = options.surfel_pages,
                              .frame_bytes = options.surfel_page_bytes,
@@ -94,9 +112,13 @@ Result<std::unique_ptr<OctreeCaches>> OctreeCaches::create(const Options& option
       caches->surfels_,
       PageCache::create(surfels, [self](PageNumber page, std::span<std::byte> frame) {
         const auto [scene, first] = self->surfelOwner(page);
-        return loaded<Surfel>(
-            scene->decodeSurfels(page - first, decodeScratch(), writableRecords<Surfel>(frame)),
-            scene->surfelPageBytes(page - first));
+        const SceneHeader& header = scene->header();
+        return load<Surfel, Lobe>(frame, header.surfel_group_capacity, header.has_lobes,
+                                  scene->surfelPageBytes(page - first),
+                                  [scene = scene, at = page - first](auto records, auto lobes) {
+                                    return scene->decodeSurfels(at, decodeScratch(), records,
+                                                                lobes);
+                                  });
       }));
   return caches;
 }
@@ -109,11 +131,10 @@ OctreeCaches::OctreeCaches(const Options& options)
 }
 
 Result<OctreeCaches::Place> OctreeCaches::attach(const SceneFile& file) {
-  const SceneHeader& header = file.header();
-  SURFEIT_RETURN_IF_ERROR(checkPageSize(file, "nodes", header.node_group_capacity * sizeof(Node),
-                                        options_.node_page_bytes));
-  SURFEIT_RETURN_IF_ERROR(checkPageSize(
-      file, "surfels", header.surfel_group_capacity * sizeof(Surfel), options_.surfel_page_bytes));
+  SURFEIT_RETURN_IF_ERROR(
+      checkPageSize(file, "nodes", file.nodePageCapacityBytes(), options_.node_page_bytes));
+  SURFEIT_RETURN_IF_ERROR(
+      checkPageSize(file, "surfels", file.surfelPageCapacityBytes(), options_.surfel_page_bytes));
   const std::unique_lock lock(mutex_);
   const std::optional<PageNumber> node_page = node_ranges_.take(file.nodePageCount(), &file);
   if (node_page) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <map>
 #include <mutex>
@@ -25,11 +26,11 @@ constexpr std::size_t kMostResidentPages = 512;
 constexpr std::size_t kDecoderBytes = 160 << 10;
 
 PageCache::Options nodeOptions(const SceneFile& file, std::size_t frames) {
-  return {file.nodePageCount(), file.header().node_group_capacity * sizeof(Node), frames};
+  return {file.nodePageCount(), file.nodePageCapacityBytes(), frames};
 }
 
 PageCache::Options surfelOptions(const SceneFile& file, std::size_t frames) {
-  return {file.surfelPageCount(), file.header().surfel_group_capacity * sizeof(Surfel), frames};
+  return {file.surfelPageCount(), file.surfelPageCapacityBytes(), frames};
 }
 
 // Frames that `threads` readers need of a cache.
@@ -56,6 +57,27 @@ template <typename Record>
 std::span<const Record> recordsOf(std::span<const std::byte> page) {
   return {reinterpret_cast<const Record*>(page.data()), page.size() / sizeof(Record)};
 }
+
+// Of a scene with lobes, the records of a page and the lobes behind them.
+template <typename Record, typename RecordLobe>
+struct LobedRecords {
+  std::span<const Record> records;
+  const RecordLobe* lobes = nullptr;
+
+  LobedRecords() = default;
+  explicit LobedRecords(std::span<const std::byte> page) {
+    const std::size_t count = page.size() / (sizeof(Record) + sizeof(RecordLobe));
+    records = {reinterpret_cast<const Record*>(page.data()), count};
+    lobes = reinterpret_cast<const RecordLobe*>(page.data() + count * sizeof(Record));
+  }
+  // Null for what is no record of it.
+  const RecordLobe* of(const Record* record) const {
+    const std::less<> before;
+    if (records.empty() || before(record, records.data())) return nullptr;
+    if (!before(record, records.data() + records.size())) return nullptr;
+    return lobes + (record - records.data());
+  }
+};
 
 Status noSuchPage(PageNumber page, std::uint32_t pages) {
   return Status::corruption(
@@ -120,12 +142,18 @@ struct PagedOctree::Reader::State {
   std::uint64_t last_leaf = 0;
   std::shared_ptr<const LeafRuns> last_runs;
   CacheFront nodes, surfels;
+  // Of the pages that were looked up last, in scenes with lobes
+  bool has_lobes = false;
+  LobedRecords<Node, NodeLobes> lobed_nodes;
+  LobedRecords<Surfel, Lobe> lobed_surfels;
 };
 
 std::size_t PagedOctree::fixedBytes(const SceneFile& file, int threads) {
   const PageFile& pages = file.pages();
-  const std::size_t per_thread =
-      pages.maxStoredBytes() + 2 * kDirectAlignment + pages.maxPayloadBytes() + kDecoderBytes;
+  const std::size_t lobes =
+      file.header().has_lobes ? file.nodePageCapacityBytes() + file.surfelPageCapacityBytes() : 0;
+  const std::size_t per_thread = pages.maxStoredBytes() + 2 * kDirectAlignment +
+                                 pages.maxPayloadBytes() + kDecoderBytes + lobes;
   return pages.memoryBytes() + static_cast<std::size_t>(threads) * per_thread;
 }
 
@@ -190,11 +218,10 @@ Result<PagedOctree::Memory> PagedOctree::planMemory(const SceneFile& file, std::
 }
 
 Result<std::unique_ptr<PagedOctree>> PagedOctree::create(SceneFile file, const Memory& memory) {
-  const SceneHeader& header = file.header();
   SURFEIT_ASSIGN_OR_RETURN(
       std::shared_ptr<OctreeCaches> caches,
-      OctreeCaches::create({.node_page_bytes = header.node_group_capacity * sizeof(Node),
-                            .surfel_page_bytes = header.surfel_group_capacity * sizeof(Surfel),
+      OctreeCaches::create({.node_page_bytes = file.nodePageCapacityBytes(),
+                            .surfel_page_bytes = file.surfelPageCapacityBytes(),
                             .node_pages = file.nodePageCount(),
                             .surfel_pages = file.surfelPageCount(),
                             .node_frames = memory.node_frames,
@@ -246,6 +273,9 @@ void PagedOctree::Reader::use(const PagedOctree& octree) {
   state_->place = octree.state_->place;
   state_->node_pages = octree.state_->file.nodePageCount();
   state_->surfel_pages = octree.state_->file.surfelPageCount();
+  state_->has_lobes = octree.state_->file.header().has_lobes;
+  state_->lobed_nodes = {};
+  state_->lobed_surfels = {};
 }
 
 const SceneFile& PagedOctree::Reader::file() const { return *state_->file; }
@@ -267,7 +297,11 @@ Result<std::span<const Node>> PagedOctree::Reader::nodes(const NodeRange& range)
   if (range.page >= state_->node_pages) return noSuchPage(range.page, state_->node_pages);
   SURFEIT_ASSIGN_OR_RETURN(const std::span<const std::byte> data,
                            state_->nodes.lookup(state_->place.first_node_page + range.page));
-  const std::span<const Node> nodes = recordsOf<Node>(data);
+  std::span<const Node> nodes = recordsOf<Node>(data);
+  if (state_->has_lobes) {
+    state_->lobed_nodes = LobedRecords<Node, NodeLobes>(data);
+    nodes = state_->lobed_nodes.records;
+  }
   // A page decodes on its own; what points into it was checked against the capacity only
   if (std::size_t{range.first} + range.count > nodes.size()) {
     return state_->file->pages().pageError(
@@ -283,7 +317,11 @@ Result<std::span<const Surfel>> PagedOctree::Reader::surfels(std::uint32_t page,
   if (page >= state_->surfel_pages) return noSuchPage(page, state_->surfel_pages);
   SURFEIT_ASSIGN_OR_RETURN(const std::span<const std::byte> data,
                            state_->surfels.lookup(state_->place.first_surfel_page + page));
-  const std::span<const Surfel> surfels = recordsOf<Surfel>(data);
+  std::span<const Surfel> surfels = recordsOf<Surfel>(data);
+  if (state_->has_lobes) {
+    state_->lobed_surfels = LobedRecords<Surfel, Lobe>(data);
+    surfels = state_->lobed_surfels.records;
+  }
   if (first >= surfels.size()) {
     return state_->file->pages().pageError(
         state_->file->nodePageCount() + page,
@@ -291,6 +329,16 @@ Result<std::span<const Surfel>> PagedOctree::Reader::surfels(std::uint32_t page,
                     first));
   }
   return surfels.subspan(first, std::min<std::uint64_t>(count, surfels.size() - first));
+}
+
+const NodeLobes* PagedOctree::Reader::lobesOf(const Node& node) const {
+  return state_->has_lobes ? state_->lobed_nodes.of(&node) : nullptr;
+}
+
+std::span<const Lobe> PagedOctree::Reader::lobesOf(std::span<const Surfel> surfels) const {
+  if (!state_->has_lobes || surfels.empty()) return {};
+  const Lobe* const first = state_->lobed_surfels.of(surfels.data());
+  return first != nullptr ? std::span(first, surfels.size()) : std::span<const Lobe>();
 }
 
 Result<std::shared_ptr<const LeafRuns>> PagedOctree::Reader::leafRuns(const Node& leaf) {

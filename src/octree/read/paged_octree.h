@@ -14,6 +14,7 @@
 #include "cache/cache_front.h"
 #include "cache/reuse_distances.h"
 #include "core/bounds.h"
+#include "octree/node/lobe.h"
 #include "octree/node/node.h"
 #include "octree/read/octree_caches.h"
 #include "octree/read/scene_file.h"
@@ -116,6 +117,11 @@ class PagedOctree {
     // Never empty when ok. Valid until the next call of surfels() or nodes() on this reader.
     Result<std::span<const Surfel>> surfels(std::uint32_t page, std::uint32_t first,
                                             std::uint64_t count);
+
+    // The lobes of a node or of surfels that the last call of nodes() or surfels() gave, as long as
+    // these are valid. None in a scene without lobes, and none of other records.
+    const NodeLobes* lobesOf(const Node& node) const;
+    std::span<const Lobe> lobesOf(std::span<const Surfel> surfels) const;
 
     // Calls visit(std::span<const Surfel>) for the surfels of a leaf, page by page, in curve order.
     // It returns nothing, or a Status, whose failure ends the visit.

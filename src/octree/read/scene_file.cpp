@@ -33,6 +33,11 @@ Result<SceneFile> SceneFile::open(PageFile pages) {
     return Status::corruption(fmt::format("{}: header: opacity in version {}, expected 3 or more",
                                           scene.path(), scene.header_.format_version));
   }
+  if (scene.header_.format_version < kLobesFormatVersion && scene.header_.has_lobes) {
+    return Status::corruption(fmt::format("{}: header: lobes in version {}, expected {} or more",
+                                          scene.path(), scene.header_.format_version,
+                                          kLobesFormatVersion));
+  }
   return scene;
 }
 
@@ -53,22 +58,24 @@ std::uint32_t SceneFile::surfelPageBytes(std::uint32_t page) const {
 }
 
 Result<std::uint32_t> SceneFile::decodeNodes(std::uint32_t page, Scratch& scratch,
-                                             std::span<Node> nodes) const {
+                                             std::span<Node> nodes,
+                                             std::span<NodeLobes> lobes) const {
   SURFEIT_RETURN_IF_ERROR(pages_.readPage(page, scratch.stored, scratch.payload));
   const NodeLimits limits{header_.level_first_page, surfelPageCount(), header_.node_group_capacity,
                           header_.surfel_group_capacity};
   Result<std::uint32_t> count = decodeNodeGroup(scratch.payload, header_.pageForm(), page, limits,
-                                                nodes.first(header_.node_group_capacity));
+                                                nodes.first(header_.node_group_capacity), lobes);
   if (!count.ok()) return pages_.pageError(page, count.status().message());
   return count;
 }
 
 Result<std::uint32_t> SceneFile::decodeSurfels(std::uint32_t page, Scratch& scratch,
-                                               std::span<Surfel> surfels) const {
+                                               std::span<Surfel> surfels,
+                                               std::span<Lobe> lobes) const {
   const std::uint32_t file_page = nodePageCount() + page;
   SURFEIT_RETURN_IF_ERROR(pages_.readPage(file_page, scratch.stored, scratch.payload));
-  Result<std::uint32_t> count = decodeSurfelGroup(scratch.payload, header_.pageForm(),
-                                                  surfels.first(header_.surfel_group_capacity));
+  Result<std::uint32_t> count = decodeSurfelGroup(
+      scratch.payload, header_.pageForm(), surfels.first(header_.surfel_group_capacity), lobes);
   if (!count.ok()) return pages_.pageError(file_page, count.status().message());
   return count;
 }

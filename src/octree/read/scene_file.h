@@ -11,6 +11,7 @@
 
 #include "core/bounds.h"
 #include "core/curve_key.h"
+#include "octree/node/lobe.h"
 #include "octree/node/node.h"
 #include "octree/page/page_form.h"
 #include "octree/page/scene_header.h"
@@ -44,14 +45,29 @@ class SceneFile {
     std::vector<std::byte> payload;
   };
   // Reads, checks and decodes a page into `nodes` or `surfels` (capacity of the header) and returns
-  // how many it holds. kCorruption names file, page, and what was wrong.
-  Result<std::uint32_t> decodeNodes(std::uint32_t page, Scratch& scratch,
-                                    std::span<Node> nodes) const;
+  // how many it holds. Of a scene with lobes they go to `lobes`, of the same capacity, or empty: to
+  // nobody. kCorruption names file, page, and what was wrong.
+  Result<std::uint32_t> decodeNodes(std::uint32_t page, Scratch& scratch, std::span<Node> nodes,
+                                    std::span<NodeLobes> lobes = {}) const;
   Result<std::uint32_t> decodeSurfels(std::uint32_t page, Scratch& scratch,
-                                      std::span<Surfel> surfels) const;
+                                      std::span<Surfel> surfels, std::span<Lobe> lobes = {}) const;
   // The groups of all surfels, as a set: those of the root, whose page is read. Group 0 alone in a
   // scene without groups, without reading. Errors as of decodeNodes.
   Result<std::uint64_t> readGroups() const;
+  // Bytes that a decoded record takes in a cache, its lobes included.
+  std::size_t nodeRecordBytes() const {
+    return sizeof(Node) + (header_.has_lobes ? sizeof(NodeLobes) : 0);
+  }
+  std::size_t surfelRecordBytes() const {
+    return sizeof(Surfel) + (header_.has_lobes ? sizeof(Lobe) : 0);
+  }
+  // Of the largest page of either kind, decoded.
+  std::size_t nodePageCapacityBytes() const {
+    return header_.node_group_capacity * nodeRecordBytes();
+  }
+  std::size_t surfelPageCapacityBytes() const {
+    return header_.surfel_group_capacity * surfelRecordBytes();
+  }
   // Stored bytes of a page.
   std::uint32_t nodePageBytes(std::uint32_t page) const;
   std::uint32_t surfelPageBytes(std::uint32_t page) const;

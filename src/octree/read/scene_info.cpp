@@ -1,7 +1,5 @@
 #include "octree/read/scene_info.h"
 
-#include "octree/node/node.h"
-
 namespace surfeit {
 
 Result<SceneInfo> sceneInfo(const SceneFile& file) {
@@ -17,10 +15,8 @@ Result<SceneInfo> sceneInfo(const SceneFile& file) {
   for (std::uint32_t i = 0; i < info.surfel_pages; ++i) {
     info.surfel_page_bytes += file.surfelPageBytes(i);
   }
-  info.node_cache_bytes =
-      std::uint64_t{info.node_pages} * header.node_group_capacity * sizeof(Node);
-  info.surfel_cache_bytes =
-      std::uint64_t{info.surfel_pages} * header.surfel_group_capacity * sizeof(Surfel);
+  info.node_cache_bytes = std::uint64_t{info.node_pages} * file.nodePageCapacityBytes();
+  info.surfel_cache_bytes = std::uint64_t{info.surfel_pages} * file.surfelPageCapacityBytes();
   const Bounds3d bounds = movedBounds(header.bounds, header.origin);
   info.min = bounds.min;
   info.max = bounds.max;
@@ -30,6 +26,7 @@ Result<SceneInfo> sceneInfo(const SceneFile& file) {
   info.up = header.up;
   info.channels = header.channels;
   info.full_precision = header.full_precision;
+  info.has_lobes = header.has_lobes;
   for (int level = 0; level <= kCurveLevels; ++level) {
     info.level_pages.push_back(header.level_first_page[level + 1] - header.level_first_page[level]);
   }

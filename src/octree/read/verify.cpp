@@ -10,6 +10,7 @@
 #include "core/job_limits.h"
 #include "core/program_memory.h"
 #include "core/worker_threads.h"
+#include "octree/node/lobe.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "octree/read/verify_bounds.h"
@@ -69,6 +70,7 @@ class PageChecker {
         referenced_(referenced) {
     nodes_.resize(file.header().node_group_capacity);
     surfels_.resize(file.header().surfel_group_capacity);
+    if (file.header().has_lobes) lobes_.resize(file.header().node_group_capacity);
   }
 
   // Returns how many records the page holds, 0 when it is damaged; kIoError when it cannot be read.
@@ -88,7 +90,7 @@ class PageChecker {
   }
 
   Result<std::uint64_t> checkNodePage(std::uint32_t page) {
-    const Result<std::uint32_t> count = file_.decodeNodes(page, scratch_, nodes_);
+    const Result<std::uint32_t> count = file_.decodeNodes(page, scratch_, nodes_, lobes_);
     if (!count.ok()) return report(count.status());
     page_brightest_ = 0;
     for (std::uint32_t i = 0; i < *count; ++i) {
@@ -99,6 +101,7 @@ class PageChecker {
     for (std::uint32_t i = 0; i < *count; ++i) {
       if (progress_.isCancelled()) return Status::interrupted();
       node_balance_ += placeHash(page, i);
+      node_lobes_ = lobes_.empty() ? nullptr : &lobes_[i];
       const Status status = nodes_[i].isLeaf() ? checkLeaf(nodes_[i]) : checkInterior(nodes_[i]);
       if (status.ok()) continue;
       const Status at =
@@ -136,6 +139,8 @@ class PageChecker {
     std::uint64_t surfels = 0;
     std::uint64_t groups = 0;
     glm::dvec3 power{0};
+    glm::dvec3 lobe{0};        // of that what is sent in lobes
+    bool has_one_lobe = true;  // all of it is in the lobes of surfels or of flat nodes
     float brightest = 0;
     float reach = 0;
     // A surfel or a child.
@@ -149,6 +154,11 @@ class PageChecker {
       surfels += count;
       groups |= record_groups;
       reach = std::max(reach, glm::length(record.position - node.position) + radius);
+    }
+    template <typename Record>
+    void addLobe(const Record& record, const Lobe& of_record) {
+      lobe += double(record.area) * double(record.opacity()) * glm::dvec3(record.radiosity) *
+              glm::dvec3(of_record.shares());
     }
   };
 
@@ -196,6 +206,22 @@ class PageChecker {
                                             kColors[c], node.radiosity[c],
                                             below.power[c] / below.covered));
     }
+    return compareLobes(node, below, slack);
+  }
+
+  // Of flat nodes, which sum up all lobes below; codes of shares are steps of 1/255.
+  Status compareLobes(const Node& node, const Below& below, double slack) const {
+    if (node_lobes_ == nullptr || !below.has_one_lobe) return {};
+    if (!node.isFlat() || node.isTwoSided()) return {};
+    Below own;
+    own.addLobe(node, (*node_lobes_)[0]);
+    for (int c = 0; c < 3; ++c) {
+      if (std::abs(below.lobe[c] - own.lobe[c]) <= kPowerTolerance * below.power[c] + slack)
+        continue;
+      return Status::corruption(
+          fmt::format("{} share of its lobe {}, expected {} from what lies below", kColors[c],
+                      (*node_lobes_)[0].shares()[c], below.lobe[c] / below.power[c]));
+    }
     return {};
   }
 
@@ -207,6 +233,8 @@ class PageChecker {
     Below below;
     for (const Node& child : children) {
       below.add(node, child, 0, child.surfel_count, child.groups);
+      below.has_one_lobe = below.has_one_lobe && child.isFlat() && !child.isTwoSided();
+      if (node_lobes_ != nullptr) below.addLobe(child, (*reader_.lobesOf(child))[0]);
       // A child's sphere may stick out of its parent's; its centre, a mean of surfels, may not
       const float distance = glm::length(child.position - node.position);
       if (distance > node.radius + (node.radius + child.radius) * kReachTolerance) {
@@ -231,6 +259,8 @@ class PageChecker {
     Below below;
     std::uint32_t page = node.page, place = node.first;
     SURFEIT_RETURN_IF_ERROR(reader_.visitLeaf(node, [&](std::span<const Surfel> surfels) {
+      const std::span<const Lobe> lobes = reader_.lobesOf(surfels);
+      for (std::size_t i = 0; i < lobes.size(); ++i) below.addLobe(surfels[i], lobes[i]);
       for (const Surfel& surfel : surfels) {
         below.add(node, surfel, surfel.radius, 1, groupBit(surfel.group));
         surfel_balance_ -= placeHash(page, place++);
@@ -255,6 +285,8 @@ class PageChecker {
   std::atomic<std::uint64_t>& referenced_;
   SceneFile::Scratch scratch_;
   std::vector<Node> nodes_;
+  std::vector<NodeLobes> lobes_;           // in a scene with lobes
+  const NodeLobes* node_lobes_ = nullptr;  // of the node that is checked
   std::vector<Surfel> surfels_;
   float page_brightest_ = 0;  // of the page of nodes that is checked
   std::uint64_t node_balance_ = 0, surfel_balance_ = 0;
@@ -264,9 +296,8 @@ class PageChecker {
 Result<PagedOctree::Memory> planMemory(const SceneFile& file, std::uint64_t memory_bytes,
                                        int threads) {
   constexpr std::uint64_t kMostCacheBytes = std::uint64_t{64} << 20;
-  const std::uint64_t thread_bytes = file.header().node_group_capacity * sizeof(Node) +
-                                     file.header().surfel_group_capacity * sizeof(Surfel) +
-                                     kThreadBytes;
+  const std::uint64_t thread_bytes =
+      file.nodePageCapacityBytes() + file.surfelPageCapacityBytes() + kThreadBytes;
   const std::uint64_t fixed = programBytes(threads) + PagedOctree::fixedBytes(file, threads) +
                               static_cast<std::uint64_t>(threads) * thread_bytes;
   const std::uint64_t least_caches = PagedOctree::leastCacheBytes(file, threads);

@@ -25,6 +25,7 @@ namespace {
 struct Work {
   std::uint32_t page = 0;
   std::vector<Surfel> surfels;
+  std::vector<Lobe> lobes;  // of a source with lobes
   EncodedPages surfel_page;
   std::vector<SweptNodePage> swept;  // the node pages that it completed
   EncodedPages node_pages;
@@ -97,12 +98,17 @@ Status Rewriting::replaceSurfels(Work& work) {
                            scene_.decodeSurfels(work.page, scratch.read, work.surfels));
   work.surfels.resize(count);
   scratch.radiosity.resize(count);
-  SURFEIT_RETURN_IF_ERROR(source_.read(work.page, scratch.radiosity));
+  if (source_.hasLobes()) {
+    work.lobes.resize(count);
+    SURFEIT_RETURN_IF_ERROR(source_.read(work.page, scratch.radiosity, work.lobes));
+  } else {
+    SURFEIT_RETURN_IF_ERROR(source_.read(work.page, scratch.radiosity));
+  }
   for (std::size_t i = 0; i < count; ++i) work.surfels[i].radiosity = scratch.radiosity[i];
 
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t packed_bytes,
                            replaceSurfelRadiosity(scratch.read.payload, header.pageForm(),
-                                                  scratch.radiosity, scratch.payload));
+                                                  scratch.radiosity, scratch.payload, work.lobes));
   SURFEIT_RETURN_IF_ERROR(compressPage(scratch.payload, packed_bytes, scratch.stored));
   work.surfel_page.clear();
   work.surfel_page.add(scratch.stored, scratch.payload.size());
@@ -114,7 +120,7 @@ Status Rewriting::encodeNodes(Work& work) {
   work.node_pages.clear();
   for (const SweptNodePage& swept : work.swept) {
     const Result<std::size_t> packed_bytes = replaceNodeRadiosity(
-        swept.payload, scene_.header().pageForm(), swept.nodes, scratch.payload);
+        swept.payload, scene_.header().pageForm(), swept.nodes, scratch.payload, swept.lobes);
     if (!packed_bytes.ok()) {
       return scene_.pages().pageError(swept.page, packed_bytes.status().message());
     }
@@ -156,7 +162,8 @@ Result<glm::dvec3> Rewriting::run() {
   };
   const PipelineStage sweep = {Mode::kInOrder, [this](std::size_t i) {
                                  if (failure_.happened()) return;
-                                 failure_.note(sweep_.add(works_[i].surfels, works_[i].swept));
+                                 Work& work = works_[i];
+                                 failure_.note(sweep_.add(work.surfels, work.lobes, work.swept));
                                }};
   const PipelineStage stages[] = {
       stage(Mode::kParallel, &Rewriting::replaceSurfels),
@@ -189,17 +196,27 @@ Result<glm::dvec3> rewriteRadiosity(const SceneFile& scene, RadiositySource& sou
   return Rewriting(scene, source, writer, threads, progress).run();
 }
 
-std::vector<std::byte> rewrittenSceneFields(const SceneFile& scene) {
+std::uint32_t rewrittenVersion(const SceneFile& scene, bool has_lobes) {
+  const SceneHeader& header = scene.header();
+  if (has_lobes) return kLobesFormatVersion;
+  return header.has_lobes ? formatVersionFor(header.channels) : header.format_version;
+}
+
+std::vector<std::byte> rewrittenSceneFields(const SceneFile& scene, bool has_lobes) {
   SceneHeader header = scene.header();
   header.channels.radiosity = true;
+  header.has_lobes = has_lobes;
   return encodeSceneHeader(header);
 }
 
-std::uint64_t rewriteRadiosityBytes(const SceneFile& scene, int threads) {
+std::uint64_t rewriteRadiosityBytes(const SceneFile& scene, int threads, bool has_lobes) {
   const SceneHeader& header = scene.header();
-  const std::uint64_t page_bytes = header.surfel_group_capacity * (sizeof(Surfel) + 64);
+  const std::uint64_t lobe_bytes = has_lobes ? sizeof(Lobe) : 0;
+  const std::uint64_t page_bytes =
+      header.surfel_group_capacity * (sizeof(Surfel) + 64 + 2 * lobe_bytes);
   const std::uint64_t node_page_bytes =
-      header.node_group_capacity * sizeof(Node) + scene.pages().maxPayloadBytes();
+      header.node_group_capacity * (sizeof(Node) + 2 * kMostFacets * lobe_bytes) +
+      scene.pages().maxPayloadBytes();
   // A thread decodes and encodes a page; the columns of both take about as much again as the page
   const std::uint64_t thread_bytes = 3 * (page_bytes + node_page_bytes) +
                                      4 * std::uint64_t{scene.pages().maxPayloadBytes()} +

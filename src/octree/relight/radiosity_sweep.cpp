@@ -79,24 +79,38 @@ Node& RadiositySweep::current() {
   return open_[static_cast<std::size_t>(siblings.level)].nodes[siblings.at];
 }
 
-Status RadiositySweep::add(std::span<const Surfel> surfels, std::vector<SweptNodePage>& complete) {
+const Node& RadiositySweep::parentOfCurrent() const {
+  const Siblings& siblings = path_[path_.size() - 2];
+  return open_[static_cast<std::size_t>(siblings.level)].nodes[siblings.at];
+}
+
+Status RadiositySweep::add(std::span<const Surfel> surfels, std::span<const Lobe> lobes,
+                           std::vector<SweptNodePage>& complete) {
   if (!has_begun_) {
     has_begun_ = true;
+    has_lobes_ = !lobes.empty();
     SURFEIT_RETURN_IF_ERROR(enter(kRootRange, complete));
     SURFEIT_RETURN_IF_ERROR(descend(complete));
   }
   for (std::size_t at = 0; at < surfels.size();) {
     if (leaf_left_ == 0) SURFEIT_RETURN_IF_ERROR(beginLeaf(at));
     const std::size_t count = std::min<std::uint64_t>(leaf_left_, surfels.size() - at);
-    for (const Surfel& surfel : surfels.subspan(at, count)) leaf_sums_.add(surfel);
+    addToLeaf(surfels.subspan(at, count), has_lobes_ ? lobes.subspan(at, count) : lobes);
     at += count;
     leaf_left_ -= count;
     if (leaf_left_ > 0) break;
-    leave(leaf_sums_);
+    leave(leaf_sums_, leaf_lobes_);
     SURFEIT_RETURN_IF_ERROR(descend(complete));
   }
   ++surfel_page_;
   return {};
+}
+
+void RadiositySweep::addToLeaf(std::span<const Surfel> surfels, std::span<const Lobe> lobes) {
+  for (const Surfel& surfel : surfels) leaf_sums_.add(surfel);
+  for (std::size_t i = 0; i < lobes.size(); ++i) {
+    addToPiece(current(), surfels[i], lobes[i], leaf_lobes_);
+  }
 }
 
 // The leaf at hand must be what begins at this surfel.
@@ -110,6 +124,7 @@ Status RadiositySweep::beginLeaf(std::size_t first) {
   }
   leaf_left_ = current().surfel_count;
   leaf_sums_ = NodeSums();
+  leaf_lobes_ = {};
   return {};
 }
 
@@ -144,7 +159,7 @@ Status RadiositySweep::enter(const NodeRange& range, std::vector<SweptNodePage>&
                                 range.first, end, open.nodes.size(), open.met));
   }
   open.met = end;
-  path_.push_back({level, range.first, static_cast<std::uint16_t>(end), NodeSums()});
+  path_.push_back({level, range.first, static_cast<std::uint16_t>(end), NodeSums(), {}});
   return {};
 }
 
@@ -156,6 +171,7 @@ Status RadiositySweep::openPage(int level, std::uint32_t page,
   SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
                            scene_.decodeNodes(page, open.scratch, open.nodes));
   open.nodes.resize(count);
+  open.lobes.resize(has_lobes_ ? count : 0);
   open.is_open = true;
   open.page = page;
   open.met = 0;
@@ -165,19 +181,25 @@ Status RadiositySweep::openPage(int level, std::uint32_t page,
 void RadiositySweep::closePage(int level, std::vector<SweptNodePage>& complete) {
   OpenPage& open = open_[static_cast<std::size_t>(level)];
   if (!open.is_open) return;
-  complete.push_back(
-      {level, open.page, std::exchange(open.nodes, {}), std::exchange(open.scratch.payload, {})});
+  complete.push_back({level, open.page, std::exchange(open.nodes, {}),
+                      std::exchange(open.lobes, {}), std::exchange(open.scratch.payload, {})});
   open.is_open = false;
 }
 
 // The node at hand is complete, and with it every parent of which it is the last child.
-void RadiositySweep::leave(NodeSums sums) {
+void RadiositySweep::leave(NodeSums sums, PieceSums lobes) {
   while (!path_.empty()) {
-    setRadiosity(sums, scene_.header().flatness_limit, current());
+    Node& node = current();
+    setRadiosity(sums, scene_.header().flatness_limit, node);
     Siblings& siblings = path_.back();
     siblings.sums.add(sums);
+    if (has_lobes_) {
+      open_[static_cast<std::size_t>(siblings.level)].lobes[siblings.at] = lobesOf(node, lobes);
+      if (path_.size() > 1) addToPieces(parentOfCurrent(), node, lobes, siblings.lobes);
+    }
     if (++siblings.at < siblings.end) return;
     sums = siblings.sums;
+    lobes = siblings.lobes;
     path_.pop_back();
   }
   root_sums_ = sums;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/curve_key.h"
+#include "octree/node/lobe.h"
 #include "octree/node/node.h"
 #include "octree/node/node_sums.h"
 #include "octree/read/scene_file.h"
@@ -24,6 +25,7 @@ struct SweptNodePage {
   int level = 0;
   std::uint32_t page = 0;  // of the file
   std::vector<Node> nodes;
+  std::vector<NodeLobes> lobes;    // of each node; empty without lobes
   std::vector<std::byte> payload;  // as it was
 };
 
@@ -33,10 +35,11 @@ class RadiositySweep {
   // `scene` must outlive it.
   explicit RadiositySweep(const SceneFile& scene) : scene_(scene) {}
 
-  // The surfels of the next surfel page. Node pages that are complete now are appended, those of a
-  // level in their order. Errors: those of reading pages, and kCorruption where the pages are not
-  // in the order of the tree.
-  Status add(std::span<const Surfel> surfels, std::vector<SweptNodePage>& complete);
+  // The surfels of the next surfel page, and their lobes; without lobes none on any page. Node
+  // pages that are complete now are appended, those of a level in their order. Errors: those of
+  // reading pages, and kCorruption where the pages are not in the order of the tree.
+  Status add(std::span<const Surfel> surfels, std::span<const Lobe> lobes,
+             std::vector<SweptNodePage>& complete);
   // After the last surfel page: the pages left. kCorruption unless every node was met.
   Status finish(std::vector<SweptNodePage>& complete);
 
@@ -50,6 +53,7 @@ class RadiositySweep {
     std::uint32_t page = 0;
     std::size_t met = 0;  // nodes of it that a parent referred to
     std::vector<Node> nodes;
+    std::vector<NodeLobes> lobes;
     SceneFile::Scratch scratch;
   };
   // Siblings on the way from the root to the leaf at hand.
@@ -57,15 +61,18 @@ class RadiositySweep {
     int level = 0;
     std::uint16_t at = 0, end = 0;  // in the open page of the level
     NodeSums sums;                  // of those before `at`
+    PieceSums lobes;                // of those before `at`, by the pieces of their parent
   };
 
   Node& current();
+  const Node& parentOfCurrent() const;  // of a node that is not the root
   Status descend(std::vector<SweptNodePage>& complete);
   Status enter(const NodeRange& range, std::vector<SweptNodePage>& complete);
   Status openPage(int level, std::uint32_t page, std::vector<SweptNodePage>& complete);
   void closePage(int level, std::vector<SweptNodePage>& complete);
   Status beginLeaf(std::size_t first);
-  void leave(NodeSums sums);
+  void addToLeaf(std::span<const Surfel> surfels, std::span<const Lobe> lobes);
+  void leave(NodeSums sums, PieceSums lobes);
 
   const SceneFile& scene_;
   std::array<OpenPage, kCurveLevels + 1> open_;
@@ -73,6 +80,8 @@ class RadiositySweep {
   std::uint32_t surfel_page_ = 0;
   std::uint64_t leaf_left_ = 0;  // surfels of the leaf at hand; 0: none is at hand
   NodeSums leaf_sums_, root_sums_;
+  PieceSums leaf_lobes_;
+  bool has_lobes_ = false;
   bool has_begun_ = false;
 };
 

@@ -88,6 +88,30 @@ static void* read_all(const char* path, size_t* size) {
   return bytes;
 }
 
+/* Surfels of group 0 send three times their light, and cover as before. */
+static void gather_with_gains(surfeit_engine* engine, const surfeit_scene* scene,
+                              surfeit_settings settings, const surfeit_receiver* receiver,
+                              surfeit_result plain) {
+  const surfeit_group_gain gains[2] = {{0, 3}, {0, 2}};
+  surfeit_gatherer* gatherer = NULL;
+  surfeit_result result;
+  settings.gains = gains;
+  settings.gain_count = 1;
+  expect(surfeit_gatherer_create(engine, scene, &settings, NULL, &gatherer) == SURFEIT_OK, "gain");
+  expect(surfeit_gather(gatherer, receiver, 1, &result, NULL, NULL) == SURFEIT_OK, "gather");
+  expect(fabs(result.irradiance[0] - 3 * plain.irradiance[0]) < 1e-5, "light with a gain");
+  expect(result.occlusion == plain.occlusion, "occlusion with a gain");
+  surfeit_gatherer_release(gatherer);
+  settings.gain_count = 2;
+  expect(surfeit_gatherer_create(engine, scene, &settings, NULL, &gatherer) ==
+             SURFEIT_INVALID_ARGUMENT,
+         "two gains of a group");
+  settings.gains = NULL;
+  expect(surfeit_gatherer_create(engine, scene, &settings, NULL, &gatherer) ==
+             SURFEIT_INVALID_ARGUMENT,
+         "no gains");
+}
+
 static void gather_from(surfeit_engine* engine, const surfeit_scene* scene) {
   surfeit_settings settings;
   surfeit_environment sky;
@@ -122,6 +146,7 @@ static void gather_from(surfeit_engine* engine, const surfeit_scene* scene) {
   expect(fabs(results[0].irradiance[0] - .239) < .01 && results[0].irradiance[1] == 0, "light");
   expect(fabs(results[0].environment[1] - 3.14159 * .761) < .05, "environment");
   expect(results[1].occlusion < .001, "nothing is there");
+  gather_with_gains(engine, scene, settings, receivers, results[0]);
   expect(surfeit_gather(gatherer, receivers, 2, results, at_once, NULL) == SURFEIT_INTERRUPTED,
          "interrupted");
   expect(surfeit_gather(NULL, receivers, 2, results, NULL, NULL) == SURFEIT_INVALID_ARGUMENT,
@@ -167,6 +192,7 @@ int main(int argc, char** argv) {
   surfeit_engine_options_init(&options);
   options.memory_bytes = 64 << 20;
   options.threads = 2;
+  options.lobes = 1;
   expect(surfeit_engine_create(&options, &engine) == SURFEIT_OK, "engine");
   options.memory_bytes = 1;
   expect(surfeit_engine_create(&options, &engine) == SURFEIT_BUDGET_TOO_SMALL, "a byte");
@@ -196,7 +222,7 @@ int main(int argc, char** argv) {
 
   statistics.size = sizeof statistics;
   expect(surfeit_engine_statistics(engine, &statistics) == SURFEIT_OK && statistics.scenes == 2 &&
-             statistics.gatherers == 0 && statistics.receivers == 2 * 5,
+             statistics.gatherers == 0 && statistics.receivers == 2 * 6,
          "statistics");
   surfeit_scene_release(held);
   surfeit_scene_release(scene);

@@ -1,0 +1,111 @@
+#include "octree/node/lobe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <iterator>
+
+#include "octree/node/moment_codes.h"
+
+namespace surfeit {
+namespace {
+
+// Rec. 709: one direction stands for all colors.
+constexpr double kWeights[3] = {0.2126, 0.7152, 0.0722};
+
+// The piece of a node that faces most as this normal does, of those of its kind; 0 where there is
+// none.
+std::size_t pieceThatFaces(const Node& node, const glm::vec3& normal, bool is_two_sided) {
+  std::size_t nearest = 0;
+  float most = -2;
+  for (std::size_t k = 0; k < node.facet_count; ++k) {
+    if (node.isTwoSided(k) != is_two_sided) continue;
+    const glm::vec3 facing = node.facets[k].meanNormal();
+    const float length = glm::length(facing);
+    float cosine = length > 0 ? glm::dot(facing, normal) / length : 0;
+    if (is_two_sided) cosine = std::abs(cosine);
+    if (cosine > most) {
+      most = cosine;
+      nearest = k;
+    }
+  }
+  return nearest;
+}
+
+glm::vec3 normalOfPiece(const Node& node, std::size_t piece) {
+  return node.hasFacets() ? node.facets[piece].meanNormal() : node.normal;
+}
+
+// Two sides have two mirror directions, and a rough node has many.
+bool holdsLobe(const Node& node, std::size_t piece) {
+  return piece < pieceCount(node) && !node.isTwoSided(piece);
+}
+
+}  // namespace
+
+Lobe Lobe::encode(const glm::vec3& shares, const glm::vec3& mean) {
+  Lobe result;
+  for (std::size_t c = 0; c < 3; ++c) {
+    result.share[c] = fractionCode(shares[static_cast<int>(c)]);
+    result.mean[c] = signedCode(mean[static_cast<int>(c)], 1);
+  }
+  return result.isEven() ? Lobe() : result;
+}
+
+void LobeSums::add(const LobeSums& other) {
+  for (int c = 0; c < 3; ++c) {
+    power[c] += other.power[c];
+    lobe[c] += other.lobe[c];
+    mean[c] += other.mean[c];
+  }
+  weight += other.weight;
+}
+
+Lobe LobeSums::toLobe() const {
+  if (!(weight > 0)) return {};
+  glm::vec3 shares(0), direction(0);
+  for (int c = 0; c < 3; ++c) {
+    if (power[c] > 0) shares[c] = float(lobe[c] / power[c]);
+    direction[c] = float(mean[c] / weight);
+  }
+  return Lobe::encode(shares, direction);
+}
+
+void addToPiece(const Node& node, const Surfel& surfel, const Lobe& lobe, PieceSums& sums) {
+  const bool is_two_sided = surfel.isTwoSided() && !surfel.isSphere();
+  const double covered = double(surfel.area) * double(surfel.opacity());
+  const glm::vec3 shares = lobe.shares(), direction = lobe.meanDirection();
+  LobeSums one;
+  for (int c = 0; c < 3; ++c) {
+    one.power[c] = covered * double(surfel.radiosity[c]);
+    one.lobe[c] = one.power[c] * double(shares[c]);
+    one.weight += kWeights[c] * one.lobe[c];
+  }
+  for (int c = 0; c < 3; ++c) one.mean[c] = one.weight * double(direction[c]);
+  sums[pieceThatFaces(node, surfel.normal, is_two_sided)].add(one);
+}
+
+void addToPieces(const Node& node, const Node& child, const PieceSums& of_child, PieceSums& sums) {
+  const std::size_t count = std::max<std::size_t>(pieceCount(child), 1);
+  for (std::size_t piece = 0; piece < count; ++piece) {
+    LobeSums one = of_child[piece];
+    if (!holdsLobe(child, piece)) {
+      // What it sends evenly as a piece of the child it sends evenly above
+      const LobeSums all = one;
+      one = {};
+      std::copy(std::begin(all.power), std::end(all.power), std::begin(one.power));
+    }
+    const bool is_two_sided = pieceCount(child) > 0 && child.isTwoSided(piece);
+    sums[pieceThatFaces(node, normalOfPiece(child, piece), is_two_sided)].add(one);
+  }
+}
+
+NodeLobes lobesOf(const Node& node, const PieceSums& sums) {
+  NodeLobes lobes;
+  for (std::size_t piece = 0; piece < lobes.size(); ++piece) {
+    if (holdsLobe(node, piece)) lobes[piece] = sums[piece].toLobe();
+  }
+  return lobes;
+}
+
+}  // namespace surfeit
