@@ -19,7 +19,6 @@
 #include "gather/packet/packet_footprint-inl.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
-#include "gather/packet/packet_lobe-inl.h"
 #include "gather/packet/packet_rays-inl.h"
 #include "gather/rules/coverage_rules.h"
 
@@ -160,7 +159,8 @@ class Brush {
     cover.opacity = hn::Mul(part, Opacity(patch));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
-    if constexpr (Kind::kColor) cover.radiosity = RadiosityTowards(patch, canvas_.lobes, sight);
+    cover.radiosity = patch.radiosity;
+    cover.lights = patch.lights == 0 ? nullptr : canvas_.lights[patch.lights].of(lane_);
     if constexpr (Kind::kFade) cover.fade = FadeAt(*canvas_.rules, distance);
     return cover;
   }

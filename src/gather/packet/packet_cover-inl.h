@@ -39,8 +39,9 @@ struct Cover {
   bool is_solid;  // and its hull is widened
   V opacity;
   float own;  // the part of its own that overlaps
-  V3 radiosity;
-  V fade;  // only when something fades
+  glm::vec3 radiosity;
+  const float* lights;  // instead of it, PacketLights of these lanes; null: none
+  V fade;               // only when something fades
 };
 
 // How occlusion at a distance counts.
@@ -122,9 +123,10 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
     }
     if constexpr (Kind::kColor) {
       if (!cover.is_all_lit) added = hn::IfThenElseZero(cover.is_lit, added);
-      for (const V& color : {cover.radiosity.x, cover.radiosity.y, cover.radiosity.z}) {
+      for (int c = 0; c < 3; ++c, at += kStep) {
+        const V color = cover.lights == nullptr ? Splat(cover.radiosity[c])
+                                                : hn::Load(d, cover.lights + c * kPacketReceivers);
         hn::Store(hn::MulAdd(added, color, hn::Load(d, at)), d, at);
-        at += kStep;
       }
     }
   }

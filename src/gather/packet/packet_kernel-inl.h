@@ -20,6 +20,7 @@
 #include "gather/packet/packet_integral-inl.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
+#include "gather/packet/packet_lobe-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {

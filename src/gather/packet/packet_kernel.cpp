@@ -18,6 +18,7 @@ PacketKernel Kernel() {
           .findSeenPixels = FindSeenPixels,
           .isAbove = IsAbove,
           .facesThatSee = FacesThatSee,
+          .seeLobe = SeeLobe,
           .seeRoughNode = SeeRoughNode,
           .draw = Draw,
           .integrate = Integrate,

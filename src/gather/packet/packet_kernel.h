@@ -58,13 +58,13 @@ struct alignas(64) Patch {
   enum class Seen : std::uint8_t { kFront, kBoth, kDarkBack, kAllAround };
   Seen seen = Seen::kFront;
   CubeKind kind = CubeKind::kPatch;  // of what it stands for
-  std::uint32_t parts = 0;  // place in PacketCanvas::parts of what counts of the opacity; 0: all
-  std::uint32_t lobe = 0;   // place in PacketCanvas::lobes; 0: it sends evenly
-  glm::vec3 radiosity{0};   // in all directions together
-  float near_distance = 0;  // closer than this it is ray traced; 0: a node, which never is
-  float reach = 0;          // how far before and behind its middle it meets others of its layer
-  float soft_peak = 0;      // of the ray traced disk, softDiskPeak
-  float ribbon_width = 0;   // of the ray traced ribbon
+  std::uint32_t parts = 0;   // place in PacketCanvas::parts of what counts of the opacity; 0: all
+  std::uint32_t lights = 0;  // place in PacketCanvas::lights; 0: it sends evenly
+  glm::vec3 radiosity{0};    // in all directions together
+  float near_distance = 0;   // closer than this it is ray traced; 0: a node, which never is
+  float reach = 0;           // how far before and behind its middle it meets others of its layer
+  float soft_peak = 0;       // of the ray traced disk, softDiskPeak
+  float ribbon_width = 0;    // of the ray traced ribbon
 
   // What is in a volume, as of smoke, hides behind its own layer as behind others: it is one alone.
   bool isDrop() const { return lets_through && reach == 0; }
@@ -81,6 +81,12 @@ static_assert(sizeof(Patch) == 128);
 // How much of a patch counts for each receiver.
 struct alignas(64) PacketParts {
   LaneParts of;
+};
+
+// The radiosity of a patch with a lobe as each receiver sees it: red, green and blue of all.
+struct alignas(64) PacketLights {
+  std::array<std::array<float, kPacketReceivers>, 3> colors;
+  const float* of(std::size_t lane) const { return colors[0].data() + lane; }
 };
 
 // The receivers as columns, one per lane; lanes without a receiver repeat the last one.
@@ -140,9 +146,9 @@ struct PacketCanvas {
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
   const SeenPixels* seen;
-  const PacketParts* parts;  // of the patches
-  const LobeLight* lobes;    // of the patches
-  PixelRecorder* recorder;   // of what the first receiver sees; null: nobody's
+  const PacketParts* parts;    // of the patches
+  const PacketLights* lights;  // of the patches
+  PixelRecorder* recorder;     // of what the first receiver sees; null: nobody's
 };
 
 struct RoughSight {
@@ -175,6 +181,9 @@ struct PacketKernel {
   // The faces on which some receiver may see something of the patch, which stands for a surfel, as
   // bits; of a cone's raster the first.
   std::uint32_t (*facesThatSee)(const PacketCanvas& canvas, const Patch& patch);
+  // What the receivers see of a patch with this lobe.
+  void (*seeLobe)(const PacketLanes& lanes, std::size_t receiver_count, const Patch& patch,
+                  const LobeLight& lobe, PacketLights& lights);
   // What the receivers see of a rough node in unit direction `direction` from them.
   void (*seeRoughNode)(const Node& node, const glm::vec3& direction, RoughSight& sight);
   // Draws patches in this order, all of one face after those of another.

@@ -21,31 +21,30 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-// The radiosity of a patch: LobeLight::part. Places on the patch lie in all directions from a
-// receiver within it, so it sees the lobe as wide as both: a disk of area A varies by A / (4 pi)
-// along each of its axes, foreshortened across.
-HWY_INLINE V3 RadiosityTowards(const Patch& patch, const LobeLight* lobes, const Sight& sight) {
-  const V3 even = {Splat(patch.radiosity.x), Splat(patch.radiosity.y), Splat(patch.radiosity.z)};
-  if (patch.lobe == 0) return even;
+// LobeLight::part of the radiosity. Places on the patch lie in all directions from a receiver
+// within it, so it sees the lobe as wide as both: a disk of area A varies by A / (4 pi) along each
+// of its axes, foreshortened across.
+void SeeLobe(const PacketLanes& lanes, std::size_t receiver_count, const Patch& patch,
+             const LobeLight& lobe, PacketLights& lights) {
   const D d;
-  const V zero = hn::Zero(d), one = Splat(1);
-  const LobeLight& lobe = lobes[patch.lobe];
-  const V distance_sq = hn::Max(sight.distance_sq, Splat(1e-30f));
-  const V inverse = InverseSqrt(distance_sq);
-  const V cosine = hn::Mul(sight.facing, inverse);
-  const V spread =
-      hn::Min(one, hn::Mul(hn::Mul(Splat(patch.area / (8 * kPi)), hn::MulAdd(cosine, cosine, one)),
-                           hn::Mul(inverse, inverse)));
-  const V k = Splat(lobe.concentration);
-  const V seen = hn::Div(k, hn::MulAdd(k, spread, one));
-  const V off_axis = hn::Min(zero, hn::NegMulAdd(Dot(sight.offset, lobe.axis), inverse, Splat(-1)));
-  const V fallen = hn::Exp(d, hn::Mul(seen, off_axis));
-  const V whole = hn::Sub(one, hn::Exp(d, hn::Mul(Splat(-2), seen)));
-  const V gain = hn::Mul(hn::Div(seen, whole), hn::Mul(fallen, Splat(0.5f / lobe.facing)));
-  const V more = hn::Sub(gain, one);
-  return {hn::Mul(even.x, hn::MulAdd(Splat(lobe.shares.x), more, one)),
-          hn::Mul(even.y, hn::MulAdd(Splat(lobe.shares.y), more, one)),
-          hn::Mul(even.z, hn::MulAdd(Splat(lobe.shares.z), more, one))};
+  const V zero = hn::Zero(d), one = Splat(1), k = Splat(lobe.concentration);
+  for (std::size_t lane = 0; lane < receiver_count; lane += kStep) {
+    const V3 offset = Receivers(lanes, lane).To(patch.position);
+    const V inverse = InverseSqrt(hn::Max(Dot(offset, offset), Splat(1e-30f)));
+    const V cosine = hn::Mul(Dot(offset, patch.normal), inverse);
+    const V across = hn::Mul(Splat(patch.area / (8 * kPi)), hn::MulAdd(cosine, cosine, one));
+    const V spread = hn::Min(one, hn::Mul(across, hn::Mul(inverse, inverse)));
+    const V seen = hn::Div(k, hn::MulAdd(k, spread, one));
+    const V off_axis = hn::Min(zero, hn::NegMulAdd(Dot(offset, lobe.axis), inverse, Splat(-1)));
+    const V fallen = hn::Exp(d, hn::Mul(seen, off_axis));
+    const V whole = hn::Sub(one, hn::Exp(d, hn::Mul(Splat(-2), seen)));
+    const V gain = hn::Mul(hn::Div(seen, whole), hn::Mul(fallen, Splat(0.5f / lobe.facing)));
+    for (int c = 0; c < 3; ++c) {
+      const V part = hn::MulAdd(Splat(lobe.shares[c]), hn::Sub(gain, one), one);
+      hn::Store(hn::Mul(Splat(patch.radiosity[c]), part), d,
+                lights.colors[std::size_t(c)].data() + lane);
+    }
+  }
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
   if (pixels_ == nullptr) throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
   parts_.reserve(kReservedParts);
-  if (rules.hasLight()) lobes_.reserve(kReservedLobes);
+  if (rules.hasLight()) lights_.reserve(kReservedLights);
   order_.resize(kReservedEntries);
   order_scratch_.resize(kReservedEntries);
 }
@@ -108,8 +108,8 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
   is_face_used_.fill(false);
   if (recorder_ != nullptr) recorder_->begin(geometry_.pixels().size());
   patches_.clear();
-  parts_.resize(1);  // that of what counts wholly
-  lobes_.resize(1);  // that of what sends evenly
+  parts_.resize(1);   // that of what counts wholly
+  lights_.resize(1);  // of what sends evenly
   order_count_ = 0;
   setFrame(nullptr);
 }
@@ -238,13 +238,16 @@ bool PacketRaster::turnsAway(const glm::vec3& position, const glm::vec3& normal)
   return away > normalRange(normal) * glm::length(to_facet) + local_radius_;
 }
 
-// Its place among those of the patches; 0: none. `normal`: of any length.
-std::uint32_t PacketRaster::keepLobe(const Lobe* lobe, const glm::vec3& normal) {
+// Of the last patch, which is in the frame of the receivers. `normal`: of its surface, of any
+// length, in the frame of what is added.
+void PacketRaster::addLobe(const Lobe& lobe, const glm::vec3& normal) {
   const float facing = glm::length(normal);
-  if (lobe == nullptr || lobe->isEven() || !(facing > 0)) return 0;
-  LobeLight& light = lobes_.emplace_back(*lobe, normal / facing);
+  if (lobe.isEven() || !(facing > 0)) return;
+  LobeLight light(lobe, normal / facing);
   if (frame_ != nullptr) light.axis = frame_->directionToWorld(light.axis);
-  return static_cast<std::uint32_t>(lobes_.size() - 1);
+  Patch& patch = patches_.back();
+  patch.lights = static_cast<std::uint32_t>(lights_.size());
+  kernel_.seeLobe(lanes_, receiver_count_, patch, light, lights_.emplace_back());
 }
 
 void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts,
@@ -268,10 +271,7 @@ void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t par
   patch.shape = shapeOf(facet.covariance);
   patch.area = facet.area;
   patch.most_area = mostVisibleArea(facet);
-  if (sides != GatherSides::kBack) {
-    patch.radiosity = gain_ * facet.radiosity;
-    patch.lobe = keepLobe(lobe, facet.normal);
-  }
+  if (sides != GatherSides::kBack) patch.radiosity = gain_ * facet.radiosity;
   patch.disk_area = facet.area;
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + local_radius_ / distance;
@@ -283,6 +283,7 @@ void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t par
   patch.kind = kind;
   patch.parts = parts;
   bringToWorld(patch);
+  if (lobe != nullptr) addLobe(*lobe, facet.normal);
   orderLastPatch(facesThatSee(patch));
 }
 
@@ -354,10 +355,6 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
     const glm::vec3 to_surfel = surfel.position - local_centre_;
-    if (!lobes.empty()) {
-      const auto i = static_cast<std::size_t>(&stored - surfels.data());
-      patch.lobe = keepLobe(&lobes[i], surfel.normal);
-    }
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
@@ -372,6 +369,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.near_distance = std::max(radii * size, std::numeric_limits<float>::min());
     patch.parts = parts;
     bringToWorld(patch);
+    if (!lobes.empty()) addLobe(lobes[std::size_t(&stored - surfels.data())], surfel.normal);
     orderLastPatch(kernel_.facesThatSee(canvas, patch));
   }
 }
@@ -397,7 +395,7 @@ PacketCanvas PacketRaster::canvas() const {
           .is_face_used = &is_face_used_,
           .seen = &seen_,
           .parts = parts_.data(),
-          .lobes = lobes_.data(),
+          .lights = lights_.data(),
           .recorder = recorder_};
 }
 
@@ -423,7 +421,7 @@ std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
          kReservedPatches * sizeof(Patch) + kReservedParts * sizeof(PacketParts) +
-         (rules.hasLight() ? kReservedLobes * sizeof(LobeLight) : 0) +
+         (rules.hasLight() ? kReservedLights * sizeof(PacketLights) : 0) +
          2 * kReservedEntries * sizeof(std::uint64_t);
 }
 

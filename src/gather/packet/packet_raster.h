@@ -47,7 +47,7 @@ class PacketRaster {
  public:
   static constexpr std::size_t kReservedPatches = 4096;
   static constexpr std::size_t kReservedParts = 1024;    // of what fades
-  static constexpr std::size_t kReservedLobes = 1024;    // of what is glossy
+  static constexpr std::size_t kReservedLights = 256;    // of what is glossy
   static constexpr std::size_t kReservedEntries = 8192;  // of the order
 
   // `rules` must be valid, as gatherCloud checks them: even resolution within its limits, the rest
@@ -96,7 +96,7 @@ class PacketRaster {
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   std::uint32_t keepParts(const LaneParts* parts);
   void addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts, const Lobe* lobe);
-  std::uint32_t keepLobe(const Lobe* lobe, const glm::vec3& normal);
+  void addLobe(const Lobe& lobe, const glm::vec3& normal);
   void addRoughNode(const Node& node, std::uint32_t parts);
   std::uint32_t facesThatSee(const Patch& patch) const;
   std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
@@ -128,7 +128,7 @@ class PacketRaster {
   float gain_ = 1;  // of the node that is added
   std::vector<Patch> patches_;
   std::vector<PacketParts> parts_;
-  std::vector<LobeLight> lobes_;
+  std::vector<PacketLights> lights_;
   std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling
   std::size_t order_count_ = 0;
 };
