@@ -11,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+#include "surfeit/mesh_files.h"
 #include "surfeit/output.h"
 
 namespace surfeit {
@@ -41,6 +42,29 @@ Status checkAgainst(const Output& output, const std::string& other, std::string_
   if (info.st_dev != output.info.st_dev || info.st_ino != output.info.st_ino) return {};
   return Status::invalidArgument(fmt::format("{}: {} would replace {} {}: give another name",
                                              output.path, output.option, what, other));
+}
+
+// The files that a value of an option may name: FILE, NAME=FILE, or "trajectory FILE".
+std::vector<std::string> filesIn(const std::string& value) {
+  constexpr std::string_view kTrajectory = "trajectory ";
+  std::vector<std::string> files = {value};
+  if (const std::size_t equals = value.find('='); equals != value.npos) {
+    files.push_back(value.substr(equals + 1));
+  }
+  if (value.starts_with(kTrajectory)) files.push_back(value.substr(kTrajectory.size()));
+  return files;
+}
+
+Status checkAgainstInput(const Output& output, const std::string& input) {
+  for (const std::string& file : filesIn(input)) {
+    SURFEIT_RETURN_IF_ERROR(checkAgainst(output, file, "its input"));
+    if (!output.is_file) continue;  // then a mesh names no such file, and is not read for it
+    for (const std::string& named : filesNamedByMesh(file)) {
+      SURFEIT_RETURN_IF_ERROR(
+          checkAgainst(output, named, fmt::format("a file that is named in {},", file)));
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -80,9 +104,7 @@ Status checkOutputs(const CLI::App& command, bool works_in_place) {
           works_in_place && option->get_positional() && output.option == "--output";
       for (const std::string& input : option->results()) {
         if (is_allowed) continue;
-        SURFEIT_RETURN_IF_ERROR(checkAgainst(output, input, "its input"));
-        const std::string named = input.substr(input.find('=') + 1);  // NAME=FILE
-        SURFEIT_RETURN_IF_ERROR(checkAgainst(output, named, "its input"));
+        SURFEIT_RETURN_IF_ERROR(checkAgainstInput(output, input));
       }
     }
   }

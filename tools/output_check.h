@@ -12,10 +12,11 @@ namespace surfeit {
 // --caustic-photons, --plot, --stats or --cache-series.
 bool isOutputOption(const CLI::Option& option);
 
-// Of a parsed command: all options but those of its outputs may name inputs. kInvalidArgument when
-// an output is the same file as an input, by whatever name, or as another output, or is a
-// directory; kIoError when it cannot be written. `works_in_place`: the file of --output may be one
-// of the inputs given by position.
+// Of a parsed command: all options but those of its outputs may name inputs, also behind another
+// word (NAME=FILE, "trajectory FILE"); a mesh names its materials, and they their pictures.
+// kInvalidArgument when an output is the same file as an input, by whatever name, or as another
+// output, or is a directory; kIoError when it cannot be written. `works_in_place`: the file of
+// --output may be one of the inputs given by position.
 Status checkOutputs(const CLI::App& command, bool works_in_place);
 
 }  // namespace surfeit

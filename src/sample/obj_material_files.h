@@ -78,6 +78,8 @@ class MaterialFiles final : public tinyobj::MaterialReader {
   const Status& status() const { return status_; }
   // By name.
   const std::map<std::string, MaterialSource>& sources() const { return sources_; }
+  // The files that were read.
+  const std::vector<std::string>& paths() const { return paths_; }
 
   bool operator()(const std::string& names, std::vector<tinyobj::material_t>* materials,
                   std::map<std::string, int>* ids, std::string* warnings,
@@ -114,6 +116,7 @@ class MaterialFiles final : public tinyobj::MaterialReader {
 
   void load(const std::string& path, std::vector<tinyobj::material_t>* materials,
             std::map<std::string, int>* ids, std::string* warnings, std::string* errors) {
+    paths_.push_back(path);
     Result<ByteInput> input = ByteInput::open(path);
     if (!input.ok()) {
       status_ = input.status();
@@ -133,6 +136,7 @@ class MaterialFiles final : public tinyobj::MaterialReader {
 
   std::string directory_;
   std::map<std::string, MaterialSource> sources_;
+  std::vector<std::string> paths_;
   Status status_;
 };
 

@@ -35,6 +35,80 @@ inputsAreNoOutputs() {
   sameBytes city.ply before.ply
 }
 
+# refusesToReplace FILE OPTION ARGUMENT...: the command names FILE, and no option may write there.
+refusesToReplace() {
+  local file=$1 option=$2
+  shift 2
+  cp "$file" kept
+  run 2 "$@"
+  says "$file: $option would replace" "give another name"
+  sameBytes "$file" kept
+}
+
+# Files that stand within the value of an option, or in another option than those given by position.
+# What they hold does not matter: nothing is read before the names are compared.
+inputsWithinOptionsAreNoOutputs() {
+  local name
+  for name in cloud.csv tr.csv cams.csv env.exr like.las map.vdb old.sft group.ply place.sft hidden.csv; do
+    echo "$name" > "$name"
+  done
+  ln -s tr.csv link.csv
+  ln tr.csv hard.csv
+  for name in tr.csv link.csv hard.csv; do
+    refusesToReplace "$name" --output normals cloud.csv -o "$name" --orient "trajectory tr.csv"
+  done
+  refusesToReplace tr.csv --stats normals cloud.csv -o out.csv --orient "trajectory ./tr.csv" --stats tr.csv
+  refusesToReplace group.ply --output index cloud.csv --group lamp=group.ply -o group.ply
+  refusesToReplace group.ply --stats index cloud.csv --group "a=b=group.ply" --group lamp=group.ply \
+    -o out.sft --stats group.ply
+  refusesToReplace place.sft --output index cloud.csv --cube place.sft -o place.sft
+  refusesToReplace cams.csv --output sample mesh.ply --camera-file cams.csv -o cams.csv
+  refusesToReplace cams.csv --stats sample mesh.ply --camera-file cams.csv -o out.ply --stats cams.csv
+  refusesToReplace env.exr --stats gather old.sft cloud.csv --environment env.exr -o out.csv --stats env.exr
+  refusesToReplace env.exr --cache-series gather old.sft cloud.csv --environment env.exr -o out.csv \
+    --cache-series env.exr
+  refusesToReplace env.exr --plot tune old.sft cloud.csv --environment env.exr --plot env.exr
+  refusesToReplace env.exr --output ptfilter --envmap env.exr cloud.csv env.exr
+  refusesToReplace cloud.csv --output ptfilter --filter occlusion cloud.csv cloud.csv
+  refusesToReplace map.vdb --output brickmake map.vdb map.vdb
+  refusesToReplace like.las --output convert cloud.csv --like like.las -o like.las
+  refusesToReplace map.vdb --stats view cloud.csv --brick map.vdb -o out.png --stats map.vdb
+  refusesToReplace cloud.csv --stats cube old.sft --receivers cloud.csv -o out.png --stats cloud.csv
+  refusesToReplace cloud.csv --output merge old.sft cloud.csv --shards 2 -o cloud.csv
+  refusesToReplace map.vdb --output lookup map.vdb cloud.csv -o map.vdb
+  refusesToReplace cloud.csv --stats bounce cloud.csv -o out.sft --stats cloud.csv
+  refusesToReplace cloud.csv --output radiance cloud.csv -o cloud.csv
+  refusesToReplace env.exr --output composite env.exr -o env.exr
+  [[ ! -e out.csv && ! -e out.sft && ! -e out.png ]] || fail "worked before it looked at its outputs"
+}
+
+# Material files and their pictures, with names as OBJ files may have them.
+filesThatMeshesNameAreNoOutputs() {
+  mkdir sub
+  printf 'newmtl a\nKd 1 1 1\nMAP_KD -s 1 1 1 kd.png\nmap_Ke ke.png\nmap_d sub\\mask.png\n' > a.mtl
+  printf 'newmtl b\nmap_Kd deep.png\n' > "sub/two words.mtl"
+  echo "newmtl c" > c.mtl
+  local name
+  for name in kd.png ke.png sub/mask.png sub/deep.png other.png; do echo "$name" > "$name"; done
+  printf 'mtllib a.mtl c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n  mtllib sub/two words.mtl\nf 1 2 3\n' > a.obj
+  cp a.obj upper.OBJ
+  ln a.mtl hard.ply
+  echo scene > old.sft
+  for name in a.mtl c.mtl "sub/two words.mtl" kd.png ke.png sub/mask.png sub/deep.png; do
+    refusesToReplace "$name" --stats sample a.obj -o out.ply --stats "$name"
+    says "named in a.obj"
+    refusesToReplace "$name" --stats relight old.sft --mesh a.obj --light-point "0 0 0 1 1 1" -o out.sft \
+      --stats "$name"
+    refusesToReplace "$name" --stats cube old.sft --at 0,0,0 --reference a.obj -o out.png --stats "$name"
+  done
+  refusesToReplace hard.ply --output sample upper.OBJ -o hard.ply
+  refusesToReplace kd.png --output cube old.sft --at 0,0,0 --reference a.obj -o kd.png
+  refusesToReplace hard.ply --caustic-photons sample a.obj --photons 9 -o out.ply --caustic-photons hard.ply
+  [[ ! -e out.ply && ! -e out.sft && ! -e out.png ]] || fail "worked before it looked at its outputs"
+  printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' > plain.obj
+  run 0 sample plain.obj -o out.ply --count 10 --stats other.png # names nothing
+}
+
 linksAndPermissionsStay() {
   generate city.ply --surfels 3k
   mkdir sub
