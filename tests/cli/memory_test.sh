@@ -31,6 +31,9 @@ commands=(
   "convert cloud.ply -o out.las"
   "convert cloud.ply cloud.ply -o out.ply --spacing 0.001"
   "convert cloud.ply -o out.vdb --spacing 0.01"
+  "merge scene.sft receivers.ply -o shards.ply"
+  "composite passes.exr light.exr -o out.png --channel lit"
+  "plan scene.sft receivers.ply -o out.ply --quality draft --shards 2 --slurm"
 )
 
 skipWhereSanitized() {
@@ -47,6 +50,12 @@ makeInputs() {
   run 0 convert cloud.ply -o receivers.ply --every 100 --quiet
   run 0 sample cornell.obj -o photons.ply --photons 50000 --quiet
   run 0 brick cloud.ply --channel radiosity -o map.vdb --quiet
+  local shard
+  for shard in 1/2 2/2; do
+    run 0 gather scene.sft receivers.ply -o shards.ply --quality draft --shard $shard --quiet
+  done
+  run 0 view scene.sft --size 200x150 --passes passes.exr --quiet
+  run 0 gather scene.sft passes.exr -o light.exr --quality draft --mode bleeding --quiet
 }
 
 # peakIsAtMost MEBIBYTES COMMAND: by the statistics that it has written.
@@ -57,12 +66,23 @@ peakIsAtMost() {
   ((peak <= $1 << 20)) || fail "peak of $peak bytes with $1 MiB: $2"
 }
 
+# withPeak PROGRAM ARGUMENT...: writes the one statistic that counts here. Of plan, which has none.
+withPeak() {
+  python3 -c '
+import resource, subprocess, sys
+status = subprocess.run(sys.argv[1:]).returncode
+peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss << 10
+open("stats.json", "w").write("\"peak_resident_bytes\": %d\n" % peak)
+sys.exit(status)' "$@"
+}
+
 # runWithin MEBIBYTES COMMAND OPTION...: succeeds below that, or says what would do.
 runWithin() {
-  local command=$2 status=0
+  local command=$2 status=0 start=("$surfeit") stats=(--stats stats.json)
+  [[ $command != plan* ]] || start=(withPeak "$surfeit") stats=()
   rm -f out.* stats.json
   # shellcheck disable=SC2086 # a list of words
-  said=$("$surfeit" $command --stats stats.json --progress none "${@:3}" 2>&1) || status=$?
+  said=$("${start[@]}" $command "${stats[@]}" --progress none "${@:3}" 2>&1) || status=$?
   case $status in
     0) peakIsAtMost "$1" "$command ${*:3}" ;;
     33) least=$(sed -n -E 's/.*[: ]([0-9.]+) MiB (is the least that works|would do).*/\1/p' <<< "$said") ;;
@@ -80,7 +100,7 @@ peaksStayBelowTheBudget() {
     for limit in "32 1" "80 2" "128 8"; do
       read -r limit threads <<< "$limit"
       options=(--memory "${limit}M" --threads "$threads")
-      [[ $command != convert* ]] || options=(--memory "${limit}M")
+      [[ $command != convert* && $command != composite* ]] || options=(--memory "${limit}M")
       if runWithin "$limit" "$command" "${options[@]}"; then
         ((++successes))
       else
