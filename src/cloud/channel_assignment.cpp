@@ -129,6 +129,20 @@ std::vector<RowProperty> targetsOf(std::string_view name, const RowLayout& eleme
   return {};
 }
 
+bool isPosition(const RowProperty& property) {
+  return std::find(std::begin(kPositionNames), std::end(kPositionNames), property.name) !=
+         std::end(kPositionNames);
+}
+
+// Floats would lose digits where they come to lie far from 0.
+void widenPositions(std::vector<RowProperty>& properties) {
+  for (RowProperty& property : properties) {
+    if (isPosition(property) && property.type == ValueType::kFloat32) {
+      property.type = ValueType::kFloat64;
+    }
+  }
+}
+
 Status unknownTarget(const AssignmentParts& parts, const std::vector<RowChannel>& channels) {
   std::string names;
   for (std::size_t i = 0; i < std::min(channels.size(), kMostChannelsTold); ++i) {
@@ -149,7 +163,9 @@ Status ChannelAssignment::declare(const std::string& text, std::vector<RowProper
   SURFEIT_ASSIGN_OR_RETURN(const AssignmentParts parts, partsOf(text));
   const RowLayout element = packedLayout(properties);
   const std::vector<RowChannel> channels = channelsOf(element);
-  if (!targetsOf(parts.target, element, channels).empty()) return {};
+  const std::vector<RowProperty> targets = targetsOf(parts.target, element, channels);
+  if (std::any_of(targets.begin(), targets.end(), isPosition)) widenPositions(properties);
+  if (!targets.empty()) return {};
   std::vector<std::string> names;
   if (contains(kNewNumbers, parts.target)) names = {std::string(parts.target)};
   for (const char* const component : {"_r", "_g", "_b"}) {
@@ -204,10 +220,7 @@ Result<ChannelAssignment> ChannelAssignment::create(const std::string& text,
 }
 
 bool ChannelAssignment::movesRows() const {
-  return std::any_of(targets_.begin(), targets_.end(), [](const RowProperty& target) {
-    return std::find(std::begin(kPositionNames), std::end(kPositionNames), target.name) !=
-           std::end(kPositionNames);
-  });
+  return std::any_of(targets_.begin(), targets_.end(), isPosition);
 }
 
 void ChannelAssignment::apply(std::byte* rows, std::size_t count) {

@@ -18,8 +18,8 @@ namespace surfeit {
 // One assignment. One thread at a time: it counts what it changes.
 class ChannelAssignment {
  public:
-  // Adds the properties of a well-known channel that a text sets with "=" and rows lack. Errors as
-  // of create, of the part before the value.
+  // Adds the properties of a well-known channel that a text sets with "=" and rows lack; positions
+  // that it sets become doubles. Errors as of create, of the part before the value.
   static Status declare(const std::string& text, std::vector<RowProperty>& properties);
   // Rows will be those of `element`. kInvalidArgument names the place in the text, what was found
   // there and what was expected.

@@ -72,16 +72,21 @@ std::array<double, 9> cofactors(const RowTransform::Matrix& m) {
           m[1] * m[6] - m[2] * m[5],  m[2] * m[4] - m[0] * m[6],  m[0] * m[5] - m[1] * m[4]};
 }
 
-// Makes floats of the integers of channels with such a role.
+// Makes floats of the integers of channels with such a role, and doubles of the floats of places
+// that a translation moves: far from 0 they would lose digits.
 template <typename Condition>
-void widenWhere(std::vector<RowProperty>& properties, const Condition& condition) {
+void widenWhere(std::vector<RowProperty>& properties, bool is_translation,
+                const Condition& condition) {
   RowLayout element;
   element.properties = properties;
   packRow(element);
   for (const RowChannel& channel : channelsOf(element)) {
-    if (!condition(RowTransform::roleOf(channel))) continue;
+    const RowTransform::Role role = RowTransform::roleOf(channel);
+    if (!condition(role)) continue;
+    const bool has_far_places = is_translation && role == RowTransform::Role::kPoint;
     for (const std::size_t i : channel.properties) {
       ValueType& type = properties[i].type;
+      if (has_far_places) type = ValueType::kFloat64;
       if (isFloatType(type)) continue;
       type = valueTypeBytes(type) <= 2 ? ValueType::kFloat32 : ValueType::kFloat64;
     }
@@ -177,11 +182,12 @@ bool RowTransform::changes(Role role) const {
 }
 
 void RowTransform::widenTypes(std::vector<RowProperty>& properties) const {
-  widenWhere(properties, [this](Role role) { return changes(role); });
+  const bool is_translation = matrix_[3] != 0 || matrix_[7] != 0 || matrix_[11] != 0;
+  widenWhere(properties, is_translation, [this](Role role) { return changes(role); });
 }
 
 void RowTransform::widenSizes(std::vector<RowProperty>& properties) {
-  widenWhere(properties, isSize);
+  widenWhere(properties, false, isSize);
 }
 
 void RowTransform::bind(const RowLayout& element) {

@@ -47,7 +47,8 @@ class RowTransform {
   // Whether it grows where a row stands for several.
   static bool isSize(Role role);
 
-  // Gives integers that it will change a type of floats that holds them.
+  // Gives integers that it will change a type of floats that holds them. Places that it translates
+  // become doubles: what a format has too few digits for is its writer's to tell.
   void widenTypes(std::vector<RowProperty>& properties) const;
   // The same of the integers among sizes, which someone else will change.
   static void widenSizes(std::vector<RowProperty>& properties);

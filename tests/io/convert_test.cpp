@@ -15,9 +15,11 @@
 namespace surfeit {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 // --- Merging
 
@@ -174,6 +176,38 @@ TEST_F(ConvertTest, LargeCoordinatesKeepTheirPrecision) {
   EXPECT_THAT(column(readTable("b.ptc"), "x"), ElementsAre(0.25));
 }
 
+// Floats stand half a unit apart there.
+TEST_F(ConvertTest, FloatsThatAreMovedFarKeepTheirDigits) {
+  Table table = tableOf({{"x", kFloat}, {"y", kFloat}, {"z", kFloat}, {"radius", kFloat}});
+  for (int i = 0; i < 4; ++i) table.rows.push_back({0.25 * i, 0.125 * i, 0.5, 0.1f});
+  writeTable("a.ply", table);
+  ConvertOptions options;
+  options.transform = {1, 0, 0, 5e5, 0, 1, 0, 5e6, 0, 0, 1, 0};
+  for (const char* name : {"b.ply", "b.csv", "b.prt"}) {
+    convertOk({"a.ply"}, name, options);
+    const Table moved = readTable(name);
+    EXPECT_THAT(column(moved, "x"), ElementsAre(500000, 500000.25, 500000.5, 500000.75)) << name;
+    EXPECT_THAT(column(moved, "y"), ElementsAre(5000000, 5000000.125, 5000000.25, 5000000.375))
+        << name;
+    EXPECT_THAT(notes_, Not(Contains(HasSubstr("positions are floats")))) << name;
+  }
+  // Where there are only floats, what is lost is told, and what is not lost is not
+  for (const char* name : {"b.ptc", "b.bgeo", "b.pdb"}) {
+    notes_.clear();
+    convertOk({"a.ply"}, name, options);
+    EXPECT_THAT(notes_, Contains(HasSubstr("positions are floats in this format: they move by")))
+        << name;
+  }
+  options.transform = {1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 0};
+  notes_.clear();
+  convertOk({"a.ply"}, "b.bgeo", options);
+  EXPECT_THAT(notes_, Not(Contains(HasSubstr("positions are floats"))));
+  // A turn and a scale cost no digits
+  options.transform = {0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0};
+  convertOk({"a.ply"}, "b.ply", options);
+  EXPECT_THAT(typesOf(readTable("b.ply")), HasSubstr("float x, float y, float z"));
+}
+
 TEST_F(ConvertTest, ChannelsMoveByWhatTheyAre) {
   Table table = tableOf({{"x", ValueType::kInt16},
                          {"y", ValueType::kInt32},
@@ -200,7 +234,7 @@ TEST_F(ConvertTest, ChannelsMoveByWhatTheyAre) {
   options.transform = {-2, 0, 0, 10, 0, 1, 0, 20, 0, 0, 4, 30};  // mirrors; volume 8
   convertOk({"a.ply"}, "b.ply", options);
   const Table moved = readTable("b.ply");
-  EXPECT_THAT(typesOf(moved), HasSubstr("float x, double y, float z, "));
+  EXPECT_THAT(typesOf(moved), HasSubstr("double x, double y, double z, "));
   const std::vector<double>& row = moved.rows[0];
   EXPECT_EQ(std::vector<double>(row.begin(), row.begin() + 3), (std::vector<double>{8, 22, 42}));
   // The plane of a normal stays perpendicular to it, its front in front
