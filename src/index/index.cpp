@@ -27,6 +27,7 @@
 #include "index/pinned_cube.h"
 #include "index/scene_description.h"
 #include "index/scene_place.h"
+#include "index/told_once.h"
 #include "octree/build/bucket_stream.h"
 #include "octree/build/octree_builder.h"
 #include "octree/build/scene_writer.h"
@@ -121,6 +122,7 @@ class Indexer {
   const IndexOptions& options_;
   const int threads_;
   Progress& progress_;
+  ToldOnce reading_progress_{progress_};  // inputs may be read again
   const std::string temporary_directory_;
   std::optional<CloudReader> reader_;
   std::vector<Surfel> sample_;
@@ -324,7 +326,7 @@ Result<std::unique_ptr<SurfelStore>> Indexer::readInto(const std::optional<RootC
     return store->add(surfels, keys);
   };
   progress_.beginPhase("read", reader_->recordCount(), "surfels");
-  SURFEIT_ASSIGN_OR_RETURN(totals_, reader_->readAll(consume, progress_));
+  SURFEIT_ASSIGN_OR_RETURN(totals_, reader_->readAll(consume, reading_progress_));
   if (totals_.surfels > 0 && (!distributing || (needs_cube && !(cubeOf(totals_.bounds) == *cube)) ||
                               originAsked(totals_.bounds) != reader_->origin())) {
     return std::unique_ptr<SurfelStore>();
