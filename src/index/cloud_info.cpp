@@ -74,6 +74,8 @@ Status addSurfels(const std::string& path, const RowReaderOptions& options, Clou
   Result<std::unique_ptr<SurfelSource>> source =
       openSurfelSource(path, /* strict= */ false, options);
   if (!source.ok()) return {};
+  // Before rows are read: notes may look at some
+  std::vector<std::string> notes = (*source)->notes();
   SURFEIT_ASSIGN_OR_RETURN(CloudScan scan, scanSurfels(**source, glm::dvec3(0), progress));
   // Floats about an origin near the cloud have its digits: once more when 0 is far
   if (!scan.bounds.isEmpty() && originFor(scan.bounds) != glm::dvec3(0)) {
@@ -84,7 +86,7 @@ Status addSurfels(const std::string& path, const RowReaderOptions& options, Clou
   surfels.spheres = scan.spheres;
   surfels.channels = (*source)->channels();
   surfels.defects = (*source)->defects().describe();
-  info.notes = (*source)->notes();
+  info.notes = std::move(notes);
   if (!scan.bounds.isEmpty()) {
     surfels.min = scan.bounds.min;
     surfels.max = scan.bounds.max;

@@ -13,6 +13,7 @@
 #include "core/up_comment.h"
 #include "surfels/generated/recipe_surfel_source.h"
 #include "surfels/generated/scene_recipe.h"
+#include "surfels/unused_alpha.h"
 
 namespace surfeit {
 namespace {
@@ -42,6 +43,8 @@ class RowSurfelSource final : public SurfelSource {
       notes.push_back(std::move(note));
     }
     noteOpacity(notes);
+    if (!alpha_note_) alpha_note_ = noteOfAlpha();
+    if (!alpha_note_->empty()) notes.push_back(*alpha_note_);
     return notes;
   }
 
@@ -79,6 +82,7 @@ class RowSurfelSource final : public SurfelSource {
   }
 
   Result<Bytes> readRows(std::size_t max_rows, AlignedBuffer& buffer) override {
+    is_untouched_ = false;
     return reader_->readRows(max_rows, buffer);
   }
 
@@ -97,9 +101,19 @@ class RowSurfelSource final : public SurfelSource {
     return size;
   }
 
-  Status seekRow(std::uint64_t record) override { return reader_->seekRow(record); }
+  Status seekRow(std::uint64_t record) override {
+    is_untouched_ = false;
+    return reader_->seekRow(record);
+  }
 
  private:
+  // Looks at rows, and so only before anyone else does. A failure will be the reader's, too.
+  std::string noteOfAlpha() const {
+    if (!is_untouched_) return {};
+    const Result<std::string> note = noteOfUnusedAlpha(*reader_, mapping_.channels().opacity);
+    return note.ok() ? *note : std::string();
+  }
+
   // What of an opacity is not used.
   void noteOpacity(std::vector<std::string>& notes) const {
     const RowLayout& element = reader_->element();
@@ -117,6 +131,8 @@ class RowSurfelSource final : public SurfelSource {
   std::unique_ptr<RowReader> reader_;
   SurfelMapping mapping_;
   bool is_strict_;
+  bool is_untouched_ = true;  // no row was read
+  mutable std::optional<std::string> alpha_note_;
 
   // Of read(): rows in the buffer that are still to be decoded, the first of them record_
   SurfelDefects defects_;
