@@ -120,10 +120,11 @@ class SURFEIT_API Gatherer {
   // work, so pass neighbours together, in the order of a curve or of the picture. The gatherer
   // takes 256 consecutive receivers at a time and divides them into packets of up to 16, which
   // share a walk through the octree. A receiver's result differs by less than .004 with other
-  // companions. A receiver that is not finite, or with kGlossy lacks a normal or a view, gets NaN.
-  // The call polls `progress`, where given, for a request to stop. Errors: kIoError and kCorruption
-  // of a page, kInterrupted; results are then incomplete, and the gatherer may be used again.
-  // kInvalidArgument while another call of this gatherer runs.
+  // companions. With GatherQuality::max_variation above 0 it takes 4096 at a time, gathers some,
+  // and interpolates the others among these. A receiver that is not finite, or with kGlossy lacks a
+  // normal or a view, gets NaN. The call polls `progress`, where given, for a request to stop.
+  // Errors: kIoError and kCorruption of a page, kInterrupted; results are then incomplete, and the
+  // gatherer may be used again. kInvalidArgument while another call of this gatherer runs.
   Status gather(const Receiver* receivers, std::size_t count, GatherResult* results,
                 const Progress* progress = nullptr);
 
@@ -132,8 +133,8 @@ class SURFEIT_API Gatherer {
   // (0: EngineOptions::threads), this one among them, with this gatherer and others made for the
   // call, as far as the budget has room for them. Holds 12 bytes per receiver meanwhile, beside the
   // budget. At most 4 billion receivers. Results depend only on world, settings and receivers. For
-  // one scene in its own coordinates they have the bits of gatherCloud (surfeit/bake.h) without
-  // interpolation. Errors: as gather.
+  // one scene in its own coordinates, and with a max_variation of 0, they have the bits of
+  // gatherCloud (surfeit/bake.h). Errors: as gather.
   Status gatherAll(ReceiverArray& receivers, Progress& progress, int threads = 1);
 
   // A gatherer of the same world for another thread; the two share data where they can. Errors:

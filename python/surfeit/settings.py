@@ -21,7 +21,7 @@ class QualitySettings(TypedDict, total=False):
     near_field_radii: float  # surfels closer than so many radii are ray traced
     bias: float  # start of rays above the receiver, in surfel radii
     max_distance: float  # surfels farther away do not count
-    max_variation: float  # interpolates where results vary less; 0: never. Jobs on files alone
+    max_variation: float  # interpolates where results vary less; 0: never
     max_pixel_dist: int  # with max_variation: most receivers between samples, 4 and more; 0: any
     sides: Literal["front", "both", "back"]  # sides of surfels that cover
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -376,6 +377,57 @@ TEST_F(PageFileTest, HostileFieldsWithValidChecksumsDoNoHarm) {
   EXPECT_LT(seconds.count() / cases, 0.01);
   // Nothing declared makes the reader allocate: 4 MiB is the largest payload of a page
   EXPECT_LT(peakResidentBytes(), peak_before + (std::uint64_t{16} << 20));
+}
+
+// Not by what follows from it, and not later, at a page.
+TEST_F(PageFileTest, EveryWrongFieldIsToldWhenTheFileIsOpened) {
+  const std::string file = sample();
+  const std::size_t footer = footerAt(file);
+  const std::size_t directory = getAt<std::uint64_t>(file, footer + kDirectoryOffsetAt);
+  const std::uint64_t pages_end = getAt<std::uint64_t>(file, footer + kProvenanceOffsetAt);
+  constexpr std::size_t kStored = 8, kPayload = 12;  // of an entry, behind its offset
+  const auto told = [&](const std::function<void(std::string&)>& edit) {
+    std::string damaged = file;
+    edit(damaged);
+    replaceContents(path("wrong.sft"), damaged);
+    return PageFile::open(path("wrong.sft")).status().message();
+  };
+  const auto toldAt = [&](std::size_t at, auto value) {
+    return told([&](std::string& damaged) {
+      setAt(damaged, at, value);
+      sealFile(damaged);
+    });
+  };
+  EXPECT_THAT(told([](std::string& damaged) { damaged.resize(100); }),
+              HasSubstr("file ends after 100 bytes"));
+  EXPECT_THAT(told([](std::string& damaged) { damaged.resize(520); }),
+              HasSubstr("file of 520 bytes, expected at least"));
+  EXPECT_THAT(toldAt(8, 0u), HasSubstr("format version 0"));
+  EXPECT_THAT(toldAt(12, 513u), HasSubstr("header of 513 bytes"));
+  EXPECT_THAT(told([&](std::string& damaged) { damaged[directory + 20] ^= 1; }),
+              HasSubstr("directory: checksum"));
+  EXPECT_THAT(told([&](std::string& damaged) { damaged[pages_end + 3] ^= 1; }),
+              HasSubstr("provenance: checksum"));
+
+  EXPECT_THAT(toldAt(footer + kFileBytesAt, std::uint64_t{file.size() + 1}),
+              HasSubstr("expected " + std::to_string(file.size() + 1)));
+  EXPECT_THAT(toldAt(footer + kProvenanceOffsetAt, std::uint64_t{511}), HasSubstr("do not fit"));
+  EXPECT_THAT(toldAt(footer + kProvenanceOffsetAt, std::uint64_t{directory + 1}),
+              HasSubstr("do not fit"));
+  EXPECT_THAT(toldAt(footer + kDirectoryOffsetAt, std::uint64_t{footer + 1}),
+              HasSubstr("do not fit"));
+  EXPECT_THAT(toldAt(footer + kDirectoryOffsetAt, std::uint64_t{directory - 1}),
+              HasSubstr("no whole number"));
+  EXPECT_THAT(toldAt(footer + kNodePagesAt, std::uint64_t{6}), HasSubstr("6 node pages"));
+
+  EXPECT_THAT(toldAt(directory, std::uint64_t{511}), HasSubstr("expected between"));
+  EXPECT_THAT(toldAt(directory, pages_end + 1), HasSubstr("expected between"));
+  EXPECT_THAT(toldAt(directory, pages_end - 1), HasSubstr("expected between"));
+  EXPECT_THAT(toldAt(directory + kStored, 8u), HasSubstr("expected 9 to"));
+  EXPECT_THAT(toldAt(directory + kPayload, 1u), HasSubstr("which decode to 1"));
+  EXPECT_THAT(toldAt(directory + kPayload, (4u << 20) + 1), HasSubstr("decodes to 4194305 bytes"));
+  EXPECT_THAT(toldAt(directory + kStored, getAt<std::uint32_t>(file, directory + kStored) + 1),
+              HasSubstr("pages of"));
 }
 
 // Files with holes declare more than they store. Offsets of the parts behind the hole move.

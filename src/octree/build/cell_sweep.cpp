@@ -7,8 +7,14 @@
 
 namespace surfeit {
 
+// In double where the square of the distance is no normal float: clouds of the least sizes.
 float reach(const glm::vec3& centre, const glm::vec3& at, float radius) {
-  return (glm::length(at - centre) + radius) * 1.000001f;
+  const glm::vec3 d = at - centre;
+  constexpr float kLeastSquare = 0x1p-100f;
+  const float distance = glm::dot(d, d) >= kLeastSquare
+                             ? glm::length(d)
+                             : float(glm::distance(glm::dvec3(at), glm::dvec3(centre)));
+  return (distance + radius) * 1.000001f;
 }
 
 void CellSweep::OpenCell::add(const FinishedNode& child) {

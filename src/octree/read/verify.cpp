@@ -20,8 +20,8 @@ namespace surfeit {
 namespace {
 
 constexpr std::size_t kMaxFindings = 100;
-// Stack and allocator of a thread.
-constexpr std::uint64_t kThreadBytes = std::uint64_t{256} << 10;
+// Stack and allocator of a thread, and the sums of its subtrees.
+constexpr std::uint64_t kThreadBytes = std::uint64_t{768} << 10;
 // Quantized sums and spheres may differ by this part.
 constexpr float kAreaTolerance = 2e-3f;
 constexpr float kReachTolerance = 2e-3f;
@@ -57,6 +57,11 @@ std::uint64_t placeHash(std::uint32_t page, std::uint32_t index) {
   return hash ^ hash >> 31;
 }
 
+// In double: squares of the least lengths are no floats.
+float distanceBetween(const glm::vec3& a, const glm::vec3& b) {
+  return float(glm::distance(glm::dvec3(a), glm::dvec3(b)));
+}
+
 // Checks pages one by one. Each thread has its own. All share the number of surfels that leaves
 // refer to: those that refer to more than there are would be visited for ever.
 class PageChecker {
@@ -80,6 +85,7 @@ class PageChecker {
     Status outside;
     for (std::uint32_t i = 0; i < *count; ++i) {
       surfel_balance_ += placeHash(page, i);
+      noteBrightness(surfels_[i].radiosity);
       if (outside.ok()) outside = checkInBounds(surfels_[i], i);
     }
     if (!outside.ok()) {
@@ -94,6 +100,7 @@ class PageChecker {
     if (!count.ok()) return report(count.status());
     page_brightest_ = 0;
     for (std::uint32_t i = 0; i < *count; ++i) {
+      noteBrightness(nodes_[i].radiosity);
       for (int c = 0; c < 3; ++c) {
         page_brightest_ = std::max(page_brightest_, nodes_[i].radiosity[c]);
       }
@@ -118,6 +125,8 @@ class PageChecker {
   // counts as referenced.
   std::uint64_t nodeBalance() const { return node_balance_; }
   std::uint64_t surfelBalance() const { return surfel_balance_; }
+  // Largest radiosity of the records.
+  float brightest() const { return brightest_; }
 
  private:
   // A damaged page is a finding and the check goes on; a failing disk is not.
@@ -129,6 +138,10 @@ class PageChecker {
 
   bool describesPage(const Status& status) const {
     return status.message().rfind(file_.path(), 0) == 0;
+  }
+
+  void noteBrightness(const glm::vec3& radiosity) {
+    brightest_ = std::max({brightest_, radiosity.x, radiosity.y, radiosity.z});
   }
 
   static constexpr const char* kColors[] = {"red", "green", "blue"};
@@ -153,7 +166,7 @@ class PageChecker {
       for (int c = 0; c < 3; ++c) brightest = std::max(brightest, record.radiosity[c]);
       surfels += count;
       groups |= record_groups;
-      reach = std::max(reach, glm::length(record.position - node.position) + radius);
+      reach = std::max(reach, distanceBetween(record.position, node.position) + radius);
     }
     template <typename Record>
     void addLobe(const Record& record, const Lobe& of_record) {
@@ -236,7 +249,7 @@ class PageChecker {
       below.has_one_lobe = below.has_one_lobe && child.isFlat() && !child.isTwoSided();
       if (node_lobes_ != nullptr) below.addLobe(child, (*reader_.lobesOf(child))[0]);
       // A child's sphere may stick out of its parent's; its centre, a mean of surfels, may not
-      const float distance = glm::length(child.position - node.position);
+      const float distance = distanceBetween(child.position, node.position);
       if (distance > node.radius + (node.radius + child.radius) * kReachTolerance) {
         return Status::corruption(
             fmt::format("bounding radius {}, expected at least {} for the "
@@ -289,6 +302,7 @@ class PageChecker {
   const NodeLobes* node_lobes_ = nullptr;  // of the node that is checked
   std::vector<Surfel> surfels_;
   float page_brightest_ = 0;  // of the page of nodes that is checked
+  float brightest_ = 0;
   std::uint64_t node_balance_ = 0, surfel_balance_ = 0;
 };
 
@@ -345,6 +359,7 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
   std::atomic<std::uint32_t> next_page{0};
   std::atomic<std::uint64_t> nodes{0}, surfels{0};
   std::atomic<std::uint64_t> node_balance{0}, surfel_balance{0}, referenced{0};
+  std::atomic<float> brightest{0};
   FirstFailure failure;
   const auto work = [&]() -> Status {
     PageChecker checker(file, *octree, findings, progress, referenced);
@@ -360,6 +375,10 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
     }
     node_balance += checker.nodeBalance();
     surfel_balance += checker.surfelBalance();
+    float most = brightest;
+    while (most < checker.brightest() &&
+           !brightest.compare_exchange_weak(most, checker.brightest())) {
+    }
     return {};
   };
   SURFEIT_RETURN_IF_ERROR(runOnThreads(threads, failure, "verify", work));
@@ -377,9 +396,10 @@ Result<VerifyReport> verifyScene(const std::string& path, int threads, Progress&
   }
 
   // What is not known to be a tree is not walked
-  if (report.finding_count == 0 && file.header().pageForm().has_bounds) {
-    SURFEIT_RETURN_IF_ERROR(verifyBounds(
-        *octree, threads, progress, [&](const std::string& finding) { findings.add(finding); }));
+  if (report.finding_count == 0) {
+    SURFEIT_RETURN_IF_ERROR(
+        verifyBounds(*octree, threads, brightest, progress,
+                     [&](const std::string& finding) { findings.add(finding); }));
   }
   report.pages_checked = pages;
   report.bytes_checked = file.fileBytes();

@@ -13,6 +13,7 @@
 
 #include "core/first_failure.h"
 #include "core/worker_threads.h"
+#include "octree/read/verify_sums.h"
 
 namespace surfeit {
 namespace {
@@ -23,7 +24,7 @@ constexpr double kTolerance = 1e-6;
 
 // Subtrees of so many surfels at most, or of a part of the scene that leaves some for each thread,
 // are walked at a time.
-constexpr std::uint64_t kSubtreeSurfels = 1 << 16;
+constexpr std::uint64_t kSubtreeSurfels = 1 << 16, kSubtreesOfThread = 16;
 
 glm::dvec3 directionOf(const glm::vec3& normal) {
   const glm::dvec3 n(normal);
@@ -47,22 +48,25 @@ struct Shape {
 
 // A node above the surfels at hand: what it claims, and what the surfels met so far need.
 struct Claim {
+  Node node;
   std::uint32_t page = 0, index = 0;
   std::size_t parent = 0;  // of nodes shared by subtrees: among those
+  SumsBelow sums;          // of the children and the surfels met so far
   glm::dvec3 position, normal;
   double radius = 0, thickness = 0, cosine = -1;
   double radius_needed = 0, thickness_needed = 0, cosine_needed = 1;
 
-  Claim(const Node& node, std::uint32_t page_of_node, std::uint32_t index_on_page,
+  Claim(const Node& claiming, std::uint32_t page_of_node, std::uint32_t index_on_page,
         std::size_t parent_of_node)
-      : page(page_of_node),
+      : node(claiming),
+        page(page_of_node),
         index(index_on_page),
         parent(parent_of_node),
-        position(node.position),
-        normal(directionOf(node.normal)),
-        radius(node.radius),
-        thickness(node.thickness),
-        cosine(node.normal_cosine) {}
+        position(claiming.position),
+        normal(directionOf(claiming.normal)),
+        radius(claiming.radius),
+        thickness(claiming.thickness),
+        cosine(claiming.normal_cosine) {}
 
   void meet(const Shape& surfel) {
     const glm::dvec3 d = surfel.position - position;
@@ -104,9 +108,14 @@ struct Claim {
 // Walks the top of the tree, then the subtrees below it on all threads.
 class BoundsWalk {
  public:
-  BoundsWalk(PagedOctree& octree, Progress& progress,
+  BoundsWalk(PagedOctree& octree, float brightest, Progress& progress,
              const std::function<void(const std::string&)>& report)
-      : octree_(octree), progress_(progress), report_(report) {}
+      : octree_(octree),
+        has_bounds_(octree.file().header().pageForm().has_bounds),
+        tolerance_{octree.file().header().full_precision, octree.file().header().flatness_limit,
+                   brightest},
+        progress_(progress),
+        report_(report) {}
 
   Status run(int threads);
 
@@ -115,87 +124,103 @@ class BoundsWalk {
   struct Subtree {
     NodeRange root;  // one node
     std::size_t parent = kNoParent;
+    SumsBelow sums;  // once it has been walked
+  };
+  // A child of a node of the top, in their order: another one, or a subtree.
+  struct TopChild {
+    std::size_t parent, index;
+    bool is_subtree;
   };
 
   Status divide(std::uint64_t most_surfels);
   Status walkSubtrees();
-  Status walk(PagedOctree::Reader& reader, const NodeRange& range, std::vector<Claim>& path);
-  Status meetLeaf(PagedOctree::Reader& reader, const Node& leaf, std::vector<Claim>& path);
+  Status walk(PagedOctree::Reader& reader, const NodeRange& range, std::vector<Claim>& path,
+              SumsBelow& sums);
+  Status meetLeaf(PagedOctree::Reader& reader, std::vector<Claim>& path);
+  void sumUpTop();
   void report(const Claim& claim);
 
   PagedOctree& octree_;
+  const bool has_bounds_;
+  const SumsTolerance tolerance_;
   Progress& progress_;
   const std::function<void(const std::string&)>& report_;
   std::deque<Claim> top_;  // parents first
-  std::vector<Subtree> subtrees_;
+  std::vector<TopChild> top_children_;
+  std::vector<Subtree> subtrees_;  // each is one thread's at a time
   std::atomic<std::size_t> next_{0};
   FirstFailure failure_;
   std::mutex mutex_;  // guards top_ while subtrees are walked, and report_
 };
 
 void BoundsWalk::report(const Claim& claim) {
-  const std::string excess = claim.excess();
-  if (excess.empty()) return;
+  std::string finding = has_bounds_ ? claim.excess() : std::string();
+  if (finding.empty()) {
+    finding = wrongSum(claim.node, claim.sums, tolerance_);
+    if (finding.empty()) return;
+    finding = fmt::format("node {}: {}", claim.index, finding);
+  }
   const std::lock_guard lock(mutex_);
-  report_(octree_.file().pages().pageError(claim.page, excess).message());
+  report_(octree_.file().pages().pageError(claim.page, finding).message());
 }
 
 // Nodes with more surfels than that become the top, what is below them subtrees.
 Status BoundsWalk::divide(std::uint64_t most_surfels) {
   PagedOctree::Reader reader(octree_);
-  std::vector<Subtree> open = {{kRootRange, kNoParent}};
+  std::vector<Subtree> open = {{kRootRange, kNoParent, {}}};
   while (!open.empty()) {
     if (progress_.isCancelled()) return Status::interrupted();
     const Subtree at = open.back();
     open.pop_back();
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(at.root));
     const Node& node = nodes.front();
-    if (node.isLeaf() || node.surfel_count <= most_surfels) {
+    const bool is_subtree = node.isLeaf() || node.surfel_count <= most_surfels;
+    const std::size_t index = is_subtree ? subtrees_.size() : top_.size();
+    if (at.parent != kNoParent) top_children_.push_back({at.parent, index, is_subtree});
+    if (is_subtree) {
       subtrees_.push_back(at);
       continue;
     }
     top_.emplace_back(node, at.root.page, at.root.first, at.parent);
     for (std::uint16_t i = node.child_count; i > 0; --i) {
       const auto child = static_cast<std::uint16_t>(node.first + i - 1);
-      open.push_back({{node.page, child, 1}, top_.size() - 1});
+      open.push_back({{node.page, child, 1}, top_.size() - 1, {}});
     }
   }
   return {};
 }
 
-// `path` holds the nodes above the range.
+// `path` holds the nodes above the range. Adds up in the order of the surfels, as the indexer does.
 Status BoundsWalk::walk(PagedOctree::Reader& reader, const NodeRange& range,
-                        std::vector<Claim>& path) {
+                        std::vector<Claim>& path, SumsBelow& sums) {
   if (progress_.isCancelled()) return Status::interrupted();
-  SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings, reader.nodes(range));
-  // Going deeper gives up the siblings' page: those with children are kept
-  std::vector<std::pair<Node, std::uint32_t>> parents;
+  SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> page, reader.nodes(range));
+  // Going deeper gives up the page
+  const std::vector<Node> siblings(page.begin(), page.end());
   for (std::uint32_t i = 0; i < siblings.size(); ++i) {
-    const Node& node = siblings[i];
-    if (!node.isLeaf()) {
-      parents.emplace_back(node, range.first + i);
-      continue;
+    path.emplace_back(siblings[i], range.page, range.first + i, kNoParent);
+    if (siblings[i].isLeaf()) {
+      SURFEIT_RETURN_IF_ERROR(meetLeaf(reader, path));
+    } else {
+      SumsBelow below;
+      SURFEIT_RETURN_IF_ERROR(walk(reader, childrenOf(siblings[i]), path, below));
+      path.back().sums = below;
     }
-    path.emplace_back(node, range.page, range.first + i, kNoParent);
-    SURFEIT_RETURN_IF_ERROR(meetLeaf(reader, node, path));
     report(path.back());
-    path.pop_back();
-  }
-  for (const auto& [node, index] : parents) {
-    path.emplace_back(node, range.page, index, kNoParent);
-    SURFEIT_RETURN_IF_ERROR(walk(reader, childrenOf(node), path));
-    report(path.back());
+    sums.add(path.back().sums);
     path.pop_back();
   }
   return {};
 }
 
-Status BoundsWalk::meetLeaf(PagedOctree::Reader& reader, const Node& leaf,
-                            std::vector<Claim>& path) {
+// The last of the path.
+Status BoundsWalk::meetLeaf(PagedOctree::Reader& reader, std::vector<Claim>& path) {
+  const Node leaf = path.back().node;
   SURFEIT_RETURN_IF_ERROR(reader.visitLeaf(leaf, [&](std::span<const Surfel> surfels) {
     for (const Surfel& surfel : surfels) {
       const Shape shape(surfel);
       for (Claim& claim : path) claim.meet(shape);
+      path.back().sums.add(surfel);
     }
     return progress_.isCancelled() ? Status::interrupted() : Status();
   }));
@@ -209,7 +234,7 @@ Status BoundsWalk::walkSubtrees() {
   while (!failure_.happened()) {
     const std::size_t number = next_++;
     if (number >= subtrees_.size()) break;
-    const Subtree& subtree = subtrees_[number];
+    Subtree& subtree = subtrees_[number];
     path.clear();
     {
       const std::lock_guard lock(mutex_);
@@ -218,7 +243,7 @@ Status BoundsWalk::walkSubtrees() {
       }
     }
     const std::size_t above = path.size();
-    SURFEIT_RETURN_IF_ERROR(walk(reader, subtree.root, path));
+    SURFEIT_RETURN_IF_ERROR(walk(reader, subtree.root, path, subtree.sums));
     const std::lock_guard lock(mutex_);
     std::size_t parent = subtree.parent;
     for (std::size_t i = 0; i < above; ++i, parent = top_[parent].parent) {
@@ -228,22 +253,34 @@ Status BoundsWalk::walkSubtrees() {
   return {};
 }
 
+// Children come after their parents, and those of one parent in their order: whatever the threads,
+// sums are the same.
+void BoundsWalk::sumUpTop() {
+  for (std::size_t i = top_.size(); i-- > 0;) {
+    for (const TopChild& child : top_children_) {
+      if (child.parent != i) continue;
+      top_[i].sums.add(child.is_subtree ? subtrees_[child.index].sums : top_[child.index].sums);
+    }
+  }
+}
+
 Status BoundsWalk::run(int threads) {
   const std::uint64_t surfels = octree_.file().header().surfel_count;
-  progress_.beginPhase("verify bounds", surfels, "surfels");
-  SURFEIT_RETURN_IF_ERROR(
-      divide(std::max(kSubtreeSurfels, surfels / (static_cast<std::uint64_t>(threads) * 64))));
+  progress_.beginPhase("verify sums", surfels, "surfels");
+  const std::uint64_t parts = static_cast<std::uint64_t>(threads) * kSubtreesOfThread;
+  SURFEIT_RETURN_IF_ERROR(divide(std::max(kSubtreeSurfels, surfels / parts)));
   SURFEIT_RETURN_IF_ERROR(
       runOnThreads(threads, failure_, "verify", [this] { return walkSubtrees(); }));
+  sumUpTop();
   for (const Claim& claim : top_) report(claim);
   return {};
 }
 
 }  // namespace
 
-Status verifyBounds(PagedOctree& octree, int threads, Progress& progress,
+Status verifyBounds(PagedOctree& octree, int threads, float brightest, Progress& progress,
                     const std::function<void(const std::string&)>& report) {
-  return BoundsWalk(octree, progress, report).run(threads);
+  return BoundsWalk(octree, brightest, progress, report).run(threads);
 }
 
 }  // namespace surfeit

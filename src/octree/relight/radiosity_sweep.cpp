@@ -7,7 +7,10 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <utility>
+
+#include "octree/node/facet_match.h"
 
 namespace surfeit {
 namespace {
@@ -39,17 +42,22 @@ std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
   return nearest;
 }
 
-// Surfels as they are stored may group a little otherwise than the indexer found them: each group
-// gives its light to the facet that faces most as it does.
-void setFacetRadiosity(const FacetSums& sums, float flatness_limit, Node& node) {
+// Each group gives its light to the facet that it is. Surfels as they are stored may group a little
+// otherwise than the indexer found them: then to the facet that faces most as it does.
+void setFacetRadiosity(const NodeSums& node_sums, float flatness_limit, Node& node) {
+  const FacetSums& sums = node_sums.facets;
   struct Light {
     double covered = 0, power[3] = {};
   };
   std::array<Light, kMostFacets> lights;
   const std::span<NodeFacet> facets = std::span(node.facets).first(node.facet_count);
   const FacetSums fewest = sums.fewest(flatness_limit);
-  for (const FacetGroup& group : fewest.groups().empty() ? sums.groups() : fewest.groups()) {
-    Light& light = lights[nearestFacet(node, group)];
+  const std::optional<FacetMatch> match = matchFacets(fewest, node_sums.origin, node);
+  const std::span<const FacetGroup> groups =
+      fewest.groups().empty() ? sums.groups() : fewest.groups();
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const FacetGroup& group = groups[i];
+    Light& light = lights[match ? (*match)[i] : nearestFacet(node, group)];
     light.covered += group.covered;
     for (int c = 0; c < 3; ++c) light.power[c] += group.radiosity[c];
   }
@@ -65,7 +73,7 @@ void setFacetRadiosity(const FacetSums& sums, float flatness_limit, Node& node) 
 // What the indexer's NodeSums::toNode gives from the same sums; the rest of the node stays.
 void setRadiosity(const NodeSums& sums, float flatness_limit, Node& node) {
   for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.covered);
-  if (node.hasFacets()) setFacetRadiosity(sums.facets, flatness_limit, node);
+  if (node.hasFacets()) setFacetRadiosity(sums, flatness_limit, node);
   if (!node.isRough()) return;
   for (int i = 0; i < kShCount; ++i) {
     for (int c = 0; c < 3; ++c) node.rough.sh[i][powerKind(c)] = float(sums.sh[i][powerKind(c)]);
