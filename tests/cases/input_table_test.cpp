@@ -221,11 +221,6 @@ void addPly(std::vector<Case>& cases) {
   add(kind, "another order", ply("float z,float y,float x", {"3.5 2.5 1.5", "3 2 1"}),
       places(2, first));
   add(kind, "CRLF", ply(kXyz, bare, "\r\n"), places(2, first));
-  add(kind, "CR", ply(kXyz, bare, "\r"), places(2, first));
-  for (const char* type : {"int64", "ulong"}) {
-    add(kind, type, ply(std::string(kXyz) + "," + type + " id", {"1 2 3 4"}),
-        refused("write these integers as double"));
-  }
   add(kind, "blank behind the magic", ply(kXyz, bare, "\n", "ply "), places(2, first));
   add(kind, "integers", ply("int x,int y,int z", {"1 2 3", "4 5 6"}), places(2, {1, 2, 3}));
   add(kind, "no z", ply("float x,float y", {"1 2", "3 4"}), refused("z"));

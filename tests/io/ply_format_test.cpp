@@ -97,23 +97,5 @@ TEST(PlyHeader, SixtyThousandPropertiesTakeNoTime) {
   EXPECT_TRUE(parsePlyHeader(text + "end_header\n", "a.ply").ok());
 }
 
-// Old Macs end lines with \r; files that went through two conversions with \r\r\n.
-TEST(PlyHeader, LinesEndAsTheFirstOneDoes) {
-  for (const std::string end : {"\n", "\r\n", "\r", "\r\r\n"}) {
-    std::string text;
-    for (const char* line : {"ply", "format binary_little_endian 1.0", "comment a", "element v 1",
-                             "property char a", "end_header"}) {
-      text += line + end;
-    }
-    // What follows the header is data, even where it looks like a line end
-    for (const char* data : {"\n", "\r", "x"}) {
-      const Result<PlyHeader> header = parsePlyHeader(text + data, "a.ply");
-      ASSERT_TRUE(header.ok()) << header.status().message();
-      EXPECT_EQ(header->data_offset, text.size());
-      EXPECT_EQ(header->comments, std::vector<std::string>{"a"});
-    }
-  }
-}
-
 }  // namespace
 }  // namespace surfeit

@@ -258,28 +258,6 @@ TEST_F(PlyReaderTest, IntegersBeyondTheirTypeAreRefused) {
   }
 }
 
-TEST_F(PlyReaderTest, LinesMayEndWithCrAlone) {
-  std::string text = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nend_header\n";
-  std::string binary =
-      "ply\rformat binary_little_endian 1.0\relement vertex 2\rproperty float x\rend_header\r";
-  put(binary, 1.5f);
-  put(binary, -2.0f);
-  text += "1.5\n\n-2\n";
-  std::replace(text.begin(), text.end(), '\n', '\r');
-  for (const std::string& file : {text, text.substr(0, text.size() - 1), binary, binary + "\r"}) {
-    Result<PlyReader> reader = open(file);
-    ASSERT_TRUE(reader.ok()) << reader.status().message();
-    std::array<float, 2> values{};
-    const auto rows = reader->readRows(std::as_writable_bytes(std::span(values)));
-    ASSERT_TRUE(rows.ok()) << rows.status().message();
-    EXPECT_EQ(values, (std::array<float, 2>{1.5f, -2}));
-  }
-  // A line too short is one here, too
-  EXPECT_THAT(corruption("ply\rformat ascii 1.0\relement v 2\rproperty int a\rproperty int "
-                         "b\rend_header\r1\r2 3\r"),
-              HasSubstr("line ends early"));
-}
-
 TEST_F(PlyReaderTest, BinaryOfWrongSizeIsRefusedByOpen) {
   std::string text =
       "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nend_header\n";

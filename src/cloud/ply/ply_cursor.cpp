@@ -13,6 +13,8 @@ bool isBlank(std::byte byte) {
   return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
 }
 
+bool isLineEnd(std::byte byte) { return static_cast<char>(byte) == '\n'; }
+
 }  // namespace
 
 void PlyCursor::jumpTo(std::uint64_t offset) {
@@ -75,7 +77,7 @@ inline void PlyCursor::skipBlanks() {
   for (;;) {
     const std::byte* next = buffer_.data() + begin_;
     const std::byte* const end = buffer_.data() + end_;
-    while (next < end && isBlank(*next) && *next != line_end_) ++next;
+    while (next < end && isBlank(*next)) ++next;
     begin_ = static_cast<std::size_t>(next - buffer_.data());
     if (end_ - begin_ > kMaxPlyNumberChars || file_ended_) return;
     refill();
@@ -87,14 +89,14 @@ std::string_view PlyCursor::nextWord() {
   const std::byte* const begin = buffer_.data() + begin_;
   const std::byte* const limit = begin + std::min(end_ - begin_, kMaxPlyNumberChars + 1);
   const std::byte* last = begin;
-  while (last < limit && !isBlank(*last) && *last != line_end_) ++last;
+  while (last < limit && !isBlank(*last) && !isLineEnd(*last)) ++last;
   const std::size_t size = static_cast<std::size_t>(last - begin);
   begin_ += size;
   return {reinterpret_cast<const char*>(begin), size};
 }
 
 void PlyCursor::skipEmptyLines() {
-  for (skipBlanks(); begin_ < end_ && buffer_[begin_] == line_end_; skipBlanks()) ++begin_;
+  for (skipBlanks(); begin_ < end_ && isLineEnd(buffer_[begin_]); skipBlanks()) ++begin_;
 }
 
 }  // namespace surfeit

@@ -27,9 +27,6 @@ class PlyCursor {
   // Passes over `size` bytes.
   void skip(std::uint64_t size);
 
-  // Lines of words end with \r, not \n.
-  void setCrEnds() { line_end_ = std::byte{'\r'}; }
-
   // Reads up to bytes.size() bytes; fewer only at the end of the file.
   Result<std::size_t> read(std::span<std::byte> bytes);
 
@@ -54,7 +51,6 @@ class PlyCursor {
   // buffer_[begin_, end_) are the next bytes; the file goes on at end_offset_
   std::vector<std::byte> buffer_ = std::vector<std::byte>(256 << 10);
   std::size_t begin_ = 0, end_ = 0;
-  std::byte line_end_{'\n'};
   std::uint64_t end_offset_ = 0;
   bool file_ended_ = false;  // the file has nothing at end_offset_
   Status failure_;

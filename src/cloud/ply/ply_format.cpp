@@ -52,20 +52,12 @@ std::optional<PlyEncoding> encodingFromName(std::string_view name) {
   return std::nullopt;
 }
 
-// Integers of 64 bits are not in the format; some programs write them all the same.
-bool isWideInteger(std::string_view name) {
-  constexpr std::string_view kNames[] = {"int64",    "uint64",    "long",    "ulong",
-                                         "longlong", "ulonglong", "int64_t", "uint64_t"};
-  return std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
-}
-
 // Reads the header line by line; each handler gets the words after its keyword.
 class HeaderParser {
  public:
   HeaderParser(std::string_view text, const std::string& path) : text_(text), path_(path) {}
 
   Result<PlyHeader> parse() {
-    line_end_ = lineEndOf(text_);
     SURFEIT_RETURN_IF_ERROR(nextLine());
     if (line_.substr(0, line_.find_last_not_of(kBlanks) + 1) != "ply") return unexpected("'ply'");
     for (;;) {
@@ -140,11 +132,6 @@ class HeaderParser {
       type_name = takeWord(rest);
     }
     const std::optional<ValueType> type = valueTypeFromName(type_name);
-    if (!type && isWideInteger(type_name)) {
-      return unexpected(
-          "a type of at most 32 bits, or float or double: write these integers as double, which "
-          "holds them up to 2^53, or leave the property out");
-    }
     if (!type) {
       return unexpected("a type: char, uchar, short, ushort, int, uint, float or double");
     }
@@ -172,16 +159,9 @@ class HeaderParser {
     return {};
   }
 
-  // The end of the first line decides: the bytes of a binary file may be anything.
-  static char lineEndOf(std::string_view text) {
-    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-    const std::size_t next = std::min(text.find_first_not_of('\r', end), text.size());
-    return next == text.size() || text[next] == '\n' ? '\n' : '\r';
-  }
-
   Status nextLine() {
     ++line_number_;
-    const std::size_t end = text_.find(line_end_, next_);
+    const std::size_t end = text_.find('\n', next_);
     if (end == std::string_view::npos) {
       return Status::corruption(
           fmt::format("{}: header line {}: found no line end in the first {} bytes, expected {}",
@@ -201,7 +181,6 @@ class HeaderParser {
 
   std::string_view text_;
   const std::string& path_;
-  char line_end_ = '\n';
   std::size_t next_ = 0;  // first byte of the next line
   std::uint64_t line_number_ = 0;
   std::string_view line_;

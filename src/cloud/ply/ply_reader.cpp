@@ -236,15 +236,6 @@ struct PlyReader::State {
                     file().path(), found, offset));
   }
 
-  // Lines of rows end as those of the header: with \r alone, as on old Macs, or not.
-  Status findLineEnd() {
-    std::array<std::byte, 1> last{};
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
-                             cursor.file().readSome(header.data_offset - 1, last));
-    if (size == 1 && last[0] == std::byte{'\r'}) cursor.setCrEnds();
-    return {};
-  }
-
   // What the file can hold bounds every count before anyone uses it; sums cannot overflow later.
   Status checkCounts() {
     // More than any disk holds stands for a size that is not known
@@ -380,7 +371,6 @@ Result<PlyReader> PlyReader::open(const std::string& path, Access access) {
   SURFEIT_RETURN_IF_ERROR(state->checkCounts());
   state->element_begin = {state->header.data_offset};
   state->cursor.jumpTo(state->header.data_offset);
-  SURFEIT_RETURN_IF_ERROR(state->findLineEnd());
   state->row = 0;
   return PlyReader(std::move(state));
 }
