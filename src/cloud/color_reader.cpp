@@ -315,21 +315,6 @@ class ColorPlan {
                                  sampled_, sample.largest, what));
   }
 
-  // 16 bits reach farther as a rule. Cameras of 10 or 12 bits write such codes, which are then 64
-  // or 16 times too dark.
-  static bool isDark(const ColorSample& sample) {
-    return sample.least >= 0 && sample.largest > 255 && sample.largest < 4096;
-  }
-
-  void noteDarkness(const ColorSample& sample) {
-    if (!isDark(sample)) return;
-    const int bits = sample.largest < 1024 ? 10 : 12;
-    note(sample, fmt::format("below {}", 1 << bits),
-         fmt::format("read as sRGB of 16 bits, {0} times darker than codes of {1}; if they are of "
-                     "{1}, convert --set \"{2} *= {0}\"; --color-range 16 says that they are of 16",
-                     1 << (16 - bits), bits, sample.channel));
-  }
-
   void decideReals(const ColorSample& sample) {
     if (isCodeGiven()) {
       const bool is_8 = range_ == ColorRange::k8;
@@ -369,13 +354,9 @@ class ColorPlan {
       add(sample, Kind::kCode8);
       note(sample, "0-255", "read as sRGB of 8 bits; --color-range 16 reads them as 16 bits");
     } else if (sample.type == ValueType::kUint16) {
-      noteDarkness(sample);
+      return {};
     } else if (bytes == 2 || (sample.least >= 0 && sample.largest <= 65535)) {
       add(sample, Kind::kCode16);
-      if (isDark(sample)) {
-        noteDarkness(sample);
-        return {};
-      }
       note(sample, "above 255",
            is_signed ? "read as sRGB of 16 bits, without a sign" : "read as sRGB of 16 bits");
     } else if (sample.positive > 0 || sample.least < 0) {

@@ -39,8 +39,7 @@ void addValues(const std::byte* rows, std::size_t count, std::size_t row_bytes,
 bool isSettled(const ColorSample& sample) {
   if (sample.is_decided) return true;
   if (isFloatType(sample.type)) return !sample.are_wholes;
-  // Above 4095 the words are none of 10 or 12 bits
-  return sample.largest > (valueTypeBytes(sample.type) <= 2 ? 4095 : 65535);
+  return sample.largest > (valueTypeBytes(sample.type) <= 2 ? 255 : 65535);
 }
 
 void addRows(const RowReader& reader, Bytes rows, std::vector<ColorSample>& samples) {

@@ -15,11 +15,9 @@
 namespace surfeit {
 namespace {
 
-using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 
 // Clouds as text of PLY: properties of one type, a row each.
 class ColorReaderTest : public RowFileTest {
@@ -92,31 +90,9 @@ TEST_F(ColorReaderTest, SixteenBitsThatNeverExceed255AreEight) {
 }
 
 TEST_F(ColorReaderTest, OneLargeValueMakesThemSixteen) {
-  const Found found = findColor("ushort", "0 0 0\n117 73 4096\n", ColorRange::kAuto);
+  const Found found = findColor("ushort", "0 0 0\n117 73 256\n", ColorRange::kAuto);
   EXPECT_EQ(found.type, "ushort");
   EXPECT_THAT(found.notes, IsEmpty());
-}
-
-TEST_F(ColorReaderTest, SixteenBitsThatHoldTenOrTwelveAreTold) {
-  for (const char* type : {"ushort", "short", "int", "uint"}) {
-    const Found ten = findColor(type, "0 0 0\n1023 73 256\n", ColorRange::kAuto);
-    EXPECT_THAT(ten.values, ElementsAre(0, 1023)) << type;
-    EXPECT_THAT(ten.notes,
-                ElementsAre("colors are below 1024 in " + std::string(type) +
-                            " (the largest is 1023): read as sRGB of 16 bits, 64 times darker than "
-                            "codes of 10; if they are of 10, convert --set \"color *= 64\"; "
-                            "--color-range 16 says that they are of 16"));
-    for (const char* largest : {"1024", "4095"}) {
-      const Found twelve = findColor(type, std::string(largest) + " 1 2\n", ColorRange::kAuto);
-      EXPECT_THAT(twelve.notes, ElementsAre(HasSubstr("16 times darker than codes of 12")))
-          << largest;
-    }
-    EXPECT_THAT(findColor(type, "4096 1 2\n", ColorRange::kAuto).notes,
-                Not(Contains(HasSubstr("darker"))))
-        << type;
-  }
-  // What the user says is not told again
-  EXPECT_THAT(findColor("ushort", "1023 0 0\n", ColorRange::k16).notes, IsEmpty());
 }
 
 TEST_F(ColorReaderTest, BlackDecidesNothing) {
