@@ -134,6 +134,8 @@ class ColorPlan {
       ColorSample sample{channel.name, channel.properties, channel.type};
       const bool is_real = isFloatType(channel.type);
       sample.is_decided = is_real ? range_ == ColorRange::kUnit : isCodeGiven();
+      const RowProperty* const alpha = element.find("alpha");
+      if (channel.name == "color" && alpha != nullptr && !alpha->is_list) sample.alpha = alpha;
       if (is_real && sample.is_decided) continue;
       samples.push_back(std::move(sample));
     }
@@ -345,7 +347,7 @@ class ColorPlan {
   // 10 or 12 where the largest code needs all of these bits, as of cameras that have no more; else
   // 0. As 16 bits such colors would be all but black.
   static int bitsOfCamera(const ColorSample& sample) {
-    if (sample.least < 0) return 0;
+    if (sample.least < 0 || sample.largest_alpha > whiteOf(12)) return 0;
     for (const int bits : {10, 12}) {
       if (sample.largest <= whiteOf(bits) && sample.largest > whiteOf(bits - 1)) return bits;
     }

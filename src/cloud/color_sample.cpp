@@ -51,6 +51,11 @@ void addRows(const RowReader& reader, Bytes rows, std::vector<ColorSample>& samp
       addValues(rows.data(), rows.size() / element.row_bytes, element.row_bytes,
                 element.properties[i], sample);
     }
+    if (sample.alpha == nullptr) continue;
+    ColorSample alpha;
+    addValues(rows.data(), rows.size() / element.row_bytes, element.row_bytes, *sample.alpha,
+              alpha);
+    sample.largest_alpha = std::max(sample.largest_alpha, alpha.largest);
   }
 }
 

@@ -21,6 +21,7 @@ struct ColorSample {
   std::vector<std::size_t> properties;  // indices into the element's
   ValueType type = ValueType::kUint8;   // the widest of them
   bool is_decided = false;              // whatever its values are
+  const RowProperty* alpha = nullptr;   // beside it, whose white is that of the color
 
   double least = std::numeric_limits<double>::infinity();
   double largest = -std::numeric_limits<double>::infinity();
@@ -28,6 +29,7 @@ struct ColorSample {
   std::uint64_t positive = 0;
   bool are_wholes = true;
   bool has_non_finite = false;
+  double largest_alpha = 0;
 
   bool isOpacity() const { return channel == kOpacity; }
   bool isPacked() const { return properties.size() == 1 && !isOpacity(); }

@@ -146,6 +146,13 @@ TEST_F(ColorReaderTest, OpacitiesOfWiderIntegersAreNotAllButNothing) {
   EXPECT_THAT(opacity("float", "0\n1\n").values, ElementsAre(0, 1));
 }
 
+TEST_F(ColorReaderTest, AlphaOf16BitsMakesThemSixteen) {
+  const std::string rows = "0 0 0 65535\n3000 73 49 65535\n";
+  EXPECT_THAT(find(ply("ushort", "red green blue alpha", rows)).values, ElementsAre(0, 3000));
+  const std::string camera = "0 0 0 4095\n3000 73 49 4095\n";
+  EXPECT_THAT(find(ply("ushort", "red green blue alpha", camera)).values, ElementsAre(0, 48011));
+}
+
 TEST_F(ColorReaderTest, ColorsThatWouldBeBlackAreTold) {
   for (const char* rows : {"0 0 0\n256 73 49\n", "0 0 0\n1024 73 49\n"}) {
     const Found found = findColor("ushort", rows, ColorRange::kAuto);
