@@ -10,18 +10,17 @@
 namespace surfeit {
 
 void addColorRangeOption(CLI::App& command, ColorRange& color_range) {
-  static const std::map<std::string, ColorRange> kRanges = {{"auto", ColorRange::kAuto},
-                                                            {"8", ColorRange::k8},
-                                                            {"16", ColorRange::k16},
-                                                            {"unit", ColorRange::kUnit}};
+  static const std::map<std::string, ColorRange> kRanges = {
+      {"auto", ColorRange::kAuto}, {"8", ColorRange::k8},   {"10", ColorRange::k10},
+      {"12", ColorRange::k12},     {"16", ColorRange::k16}, {"unit", ColorRange::kUnit}};
   command
       .add_option_function<std::string>(
           "--color-range",
           [&color_range](const std::string& name) { color_range = kRanges.at(name); },
-          "Meaning of colors that are not bytes: 8 or 16 bits of sRGB, unit (reals are "
+          "Meaning of colors that are not bytes: 8, 10, 12 or 16 bits of sRGB, unit (reals are "
           "scene-linear), or auto: decided by a sample of the cloud (docs/files.md)")
-      ->type_name("8|16|unit|auto")
-      ->check(CLI::IsMember({"8", "16", "unit", "auto"}).description(""))
+      ->type_name("8|10|12|16|unit|auto")
+      ->check(CLI::IsMember({"8", "10", "12", "16", "unit", "auto"}).description(""))
       ->default_str("auto");
 }
 

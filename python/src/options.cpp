@@ -92,6 +92,8 @@ void takeColorRange(Options& options, ColorRange& range) {
   options.choose<ColorRange>("color_range", range,
                              {{"auto", ColorRange::kAuto},
                               {"8", ColorRange::k8},
+                              {"10", ColorRange::k10},
+                              {"12", ColorRange::k12},
                               {"16", ColorRange::k16},
                               {"unit", ColorRange::kUnit}});
 }

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from . import _surfeit
+from ._errors import DataWarning
 from ._looks import look_of
+from ._watch import _level_of_caller
 
 PathLike = Union[str, "os.PathLike[str]"]
 Memory = Union[int, str, None]
@@ -115,7 +118,43 @@ def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
     return {name: value for name, value in taken.items() if value is not None}
 
 
-def _plain(array: np.ndarray) -> np.ndarray:
+# What arrays are called that mean a channel of ours, and are not read as one.
+_MISNOMERS = {
+    "color": ("colors", "colour", "colours", "rgb", "rgba", "cd"),
+    "normal": ("normals", "n"),
+    "position": ("positions", "points", "point", "xyz", "vertices", "p"),
+    "radius": ("radii",),
+    "area": ("areas",),
+    "albedo": ("albedos", "reflectance"),
+    "group": ("groups",),
+}
+# Channels of a number of values that is fixed.
+_VALUES = {"position": (3,), "normal": (3,), "color": (3, 4), "radiosity": (3,), "albedo": (3,),
+           "long_side": (3,), "radius": (1,), "area": (1,), "coverage": (1,), "opacity": (1,),
+           "group": (1,), "two_sided": (1,)}
+_LARGEST_EXACT = 2**53
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, DataWarning, stacklevel=_level_of_caller())
+
+
+def _check_channels(arrays: Mapping[str, Any]) -> None:
+    """Refuses known channels of another shape, and tells what is called like them."""
+    for name, value in arrays.items():
+        shape = np.shape(value)
+        expected = _VALUES.get(name)
+        values = shape[1] if len(shape) == 2 else 1
+        if expected and len(shape) in (1, 2) and values not in expected:
+            wanted = " or ".join("(n,)" if count == 1 else f"(n, {count})" for count in expected)
+            raise ValueError(f"{name}: found shape {shape}, expected {wanted}")
+        for channel, others in _MISNOMERS.items():
+            is_like = len(shape) == (2 if _VALUES[channel][0] == 3 else 1)
+            if is_like and name.lower() in others and channel not in arrays:
+                _warn(f"{name}: not read as {channel}, which is its name here")
+
+
+def _plain(array: np.ndarray, name: str) -> np.ndarray:
     """The same numbers in a type that clouds have; a copy only where they have another one."""
     dtype = array.dtype
     if dtype == np.bool_:
@@ -131,13 +170,19 @@ def _plain(array: np.ndarray) -> np.ndarray:
         limits = np.iinfo(integer)
         if array.size == 0 or (array.min() >= limits.min and array.max() <= limits.max):
             return array.astype(integer)
+    if array.max() > _LARGEST_EXACT or array.min() < -_LARGEST_EXACT:
+        _warn(f"{name}: integers of 64 bits become float64, exact to 2^53")
     return array.astype(np.float64)
 
 
 def columns_of_channel(name: str, values: int) -> Sequence[str]:
     """Names of the columns of a channel: "normal" and 3 values are nx, ny, nz."""
+    if values == 1:
+        return (name,)
     if values == 3 and name in _COLUMNS:
         return _COLUMNS[name]
+    if values == 4 and name == "color":
+        return (*_COLUMNS[name], "alpha")
     if values == 3:
         return [f"{name}_{letter}" for letter in ("rgb" if name in _COLORS else "xyz")]
     return [f"{name}_{i}" for i in range(values)]
@@ -149,9 +194,10 @@ def _sh_columns(coefficients: int) -> List[str]:
 
 def columns_of(arrays: Mapping[str, Any]) -> List[Tuple[str, np.ndarray]]:
     """Columns of one dimension, from channels (n,), (n, k) or, for radiance_sh, (n, 9, 3)."""
+    _check_channels(arrays)
     columns: List[Tuple[str, np.ndarray]] = []
     for name, value in arrays.items():
-        array = _plain(np.asarray(value))
+        array = _plain(np.asarray(value), name)
         if array.ndim == 1:
             columns.append((name, array))
             continue

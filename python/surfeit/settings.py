@@ -72,7 +72,7 @@ class ReadSettings(TypedDict, total=False):
     part: str  # grid, layer or element to read
     filter: str  # "classification == 2"
     text: Literal["decimal-comma", "decimal-point"]  # commas in text; default: as the lines tell
-    color_range: Literal["auto", "8", "16", "unit"]
+    color_range: Literal["auto", "8", "10", "12", "16", "unit"]
 
 
 class JobSettings(TypedDict, total=False):
@@ -205,7 +205,7 @@ class BrickSettings(JobSettings, total=False):
     max_error: float  # divides a voxel where a value differs by more; 0: keeps the finest ones
     voxel_size: float  # edge of the finest voxels; default: twice the spacing of the points
     filter: str  # "classification == 2"
-    color_range: Literal["auto", "8", "16", "unit"]
+    color_range: Literal["auto", "8", "10", "12", "16", "unit"]
 
 
 class RadianceSettings(ReadSettings, JobSettings, total=False):

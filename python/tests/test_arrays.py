@@ -143,3 +143,50 @@ def test_stats_and_windows_tell_of_the_caches(engine, scene, receivers):
     assert stats["node_cache"]["requests"] >= stats["node_cache"]["hits"] > 0
     assert engine.windows[-1]["receivers"] >= 0
     assert "surfels" in repr(scene) and "256" not in str(surfeit.__version__)
+
+
+def test_channels_of_other_shapes_are_read_or_refused(tmp_path):
+    """What numpy users have: RGBA, columns (n, 1); what has no meaning is refused."""
+    places = np.random.default_rng(3).random((20, 3))
+    rgba = np.tile(np.uint8([117, 73, 49, 255]), (20, 1))
+    surfeit.write(tmp_path / "a.ply", {"position": places, "color": rgba,
+                                       "radius": np.full((20, 1), 0.1)})
+    read = surfeit.read(tmp_path / "a.ply")
+    assert np.array_equal(read["color"][:, :3], rgba[:, :3])
+    assert np.allclose(read["radius"], 0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        surfeit.index({"position": places, "color": rgba, "radius": np.full((20, 1), 0.1)},
+                      tmp_path / "a.sft")
+    scene = surfeit.read(tmp_path / "a.sft")
+    assert scene["radiosity"].min() > 0.02 and np.allclose(scene["radius"], 0.1, rtol=0.01)
+    for name, array, expected in [
+        ("position", places.T, r"\(n, 3\)"), ("position", np.zeros((20, 4)), r"\(n, 3\)"),
+        ("position", np.zeros(60), r"\(n, 3\)"), ("normal", np.zeros((20, 2)), r"\(n, 3\)"),
+        ("color", np.zeros((20, 5)), r"\(n, 3\) or \(n, 4\)"),
+        ("radius", np.zeros((20, 2)), r"\(n,\)"), ("group", np.zeros((20, 3), int), r"\(n,\)"),
+    ]:
+        with pytest.raises(ValueError, match=f"{name}: found shape .*expected {expected}"):
+            surfeit.index({"position": places, name: array}, tmp_path / "b.sft")
+        with pytest.raises(ValueError, match=f"{name}: found shape"):
+            surfeit.write(tmp_path / "b.ply", {"position": places, name: array})
+
+
+def test_names_that_are_nearly_ours_are_told(tmp_path):
+    places = np.random.default_rng(3).random((20, 3))
+    for name, array, channel in [("colors", places, "color"), ("RGB", places, "color"),
+                                 ("normals", places, "normal"), ("radii", places[:, 0], "radius")]:
+        with pytest.warns(surfeit.DataWarning, match=f"{name}: not read as {channel}"):
+            surfeit.index({"position": places, name: array}, tmp_path / "a.sft")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        surfeit.write(tmp_path / "a.ply", {"position": places, "color": places, "n": places[:, 0]})
+
+
+def test_integers_that_lose_digits_are_told(tmp_path):
+    places = np.zeros((2, 3))
+    with pytest.warns(surfeit.DataWarning, match="id: integers of 64 bits"):
+        surfeit.write(tmp_path / "a.ply", {"position": places, "id": np.array([1, 2**53 + 1])})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        surfeit.write(tmp_path / "a.ply", {"position": places, "id": np.array([1, 2**53])})

@@ -32,6 +32,7 @@
 #include "cloud/vdb/vdb_output.h"
 #include "cloud/vdb/vdb_reader.h"
 #include "cloud/vdb/vdb_writer.h"
+#include "core/crs_comment.h"
 #include "core/group_comment.h"
 #include "core/text_case.h"
 #include "core/up_comment.h"
@@ -77,7 +78,9 @@ constexpr std::string_view kTableAdvice = "save the points as PLY or CSV";
 constexpr std::string_view kGridAdvice =
     "write the points of a map of heights as text: `gdal_translate -of XYZ IN OUT.xyz`";
 constexpr OtherFormat kOtherFormats[] = {
-    {kSceneMagic, "a Surfeit scene (.sft)", "give the cloud that it was indexed from"},
+    {kSceneMagic, "a Surfeit scene (.sft)",
+     "give the cloud that it was indexed from, or make one: surfeit convert SCENE.sft -o "
+     "CLOUD.ply"},
     {"surfeit-recipe"sv, "a recipe of `surfeit generate`", "give it to `surfeit index`"},
     {"ASTM-E57"sv, "E57",
      "convert it to LAS or PLY first: `pdal translate IN.e57 OUT.las`, CloudCompare 2.12 or later, "
@@ -270,14 +273,29 @@ void noteLostUpAxis(const std::string& path, const CloudFormat& format,
 }
 
 // Other formats without comments say so themselves.
-void noteLostGroupNames(const std::string& path, const CloudFormat& format,
-                        const RowWriterOptions& options) {
-  const bool has_names =
-      std::any_of(options.comments.begin(), options.comments.end(),
-                  [](const std::string& comment) { return statedGroupName(comment).has_value(); });
-  if (format.create != createPtc || !has_names || options.progress == nullptr) return;
-  options.progress->note(fmt::format(
-      "{}: {} has no place for the names of object groups: they stay numbers", path, format.name));
+void noteLostComments(const std::string& path, const CloudFormat& format,
+                      const RowWriterOptions& options) {
+  if (format.create != createPtc || options.progress == nullptr) return;
+  const auto isName = [](const std::string& comment) {
+    return statedGroupName(comment).has_value();
+  };
+  const auto isUp = [](const std::string& comment) {
+    return statedUpAxis(std::span(&comment, 1)).has_value();
+  };
+  const auto names = std::count_if(options.comments.begin(), options.comments.end(), isName);
+  const auto others = std::ssize(options.comments) - names -
+                      std::count_if(options.comments.begin(), options.comments.end(), isUp);
+  if (names > 0) {
+    options.progress->note(
+        fmt::format("{}: {} has no place for the names of object groups: they stay numbers", path,
+                    format.name));
+  }
+  if (others > 0) {
+    const bool has_crs = !statedCrs(options.comments).empty();
+    options.progress->note(
+        fmt::format("{}: {} has no place for comments: {} are not kept{}", path, format.name,
+                    others, has_crs ? ", the coordinate reference system among them" : ""));
+  }
 }
 
 // Of a PLY.
@@ -300,7 +318,7 @@ Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
   for (const CloudFormat& format : kFormats) {
     if (format.create != nullptr && hasExtension(name, format.extensions)) {
       noteLostUpAxis(path, format, writing);
-      noteLostGroupNames(path, format, writing);
+      noteLostComments(path, format, writing);
       if (writing.count && name == path && format.extensions == ".ply") {
         SURFEIT_RETURN_IF_ERROR(checkOutputRoom(path, *writing.count * rowBytesOf(writing)));
       }

@@ -3,24 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
-#include <cstring>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "cloud/channels.h"
 #include "cloud/color_sample.h"
-#include "cloud/srgb_curve.h"
+#include "cloud/number_change.h"
 
 namespace surfeit {
 namespace {
 
 // Linear light rarely has a mean so far above white, and codes of 8 bits mostly do.
 constexpr double kSuspectMean = 16;
+// As codes of 16 bits and of 8, smaller numbers are black to the eye.
+constexpr double kDark = 4096, kDarkByte = 16;
 // One number for a color: [ alpha : 8 | red : 8 | green : 8 | blue : 8 ].
 constexpr std::string_view kPackedNames[] = {"rgb", "rgba"};
 
@@ -34,123 +32,13 @@ std::vector<std::string> unpackedNames(const std::string& packed) {
   return propertyNames(isPackedName(packed) ? "color" : packed, 3, ChannelKind::kColor, {});
 }
 
-// What is done to the numbers of a property. They become others at the same place of a row.
-struct Change {
-  enum class Kind {
-    kCode8,         // a whole number up to 255 becomes uchar
-    kCode16,        // up to 65535: ushort
-    kLight8,        // a code becomes scene-linear, of 8 bits
-    kLight16,       // of 16 bits
-    kPackedNumber,  // three codes in a whole number
-    kPackedBits     // or in the bits of an integer or float
-  };
-  Kind kind = Kind::kCode8;
-  RowProperty property;       // as the file has it
-  bool takes_larger = false;  // as the largest code, instead of refusing them
-
-  double most() const { return kind == Kind::kCode16 || kind == Kind::kLight16 ? 65535 : 255; }
-};
-
-template <typename T>
-T load(const std::byte* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return value;
-}
-template <typename T>
-void store(std::byte* bytes, T value) {
-  std::memcpy(bytes, &value, sizeof value);
-}
-
-// The code, or -1 when the value is none. Signed integers of 8 and 16 bits stand for their bits.
-template <typename T>
-double codeOf(T value, const Change& change) {
-  double code;
-  if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
-    code = static_cast<double>(static_cast<std::make_unsigned_t<T>>(value));
-  } else {
-    code = static_cast<double>(value);
-  }
-  if (!(code >= 0 && code == std::floor(code))) return -1;
-  if (code > change.most()) return change.takes_larger ? change.most() : -1;
-  return code;
-}
-
-// Each returns the number of rows done: less than `count` when the next one's value is none.
-template <typename T>
-std::size_t toCodes(const Change& change, std::byte* row, std::size_t count,
-                    std::size_t row_bytes) {
-  std::byte* at = row + change.property.offset;
-  for (std::size_t i = 0; i < count; ++i, at += row_bytes) {
-    const double code = codeOf(load<T>(at), change);
-    if (code < 0) return i;
-    if (change.kind == Change::Kind::kCode16) {
-      store(at, static_cast<std::uint16_t>(code));
-    } else {
-      store(at, static_cast<std::uint8_t>(code));
-    }
-  }
-  return count;
-}
-
-// What is no code, below 0 or not finite, stays: the mapping to surfels tells.
-template <typename T>
-std::size_t toLight(const Change& change, std::byte* row, std::size_t count,
-                    std::size_t row_bytes) {
-  std::byte* at = row + change.property.offset;
-  for (std::size_t i = 0; i < count; ++i, at += row_bytes) {
-    const double value = static_cast<double>(load<T>(at));
-    if (value >= 0) store(at, static_cast<T>(linearFromSrgbCode(value / change.most())));
-  }
-  return count;
-}
-
-template <typename T>
-std::size_t unpack(const Change& change, std::byte* row, std::size_t count, std::size_t row_bytes) {
-  std::byte* at = row + change.property.offset;
-  for (std::size_t i = 0; i < count; ++i, at += row_bytes) {
-    const T value = load<T>(at);
-    std::uint32_t bits;
-    if constexpr (std::is_integral_v<T>) {
-      bits = static_cast<std::uint32_t>(value);
-    } else if (change.kind == Change::Kind::kPackedNumber) {
-      if (!(value >= 0 && value <= 4294967295.0 && value == std::floor(value))) return i;
-      bits = static_cast<std::uint32_t>(value);
-    } else {
-      bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
-    }
-    const std::uint8_t codes[4] = {
-        static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
-        static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 24)};
-    std::memcpy(at, codes, sizeof codes);
-  }
-  return count;
-}
-
-std::size_t apply(const Change& change, std::byte* rows, std::size_t count, std::size_t row_bytes) {
-  return visitValueType(change.property.type, [&]<typename T>(std::type_identity<T>) {
-    switch (change.kind) {
-      case Change::Kind::kCode8:
-      case Change::Kind::kCode16:
-        if constexpr (sizeof(T) >= 2) return toCodes<T>(change, rows, count, row_bytes);
-        return count;  // bytes are codes, signed or not
-      case Change::Kind::kLight8:
-      case Change::Kind::kLight16:
-        if constexpr (std::is_floating_point_v<T>) {
-          return toLight<T>(change, rows, count, row_bytes);
-        }
-        return count;
-      default:
-        if constexpr (sizeof(T) >= 4) return unpack<T>(change, rows, count, row_bytes);
-        return count;
-    }
-  });
-}
+// The largest code of so many bits.
+double whiteOf(int bits) { return double((1 << bits) - 1); }
 
 class ColorReader final : public RowReader {
  public:
-  ColorReader(std::unique_ptr<RowReader> reader, RowLayout element, std::vector<Change> changes,
-              std::vector<std::string> notes)
+  ColorReader(std::unique_ptr<RowReader> reader, RowLayout element,
+              std::vector<NumberChange> changes, std::vector<std::string> notes)
       : reader_(std::move(reader)),
         element_(std::move(element)),
         changes_(std::move(changes)),
@@ -174,8 +62,8 @@ class ColorReader final : public RowReader {
     if (view.empty()) return view;
     const std::size_t row_bytes = element_.row_bytes, count = view.size() / row_bytes;
     std::byte* const rows = buffer.data() + (view.data() - buffer.data());
-    for (const Change& change : changes_) {
-      const std::size_t done = apply(change, rows, count, row_bytes);
+    for (const NumberChange& change : changes_) {
+      const std::size_t done = changeNumbers(change, rows, count, row_bytes);
       if (done == count) continue;
       failure_ = misfit(change, rows + done * row_bytes, row_ + done);
       return failure_;
@@ -198,18 +86,18 @@ class ColorReader final : public RowReader {
   }
 
  private:
-  Status misfit(const Change& change, const std::byte* row, std::uint64_t record) const {
+  Status misfit(const NumberChange& change, const std::byte* row, std::uint64_t record) const {
     const RowProperty& property = change.property;
     return Status::corruption(fmt::format(
         "{}: record {}: found {} as {}, expected a whole number up to {}, as a sample of the cloud "
-        "has: --color-range 8, 16 or unit says what colors are",
+        "has: --color-range 8, 10, 12, 16 or unit says what colors are",
         path(), record, rowValue(row + property.offset, property.type), property.name,
-        change.kind == Change::Kind::kPackedNumber ? 4294967295.0 : change.most()));
+        change.kind == NumberChange::Kind::kPackedNumber ? 4294967295.0 : change.white));
   }
 
   std::unique_ptr<RowReader> reader_;
   RowLayout element_;
-  std::vector<Change> changes_;
+  std::vector<NumberChange> changes_;
   std::vector<std::string> notes_;
   std::uint64_t row_ = 0;  // that comes next
   Status failure_;
@@ -235,13 +123,19 @@ class ColorPlan {
     bool has_color = false;
     for (const RowChannel& channel : channelsOf(element)) {
       has_color = has_color || channel.name == "color";
-      const bool is_color = channel.properties.size() == 3 &&
-                            (channel.name == "color" || channel.name == "albedo" ||
-                             (channel.name == "radiosity" && !isFloatType(channel.type)));
+      const bool is_triple = channel.properties.size() == 3;
+      if ((is_triple && isUnsignedNormal(channel)) || isOpacity(channel)) {
+        samples.push_back({channel.name, channel.properties, channel.type});
+      }
+      const bool is_color =
+          is_triple && (channel.name == "color" || channel.name == "albedo" ||
+                        (channel.name == "radiosity" && !isFloatType(channel.type)));
       if (!is_color || channel.type == ValueType::kUint8) continue;
       ColorSample sample{channel.name, channel.properties, channel.type};
       const bool is_real = isFloatType(channel.type);
       sample.is_decided = is_real ? range_ == ColorRange::kUnit : isCodeGiven();
+      const RowProperty* const alpha = element.find("alpha");
+      if (channel.name == "color" && alpha != nullptr && !alpha->is_list) sample.alpha = alpha;
       if (is_real && sample.is_decided) continue;
       samples.push_back(std::move(sample));
     }
@@ -261,6 +155,14 @@ class ColorPlan {
       addPacked(sample);
       return {};
     }
+    if (sample.isOpacity()) {
+      decideOpacity(sample);
+      return {};
+    }
+    if (sample.channel == "normal") {
+      decideDirections(sample);
+      return {};
+    }
     if (isFloatType(sample.type)) {
       decideReals(sample);
       return {};
@@ -276,9 +178,33 @@ class ColorPlan {
   }
 
  private:
-  using Kind = Change::Kind;
+  using Kind = NumberChange::Kind;
 
-  bool isCodeGiven() const { return range_ == ColorRange::k8 || range_ == ColorRange::k16; }
+  // Bits of codes, where the user says them; else 0.
+  int bitsGiven() const {
+    switch (range_) {
+      case ColorRange::k8:
+        return 8;
+      case ColorRange::k10:
+        return 10;
+      case ColorRange::k12:
+        return 12;
+      case ColorRange::k16:
+        return 16;
+      default:
+        return 0;
+    }
+  }
+  bool isCodeGiven() const { return bitsGiven() > 0; }
+
+  static bool isOpacity(const RowChannel& channel) {
+    return channel.name == kOpacity && channel.properties.size() == 1 &&
+           channel.type != ValueType::kInt8;
+  }
+  static bool isUnsignedNormal(const RowChannel& channel) {
+    return channel.name == "normal" &&
+           (channel.type == ValueType::kUint8 || channel.type == ValueType::kUint16);
+  }
 
   // Three values in one: rgb and rgba, where there is no other color; integers also as what the
   // user calls albedo or radiosity.
@@ -295,11 +221,11 @@ class ColorPlan {
     });
   }
 
-  void add(const ColorSample& sample, Kind kind, bool takes_larger = false) {
+  void add(const ColorSample& sample, Kind kind, double white = 255, bool takes_larger = false) {
     for (const std::size_t i : sample.properties) {
       RowProperty& property = element_.properties[i];
       if (property.type == ValueType::kUint8) continue;  // of a triple of several types
-      changes_.push_back({kind, property, takes_larger});
+      changes_.push_back({kind, property, takes_larger, white});
       if (kind == Kind::kCode8 || valueTypeBytes(property.type) == 1)
         property.type = ValueType::kUint8;
       else if (kind == Kind::kCode16)
@@ -317,14 +243,16 @@ class ColorPlan {
 
   void decideReals(const ColorSample& sample) {
     if (isCodeGiven()) {
-      const bool is_8 = range_ == ColorRange::k8;
-      add(sample, is_8 ? Kind::kLight8 : Kind::kLight16);
+      add(sample, Kind::kLight, whiteOf(bitsGiven()));
       notes_.push_back(
           fmt::format("{} in {} become scene-linear from sRGB of {} bits, as "
                       "--color-range says",
-                      sample.channel, typeText(sample.type), is_8 ? 8 : 16));
+                      sample.channel, typeText(sample.type), bitsGiven()));
+    } else if (sample.largest > 1 && sample.largest < kDarkByte && sample.areBytes()) {
+      note(sample, "small whole numbers",
+           "read as linear light; --color-range 8 reads them as sRGB of 8 bits");
     } else if (sample.largest > 1 && sample.areBytes()) {
-      add(sample, sample.has_non_finite ? Kind::kLight8 : Kind::kCode8);
+      add(sample, sample.has_non_finite ? Kind::kLight : Kind::kCode8);
       note(sample, "0-255", "read as sRGB of 8 bits; --color-range unit reads them as linear");
     } else if (sample.largest > 255 && sample.are_wholes && sample.least >= 0) {
       note(sample, "whole numbers",
@@ -335,16 +263,45 @@ class ColorPlan {
     }
   }
 
+  // Directions cannot lie on one side of 0 alone.
+  void decideDirections(const ColorSample& sample) {
+    if (sample.largest <= 1) return;  // axes
+    for (const std::size_t i : sample.properties) {
+      RowProperty& property = element_.properties[i];
+      const bool is_byte = property.type == ValueType::kUint8;
+      if (!is_byte && property.type != ValueType::kUint16) continue;
+      changes_.push_back({Kind::kDirection, property});
+      property.type = is_byte ? ValueType::kInt8 : ValueType::kInt16;
+    }
+    notes_.push_back(fmt::format(
+        "normals are {} ({} {}): read as directions whose 0 is at {}; --channels normal=- drops "
+        "them",
+        valueTypeName(sample.type), sampled_, sample.largest,
+        sample.type == ValueType::kUint8 ? 128 : 32768));
+  }
+
+  // Integers are parts of the largest that their type holds, unless that leaves all but nothing.
+  void decideOpacity(const ColorSample& sample) {
+    const bool is_real = isFloatType(sample.type);
+    if (!sample.areBytes() || sample.has_non_finite || sample.largest < 1) return;
+    if (is_real ? sample.largest <= 1 : sample.type == ValueType::kUint8 && sample.largest > 1) {
+      return;
+    }
+    RowProperty& property = element_.properties[sample.properties[0]];
+    const bool is_flag = sample.largest <= 1;
+    changes_.push_back({is_flag ? Kind::kFlag : Kind::kCode8, property});
+    property.type = ValueType::kUint8;
+    notes_.push_back(fmt::format("opacity is 0-{} in {} ({} {}): {} is opaque", is_flag ? 1 : 255,
+                                 typeText(sample.type), sampled_, sample.largest,
+                                 is_flag ? 1 : 255));
+  }
+
   Status decideIntegers(const ColorSample& sample) {
-    const std::size_t bytes = valueTypeBytes(sample.type);
     const bool is_signed = sample.type == ValueType::kInt8 || sample.type == ValueType::kInt16;
+    const bool are_16_bits =
+        valueTypeBytes(sample.type) == 2 || (sample.least >= 0 && sample.largest <= 65535);
     if (isCodeGiven()) {
-      const bool is_8 = range_ == ColorRange::k8;
-      if (!is_8 && sample.type == ValueType::kUint16) return {};
-      add(sample, is_8 ? Kind::kCode8 : Kind::kCode16, true);
-      notes_.push_back(fmt::format(
-          "{} in {}: sRGB of {} bits, as --color-range says; what is above {} counts as that",
-          sample.channel, valueTypeName(sample.type), is_8 ? 8 : 16, is_8 ? 255 : 65535));
+      decideGiven(sample);
     } else if (sample.type == ValueType::kInt8) {
       add(sample, Kind::kCode8);
       note(sample, "char", "read as sRGB of 8 bits, without a sign");
@@ -353,12 +310,19 @@ class ColorPlan {
     } else if (sample.least >= 0 && sample.largest <= 255) {
       add(sample, Kind::kCode8);
       note(sample, "0-255", "read as sRGB of 8 bits; --color-range 16 reads them as 16 bits");
-    } else if (sample.type == ValueType::kUint16) {
-      return {};
-    } else if (bytes == 2 || (sample.least >= 0 && sample.largest <= 65535)) {
-      add(sample, Kind::kCode16);
-      note(sample, "above 255",
-           is_signed ? "read as sRGB of 16 bits, without a sign" : "read as sRGB of 16 bits");
+    } else if (const int bits = bitsOfCamera(sample)) {
+      add(sample, Kind::kCode16, whiteOf(bits));
+      note(sample, fmt::format("0-{}", whiteOf(bits)),
+           fmt::format("read as sRGB of {} bits; --color-range 16 reads them as 16 bits", bits));
+    } else if (are_16_bits) {
+      if (sample.type != ValueType::kUint16) add(sample, Kind::kCode16, 65535);
+      if (sample.least >= 0 && sample.largest < kDark) {
+        note(sample, "dark",
+             "read as sRGB of 16 bits; --color-range 10 or 12 reads them as so many bits");
+      } else if (sample.type != ValueType::kUint16) {
+        note(sample, "above 255",
+             is_signed ? "read as sRGB of 16 bits, without a sign" : "read as sRGB of 16 bits");
+      }
     } else if (sample.positive > 0 || sample.least < 0) {
       const RowProperty& property = element_.properties[sample.properties[0]];
       return Status::corruption(fmt::format(
@@ -368,6 +332,26 @@ class ColorPlan {
           sample.channel));
     }
     return {};
+  }
+
+  void decideGiven(const ColorSample& sample) {
+    const int bits = bitsGiven();
+    const double white = whiteOf(bits);
+    if (bits == 16 && sample.type == ValueType::kUint16) return;
+    add(sample, bits == 8 ? Kind::kCode8 : Kind::kCode16, white, true);
+    notes_.push_back(fmt::format(
+        "{} in {}: sRGB of {} bits, as --color-range says; what is above {} counts as that",
+        sample.channel, valueTypeName(sample.type), bits, white));
+  }
+
+  // 10 or 12 where the largest code needs all of these bits, as of cameras that have no more; else
+  // 0. As 16 bits such colors would be all but black.
+  static int bitsOfCamera(const ColorSample& sample) {
+    if (sample.least < 0 || sample.largest_alpha > whiteOf(12)) return 0;
+    for (const int bits : {10, 12}) {
+      if (sample.largest <= whiteOf(bits) && sample.largest > whiteOf(bits - 1)) return bits;
+    }
+    return 0;
   }
 
   // The properties of the color, in place of the one.
@@ -395,7 +379,7 @@ class ColorPlan {
   const RowReader& reader_;
   const ColorRange range_;
   RowLayout element_;
-  std::vector<Change> changes_;
+  std::vector<NumberChange> changes_;
   std::vector<std::string> notes_;
   std::string_view sampled_;
 };

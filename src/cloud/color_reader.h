@@ -1,7 +1,7 @@
 // Colors as rows have them, whatever numbers a file has for them. Integers of 8 and 16 bits in
 // wider types, bytes that are signed, 0-255 in reals and colors packed into one number become uchar
 // or ushort, which code sRGB, or floats, which are scene-linear (docs/files.md, "Colors"): so that
-// all that reads rows knows a color by its type. The numbers stay what they are.
+// all that reads rows knows a color by its type. Opacities and normals in integers likewise.
 #pragma once
 
 #include <memory>

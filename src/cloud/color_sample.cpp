@@ -9,6 +9,8 @@ namespace surfeit {
 namespace {
 
 constexpr std::size_t kPlaces = 1024, kRowsOfPlace = 64;
+// Larger numbers need more than 12 bits.
+constexpr double kMostOfCameras = 4095;
 constexpr std::size_t kPassBytes = 256 << 10;
 
 void addValues(const std::byte* rows, std::size_t count, std::size_t row_bytes,
@@ -39,7 +41,7 @@ void addValues(const std::byte* rows, std::size_t count, std::size_t row_bytes,
 bool isSettled(const ColorSample& sample) {
   if (sample.is_decided) return true;
   if (isFloatType(sample.type)) return !sample.are_wholes;
-  return sample.largest > (valueTypeBytes(sample.type) <= 2 ? 255 : 65535);
+  return sample.largest > (valueTypeBytes(sample.type) <= 2 ? kMostOfCameras : 65535);
 }
 
 void addRows(const RowReader& reader, Bytes rows, std::vector<ColorSample>& samples) {
@@ -49,6 +51,11 @@ void addRows(const RowReader& reader, Bytes rows, std::vector<ColorSample>& samp
       addValues(rows.data(), rows.size() / element.row_bytes, element.row_bytes,
                 element.properties[i], sample);
     }
+    if (sample.alpha == nullptr) continue;
+    ColorSample alpha;
+    addValues(rows.data(), rows.size() / element.row_bytes, element.row_bytes, *sample.alpha,
+              alpha);
+    sample.largest_alpha = std::max(sample.largest_alpha, alpha.largest);
   }
 }
 

@@ -13,12 +13,15 @@
 
 namespace surfeit {
 
-// The properties of a color, and what was seen of their values.
+inline constexpr const char* kOpacity = "opacity";
+
+// The properties of a color or the like, and what was seen of their values.
 struct ColorSample {
-  std::string channel;                  // color, radiosity, albedo; of one property: packed
+  std::string channel;  // color, radiosity, albedo, normal, opacity; else of one property: packed
   std::vector<std::size_t> properties;  // indices into the element's
   ValueType type = ValueType::kUint8;   // the widest of them
   bool is_decided = false;              // whatever its values are
+  const RowProperty* alpha = nullptr;   // beside it, whose white is that of the color
 
   double least = std::numeric_limits<double>::infinity();
   double largest = -std::numeric_limits<double>::infinity();
@@ -26,8 +29,10 @@ struct ColorSample {
   std::uint64_t positive = 0;
   bool are_wholes = true;
   bool has_non_finite = false;
+  double largest_alpha = 0;
 
-  bool isPacked() const { return properties.size() == 1; }
+  bool isOpacity() const { return channel == kOpacity; }
+  bool isPacked() const { return properties.size() == 1 && !isOpacity(); }
   bool hasLight() const { return positive > 0 || least < 0; }
   double meanOfPositive() const { return positive > 0 ? sum_of_positive / double(positive) : 0; }
   bool areBytes() const { return are_wholes && least >= 0 && largest <= 255; }

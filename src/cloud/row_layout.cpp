@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 #include <utility>
 
 namespace surfeit {
@@ -120,6 +121,25 @@ void swapRows(const RowLayout& element, std::span<std::byte> rows) {
   for (std::size_t row = 0; row + element.row_bytes <= rows.size(); row += element.row_bytes) {
     for (const RowProperty& property : element.properties) {
       if (!property.is_list) swapValue(&rows[row + property.offset], property.type);
+    }
+  }
+}
+
+void widenValue(std::byte* value, WideInteger wide) {
+  const auto widen = [value]<typename T>(T stored) {
+    std::memcpy(&stored, value, sizeof stored);
+    const double real = static_cast<double>(stored);
+    std::memcpy(value, &real, sizeof real);
+  };
+  if (wide == WideInteger::kSigned) widen(std::int64_t{});
+  if (wide == WideInteger::kUnsigned) widen(std::uint64_t{});
+}
+
+void widenRows(const RowLayout& element, std::span<std::byte> rows) {
+  for (const RowProperty& property : element.properties) {
+    if (property.is_list || property.wide == WideInteger::kNone) continue;
+    for (std::size_t at = property.offset; at < rows.size(); at += element.row_bytes) {
+      widenValue(&rows[at], property.wide);
     }
   }
 }

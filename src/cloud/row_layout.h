@@ -65,6 +65,9 @@ decltype(auto) visitValueType(ValueType type, Visit visit) {
 // control characters, fit to stand in a message.
 bool isPropertyName(std::string_view word);
 
+// Integers of 64 bits in a file: rows have doubles, which are exact up to 2^53.
+enum class WideInteger : std::uint8_t { kNone, kSigned, kUnsigned };
+
 struct RowProperty {
   std::string name;
   ValueType type = ValueType::kFloat32;  // of the value, or of the items of a list
@@ -72,6 +75,7 @@ struct RowProperty {
   ValueType count_type = ValueType::kUint8;  // of a list's length
   // Where the value stands in a row of the reader: packed, host byte order; lists take no bytes.
   std::size_t offset = 0;
+  WideInteger wide = WideInteger::kNone;  // in the file, where the type is float64
 };
 
 struct RowLayout {
@@ -95,6 +99,11 @@ void packRow(RowLayout& element);
 void swapValue(std::byte* value, ValueType type);
 // Turns every value of whole packed rows round, in place.
 void swapRows(const RowLayout& element, std::span<std::byte> rows);
+
+// Turns the bits of integers of 64 bits into doubles, in place.
+void widenValue(std::byte* value, WideInteger wide);
+// Those of whole packed rows.
+void widenRows(const RowLayout& element, std::span<std::byte> rows);
 
 // Text of a file as it may stand in a message: quoted, printable, at most 40 characters of it.
 std::string quoteText(std::string_view text);

@@ -3,14 +3,23 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
 
 #include "cloud/channels.h"
 #include "cloud/srgb_curve.h"
+#include "cloud/surfel_names.h"
 
 namespace surfeit {
 namespace {
+
+// Whether values of a color become values of another type without loss.
+bool holdsColor(ValueType to, ValueType from) {
+  return to == from || (isFloatType(to) && valueTypeBytes(to) >= valueTypeBytes(from)) ||
+         (from == ValueType::kUint8 && to == ValueType::kUint16);
+}
 
 // By property, whether it belongs to a color that is coded.
 std::vector<bool> findColors(const RowLayout& element) {
@@ -82,6 +91,14 @@ void convertValues(const std::byte* from, std::size_t from_stride, std::size_t c
   }
 }
 
+// The property of a color that stands for this one of radiosity or albedo; else nullptr.
+const char* colorFor(std::string_view name) {
+  for (int i = 0; i < 3; ++i) {
+    if (name == kRadiosityNames[i] || name == kAlbedoNames[i]) return kColorNames[i];
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 void RowUnion::add(const RowLayout& element) {
@@ -107,20 +124,39 @@ RowCopier::RowCopier(const RowLayout& from, const RowLayout& to)
   }
   const std::vector<bool> is_color = findColors(from);
   for (const RowProperty& target : to.properties) {
-    const auto found = index.find(target.name);
-    if (found == index.end()) {
+    auto found = index.find(target.name);
+    if (found != index.end()) {
+      addCopy(from.properties[found->second], target, is_color[found->second]);
+      continue;
+    }
+    const char* const color = colorFor(target.name);
+    found = color != nullptr ? index.find(color) : index.end();
+    if (found != index.end() && holdsColor(target.type, from.properties[found->second].type)) {
+      addCopy(from.properties[found->second], target, is_color[found->second]);
+      colored_.push_back(target.name);
+    } else if (!addFull(target)) {
       absent_.push_back(target.name);
-      continue;
     }
-    const RowProperty& source = from.properties[found->second];
-    if (source.type == target.type) {
-      addRun({source.offset, target.offset, valueTypeBytes(target.type)});
-      continue;
-    }
-    Conversion conversion{source, target, {}};
-    if (is_color[found->second]) conversion.codes = convertedCodes(source.type, target.type);
-    conversions_.push_back(std::move(conversion));
   }
+}
+
+void RowCopier::addCopy(const RowProperty& source, const RowProperty& target, bool is_color) {
+  if (source.type == target.type) {
+    addRun({source.offset, target.offset, valueTypeBytes(target.type)});
+    return;
+  }
+  Conversion conversion{source, target, {}};
+  if (is_color) conversion.codes = convertedCodes(source.type, target.type);
+  conversions_.push_back(std::move(conversion));
+}
+
+bool RowCopier::addFull(const RowProperty& target) {
+  const bool is_full =
+      target.name == "opacity" || target.name == "coverage" || target.name == "alpha";
+  if (!is_full) return false;
+  filled_.push_back(target);
+  full_.push_back(target.name);
+  return true;
 }
 
 void RowCopier::addRun(const Run& run) {
@@ -148,6 +184,15 @@ void RowCopier::copy(const std::byte* from, std::size_t step, std::size_t count,
   const std::size_t stride = step * from_bytes_;
   for (const Run& run : runs_) {
     copyBytes(from + run.from, stride, run.bytes, count, to + run.to, to_bytes_);
+  }
+  for (const RowProperty& property : filled_) {
+    visitValueType(property.type, [&]<typename T>(std::type_identity<T>) {
+      T full{1};
+      if constexpr (std::is_integral_v<T>) full = std::numeric_limits<T>::max();
+      for (std::size_t i = 0; i < count; ++i) {
+        std::memcpy(to + i * to_bytes_ + property.offset, &full, sizeof full);
+      }
+    });
   }
   for (const Conversion& conversion : conversions_) {
     visitValueType(conversion.from.type, [&]<typename In>(std::type_identity<In>) {

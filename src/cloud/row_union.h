@@ -27,12 +27,16 @@ class RowUnion {
 // thread.
 class RowCopier {
  public:
-  // Properties that `to` lacks are left out; those that only `to` has become 0. Those that both
-  // have must be of a type in `to` that holds the values.
+  // Properties that `to` lacks are left out. Those that only `to` has become what their absence
+  // means: opacity, coverage and alpha are full, radiosity and albedo are the color where `from`
+  // has one, all others are 0. Those that both have must be of a type in `to` that holds the
+  // values.
   RowCopier(const RowLayout& from, const RowLayout& to);
 
-  // Properties that become 0.
+  // Properties that become 0, that are full, and that are the color.
   const std::vector<std::string>& absent() const { return absent_; }
+  const std::vector<std::string>& full() const { return full_; }
+  const std::vector<std::string>& colored() const { return colored_; }
   // Whether the rows are the same bytes either way.
   bool keepsRows() const;
 
@@ -49,11 +53,14 @@ class RowCopier {
   };
 
   void addRun(const Run& run);
+  void addCopy(const RowProperty& source, const RowProperty& target, bool is_color);
+  bool addFull(const RowProperty& target);
 
   std::size_t from_bytes_, to_bytes_;
   std::vector<Run> runs_;
   std::vector<Conversion> conversions_;
-  std::vector<std::string> absent_;
+  std::vector<RowProperty> filled_;  // with the value of full
+  std::vector<std::string> absent_, full_, colored_;
 };
 
 }  // namespace surfeit

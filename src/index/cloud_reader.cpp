@@ -14,6 +14,7 @@
 #include "core/parallel.h"
 #include "core/thread_scratch.h"
 #include "core/up_comment.h"
+#include "index/mixed_clouds.h"
 #include "index/row_fetcher.h"
 #include "index/scene_rows.h"
 #include "surfeit/group_names.h"
@@ -23,6 +24,8 @@ namespace {
 
 // Places that a sample is taken from; few records at each, because neighbours say the same.
 constexpr std::uint64_t kLeastPlaces = 2048, kMostPlaces = 16384;
+// The provenance of a scene has 64 KiB, and escapes take room.
+constexpr std::size_t kMostCrsBytes = 16 << 10;
 
 // What the decoding threads of one input share.
 class InputPass {
@@ -170,7 +173,28 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
     reader.file_bytes_ += file.size();
   }
+  if (const std::size_t bytes = reader.crs_.crs().size(); bytes > kMostCrsBytes) {
+    reader.notes_.push_back(
+        fmt::format("the coordinate reference system has {} bytes of text, and a scene keeps {} at "
+                    "most: it is not kept",
+                    bytes, kMostCrsBytes));
+  }
+  for (std::string& note : notesOfDarkClouds(reader.clouds())) {
+    reader.notes_.push_back(std::move(note));
+  }
   return reader;
+}
+
+std::string CloudReader::crs() const {
+  return crs_.crs().size() <= kMostCrsBytes ? crs_.crs() : std::string();
+}
+
+std::vector<MixedCloud> CloudReader::clouds() const {
+  std::vector<MixedCloud> clouds;
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    clouds.push_back({inputs_[i], channels_[i], records_[i]});
+  }
+  return clouds;
 }
 
 void CloudReader::addGroupNames(const SurfelSource& source) {
@@ -202,6 +226,14 @@ std::map<std::uint32_t, std::string> CloudReader::groupNames(
                       "name (index --group gives clouds names)",
                       inputs_[i], group, name, known->second));
     }
+  }
+  const auto named = names.find(0);
+  for (std::size_t i = 0; named != names.end() && i < inputs_.size(); ++i) {
+    if (channels_[i].group || (!groups_.empty() && groups_[i])) continue;
+    notes.push_back(
+        fmt::format("{}: no object groups, so its surfels are of group 0, which is \"{}\" in "
+                    "another cloud (index --group gives it a name of its own)",
+                    inputs_[i], named->second));
   }
   return names;
 }

@@ -15,6 +15,7 @@
 #include "cloud/cloud_formats.h"
 #include "core/bounds.h"
 #include "index/merged_comments.h"
+#include "index/mixed_clouds.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
@@ -77,6 +78,10 @@ class CloudReader {
   // The axis that the inputs say is up; where they disagree that of the first, which notes() tell.
   UpAxis up() const { return up_.value_or(kDefaultUpAxis); }
 
+  // The coordinate reference system of the first input that states one, for the scene to keep;
+  // empty where none does, or where its text is too long, which notes() tell.
+  std::string crs() const;
+
   // Of inputs whose positions are floats, where these are coarse beside the spacing of all.
   std::vector<std::string> notesOfFloats(const CloudTotals& totals) const;
   // What is to be told of the inputs, with their paths.
@@ -114,6 +119,7 @@ class CloudReader {
   Result<CloudTotals> readInput(std::size_t input, const Records& records, const Consumer& consume,
                                 Progress& progress) const;
   void addGroupNames(const SurfelSource& source);
+  std::vector<MixedCloud> clouds() const;
 
   std::vector<std::string> inputs_;
   std::vector<std::uint64_t> records_;  // by input

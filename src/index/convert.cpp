@@ -363,15 +363,21 @@ class Converter {
     }
   }
 
+  void noteAbsent(const std::string& path, const RowCopier& copier) {
+    const auto tell = [&](const char* what, const std::vector<std::string>& names) {
+      if (!names.empty()) progress_.note(fmt::format("{}: {}:{}", path, what, listNames(names)));
+    };
+    tell("not there, 0 is written", copier.absent());
+    tell("not there, 1 or the largest code is written", copier.full());
+    tell("not there, the color is written", copier.colored());
+  }
+
   Status convert(RowReader& reader) {
     const RowLayout& from = reader.element();
     const RowLayout& to = writer_->element();
     if (from.count == 0) return {};
     const RowCopier copier(from, to);
-    if (!copier.absent().empty() && !is_measuring_) {
-      progress_.note(
-          fmt::format("{}: not there, 0 is written:{}", reader.path(), listNames(copier.absent())));
-    }
+    if (!is_measuring_) noteAbsent(reader.path(), copier);
     const bool keeps_rows = copier.keepsRows() && options_.every == 1 && transform_.isIdentity() &&
                             !cropper_ && !thinner_ && assignments_.empty();
     const std::size_t batch_rows =

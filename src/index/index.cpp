@@ -344,7 +344,8 @@ Result<std::unique_ptr<SceneWriter>> Indexer::createWriter(const std::string& pa
 }
 
 SceneDescription Indexer::describe(const std::optional<NormalRule>& rule) const {
-  return {options_, group_names_, totals_, reader_->origin(), up(), rule ? &*rule : nullptr};
+  return {options_,      group_names_, totals_, reader_->origin(), up(), rule ? &*rule : nullptr,
+          reader_->crs()};
 }
 
 std::string Indexer::provenance() const {

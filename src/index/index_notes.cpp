@@ -16,8 +16,8 @@ void noteStrays(const CloudTotals& totals, const glm::dvec3& origin, bool is_ori
   for (const Surfel& surfel : totals.sample) places.push_back(surfel.position);
   const std::string strays = strayNote(places, totals.bounds, origin);
   if (!strays.empty()) progress.inform(strays);
-  const std::string loss =
-      lossByStrays(std::move(places), totals.bounds, origin, totals.surfels, is_origin_asked);
+  std::string loss = lossByStrays(places, totals.bounds, origin, totals.surfels, is_origin_asked);
+  if (loss.empty()) loss = lossByDistance(places, totals.bounds, origin, totals.surfels);
   if (!loss.empty()) progress.note(loss);
 }
 

@@ -185,8 +185,9 @@ class ShardBuild {
                                                job_.temporary_directory},
                          progress_);
     RepeatFilter distinct(buckets, job_.options.repeats);
-    const SceneDescription description{job_.options, job_.group_names, plan_.totals, plan_.origin,
-                                       job_.up()};
+    const SceneDescription description{job_.options,     job_.group_names, plan_.totals,
+                                       plan_.origin,     job_.up(),        nullptr,
+                                       job_.reader.crs()};
     CountedSurfels left(distinct, plan_.splitters);
     const bool is_thin = job_.options.repeats == Repeats::kThin;
     SortedSurfelStream& stream = is_thin ? static_cast<SortedSurfelStream&>(left) : distinct;

@@ -116,8 +116,8 @@ class IndexMerge {
     noteRepeats(stats_, options, progress_);
     if (progress_.isCancelled()) return Status::interrupted();
 
-    const SceneDescription description{options, job_.group_names, plan_.totals, plan_.origin,
-                                       job_.up()};
+    const SceneDescription description{options,   job_.group_names, plan_.totals,     plan_.origin,
+                                       job_.up(), nullptr,          job_.reader.crs()};
     SURFEIT_ASSIGN_OR_RETURN(
         const std::unique_ptr<SceneWriter> writer,
         SceneWriter::create(job_.output, description.header(options.full_precision),

@@ -19,6 +19,9 @@ class FirstCrs {
   // A note when the comments of a later cloud state another one; else empty.
   std::string compare(const std::string& path, std::span<const std::string> comments);
 
+  // Empty where none does.
+  const std::string& crs() const { return crs_; }
+
  private:
   std::string crs_, path_;
 };

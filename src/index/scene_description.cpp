@@ -65,6 +65,7 @@ std::string SceneDescription::provenance() const {
   const auto cube =
       options.cube ? PinnedCube(*options.cube).unusualNumbers(totals.bounds, origin) : std::nullopt;
   if (cube) json["cube"] = *cube;
+  if (!crs.empty()) json["crs"] = crs;
   if (normals != nullptr) json["normals"] = normals->describe();
   for (const auto& [group, name] : groups) json["groups"][std::to_string(group)] = name;
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);

@@ -23,6 +23,7 @@ struct SceneDescription {
   glm::dvec3 origin{0};
   UpAxis up = kDefaultUpAxis;
   const NormalRule* normals = nullptr;  // by which normals are found, if they are
+  std::string crs{};                    // coordinate reference system; empty: not known
 
   // Without counts and levels.
   SceneHeader header(bool full_precision) const;

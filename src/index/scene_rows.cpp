@@ -9,8 +9,11 @@
 
 #include "cloud/filtered_reader.h"
 #include "cloud/parts/property_renames.h"
+#include "core/crs_comment.h"
+#include "core/group_comment.h"
 #include "core/parallel.h"
 #include "core/up_comment.h"
+#include "octree/read/provenance.h"
 #include "surfeit/cloud_info.h"
 #include "surfels/surfel_rows.h"
 
@@ -69,7 +72,16 @@ class SceneRowReader final : public RowReader {
     return Bytes(buffer.data(), count * rows_.rowBytes());
   }
 
-  std::vector<std::string> comments() const override { return {upComment(scene_.header().up)}; }
+  std::vector<std::string> comments() const override {
+    std::vector<std::string> comments = {upComment(scene_.header().up)};
+    if (const std::string crs = sceneCrs(scene_.provenance()); !crs.empty()) {
+      comments.push_back(std::string(kCrsComment) + crs);
+    }
+    for (const GroupName& name : groupNamesOf(scene_.provenance())) {
+      comments.push_back(groupComment(name.group, name.name));
+    }
+    return comments;
+  }
 
   Status rewind() override {
     next_page_ = 0;

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <set>
+#include <tuple>
 
 namespace surfeit {
 namespace {
@@ -13,6 +16,9 @@ namespace {
 constexpr double kFar = 1000;
 // A hundredth of the sample at either end of each axis may be strays.
 constexpr std::size_t kRare = 100;
+// Part of the spacing that rounding may move positions by.
+constexpr double kLoss = 0.02;
+constexpr std::size_t kLeastInCell = 8;
 
 Bounds3d usualBounds(std::vector<glm::vec3>& sample) {
   Bounds3d bounds;
@@ -36,6 +42,46 @@ std::optional<Bounds3d> boundsBesideStrays(std::vector<glm::vec3>& sample, const
   const double width = usual.longestSide();
   if (!(width > 0) || double(bounds.longestSide()) <= kFar * width) return std::nullopt;
   return usual;
+}
+
+// Places from all over a sample, few enough to be sorted often.
+std::vector<glm::vec3> fewPlaces(const std::vector<glm::vec3>& sample) {
+  constexpr std::size_t kMost = 4096;
+  const std::size_t step = sample.size() / kMost + 1;
+  std::vector<glm::vec3> few(sample.size() / step);
+  for (std::size_t i = 0; i < few.size(); ++i) few[i] = sample[i * step];
+  return few;
+}
+
+// Whether most places repeat another one: then their spacing is not to be seen.
+bool areRepeats(const std::vector<glm::vec3>& places) {
+  std::set<std::tuple<float, float, float>> distinct;
+  for (const glm::vec3& place : places) distinct.emplace(place.x, place.y, place.z);
+  return distinct.size() * kLeastInCell <= places.size();
+}
+
+// The area that places cover, or more: of the finest cells of a grid that hold a good number each.
+double coveredArea(const std::vector<glm::vec3>& places, const Bounds3& bounds) {
+  constexpr int kLevels = 21;
+  const double side = double(bounds.longestSide());
+  std::vector<std::uint64_t> cells(places.size());
+  double area = side * side;
+  for (int level = 1; level < kLevels; ++level) {
+    const double scale = double(1 << level) / side;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      std::uint64_t cell = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double offset = double(places[i][axis]) - double(bounds.min[axis]);
+        cell = cell << kLevels | static_cast<std::uint64_t>(std::max(offset * scale, 0.));
+      }
+      cells[i] = cell;
+    }
+    std::sort(cells.begin(), cells.end());
+    const auto count = std::unique(cells.begin(), cells.end()) - cells.begin();
+    if (std::size_t(count) * kLeastInCell > places.size()) break;
+    area = double(count) / (scale * scale);
+  }
+  return area;
 }
 
 }  // namespace
@@ -70,6 +116,30 @@ std::string lossByStrays(std::vector<glm::vec3> sample, const Bounds3& bounds,
       "positions are rounded to {:.2g}, beside a spacing of about {:.2g}, because strays put their "
       "origin far away: leave the strays out{}",
       step, spacing, is_origin_asked ? choice : "");
+}
+
+std::string lossByDistance(const std::vector<glm::vec3>& sample, const Bounds3& bounds,
+                           const glm::dvec3& origin, std::uint64_t count) {
+  const double side = double(bounds.longestSide());
+  const std::vector<glm::vec3> places = fewPlaces(sample);
+  if (places.size() < kRare || !(side > 0) || count == 0 || areRepeats(places)) return {};
+  const double spacing = std::sqrt(coveredArea(places, bounds) / double(count));
+  std::size_t coarse = 0;
+  double most = 0;
+  for (const glm::vec3& place : places) {
+    const double step = floatStep({glm::dvec3(place), glm::dvec3(place)});
+    if (step <= kLoss * spacing) continue;
+    ++coarse;
+    most = std::max(most, step);
+  }
+  if (coarse <= places.size() / kRare) return {};
+  return fmt::format(
+      "positions of {:.0f} % of the surfels are rounded to {:.2g}, beside a spacing of about "
+      "{:.2g}, "
+      "because the surfels lie up to {:.2g} apart, and the scene counts from {:.0f} {:.0f} {:.0f}: "
+      "index places far from each other one by one, or move them together (convert --transform)",
+      100. * double(coarse) / double(places.size()), most, spacing, side, origin.x, origin.y,
+      origin.z);
 }
 
 }  // namespace surfeit

@@ -23,4 +23,10 @@ std::string strayNote(std::vector<glm::vec3> sample, const Bounds3& bounds,
 std::string lossByStrays(std::vector<glm::vec3> sample, const Bounds3& bounds,
                          const glm::dvec3& origin, std::uint64_t count, bool is_origin_asked);
 
+// A sentence when the surfels lie in places so far apart that floats about one origin round the
+// positions of more than one in a hundred of `sample`, beside the spacing of `count` surfels, where
+// no strays are to blame.
+std::string lossByDistance(const std::vector<glm::vec3>& sample, const Bounds3& bounds,
+                           const glm::dvec3& origin, std::uint64_t count);
+
 }  // namespace surfeit

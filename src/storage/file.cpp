@@ -49,11 +49,13 @@ Result<InputFile> InputFile::fromOpen(PositionalFile file, Access access) {
     return input.file_.systemError("stat");
   }
   if (!S_ISREG(info.st_mode)) {
-    return Status::ioError(fmt::format("{}: found a {}, expected a regular file or a pipe",
-                                       input.path(),
-                                       S_ISDIR(info.st_mode)              ? "directory"
-                                       : isatty(input.file_.descriptor()) ? "terminal"
-                                                                          : "device"));
+    const bool is_directory = S_ISDIR(info.st_mode);
+    return Status::ioError(fmt::format(
+        "{}: found a {}, expected a regular file or a pipe{}", input.path(),
+        is_directory                       ? "directory"
+        : isatty(input.file_.descriptor()) ? "terminal"
+                                           : "device",
+        is_directory ? fmt::format(": name the files in it ({}/*)", input.path()) : ""));
   }
   input.size_ = static_cast<std::uint64_t>(info.st_size);
   input.written_ns_ = writtenNs(info);

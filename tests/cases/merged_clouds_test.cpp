@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -115,6 +116,119 @@ TEST_F(MergedClouds, CoordinateReferenceSystemsThatDifferAreTold) {
 TEST_F(MergedClouds, OnePlaceIsNotCoarse) {
   index({cloud("one.ply", "")});
   EXPECT_THAT(notes_.notes, Each(Not(HasSubstr("positions are floats"))));
+}
+
+// Points at z = 0, in an n by n grid of edge 1, with what `properties` and `values` add.
+std::string gridCloud(int n, double x, double y, const std::string& properties,
+                      const std::string& values) {
+  std::string text = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(n * n) +
+                     "\nproperty double x\nproperty double y\nproperty double z\nproperty float "
+                     "radius\n" +
+                     properties + "end_header\n";
+  for (int i = 0; i < n * n; ++i) {
+    text += std::to_string(x + double(i % n) / n) + " " + std::to_string(y + double(i / n) / n) +
+            " 0 .01" + values + "\n";
+  }
+  return text;
+}
+
+TEST_F(MergedClouds, CloudsThatStayDarkBesideOthersAreToldOnce) {
+  const std::string rgb = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  const std::string radiosity =
+      "property float radiosity_r\nproperty float radiosity_g\nproperty float radiosity_b\n";
+  const std::string albedo =
+      "property float albedo_r\nproperty float albedo_g\nproperty float albedo_b\n";
+  write("colors.ply", gridCloud(3, 0, 0, rgb, " 1 2 3"));
+  write("plain.ply", gridCloud(2, 0, 2, "", ""));
+  write("plain2.ply", gridCloud(1, 0, 4, "", ""));
+  write("light.ply", gridCloud(1, 0, 6, radiosity, " 1 1 1"));
+  write("matte.ply", gridCloud(1, 0, 8, albedo, " 1 1 1"));
+  const auto dark = testing::HasSubstr("records have no");
+
+  index({path("plain.ply"), path("colors.ply"), path("plain2.ply")});
+  EXPECT_THAT(notes_.notes,
+              Contains(testing::AllOf(HasSubstr("plain.ply and 1 more: 5 of 14 records have no "
+                                                "colors, which "),
+                                      HasSubstr("colors.ply has: they send and reflect no light"),
+                                      HasSubstr("--set \"radiosity = 0.5\""))));
+  EXPECT_EQ(std::count_if(
+                notes_.notes.begin(), notes_.notes.end(),
+                [](const std::string& note) { return note.find("records have no") != note.npos; }),
+            1);
+  index({path("colors.ply"), path("light.ply"), path("matte.ply")});
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("light.ply: 1 of 11 records have no albedo")));
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("matte.ply: 1 of 11 records have no radiosity")));
+  index({path("colors.ply"), path("colors.ply")});
+  EXPECT_THAT(notes_.notes, Not(Contains(dark)));
+  index({path("plain.ply"), path("plain2.ply")});
+  EXPECT_THAT(notes_.notes, Not(Contains(dark)));
+
+  // The way out works
+  ConvertOptions options;
+  options.assignments = {"radiosity = 0.5", "albedo = 0.5"};
+  ASSERT_TRUE(convert({path("plain.ply")}, "lit.ply", options).ok());
+  index({path("colors.ply"), path("lit.ply")});
+  EXPECT_THAT(notes_.notes, Not(Contains(dark)));
+}
+
+TEST_F(MergedClouds, PlacesTooFarApartForFloatsAreTold) {
+  write("here.ply", gridCloud(30, 0, 0, "", ""));
+  write("map.ply", gridCloud(30, 500000, 5000000, "", ""));
+  write("near.ply", gridCloud(30, 40, 90, "", ""));
+  const auto loss = HasSubstr("of the surfels are rounded to");
+  index({path("here.ply"), path("map.ply")});
+  EXPECT_THAT(notes_.notes, Contains(testing::AllOf(loss, HasSubstr("50 %"))));
+  // One cloud with both places, too
+  ASSERT_TRUE(convert({path("map.ply"), path("here.ply")}, "both.ply").ok());
+  index({path("both.ply")});
+  EXPECT_THAT(notes_.notes, Contains(loss));
+  for (const char* other : {"near.ply", "here.ply"}) {
+    index({path("here.ply"), path(other)});
+    EXPECT_THAT(notes_.notes, Not(Contains(loss))) << other;
+  }
+  index({path("map.ply")});
+  EXPECT_THAT(notes_.notes, Not(Contains(loss)));
+}
+
+TEST_F(MergedClouds, ScenesKeepNamesOfGroupsAndTheReferenceSystem) {
+  index({cloud("lamp.ply", "comment crs EPSG:32610\ncomment group 1 lamp\n", 1)});
+  for (const char* name : {"back.ply", "back.xyz", "back.las"}) {
+    ASSERT_TRUE(convert({path("scene.sft")}, name).ok());
+    const auto reader = openRowReader(path(name));
+    ASSERT_TRUE(reader.ok());
+    EXPECT_THAT((*reader)->comments(), Contains("crs EPSG:32610")) << name;
+  }
+  index({path("back.ply")});
+  EXPECT_THAT(groupsOfScene(), testing::ElementsAre("1 lamp"));
+}
+
+TEST_F(MergedClouds, CloudsWithoutGroupsAreNotTakenForAGroupWithAName) {
+  write("plain.ply", gridCloud(1, 0, 6, "", ""));
+  index({cloud("lamp.ply", "comment group 0 lamp\n", 0), path("plain.ply")});
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("plain.ply: no object groups, so its surfels are of "
+                                               "group 0, which is \"lamp\"")));
+}
+
+TEST_F(MergedClouds, WhatACloudLacksIsWhatItsAbsenceMeans) {
+  const std::string rgb = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  const std::string radiosity =
+      "property float radiosity_r\nproperty float radiosity_g\nproperty float radiosity_b\n";
+  write("pane.ply", gridCloud(1, 0, 0, radiosity + "property float opacity\n", " 2 3 4 .25"));
+  write("wall.ply", gridCloud(1, 0, 2, rgb, " 255 0 0"));
+  ASSERT_TRUE(convert({path("pane.ply"), path("wall.ply")}, "all.ply").ok());
+  EXPECT_THAT(columnOf(path("all.ply"), "opacity"), testing::ElementsAre(.25, 1));
+  EXPECT_THAT(columnOf(path("all.ply"), "radiosity_r"), testing::ElementsAre(2, 1));
+  EXPECT_THAT(columnOf(path("all.ply"), "radiosity_g"), testing::ElementsAre(3, 0));
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("1 or the largest code is written: opacity")));
+  EXPECT_THAT(notes_.notes, Contains(HasSubstr("the color is written: radiosity_r")));
+  // So that the scene of the merged cloud is that of the clouds
+  ASSERT_TRUE(indexClouds({path("all.ply")}, path("all.sft"), {}, notes_).ok());
+  index({path("pane.ply"), path("wall.ply")});
+  ASSERT_TRUE(convert({path("scene.sft")}, "one.ply").ok());
+  ASSERT_TRUE(convert({path("all.sft")}, "two.ply").ok());
+  for (const char* name : {"x", "radiosity_r", "radiosity_b", "opacity"}) {
+    EXPECT_EQ(columnOf(path("one.ply"), name), columnOf(path("two.ply"), name)) << name;
+  }
 }
 
 TEST(CrsComment, CodesAreThoseOfTheWhole) {

@@ -230,8 +230,7 @@ class ScanTable : public DirectoryTest {
           "LAS dark first", name,
           isRight(readText("a.las", coloredLas(minor, format, {3, 3, 3, 40000}, 7)), 7, deep, ""));
       check("LAS 12 bits in 16", name,
-            isRight(readText("a.las", coloredLas(minor, format, {4095}, 7)), 7,
-                    linearOf(4095, 65535), "16 times darker than codes of 12"));
+            isRight(readText("a.las", coloredLas(minor, format, {4095}, 7)), 7, 1, "12 bits"));
       // Points 0 to 5 have their numbers as classes
       const std::string six = makeLas(minor, format, 6);
       const std::size_t at = format <= 5 ? 15 : 16;

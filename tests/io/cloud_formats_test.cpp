@@ -56,9 +56,9 @@ TEST_F(CloudFormatsTest, FormatsThatAreNotReadAreToldWhatToDo) {
               HasSubstr("git lfs pull"));
   EXPECT_THAT(refusal("<!DOCTYPE html>\n<html>"), HasSubstr("a web page"));
   EXPECT_THAT(refusal("{\"points\": [1, 2, 3]}"), HasSubstr("found JSON"));
-  write("a.csv", "% of a program\n1|2|3\n");
+  write("a.csv", "% of a program\n1!2!3\n");
   EXPECT_THAT(openRowReader(path("a.csv")).status().message(),
-              HasSubstr("line 2: found '1|2|3', expected three numbers or names"));
+              HasSubstr("line 2: found '1!2!3', expected three numbers or names"));
   write("a.splat", std::string(96, '\x01'));
   EXPECT_THAT(openRowReader(path("a.splat")).status().message(),
               HasSubstr("PLY of Gaussian splats"));

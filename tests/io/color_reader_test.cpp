@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "cloud/cloud_formats.h"
@@ -90,9 +91,84 @@ TEST_F(ColorReaderTest, SixteenBitsThatNeverExceed255AreEight) {
 }
 
 TEST_F(ColorReaderTest, OneLargeValueMakesThemSixteen) {
-  const Found found = findColor("ushort", "0 0 0\n117 73 256\n", ColorRange::kAuto);
+  const Found found = findColor("ushort", "0 0 0\n117 73 4096\n", ColorRange::kAuto);
   EXPECT_EQ(found.type, "ushort");
+  EXPECT_THAT(found.values, ElementsAre(0, 117));
   EXPECT_THAT(found.notes, IsEmpty());
+}
+
+TEST_F(ColorReaderTest, CodesThatNeedTenOrTwelveBitsHaveThese) {
+  for (const char* type : {"ushort", "short", "int", "uint"}) {
+    for (const auto& [rows, bits, second] :
+         {std::tuple{"0 0 0\n1023 73 512\n", 10, 65535}, std::tuple{"0 0 0\n512 1 2\n", 10, 32800},
+          std::tuple{"0 0 0\n4095 73 49\n", 12, 65535},
+          std::tuple{"0 0 0\n2048 1 2\n", 12, 32776}}) {
+      const Found found = findColor(type, rows, ColorRange::kAuto);
+      EXPECT_EQ(found.type, "ushort") << type << rows;
+      EXPECT_THAT(found.values, ElementsAre(0, second)) << type << rows;
+      ASSERT_EQ(found.notes.size(), 1u) << type << rows;
+      EXPECT_THAT(found.notes[0], HasSubstr("read as sRGB of " + std::to_string(bits) +
+                                            " bits; --color-range 16 reads them as 16 bits"));
+      EXPECT_EQ(findColor(type, rows, ColorRange::k16).values[1], std::stoi(rows + 6)) << type;
+    }
+  }
+}
+
+TEST_F(ColorReaderTest, SmallWholeRealsAreLight) {
+  const Found found = findColor("float", "0 0 0\n2 1 15\n", ColorRange::kAuto);
+  EXPECT_EQ(found.type, "float");
+  EXPECT_THAT(found.values, ElementsAre(0, 2));
+  ASSERT_EQ(found.notes.size(), 1u);
+  EXPECT_THAT(found.notes[0], HasSubstr("--color-range 8 reads them as sRGB of 8 bits"));
+}
+
+TEST_F(ColorReaderTest, OpacitiesOfWiderIntegersAreNotAllButNothing) {
+  const auto opacity = [&](const char* type, const char* rows) {
+    return find(ply(type, "opacity", rows), "opacity");
+  };
+  for (const char* type : {"ushort", "int", "uint", "float"}) {
+    const Found bytes = opacity(type, "0\n128\n255\n");
+    EXPECT_EQ(bytes.type, "uchar") << type;
+    EXPECT_THAT(bytes.values, ElementsAre(0, 128, 255)) << type;
+    ASSERT_EQ(bytes.notes.size(), 1u) << type;
+    EXPECT_THAT(bytes.notes[0], HasSubstr("255 is opaque"));
+  }
+  for (const char* type : {"uchar", "ushort", "int"}) {
+    const Found flags = opacity(type, "0\n1\n");
+    EXPECT_EQ(flags.type, "uchar") << type;
+    EXPECT_THAT(flags.values, ElementsAre(0, 255)) << type;
+    ASSERT_EQ(flags.notes.size(), 1u) << type;
+  }
+  // As they are
+  EXPECT_THAT(opacity("uchar", "3\n128\n").notes, IsEmpty());
+  EXPECT_THAT(opacity("ushort", "3\n30000\n").notes, IsEmpty());
+  EXPECT_THAT(opacity("float", "0\n.5\n1\n").notes, IsEmpty());
+  EXPECT_THAT(opacity("float", "0\n1\n").values, ElementsAre(0, 1));
+}
+
+TEST_F(ColorReaderTest, AlphaOf16BitsMakesThemSixteen) {
+  const std::string rows = "0 0 0 65535\n3000 73 49 65535\n";
+  EXPECT_THAT(find(ply("ushort", "red green blue alpha", rows)).values, ElementsAre(0, 3000));
+  const std::string camera = "0 0 0 4095\n3000 73 49 4095\n";
+  EXPECT_THAT(find(ply("ushort", "red green blue alpha", camera)).values, ElementsAre(0, 48011));
+}
+
+TEST_F(ColorReaderTest, ColorsThatWouldBeBlackAreTold) {
+  for (const char* rows : {"0 0 0\n256 73 49\n", "0 0 0\n1024 73 49\n"}) {
+    const Found found = findColor("ushort", rows, ColorRange::kAuto);
+    EXPECT_EQ(found.type, "ushort");
+    ASSERT_EQ(found.notes.size(), 1u) << rows;
+    EXPECT_THAT(found.notes[0], HasSubstr("--color-range 10 or 12 reads them as so many bits"));
+  }
+}
+
+TEST_F(ColorReaderTest, TenAndTwelveBitsMayBeAskedFor) {
+  EXPECT_THAT(findColor("ushort", "0 0 0\n1023 0 0\n2000 0 0\n", ColorRange::k10).values,
+              ElementsAre(0, 65535, 65535));
+  EXPECT_THAT(findColor("int", "0 0 0\n4095 0 0\n", ColorRange::k12).values, ElementsAre(0, 65535));
+  const Found reals = findColor("float", "0 0 0\n1023 0 0\n", ColorRange::k10);
+  EXPECT_EQ(reals.type, "float");
+  EXPECT_THAT(reals.values, ElementsAre(0, 1));
 }
 
 TEST_F(ColorReaderTest, BlackDecidesNothing) {

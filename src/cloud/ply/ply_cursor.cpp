@@ -10,10 +10,13 @@ namespace {
 
 bool isBlank(std::byte byte) {
   const char c = static_cast<char>(byte);
-  return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+  return c == ' ' || c == '\t' || c == '\v' || c == '\f';
 }
 
-bool isLineEnd(std::byte byte) { return static_cast<char>(byte) == '\n'; }
+// Of CR LF the second ends an empty line.
+bool isLineEnd(std::byte byte) {
+  return static_cast<char>(byte) == '\n' || static_cast<char>(byte) == '\r';
+}
 
 }  // namespace
 

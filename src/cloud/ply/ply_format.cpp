@@ -44,6 +44,13 @@ std::string_view encodingName(PlyEncoding encoding) {
   return "binary_big_endian";
 }
 
+// Of programs that write types which the format does not have.
+WideInteger wideIntegerFromName(std::string_view name) {
+  if (name == "int64" || name == "long" || name == "longlong") return WideInteger::kSigned;
+  if (name == "uint64" || name == "ulong" || name == "ulonglong") return WideInteger::kUnsigned;
+  return WideInteger::kNone;
+}
+
 std::optional<PlyEncoding> encodingFromName(std::string_view name) {
   for (const PlyEncoding encoding :
        {PlyEncoding::kAscii, PlyEncoding::kBinaryLittleEndian, PlyEncoding::kBinaryBigEndian}) {
@@ -58,6 +65,11 @@ class HeaderParser {
   HeaderParser(std::string_view text, const std::string& path) : text_(text), path_(path) {}
 
   Result<PlyHeader> parse() {
+    // Old programs end lines with CR alone
+    const std::size_t first_end = text_.find_first_of("\r\n");
+    const bool is_cr = first_end != text_.npos && text_[first_end] == '\r' &&
+                       text_.substr(first_end + 1, 1) != "\n";
+    line_end_ = is_cr ? '\r' : '\n';
     SURFEIT_RETURN_IF_ERROR(nextLine());
     if (line_.substr(0, line_.find_last_not_of(kBlanks) + 1) != "ply") return unexpected("'ply'");
     for (;;) {
@@ -131,9 +143,12 @@ class HeaderParser {
       property.count_type = *count_type;
       type_name = takeWord(rest);
     }
-    const std::optional<ValueType> type = valueTypeFromName(type_name);
+    property.wide = wideIntegerFromName(type_name);
+    const std::optional<ValueType> type =
+        property.wide == WideInteger::kNone ? valueTypeFromName(type_name) : ValueType::kFloat64;
     if (!type) {
-      return unexpected("a type: char, uchar, short, ushort, int, uint, float or double");
+      return unexpected(
+          "a type: char, uchar, short, ushort, int, uint, int64, uint64, float or double");
     }
     property.type = *type;
     property.name = takeWord(rest);
@@ -161,7 +176,7 @@ class HeaderParser {
 
   Status nextLine() {
     ++line_number_;
-    const std::size_t end = text_.find('\n', next_);
+    const std::size_t end = text_.find(line_end_, next_);
     if (end == std::string_view::npos) {
       return Status::corruption(
           fmt::format("{}: header line {}: found no line end in the first {} bytes, expected {}",
@@ -181,6 +196,7 @@ class HeaderParser {
 
   std::string_view text_;
   const std::string& path_;
+  char line_end_ = '\n';
   std::size_t next_ = 0;  // first byte of the next line
   std::uint64_t line_number_ = 0;
   std::string_view line_;

@@ -17,12 +17,40 @@ bool storeInteger(std::string_view text, std::byte* out) {
   return true;
 }
 
+template <typename T>
+bool storeReal(std::string_view text, std::byte* out);
+
+// Numbers as Fortran has them, 1.5D+00, and as old programs of Windows do: 1.#QNAN,
+// -1.#IND, 1.#INF. `read`: the characters that are a number by the rules of C.
+template <typename T>
+bool storeForeignReal(std::string_view text, std::size_t read, std::byte* out) {
+  if (text.substr(read).starts_with('#') && read > 0) {
+    const std::string_view name = text.substr(read + 1);
+    T value = std::numeric_limits<T>::quiet_NaN();
+    if (name.starts_with("INF")) {
+      value = std::numeric_limits<T>::infinity() * (text[0] == '-' ? -1 : 1);
+    } else if (!name.starts_with("IND") && !name.starts_with("QNAN") && !name.starts_with("SNAN")) {
+      return false;
+    }
+    std::memcpy(out, &value, sizeof value);
+    return true;
+  }
+  if (read == 0 || read + 1 >= text.size() || (text[read] != 'd' && text[read] != 'D'))
+    return false;
+  char copy[kMaxPlyNumberChars];
+  std::memcpy(copy, text.data(), text.size());
+  copy[read] = 'e';
+  return storeReal<T>({copy, text.size()}, out);
+}
+
 // Numbers too large for the type become infinite and numbers too small become zero, as in C.
 template <typename T>
 bool storeReal(std::string_view text, std::byte* out) {
   T value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (end != text.data() + text.size()) return false;
+  if (end != text.data() + text.size()) {
+    return storeForeignReal<T>(text, static_cast<std::size_t>(end - text.data()), out);
+  }
   if (error == std::errc::result_out_of_range) {
     // A float may be small without an exponent; a double of kMaxPlyNumberChars digits may not
     double wide = 0;

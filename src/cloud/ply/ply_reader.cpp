@@ -138,9 +138,10 @@ struct PlyReader::State {
 
   // --- Binary rows with lists ---
 
-  Status readBinaryValue(ValueType type, std::byte* value) {
+  Status readBinaryValue(ValueType type, std::byte* value, WideInteger wide = WideInteger::kNone) {
     SURFEIT_RETURN_IF_ERROR(readBytes({value, valueTypeBytes(type)}));
     if (needsByteSwap(header.encoding)) swapValue(value, type);
+    widenValue(value, wide);
     return {};
   }
 
@@ -150,7 +151,8 @@ struct PlyReader::State {
       // A scalar
       const RowProperty& property = properties[i];
       if (!property.is_list) {
-        SURFEIT_RETURN_IF_ERROR(readBinaryValue(property.type, scalars + property.offset));
+        SURFEIT_RETURN_IF_ERROR(
+            readBinaryValue(property.type, scalars + property.offset, property.wide));
         continue;
       }
 
@@ -165,7 +167,7 @@ struct PlyReader::State {
         continue;
       }
       for (std::uint64_t item = 0; item < item_count; ++item) {
-        SURFEIT_RETURN_IF_ERROR(readBinaryValue(property.type, value));
+        SURFEIT_RETURN_IF_ERROR(readBinaryValue(property.type, value, property.wide));
         list->push_back(rowValue(value, property.type));
       }
     }
@@ -313,6 +315,7 @@ struct PlyReader::State {
       // The rows of the file are the packed rows
       SURFEIT_RETURN_IF_ERROR(readBytes(rows));
       if (needsByteSwap(header.encoding)) swapRows(element(), rows);
+      widenRows(element(), rows);
       row += row_count;
     }
     SURFEIT_RETURN_IF_ERROR(endElement());
@@ -339,8 +342,10 @@ struct PlyReader::State {
       return damaged(
           fmt::format("file ends early: {} bytes at {}, expected {}", view.size(), at, size));
     }
-    if (needsByteSwap(header.encoding)) {
-      swapRows(element(), {view_buffer.data() + (view.data() - view_buffer.data()), size});
+    if (size > 0) {
+      const std::span rows(view_buffer.data() + (view.data() - view_buffer.data()), size);
+      if (needsByteSwap(header.encoding)) swapRows(element(), rows);
+      widenRows(element(), rows);
     }
     cursor.jumpTo(at + size);
     row += row_count;

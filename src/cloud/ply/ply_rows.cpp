@@ -56,8 +56,19 @@ class PlyRowReader final : public RowReader {
     std::vector<std::string> notes;
     const std::vector<RowLayout>& elements = reader_.header().elements;
     for (const RowProperty& property : elements[index_].properties) {
+      if (property.wide != WideInteger::kNone && !property.is_list) {
+        notes.push_back(
+            fmt::format("integers of 64 bits become float64, exact to 2^53: '{}'", property.name));
+      }
       if (!property.is_list) continue;
       notes.push_back(fmt::format("list property {} is not kept", property.name));
+    }
+    const std::vector<std::string> missing = missingOfSplats(element_);
+    if (!missing.empty()) {
+      notes.push_back(fmt::format(
+          "these are Gaussian splats without {}: read as points, with opacity and scales as they "
+          "are; --channels opacity=- leaves opacity out",
+          fmt::join(missing, " ")));
     }
     for (std::size_t i = 0; i < elements.size(); ++i) {
       if (i != index_) notes.push_back(fmt::format("element {} is not kept", elements[i].name));

@@ -195,6 +195,17 @@ bool areSplats(const RowLayout& element) {
   });
 }
 
+std::vector<std::string> missingOfSplats(const RowLayout& element) {
+  constexpr std::size_t kMost = 5;
+  std::vector<std::string> missing;
+  for (const char* name : kNeeded) {
+    if (element.find(name) == nullptr) missing.emplace_back(name);
+  }
+  const bool has_place = element.find("x") != nullptr && element.find("opacity") != nullptr;
+  if (!has_place || missing.size() >= kMost) missing.clear();
+  return missing;
+}
+
 std::unique_ptr<RowReader> readSplatsAsDisks(std::unique_ptr<RowReader> splats) {
   return std::make_unique<SplatReader>(std::move(splats));
 }

@@ -19,6 +19,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "cloud/row_reader.h"
 #include "surfeit/status.h"
@@ -32,6 +34,9 @@ inline constexpr double kSplatColorFactor = 0.28209479177387814;
 // Whether the vertices of a PLY file are splats: f_dc_0 to f_dc_2, opacity, scale_0 and scale_1,
 // rot_0 to rot_3.
 bool areSplats(const RowLayout& element);
+
+// What is missing where most of the properties of splats are there; empty elsewhere.
+std::vector<std::string> missingOfSplats(const RowLayout& element);
 
 // The rows of `splats`, of which areSplats() holds, as disks.
 std::unique_ptr<RowReader> readSplatsAsDisks(std::unique_ptr<RowReader> splats);

@@ -192,8 +192,17 @@ std::string nameOfFormat(const PcdHeader& header) {
 }
 
 std::vector<std::string> notesOf(const PcdHeader& header) {
-  if (!header.has_view_point) return {};
-  return {"the view point is not kept: positions are as the file has them"};
+  std::vector<std::string> notes;
+  if (header.has_view_point) {
+    notes.emplace_back("the view point is not kept: positions are as the file has them");
+  }
+  for (const PcdField& field : header.fields) {
+    const bool is_wide = field.type == StoredType::kInt64 || field.type == StoredType::kUint64;
+    if (!is_wide || field.isPadding()) continue;
+    notes.push_back(
+        fmt::format("integers of 64 bits become float64, exact to 2^53: '{}'", field.name));
+  }
+  return notes;
 }
 
 class PcdBinaryReader final : public FixedRecordReader {

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <limits>
 #include <type_traits>
 
 #include "cloud/ply/ply_number.h"
@@ -81,7 +84,10 @@ template <typename T>
 const char* parseReal(const char* at, const char* end, ValueType type, std::byte* out) {
   Decimal decimal;
   const char* const number_end = at < end ? takeDecimal(at, end, decimal) : nullptr;
-  if (number_end == nullptr || decimal.digits > (std::uint64_t{1} << 53) ||
+  // 1.5D+00 and 1.#QNAN go on
+  const bool goes_on = number_end != nullptr && number_end < end &&
+                       (*number_end == 'D' || *number_end == 'd' || *number_end == '#');
+  if (number_end == nullptr || goes_on || decimal.digits > (std::uint64_t{1} << 53) ||
       decimal.tens < -kMostTens || decimal.tens > kMostTens) {
     return parseAnyNumber(at, end, type, out);
   }
@@ -114,6 +120,19 @@ const char* parseInteger(const char* at, const char* end, ValueType type, std::b
   return value_end;
 }
 
+// Stores nan where the cell may lack a value and does.
+bool storeMissing(const TextColumn& column, std::string_view word, bool has_comma, std::byte* row) {
+  if (!column.takes_missing || !isMissingText(word) || (word.empty() && !has_comma)) return false;
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  if (column.type == ValueType::kFloat64) {
+    std::memcpy(row + column.offset, &kNan, sizeof kNan);
+  } else {
+    const auto nan = static_cast<float>(kNan);
+    std::memcpy(row + column.offset, &nan, sizeof nan);
+  }
+  return true;
+}
+
 std::string_view withoutEnd(std::string_view lines, std::size_t& bytes) {
   const void* const end = std::memchr(lines.data(), '\n', lines.size());
   const std::size_t size =
@@ -138,6 +157,13 @@ bool isTextNumber(std::string_view word) {
   return parsePlyNumber(word, ValueType::kFloat64, value);
 }
 
+bool isMissingText(std::string_view word) {
+  constexpr std::string_view kMissing[] = {"", "-", "na", "n/a", "null", "none"};
+  std::string lower(word.substr(0, 5));
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return std::find(std::begin(kMissing), std::end(kMissing), lower) != std::end(kMissing);
+}
+
 bool isTextCount(std::string_view word) {
   return !word.empty() && word.size() <= 18 && std::all_of(word.begin(), word.end(), isDigit);
 }
@@ -149,7 +175,7 @@ std::string_view trimmedLine(std::string_view line) {
 }
 
 bool isTextComment(std::string_view line) {
-  return line.starts_with('#') || line.starts_with("//");
+  return line.starts_with('#') || line.starts_with('%') || line.starts_with("//");
 }
 
 std::vector<std::string_view> wordsOf(std::string_view line, std::size_t most) {
@@ -247,7 +273,9 @@ bool parseTextRow(std::string_view line, std::span<const TextColumn> columns, st
       continue;
     }
     at = parseTextNumber(at, end, column.type, row + column.offset);
-    if (at == nullptr || at == word || (at < end && !endsWord(*at))) return false;
+    if (at != nullptr && at != word && (at == end || endsWord(*at))) continue;
+    at = skipWord(word, end);
+    if (!storeMissing(column, {word, at}, has_comma, row)) return false;
   }
 
   // A comma may end the line, as some programs write it
@@ -264,6 +292,7 @@ std::string describeTextRow(std::string_view line, std::span<const TextColumn> c
     if (i >= words.size()) return fmt::format("line ends early, expected {}", expected);
     std::byte value[8];
     const char* const word_end = words[i].data() + words[i].size();
+    if (columns[i].takes_missing && isMissingText(words[i])) continue;
     if (columns[i].is_kept &&
         (words[i].empty() ||
          parseTextNumber(words[i].data(), word_end, columns[i].type, value) != word_end)) {

@@ -16,18 +16,22 @@
 
 namespace surfeit {
 
-// Between values: blanks, tabs, and at most one comma or semicolon. A carriage return is a blank.
+// Between values: blanks, tabs, and at most one comma, semicolon or bar. A carriage return is a
+// blank.
 constexpr bool isTextBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-constexpr bool isTextComma(char c) { return c == ',' || c == ';'; }
+constexpr bool isTextComma(char c) { return c == ',' || c == ';' || c == '|'; }
 // A line without the blanks around it.
 std::string_view trimmedLine(std::string_view line);
-// Whether a line, trimmed, is a comment: it begins with # or //.
+// Whether a line, trimmed, is a comment: it begins with #, % or //.
 bool isTextComment(std::string_view line);
 // The words of a line; an empty one between two commas. No more than `most`.
 std::vector<std::string_view> wordsOf(std::string_view line, std::size_t most);
 
 // Whether a word is a number, by the rules of ascii PLY.
 bool isTextNumber(std::string_view word);
+// Whether a cell of a table says that it has no value: nothing between commas, NA, N/A, null, none,
+// or a dash.
+bool isMissingText(std::string_view word);
 // Whether a word is digits only, 18 at most: a count.
 bool isTextCount(std::string_view word);
 
@@ -76,6 +80,8 @@ struct TextColumn {
   ValueType type = ValueType::kFloat32;
   std::size_t offset = 0;  // in a row
   bool is_kept = true;
+  // Cells without a value (isMissingText) are nan. Of reals.
+  bool takes_missing = false;
 };
 
 // Turns a line, without its end, into a row; false when it is not as the columns say. Reals are

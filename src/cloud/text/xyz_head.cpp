@@ -34,7 +34,9 @@ bool isSeparatorLine(std::string_view line) {
 
 std::string textOfComment(std::string_view line) {
   line = line.substr(0, kMaxCommentChars);
-  while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
+  while (line.starts_with('#') || line.starts_with('%') || line.starts_with('/')) {
+    line.remove_prefix(1);
+  }
   std::string text(trimmedLine(line));
   std::replace_if(
       text.begin(), text.end(), [](char c) { return c < ' ' && c > '\0'; }, ' ');

@@ -267,10 +267,11 @@ XyzHeader headerOf(Words words) {
 
 XyzHeader parseXyzHeader(std::string_view line, std::size_t column_count) {
   line = trimmedLine(line);
-  while (line.starts_with('#') || line.starts_with('/')) line.remove_prefix(1);
+  while (line.starts_with('#') || line.starts_with('%') || line.starts_with('/'))
+    line.remove_prefix(1);
   line = trimmedLine(line);
   XyzHeader best;
-  for (const char separator : {';', '\t', ',', ' '}) {
+  for (const char separator : {';', '\t', ',', '|', ' '}) {
     if (separator != ' ' && line.find(separator) == line.npos) continue;
     Words words = split(line, separator);
     if (words.size() > kMaxXyzColumns) continue;

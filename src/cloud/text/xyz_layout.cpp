@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kLargestExactFloat = 1 << 24;
 constexpr double kByteColor = 255, kWordColor = 65535;
+constexpr std::uint64_t kLeastNumbered = 8;
 
 bool contains(std::span<const std::string> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -118,7 +119,22 @@ Status severalReadings(std::size_t first, std::size_t count, const std::vector<N
 
 }  // namespace
 
+// Places on a line of a grid are whole numbers along all axes.
+Status checkFirstXyzColumn(const XyzTable& table) {
+  const std::span<const XyzColumn> columns = table.columns;
+  const bool may_count = columns.size() > 3 && table.row_count >= kLeastNumbered &&
+                         columns[0].are_wholes && columns[0].counts_rows &&
+                         std::any_of(columns.begin() + 1, columns.begin() + 4,
+                                     [](const XyzColumn& column) { return !column.are_wholes; });
+  if (!may_count) return {};
+  return Status::corruption(fmt::format(
+      "column 1 has no name and counts on from {:.0f} to {:.0f}: it may number the "
+      "points, or be x; say which: --channels 1=-,2=x,3=y,4=z or --channels 1=x,2=y,3=z",
+      table.columns[0].least, table.columns[0].largest));
+}
+
 Result<std::vector<std::string>> nameXyzColumns(const XyzTable& table, bool is_pts) {
+  SURFEIT_RETURN_IF_ERROR(checkFirstXyzColumn(table));
   const std::span<const XyzColumn> columns = table.columns;
   std::vector<std::string> names;
   DistinctNames distinct;

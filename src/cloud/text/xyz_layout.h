@@ -18,8 +18,10 @@ namespace surfeit {
 // The values of one column in all rows; of none, when it has words that are no numbers.
 struct XyzColumn {
   bool are_numbers = true;
-  bool are_floats = true;  // floats, written with as many decimals, give all of them back
-  bool are_wholes = true;  // 235 and 235.0
+  bool are_floats = true;     // floats, written with as many decimals, give all of them back
+  bool are_wholes = true;     // 235 and 235.0
+  bool counts_rows = true;    // each is one more than that of the row before
+  std::uint64_t missing = 0;  // rows whose cell has no value
   double least = std::numeric_limits<double>::infinity();
   double largest = -std::numeric_limits<double>::infinity();
 
@@ -45,6 +47,10 @@ struct XyzTable {
 Result<XyzTable> scanXyz(LineSource& source, std::span<const TextColumn> columns, TextExtras extras,
                          std::uint64_t pts_count);
 
+// Surveys number their points: 1 x y z. kCorruption, with both readings, when the first of four
+// columns or more may do so.
+Status checkFirstXyzColumn(const XyzTable& table);
+
 // Names of columns that no header names: x y z, then from left to right
 //   three that are unit vectors in all rows                            nx ny nz, once
 //   three between those and the ends that are colors                   red green blue, once
@@ -52,7 +58,8 @@ Result<XyzTable> scanXyz(LineSource& source, std::span<const TextColumn> columns
 //   all others                                                         intensity right after x y z,
 //                                                                      else scalar, scalar_2, ...
 // Colors are whole numbers up to 65535, values up to 1, or reals up to 255. kCorruption when
-// values allow several readings, which the message has. At least three columns.
+// values allow several readings, which the message has, and as checkFirstXyzColumn. At
+// least three columns.
 Result<std::vector<std::string>> nameXyzColumns(const XyzTable& table, bool is_pts);
 
 // Types of the columns. x y z are floats when floats give all rows back, else doubles; so are all

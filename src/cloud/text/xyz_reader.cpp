@@ -31,6 +31,8 @@ bool hasCommasInAndOutOfQuotes(std::string_view line) {
   return has_inner && has_outer;
 }
 
+bool isPlaceColumn(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
+
 class XyzReader final : public CountedRowReader {
  public:
   explicit XyzReader(ByteInput input) : source_(std::move(input)) {
@@ -57,6 +59,7 @@ class XyzReader final : public CountedRowReader {
     SURFEIT_RETURN_IF_ERROR(table.refusal);
     SURFEIT_RETURN_IF_ERROR(nameColumns(table));
     noteScans(table);
+    noteMissing(table);
     element_.count = table.row_count;
     SURFEIT_RETURN_IF_ERROR(setColumns(names_, typeXyzColumns(table, names_)));
     return moveTo(0);
@@ -172,8 +175,9 @@ class XyzReader final : public CountedRowReader {
       }
     }
     for (std::size_t i = 0; i < names_.size(); ++i) {
-      const bool is_text = i < words.size() && !isTextNumber(words[i]) && !words[i].empty();
-      first_row_.push_back({names_[i], ValueType::kFloat32, 0, !is_text && !isDropped(i)});
+      const bool is_text = i < words.size() && !isTextNumber(words[i]) && !isMissingText(words[i]);
+      first_row_.push_back({names_[i], ValueType::kFloat32, 0, !is_text && !isDropped(i),
+                            !isPlaceColumn(names_[i])});
     }
     return {};
   }
@@ -235,6 +239,8 @@ class XyzReader final : public CountedRowReader {
             return isTextCount(rename.from) &&
                    (rename.to == "x" || rename.to == "y" || rename.to == "z");
           });
+      const Status first = has_place ? Status() : checkFirstXyzColumn(table);
+      if (!first.ok()) return Status::corruption(fmt::format("{}: {}", path_, first.message()));
       for (std::size_t i = has_place ? 0 : 3; i < names_.size(); ++i) {
         names_[i] = fmt::format("column_{}", i + 1);
       }
@@ -296,6 +302,16 @@ class XyzReader final : public CountedRowReader {
     if (!table.count_note.empty()) notes_.push_back(table.count_note);
   }
 
+  void noteMissing(const XyzTable& table) {
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (table.columns[i].missing == 0) continue;
+      notes_.push_back(
+          fmt::format("column {} ({}) has no value in {} of {} rows: nan is read; --channels {}=- "
+                      "leaves the column out",
+                      i + 1, names_[i], table.columns[i].missing, table.row_count, i + 1));
+    }
+  }
+
   Status setColumns(const std::vector<std::string>& names, const std::vector<ValueType>& types) {
     // As the file has them
     RowLayout all;
@@ -314,7 +330,8 @@ class XyzReader final : public CountedRowReader {
         return Status::corruption(fmt::format(
             "{}: column {} would be a second {}, expected another name", path_, i + 1, called[i]));
       }
-      columns.push_back({names[i], types[i], element_.row_bytes, !called[i].empty()});
+      columns.push_back({names[i], types[i], element_.row_bytes, !called[i].empty(),
+                         isFloatType(types[i]) && !isPlaceColumn(called[i])});
       if (called[i].empty()) continue;
       element_.properties.push_back(all.properties[i]);
       element_.properties.back().name = called[i];

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "cloud/text/xyz_layout.h"
 
@@ -70,13 +71,8 @@ class XyzScanner {
       while (at < end && isTextBlank(*at)) ++at;
       const char* word_end = at;
       while (word_end < end && !isTextBlank(*word_end) && !isTextComma(*word_end)) ++word_end;
-      if (word_end == at && !(has_comma && !columns_[i].is_kept)) return false;
-      if (columns_[i].is_kept) {
-        std::byte bytes[8];
-        if (parseTextNumber(at, word_end, ValueType::kFloat64, bytes) != word_end) return false;
-        std::memcpy(&values_[i], bytes, sizeof bytes);
-        takeValue({at, static_cast<std::size_t>(word_end - at)}, values_[i], table_.columns[i]);
-      }
+      if (word_end == at && !has_comma) return false;
+      if (columns_[i].is_kept && !takeCell({at, word_end}, i)) return false;
       at = word_end;
     }
     while (at < end && (isTextBlank(*at) || isTextComma(*at))) ++at;
@@ -109,6 +105,25 @@ class XyzScanner {
   XyzTable& table() { return table_; }
 
  private:
+  bool takeCell(std::string_view word, std::size_t i) {
+    std::byte bytes[8];
+    const char* const end = word.data() + word.size();
+    if (!word.empty() && parseTextNumber(word.data(), end, ValueType::kFloat64, bytes) == end) {
+      const double before = values_[i];
+      std::memcpy(&values_[i], bytes, sizeof bytes);
+      XyzColumn& column = table_.columns[i];
+      column.counts_rows =
+          column.counts_rows && (table_.row_count == 0 || values_[i] == before + 1);
+      takeValue(word, values_[i], column);
+      return true;
+    }
+    if (!columns_[i].takes_missing || !isMissingText(word)) return false;
+    values_[i] = std::numeric_limits<double>::quiet_NaN();
+    table_.columns[i].are_wholes = table_.columns[i].counts_rows = false;
+    ++table_.columns[i].missing;
+    return true;
+  }
+
   static void takeValue(std::string_view word, double value, XyzColumn& column) {
     column.least = std::min(column.least, value);
     column.largest = std::max(column.largest, value);

@@ -1,4 +1,4 @@
-// In the provenance: "groups": {"1": "lamp", "2": "tree"}.
+// In the provenance: "groups": {"1": "lamp", "2": "tree"}, "crs": "EPSG:32610".
 #include "surfeit/group_names.h"
 
 #include <fmt/format.h>
@@ -7,6 +7,7 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
+#include "octree/read/provenance.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/scene.h"
 
@@ -42,7 +43,17 @@ Status checkGroupName(std::string_view name) {
 
 Result<std::vector<GroupName>> readGroupNames(const std::string& scene_path) {
   SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, SceneFile::open(scene_path));
-  const nlohmann::json json = nlohmann::json::parse(scene.provenance(), nullptr, false);
+  return groupNamesOf(scene.provenance());
+}
+
+std::string sceneCrs(const std::string& provenance) {
+  const nlohmann::json json = nlohmann::json::parse(provenance, nullptr, false);
+  if (!json.is_object() || !json.contains("crs") || !json["crs"].is_string()) return {};
+  return json["crs"];
+}
+
+std::vector<GroupName> groupNamesOf(const std::string& provenance) {
+  const nlohmann::json json = nlohmann::json::parse(provenance, nullptr, false);
   std::vector<GroupName> names;
   if (!json.is_object() || !json.contains("groups") || !json["groups"].is_object()) return names;
   for (const auto& [number, name] : json["groups"].items()) {
