@@ -15,6 +15,7 @@
 #include "gather/rules/gather_rules.h"
 #include "gather/rules/raster_geometry.h"
 #include "octree/read/group_set.h"
+#include "storage/output_target.h"
 #include "surfeit/scene.h"
 
 namespace surfeit {
@@ -32,11 +33,6 @@ Status checkEnvironment(const GatherEnvironment& environment) {
     return refuse("rotation of the environment", environment.rotation, "radians");
   }
   return {};
-}
-
-Status checkBeside(const std::string& scene_path, const std::string& result_path) {
-  if (result_path != scene_path) return {};
-  return Status::invalidArgument(fmt::format("{}: the result would replace the scene", scene_path));
 }
 
 }  // namespace
@@ -76,7 +72,7 @@ Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOpt
 
 Result<SceneFile> openSceneBeside(const std::string& scene_path, const std::string& result_path,
                                   Access access) {
-  SURFEIT_RETURN_IF_ERROR(checkBeside(scene_path, result_path));
+  SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path, scene_path, "scene"));
   return SceneFile::open(scene_path, access);
 }
 
@@ -97,7 +93,7 @@ Status checkGroupsFor(const SceneFile& scene, const GatherOptions& options, Prog
 Status checkSceneFor(const SceneFile& scene, const std::string& result_path,
                      const GatherOptions& options, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
-  SURFEIT_RETURN_IF_ERROR(checkBeside(scene.path(), result_path));
+  SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path, scene.path(), "scene"));
   return checkGroupsFor(scene, options, progress);
 }
 

@@ -130,10 +130,7 @@ class Bouncer {
 };
 
 Result<BounceStats> Bouncer::run() {
-  if (result_path_ == scene_path_) {
-    return Status::invalidArgument(
-        fmt::format("{}: the result would replace the scene", scene_path_));
-  }
+  SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path_, scene_path_, "scene"));
   SURFEIT_ASSIGN_OR_RETURN(scene_, SceneFile::open(scene_path_, sceneAccess(gather_options_)));
   SURFEIT_RETURN_IF_ERROR(checkScene());
   SURFEIT_RETURN_IF_ERROR(checkMemory());

@@ -334,9 +334,7 @@ Result<LookupStats> lookupCloud(const std::string& map, const std::string& recei
   LookupOptions options = given;
   if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
   SURFEIT_RETURN_IF_ERROR(checkOptions(options));
-  if (result == map) {
-    return Status::invalidArgument(fmt::format("{}: the result would replace the map", map));
-  }
+  SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result, map, "map"));
   const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
   return guarded(result, [&] {
     Result<LookupStats> stats = Status::failed("lookup: not run");

@@ -408,9 +408,8 @@ Result<RadianceStats> radianceCloud(const std::vector<std::string>& photon_paths
                                     const std::string& result_path, const RadianceOptions& options,
                                     Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(checkOptions(options));
-  if (std::find(photon_paths.begin(), photon_paths.end(), result_path) != photon_paths.end()) {
-    return Status::invalidArgument(
-        fmt::format("{}: the result would replace the photons", result_path));
+  for (const std::string& photons : photon_paths) {
+    SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path, photons, "photons"));
   }
   return guarded(result_path, [&]() -> Result<RadianceStats> {
     return RadianceJob(options, progress).run(photon_paths, result_path);

@@ -27,6 +27,7 @@
 #include "sample/direct_light.h"
 #include "sample/ray_scene.h"
 #include "sample/surroundings.h"
+#include "storage/output_target.h"
 #include "storage/page_file.h"
 
 namespace surfeit {
@@ -186,10 +187,7 @@ Result<RelightStats> Relighter::run() {
 }
 
 Status Relighter::openScene() {
-  if (result_path_ == scene_path_) {
-    return Status::invalidArgument(
-        fmt::format("{}: the result would replace the scene", scene_path_));
-  }
+  SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path_, scene_path_, "scene"));
   SURFEIT_ASSIGN_OR_RETURN(scene_, SceneFile::open(scene_path_));
   stats_.surfels = scene_.header().surfel_count;
   if (!scene_.header().channels.albedo) {

@@ -133,6 +133,17 @@ Result<OutputTarget> resolveOutput(const std::string& path) {
   return target;
 }
 
+Status checkReplacesNot(const std::string& output, const std::string& input, const char* what) {
+  struct ::stat of_output {
+  }, of_input{};
+  const bool is_one = ::stat(output.c_str(), &of_output) == 0 &&
+                      ::stat(input.c_str(), &of_input) == 0 && S_ISREG(of_output.st_mode) &&
+                      of_output.st_dev == of_input.st_dev && of_output.st_ino == of_input.st_ino;
+  if (output != input && !is_one) return {};
+  return Status::invalidArgument(
+      fmt::format("{}: the result would replace the {}: give another name", output, what));
+}
+
 Status checkOutputRoom(const std::string& path, std::uint64_t least_bytes) {
   SURFEIT_ASSIGN_OR_RETURN(const OutputTarget target, resolveOutput(path));
   if (target.is_stream) return {};

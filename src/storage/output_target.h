@@ -24,6 +24,10 @@ struct OutputTarget {
 // socket may not be.
 Result<OutputTarget> resolveOutput(const std::string& path);
 
+// kInvalidArgument when the output is the file of an input, by its name, by a link or by another
+// name: "OUTPUT: the result would replace the WHAT". A stream replaces nothing.
+Status checkReplacesNot(const std::string& output, const std::string& input, const char* what);
+
 // kIoError when the file system of an output has less room; none is needed for a stream.
 Status checkOutputRoom(const std::string& path, std::uint64_t least_bytes);
 

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 
 #include "gather/test_clouds.h"
 #include "surfeit/bake.h"
+#include "surfeit/bounce.h"
 #include "surfeit/progress.h"
 
 namespace surfeit {
@@ -450,6 +452,24 @@ TEST(GatherCloudOutOfCore, CacheOfATenthOfTheSceneGivesTheSameResult) {
   EXPECT_GT(nodes.evictions + surfels.evictions, 0u);
   EXPECT_TRUE(readBytes(directory.file("out_of_core.ply")) ==
               readBytes(directory.file("in_core.ply")));
+}
+
+// By its name, by a symbolic link and by another name of the same file.
+TEST_F(GatherCloud, AResultThatIsTheSceneIsRefusedByAnyName) {
+  writeTable(receiversOf(10), directory_.file("receivers.ply"));
+  const std::string scene = directory_.file("scene.sft"), before = readBytes(scene);
+  std::filesystem::create_symlink(scene, directory_.file("link.ply"));
+  std::filesystem::create_hard_link(scene, directory_.file("again.ply"));
+  for (const char* name : {"scene.sft", "link.ply", "again.ply"}) {
+    const Status gathered = gatherCloud(scene, directory_.file("receivers.ply"),
+                                        directory_.file(name), fastOptions(), progress_)
+                                .status();
+    EXPECT_EQ(gathered.code(), StatusCode::kInvalidArgument) << name;
+    EXPECT_THAT(gathered.message(), testing::HasSubstr("would replace the scene")) << name;
+    const Status bounced = bounceScene(scene, directory_.file(name), {}, progress_).status();
+    EXPECT_THAT(bounced.message(), testing::HasSubstr("would replace the scene")) << name;
+    EXPECT_TRUE(readBytes(scene) == before) << name;
+  }
 }
 
 }  // namespace
