@@ -123,3 +123,8 @@ def room(tmp_path_factory, run_program):
                 "--light-samples", 2, "--group-by", "material")
     run_program("index", directory / "room.ply", "-o", directory / "room.sft")
     return directory
+
+
+def same_bytes(*paths):
+    first, *others = (path.read_bytes() for path in paths)
+    return len(first) > 0 and all(other == first for other in others)
