@@ -1,7 +1,6 @@
 // What else is read with a mesh (surfeit/mesh_files.h).
 #include "surfeit/mesh_files.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <istream>
 #include <map>
@@ -10,6 +9,7 @@
 #include <system_error>
 #include <vector>
 
+#include "core/text_case.h"
 #include "sample/obj_material_files.h"
 
 namespace surfeit {
@@ -32,10 +32,7 @@ void readMaterialFiles(std::istream& lines, MaterialFiles& files,
 std::vector<std::string> filesNamedByMesh(const std::string& mesh) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(mesh, ignored)) return {};
-  std::string ending = std::filesystem::path(mesh).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
-  if (ending != ".obj") return {};
+  if (!hasEnding(mesh, ".obj")) return {};
 
   // The parser's own readers, so that both find the same files
   Result<ByteInput> input = ByteInput::open(mesh);
