@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <string>
 
+#include "core/luminance.h"
 #include "core/spherical_harmonics.h"
-#include "gather/rules/result_sums.h"
 
 namespace surfeit {
 namespace {
@@ -116,7 +116,7 @@ BounceLook countedFrom(BounceLook look, const glm::dvec3& origin) {
 glm::vec3 corrected(const ColorCorrection& correction, const glm::vec3& light) {
   glm::vec3 result = light;
   if (correction.saturation != 1) {
-    const glm::vec3 grey(glm::dot(light, kLuminance));
+    const glm::vec3 grey(luminance(light));
     result = glm::max(grey + correction.saturation * (light - grey), glm::vec3(0));
   }
   return correction.gain * correction.tint * result;

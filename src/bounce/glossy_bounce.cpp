@@ -7,9 +7,9 @@
 #include <limits>
 #include <string>
 
+#include "core/luminance.h"
 #include "core/spherical_harmonics.h"
 #include "gather/rules/gather_rules.h"
-#include "gather/rules/result_sums.h"
 
 namespace surfeit {
 namespace {
@@ -62,8 +62,8 @@ float lobeNodeAngle(const std::vector<GroupGloss>& glossy) {
 
 // Band 0 holds the integral of the light, and band 1 that of the light times the direction.
 ArrivingLight arrivingLight(const std::array<glm::vec3, 9>& radiance_sh) {
-  const auto luminance = [&](std::size_t i) { return glm::dot(radiance_sh[i], kLuminance); };
-  return {luminance(0) / kShY00, glm::vec3(luminance(3), luminance(1), luminance(2)) / kShY1};
+  const auto band = [&](std::size_t i) { return luminance(radiance_sh[i]); };
+  return {band(0) / kShY00, glm::vec3(band(3), band(1), band(2)) / kShY1};
 }
 
 // The mean direction of what arrives, mirrored, is that of what a mirror sends. Each of its

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "core/luminance.h"
 #include "core/spherical_harmonics.h"
 
 namespace surfeit {
@@ -37,10 +38,6 @@ struct Pattern {
 
 // Part of the mean in what chooses an emissive triangle; the rest is the most that it may send.
 constexpr float kMeanShare = 0.95f;
-
-float luminance(const glm::vec3& rgb) {
-  return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
-}
 
 // The cosine with which light arrives from there, times the length of `towards`. All sides of a
 // sphere together: its cross-section is a quarter of its surface.

@@ -74,8 +74,7 @@ Result<MeshFormat> recogniseMesh(const std::string& path) {
   for (const char* const extension : {".bgeo", ".geo", ".bgeo.sc"}) {
     if (hasEnding(name, extension)) return MeshFormat::kHoudini;
   }
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension == ".obj" || extension == ".OBJ") return MeshFormat::kObj;
+  if (hasEnding(path, ".obj")) return MeshFormat::kObj;
   return MeshFormat::kUnknown;
 }
 

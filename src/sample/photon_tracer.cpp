@@ -28,6 +28,7 @@
 #include "cloud/row_writer.h"
 #include "cloud/surfel_names.h"
 #include "core/job_limits.h"
+#include "core/luminance.h"
 #include "core/seconds_since.h"
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
@@ -91,7 +92,6 @@ Status writeRows(std::span<const Photon> photons, const glm::dvec3& origin, RowW
 }
 
 float largest(const glm::vec3& rgb) { return std::max({rgb.x, rgb.y, rgb.z}); }
-double luminance(const glm::dvec3& rgb) { return 0.2126 * rgb.x + 0.7152 * rgb.y + 0.0722 * rgb.z; }
 
 // Everything that sends photons. Immutable; safe from any thread.
 class Emitters {

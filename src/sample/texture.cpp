@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "core/luminance.h"
 #include "storage/file.h"
 
 namespace surfeit {
@@ -121,9 +122,8 @@ Result<Mask> Mask::load(const std::string& path) {
   std::vector<std::uint8_t> values(count);
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint8_t* const texel = &picture.texels[4 * i];
-    // Rec. 709, of codes: masks are data and have no curve
-    const double lightness =
-        0.2126 * double(texel[0]) + 0.7152 * double(texel[1]) + 0.0722 * double(texel[2]);
+    // Of codes: masks are data and have no curve
+    const double lightness = luminance(glm::dvec3(texel[0], texel[1], texel[2]));
     values[i] = picture.has_alpha ? texel[3] : std::uint8_t(std::lround(lightness));
   }
   return Mask(picture.width, picture.height, std::move(values));

@@ -11,8 +11,7 @@
 #include "core/job_limits.h"
 #include "io/fault_injector.h"
 #include "io/page_file_damage.h"
-#include "io/test_directory.h"
-#include "storage/page_codec.h"
+#include "io/page_file_fixture.h"
 #include "surfeit/version.h"
 
 namespace surfeit {
@@ -22,81 +21,6 @@ using testing::AllOf;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
-
-constexpr std::uint64_t kIdentity = 0x0123456789abcdefull;
-const std::string kProvenance = "{\"program\":\"test\"}";
-
-// A payload that depends on its number, compressible like real ones.
-std::vector<std::byte> payloadOf(std::uint32_t number) {
-  std::vector<std::byte> payload(100 + 37 * (number % 5));
-  std::uint32_t state = number * 2654435761u + 1;
-  for (std::size_t i = 0; i < payload.size(); ++i) {
-    state = state * 1664525 + 1013904223;
-    payload[i] = static_cast<std::byte>(i % 4 == 0 ? state >> 24 : i / 8);
-  }
-  return payload;
-}
-
-std::vector<std::byte> sceneFields() {
-  std::vector<std::byte> fields(kSceneFieldsBytes);
-  for (std::size_t i = 0; i < fields.size(); ++i) fields[i] = static_cast<std::byte>(i * 7);
-  return fields;
-}
-
-class PageFileTest : public DirectoryTest {
- protected:
-  // Surfel pages hold payloads 100.., node pages 0..
-  void writePages(const std::string& name, std::uint32_t node_pages, std::uint32_t surfel_pages,
-                  std::uint64_t identity = kIdentity) {
-    Result<PageFileWriter> writer = PageFileWriter::create(path(name), identity);
-    ASSERT_TRUE(writer.ok()) << writer.status().message();
-    std::vector<std::byte> stored;
-    for (std::uint32_t i = 0; i < surfel_pages; ++i) {
-      ASSERT_TRUE(compressPage(payloadOf(100 + i), stored).ok());
-      ASSERT_TRUE(writer->addSurfelPage(stored, std::uint32_t(payloadOf(100 + i).size())).ok());
-    }
-    for (std::uint32_t i = 0; i < node_pages; ++i) {
-      ASSERT_TRUE(compressPage(payloadOf(i), stored).ok());
-      ASSERT_TRUE(writer->addNodePage(stored, std::uint32_t(payloadOf(i).size())).ok());
-    }
-    EXPECT_LE(fileCount(), 1) << "a temporary file at most";
-    ASSERT_TRUE(writer->finish(sceneFields(), kProvenance).ok());
-    EXPECT_EQ(writer->fileBytes(), contents(name).size());
-  }
-
-  // Opens the file and reads every page.
-  Status readAll(const std::string& name, Access access = Access::kCached) {
-    SURFEIT_ASSIGN_OR_RETURN(const PageFile pages, PageFile::open(path(name), access));
-    AlignedBuffer stored;
-    std::vector<std::byte> payload;
-    for (std::uint32_t page = 0; page < pages.pageCount(); ++page) {
-      SURFEIT_RETURN_IF_ERROR(pages.readPage(page, stored, payload));
-    }
-    return {};
-  }
-
-  // Whether reading `bytes` as a file fails as damage does, naming the file.
-  testing::AssertionResult noticed(const std::string& bytes) {
-    replaceContents(path("damaged.sft"), bytes);
-    const Status status = readAll("damaged.sft");
-    if (const Status direct = readAll("damaged.sft", Access::kDirect);
-        direct.message() != status.message()) {
-      return testing::AssertionFailure() << "read directly: " << direct.message();
-    }
-    if (status.ok()) return testing::AssertionFailure() << "not noticed";
-    if (status.code() != StatusCode::kCorruption ||
-        status.message().find("damaged.sft: ") == std::string::npos) {
-      return testing::AssertionFailure() << status.message();
-    }
-    return testing::AssertionSuccess();
-  }
-
-  // A small file to damage.
-  std::string sample() {
-    writePages("sample.sft", 2, 3);
-    return contents("sample.sft");
-  }
-};
 
 // Fails the test when a read of pages is not as its access says: direct, or exactly the page.
 class ReadWatch : public FaultInjector {
@@ -176,7 +100,7 @@ TEST_F(PageFileTest, WhatIsWrittenIsRead) {
     writePages("a.sft", node_pages, surfel_pages);
     const Result<PageFile> pages = PageFile::open(path("a.sft"));
     ASSERT_TRUE(pages.ok()) << pages.status().message();
-    EXPECT_EQ(pages->identity(), kIdentity);
+    EXPECT_EQ(pages->identity(), kFileIdentity);
     EXPECT_EQ(pages->provenance(), kProvenance);
     EXPECT_EQ(pages->fileBytes(), contents("a.sft").size());
     EXPECT_EQ(std::vector<std::byte>(pages->sceneFields().begin(), pages->sceneFields().end()),
@@ -197,7 +121,7 @@ TEST_F(PageFileTest, WhatIsWrittenIsRead) {
 
 TEST_F(PageFileTest, UnfinishedFileLeavesNothing) {
   {
-    Result<PageFileWriter> writer = PageFileWriter::create(path("a.sft"), kIdentity);
+    Result<PageFileWriter> writer = PageFileWriter::create(path("a.sft"), kFileIdentity);
     ASSERT_TRUE(writer.ok());
     std::vector<std::byte> stored;
     ASSERT_TRUE(compressPage(payloadOf(1), stored).ok());
@@ -277,7 +201,7 @@ TEST_F(PageFileTest, PageOfAnotherFileAtTheSameOffsetIsNoticed) {
   writePages("a.sft", 2, 3);
   const std::string a = contents("a.sft");
   std::filesystem::remove(path("a.sft"));
-  writePages("b.sft", 2, 3, kIdentity + 1);
+  writePages("b.sft", 2, 3, kFileIdentity + 1);
   const std::string b = contents("b.sft");
   ASSERT_EQ(a.size(), b.size());
   // The pages are the same bytes; parts that hold checksums are not
@@ -288,7 +212,7 @@ TEST_F(PageFileTest, PageOfAnotherFileAtTheSameOffsetIsNoticed) {
   ASSERT_TRUE(pages.ok());
   const PageEntry& first = pages->entry(2);
   EXPECT_NE(first.checksum, XXH3_64bits_withSeed(a.data() + first.offset, first.stored_bytes,
-                                                 pageSeed(kIdentity, first.offset)));
+                                                 pageSeed(kFileIdentity, first.offset)));
 }
 
 TEST_F(PageFileTest, DamageInOnePageLeavesTheOthersReadable) {
@@ -430,78 +354,8 @@ TEST_F(PageFileTest, EveryWrongFieldIsToldWhenTheFileIsOpened) {
               HasSubstr("pages of"));
 }
 
-// Files with holes declare more than they store. Offsets of the parts behind the hole move.
-class SparseFileTest : public PageFileTest {
- protected:
-  // `file` with `hole` bytes of zeros put in at `at`, its footer and checksums made right.
-  void writeSparse(std::string file, std::size_t at, std::uint64_t hole) {
-    const std::size_t footer = footerAt(file);
-    for (const std::size_t field : {kProvenanceOffsetAt, kDirectoryOffsetAt, kFileBytesAt}) {
-      const std::uint64_t offset = getAt<std::uint64_t>(file, footer + field);
-      if (offset > at) setAt(file, footer + field, offset + hole);
-    }
-    setAt(file, footer + kFooterChecksumAt,
-          hashOf(file, footer, footer + kFooterChecksumAt, getAt<std::uint64_t>(file, 16)));
-    replaceContents(path("sparse.sft"), file.substr(0, at));
-    std::filesystem::resize_file(path("sparse.sft"), at + hole);
-    std::ofstream(path("sparse.sft"), std::ios::binary | std::ios::app) << file.substr(at);
-  }
-
-  void expectRefused(const std::string& what) {
-    const std::uint64_t peak_before = peakResidentBytes();
-    const Result<PageFile> pages = PageFile::open(path("sparse.sft"));
-    EXPECT_EQ(pages.status().code(), StatusCode::kCorruption);
-    EXPECT_THAT(pages.status().message(), AllOf(HasSubstr("sparse.sft: "), HasSubstr(what)));
-    EXPECT_LT(peakResidentBytes(), peak_before + (std::uint64_t{1} << 20));
-  }
-
-  std::uint64_t fieldOf(const std::string& file, FooterField field) {
-    return getAt<std::uint64_t>(file, footerAt(file) + field);
-  }
-};
-
-TEST_F(SparseFileTest, ProvenanceOfAHoleIsRefusedBeforeItIsRead) {
-  const std::string file = sample();
-  writeSparse(file, fieldOf(file, kDirectoryOffsetAt) - 1, std::uint64_t{1} << 30);
-  expectRefused("expected at most 65536");
-}
-
-TEST_F(SparseFileTest, DirectoryOfAHoleIsRefusedBeforeItTakesMemory) {
-  const std::string file = sample();
-  for (const std::uint64_t entries : {std::uint64_t{100'000'000}, (std::uint64_t{1} << 32) - 100}) {
-    writeSparse(file, footerAt(file), entries * kEntryBytes);
-    expectRefused("expected at most");
-    writeSparse(file, fieldOf(file, kDirectoryOffsetAt), entries * kEntryBytes);
-    expectRefused("expected at most");
-  }
-}
-
-TEST_F(SparseFileTest, DirectoryOfAHoleIsRefusedHoweverManyBytesThePagesHave) {
-  std::string file = sample();
-  const std::uint64_t pages_end = fieldOf(file, kProvenanceOffsetAt);
-  const std::uint64_t hole = 100'000'000 * kEntryBytes;
-  // Pages of a hole, and then a directory of one
-  const std::string tail = file.substr(pages_end);
-  writeSparse(file, pages_end - 1, hole);
-  std::string grown = file.substr(0, pages_end);
-  std::ifstream in(path("sparse.sft"), std::ios::binary);
-  in.seekg(-static_cast<std::streamoff>(kFooterBytes), std::ios::end);
-  std::string footer(kFooterBytes, '\0');
-  in.read(footer.data(), static_cast<std::streamsize>(footer.size()));
-  in.close();
-  setAt(footer, kFileBytesAt, getAt<std::uint64_t>(footer, kFileBytesAt) + hole);
-  setAt(footer, kFooterChecksumAt,
-        XXH3_64bits_withSeed(footer.data(), kFooterChecksumAt, getAt<std::uint64_t>(file, 16)));
-  const std::uint64_t size = std::filesystem::file_size(path("sparse.sft"));
-  std::filesystem::resize_file(path("sparse.sft"),
-                               getAt<std::uint64_t>(footer, kDirectoryOffsetAt));
-  std::filesystem::resize_file(path("sparse.sft"), size + hole - kFooterBytes);
-  std::ofstream(path("sparse.sft"), std::ios::binary | std::ios::app) << footer;
-  expectRefused("page 0 at 0");
-}
-
 TEST_F(PageFileTest, LongProvenanceIsNotWritten) {
-  Result<PageFileWriter> writer = PageFileWriter::create(path("long.sft"), kIdentity);
+  Result<PageFileWriter> writer = PageFileWriter::create(path("long.sft"), kFileIdentity);
   ASSERT_TRUE(writer.ok());
   const Status status = writer->finish(sceneFields(), std::string(kMaxProvenanceBytes + 1, ' '));
   EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << status.message();

@@ -118,6 +118,14 @@ TEST_F(ObjFiles, StatementsOfMaterialsMayHaveAnyCase) {
   EXPECT_TRUE(notes_.notes.empty());
 }
 
+TEST_F(ObjFiles, NameMayEndInAnyCase) {
+  for (const char* const name : {"a.obj", "a.OBJ", "a.Obj"}) {
+    const Result<Mesh> mesh = load(write(name, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+    ASSERT_TRUE(mesh.ok()) << mesh.status().message();
+    EXPECT_EQ(mesh->triangle.size(), 1u) << name;
+  }
+}
+
 // The parser takes the name for a value that an option leaves out.
 TEST_F(ObjFiles, OptionsOfPicturesMayLeaveOutValues) {
   write("my t.ppm", ppm());

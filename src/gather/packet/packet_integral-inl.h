@@ -16,6 +16,7 @@
 #include <limits>
 #include <span>
 
+#include "core/luminance.h"
 #include "gather/light/environment_map.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"

@@ -11,9 +11,6 @@
 
 namespace surfeit {
 
-// What Rec. 709 primaries of equal strength look like; weighs the colors of light by brightness.
-inline constexpr glm::vec3 kLuminance = {0.2126f, 0.7152f, 0.0722f};
-
 // The result of sums over the pixels, each times the direction's weight and the solid angle; those
 // of fluence and harmonics times the solid angle alone. Dividing by the sum of the weights rather
 // than by pi makes a wholly covered hemisphere exactly 1, whatever the resolution.

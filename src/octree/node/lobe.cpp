@@ -5,13 +5,11 @@
 #include <glm/geometric.hpp>
 #include <iterator>
 
+#include "core/luminance.h"
 #include "octree/node/moment_codes.h"
 
 namespace surfeit {
 namespace {
-
-// Rec. 709: one direction stands for all colors.
-constexpr double kWeights[3] = {0.2126, 0.7152, 0.0722};
 
 // The piece of a node that faces most as this normal does, of those of its kind; 0 where there is
 // none.
@@ -79,8 +77,9 @@ void addToPiece(const Node& node, const Surfel& surfel, const Lobe& lobe, PieceS
   for (int c = 0; c < 3; ++c) {
     one.power[c] = covered * double(surfel.radiosity[c]);
     one.lobe[c] = one.power[c] * double(shares[c]);
-    one.weight += kWeights[c] * one.lobe[c];
   }
+  // One direction stands for all colors
+  one.weight = luminance(glm::dvec3(one.lobe[0], one.lobe[1], one.lobe[2]));
   for (int c = 0; c < 3; ++c) one.mean[c] = one.weight * double(direction[c]);
   sums[pieceThatFaces(node, surfel.normal, is_two_sided)].add(one);
 }
