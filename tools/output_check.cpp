@@ -44,17 +44,6 @@ Status checkAgainst(const Output& output, const std::string& other, std::string_
                                              output.path, output.option, what, other));
 }
 
-// The files that a value of an option may name: FILE, NAME=FILE, or "trajectory FILE".
-std::vector<std::string> filesIn(const std::string& value) {
-  constexpr std::string_view kTrajectory = "trajectory ";
-  std::vector<std::string> files = {value};
-  if (const std::size_t equals = value.find('='); equals != value.npos) {
-    files.push_back(value.substr(equals + 1));
-  }
-  if (value.starts_with(kTrajectory)) files.push_back(value.substr(kTrajectory.size()));
-  return files;
-}
-
 Status checkAgainstInput(const Output& output, const std::string& input) {
   for (const std::string& file : filesIn(input)) {
     SURFEIT_RETURN_IF_ERROR(checkAgainst(output, file, "its input"));
@@ -68,6 +57,16 @@ Status checkAgainstInput(const Output& output, const std::string& input) {
 }
 
 }  // namespace
+
+std::vector<std::string> filesIn(const std::string& value) {
+  constexpr std::string_view kTrajectory = "trajectory ";
+  std::vector<std::string> files = {value};
+  if (const std::size_t equals = value.find('='); equals != value.npos) {
+    files.push_back(value.substr(equals + 1));
+  }
+  if (value.starts_with(kTrajectory)) files.push_back(value.substr(kTrajectory.size()));
+  return files;
+}
 
 bool isOutputOption(const CLI::Option& option) {
   const std::vector<std::string>& names = option.get_lnames();

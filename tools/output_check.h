@@ -12,6 +12,9 @@ namespace surfeit {
 // --caustic-photons, --plot, --stats or --cache-series.
 bool isOutputOption(const CLI::Option& option);
 
+// The files that a value of an option may name: FILE, NAME=FILE, or "trajectory FILE".
+std::vector<std::string> filesIn(const std::string& value);
+
 // Of a parsed command: all options but those of its outputs may name inputs, also behind another
 // word (NAME=FILE, "trajectory FILE"); a mesh names its materials, and they their pictures.
 // kInvalidArgument when an output is the same file as an input, by whatever name, or as another

@@ -177,6 +177,7 @@ void addRelightCommand(CLI::App& app, CommandContext& context) {
       ->type_name("AXIS")
       ->group("Ground");
   context.addCommonOptions(*command);
+  context.addFrameOptions(*command);
   command->footer(
       "The result holds the same surfels, pages and nodes with new radiosities: albedo times the\n"
       "irradiance of the lights. Meshes are held in memory, some 100 bytes per triangle.\n"

@@ -16,17 +16,24 @@ namespace {
 constexpr const char* kSequenceGroup = "Sequences";
 
 // Inputs that are not given by position.
-constexpr const char* kInputOptions[] = {"environment", "brick", "like"};
+constexpr const char* kInputOptions[] = {"environment", "brick", "like", "mesh", "camera-file"};
+// Inputs behind a word, or words (--group NAME=FILE, --orient up).
+constexpr const char* kWordOptions[] = {"group", "orient", "cube"};
+
+template <std::size_t kCount>
+bool isOneOf(const CLI::Option& option, const char* const (&names)[kCount]) {
+  return std::any_of(std::begin(names), std::end(names),
+                     [&](const char* name) { return option.check_lname(name); });
+}
 
 bool isInputOption(const CLI::Option& option) {
-  if (option.get_positional()) return true;
-  return std::any_of(std::begin(kInputOptions), std::end(kInputOptions),
-                     [&](const char* name) { return option.check_lname(name); });
+  return option.get_positional() || isOneOf(option, kInputOptions) || isOneOf(option, kWordOptions);
 }
 
 struct FileName {
   std::string name;
   bool is_output = false;
+  bool may_be_word = false;
 };
 
 // The files that a parsed command names.
@@ -35,7 +42,10 @@ std::vector<FileName> fileNames(const CLI::App& command) {
   for (const CLI::Option* const option : command.get_options()) {
     const bool is_output = isOutputOption(*option);
     if (option->count() == 0 || (!is_output && !isInputOption(*option))) continue;
-    for (const std::string& name : option->results()) names.push_back({name, is_output});
+    const bool may_be_word = isOneOf(*option, kWordOptions);
+    for (const std::string& name : option->results()) {
+      names.push_back({name, is_output, may_be_word});
+    }
   }
   return names;
 }
@@ -122,8 +132,13 @@ bool isUpToDate(const CLI::App& command) {
   bool has_output = false;
   for (const FileName& file : fileNames(command)) {
     struct ::stat info {};
+    const std::vector<std::string> readings = filesIn(file.name);
+    const bool is_there = std::any_of(
+        readings.begin(), readings.end(),
+        [&](const std::string& reading) { return ::stat(reading.c_str(), &info) == 0; });
+    if (!is_there && file.may_be_word) continue;
     // A file that is missing is for the command to make, or to report
-    if (::stat(file.name.c_str(), &info) != 0) return false;
+    if (!is_there) return false;
     if (!file.is_output) {
       if (isLater(info.st_mtim, newest_input)) newest_input = info.st_mtim;
     } else if (!has_output || isLater(oldest_output, info.st_mtim)) {

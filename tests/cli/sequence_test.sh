@@ -111,6 +111,35 @@ newerFramesAreSkipped() {
   says "1 frame: 1 done"
 }
 
+# Files behind options, and behind a name in them, are of the frame, too.
+inputsOfOptionsAreOfTheFrame() {
+  local frame
+  makeFrames 1 2
+  "$cornell_scene" .
+  for frame in 1 2; do
+    cp cornell.obj "mesh.$frame.obj"
+    cp "street.000$frame.ply" "lamp.$frame.ply"
+  done
+  local index=(index street.000#.ply lamp.#.ply -o named.#.sft --group "lamp=lamp.#.ply" --memory 64M
+    --frames 1-2 --newer)
+  run 0 "${index[@]}"
+  run 0 info named.2.sft
+  says "lamp"
+  run 0 "${index[@]}"
+  says "2 frames: 0 done, 2 up to date, 0 failed"
+  run 0 sample mesh.#.obj -o box.#.ply --count 300 --frames 1-2
+  run 0 index box.#.ply -o box.#.sft --memory 64M --frames 1-2
+  local relight=(relight box.#.sft -o lit.#.sft --mesh mesh.#.obj --light-directional "-1 -2 -1  3 3 3"
+    --frames 1-2 --newer)
+  run 0 "${relight[@]}"
+  run 0 "${relight[@]}"
+  says "2 frames: 0 done, 2 up to date, 0 failed"
+  sleep 0.05
+  touch mesh.2.obj
+  run 0 "${relight[@]}"
+  says "frame 2 (2 of 2)" "2 frames: 1 done, 1 up to date, 0 failed"
+}
+
 # The peak of a frame does not count against the budget of the next.
 theLeastBudgetDoesForAllFrames() {
   local least

@@ -112,6 +112,25 @@ static void gather_with_gains(surfeit_engine* engine, const surfeit_scene* scene
          "no gains");
 }
 
+/* A caller compiled before gains: what lies behind its struct is not read. */
+static void gather_as_older_caller(surfeit_engine* engine, const surfeit_scene* scene,
+                                   surfeit_settings settings, const surfeit_receiver* receiver,
+                                   surfeit_result plain) {
+  surfeit_gatherer* gatherer = NULL;
+  surfeit_result result;
+  settings.size = offsetof(surfeit_settings, gain_count);
+  settings.gain_count = 99;
+  expect(surfeit_gatherer_create(engine, scene, &settings, NULL, &gatherer) == SURFEIT_OK,
+         "an older caller");
+  expect(surfeit_gather(gatherer, receiver, 1, &result, NULL, NULL) == SURFEIT_OK, "gather");
+  expect(result.irradiance[0] == plain.irradiance[0], "light of an older caller");
+  surfeit_gatherer_release(gatherer);
+  settings.size = sizeof settings + 8;
+  expect(surfeit_gatherer_create(engine, scene, &settings, NULL, &gatherer) ==
+             SURFEIT_INVALID_ARGUMENT,
+         "a newer caller");
+}
+
 static void gather_from(surfeit_engine* engine, const surfeit_scene* scene) {
   surfeit_settings settings;
   surfeit_environment sky;
@@ -147,6 +166,7 @@ static void gather_from(surfeit_engine* engine, const surfeit_scene* scene) {
   expect(fabs(results[0].environment[1] - 3.14159 * .761) < .05, "environment");
   expect(results[1].occlusion < .001, "nothing is there");
   gather_with_gains(engine, scene, settings, receivers, results[0]);
+  gather_as_older_caller(engine, scene, settings, receivers, results[0]);
   expect(surfeit_gather(gatherer, receivers, 2, results, at_once, NULL) == SURFEIT_INTERRUPTED,
          "interrupted");
   expect(surfeit_gather(NULL, receivers, 2, results, NULL, NULL) == SURFEIT_INVALID_ARGUMENT,
@@ -203,6 +223,10 @@ int main(int argc, char** argv) {
   expect(surfeit_scene_open(engine, path, &scene) == SURFEIT_OK, "open");
   memset(&info, 0, sizeof info);
   expect(surfeit_scene_get_info(scene, &info) == SURFEIT_INVALID_ARGUMENT, "no size");
+  info.size = offsetof(surfeit_scene_info, surfels);
+  expect(surfeit_scene_get_info(scene, &info) == SURFEIT_OK && info.file_bytes > 0 &&
+             info.surfels == 0,
+         "info of an older caller");
   info.size = sizeof info;
   expect(surfeit_scene_get_info(scene, &info) == SURFEIT_OK && info.surfels == EDGE * EDGE, "info");
 
@@ -222,7 +246,7 @@ int main(int argc, char** argv) {
 
   statistics.size = sizeof statistics;
   expect(surfeit_engine_statistics(engine, &statistics) == SURFEIT_OK && statistics.scenes == 2 &&
-             statistics.gatherers == 0 && statistics.receivers == 2 * 6,
+             statistics.gatherers == 0 && statistics.receivers == 2 * 7,
          "statistics");
   surfeit_scene_release(held);
   surfeit_scene_release(scene);
