@@ -252,6 +252,15 @@ Result<std::optional<ColorRange>> colorRangeFor(std::span<const std::string> inp
   return std::optional<ColorRange>();
 }
 
+const CloudFormat* formatWritten(const std::string& path) {
+  // Standard output has no name: it is PLY, or what follows the dash (-.csv)
+  const std::string_view name = path == "-" ? std::string_view("-.ply") : withoutCompression(path);
+  for (const CloudFormat& format : kFormats) {
+    if (format.create != nullptr && hasExtension(name, format.extensions)) return &format;
+  }
+  return nullptr;
+}
+
 std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes) {
   return hasExtension(path, ".vdb") ? count * (row_bytes + sizeof(VdbEntry)) : 0;
 }
@@ -311,26 +320,24 @@ std::uint64_t rowBytesOf(const RowWriterOptions& writing) {
 
 Result<std::unique_ptr<RowWriter>> createRowWriter(const std::string& path,
                                                    const RowWriterOptions& options) {
-  // Standard output has no name: it is PLY, or what follows the dash (-.csv)
-  const std::string_view name = path == "-" ? std::string_view("-.ply") : withoutCompression(path);
+  const CloudFormat* const format = formatWritten(path);
+  if (format == nullptr) {
+    return Status::invalidArgument(fmt::format(
+        "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it; - "
+        "is PLY to standard output, -.csv CSV",
+        path, extensionsWritten()));
+  }
   RowWriterOptions writing = options;
   if (writing.like != nullptr) writing.like = &writing.like->file();
-  for (const CloudFormat& format : kFormats) {
-    if (format.create != nullptr && hasExtension(name, format.extensions)) {
-      noteLostUpAxis(path, format, writing);
-      noteLostComments(path, format, writing);
-      if (writing.count && name == path && format.extensions == ".ply") {
-        SURFEIT_RETURN_IF_ERROR(checkOutputRoom(path, *writing.count * rowBytesOf(writing)));
-      }
-      SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> writer, format.create(path, writing));
-      return format.has(CloudFormat::kFloatPositions) ? watchPositions(std::move(writer))
-                                                      : std::move(writer);
-    }
+  noteLostUpAxis(path, *format, writing);
+  noteLostComments(path, *format, writing);
+  if (writing.count && path != "-" && withoutCompression(path) == path &&
+      format->extensions == ".ply") {
+    SURFEIT_RETURN_IF_ERROR(checkOutputRoom(path, *writing.count * rowBytesOf(writing)));
   }
-  return Status::invalidArgument(fmt::format(
-      "{}: expected a name that ends with one of {}, with or without .gz or .zst behind it; - "
-      "is PLY to standard output, -.csv CSV",
-      path, extensionsWritten()));
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> writer, format->create(path, writing));
+  return format->has(CloudFormat::kFloatPositions) ? watchPositions(std::move(writer))
+                                                   : std::move(writer);
 }
 
 }  // namespace surfeit

@@ -61,6 +61,10 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
 Result<std::optional<ColorRange>> colorRangeFor(std::span<const std::string> inputs,
                                                 const std::string& output, ColorRange asked);
 
+// The format of the cloud that is written under a name, by its extension; none where no format has
+// it.
+const CloudFormat* formatWritten(const std::string& path);
+
 // What the writer of `path` holds of so many rows until its end: 0 but for OpenVDB, whose tree is
 // sorted in memory (RowWriterOptions::memory_bytes).
 std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes);

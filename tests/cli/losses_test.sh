@@ -169,4 +169,16 @@ whatIsSkippedIsToldOnce() {
   run 3 index far.csv -o strict.sft --strict
 }
 
+scenesUnderNamesOfCloudsAreTold() {
+  generate city.ply --surfels 100
+  run 0 index city.ply -o odd.PLY.gz
+  says "odd.PLY.gz: a scene, under a name of PLY files" ".sft"
+  run 0 index city.ply -o odd.las
+  says "a name of LAS files"
+  run 3 index city.ply -o strict.csv --strict
+  leavesNothing strict
+  run 0 index city.ply -o even.sft --strict
+  run 0 index city.ply -o even.ply.scene --strict
+}
+
 runCase
