@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
 """Occlusion of open ground in airborne scans: with estimated normals, and as spheres.
 
-    PYTHONPATH=build/release/python python3 bench/open_ground.py CLOUD ... [--quality draft]
+    PYTHONPATH=build/dev/python python3 bench/open_ground.py CLOUD ... [--quality draft]
         [--rounds 5] [--directory DIR]
 
 Indexes each cloud twice, with `normals=estimate` turned up and without normals, and gathers
 occlusion at the points of both, in turns. Receivers are the points with their estimated normals.
 Heights alone tell open ground: a point lies on it where all points of the cells around it, a window
-of 20 by 20 spacings, lie within 2 spacings of height. A truth of such ground is near 0: only what stands
-farther away covers its sky.
+of 20 by 20 spacings, lie within 2 spacings of height. Only what stands farther away covers its sky.
 """
 
 import argparse
@@ -28,7 +27,7 @@ MOST_HEIGHT = 2  # spacings
 
 
 def open_ground(position):
-    """Whether each point lies on open ground; and the spacing."""
+    """Whether each point lies on open ground."""
     position = position - position.min(axis=0)
     extent = position.max(axis=0)
     occupied = np.unique((position[:, :2] / (extent[:2].max() / 256)).astype(int), axis=0)
@@ -45,7 +44,7 @@ def open_ground(position):
     highest = np.max([np.roll(high, step, (0, 1)) for step in around], axis=0)
     missing = np.max([np.roll(np.isinf(low), step, (0, 1)) for step in around], axis=0)
     is_open = (highest - lowest < MOST_HEIGHT * spacing) & ~missing
-    return is_open[tuple(cell.T)], spacing
+    return is_open[tuple(cell.T)]
 
 
 def measure(cloud, options, directory):
@@ -57,7 +56,7 @@ def measure(cloud, options, directory):
     surfeit.index(cloud, scenes["spheres"])
     points = surfeit.read(normals)
     position = np.asarray(points["position"], dtype=np.float64)
-    is_open, spacing = open_ground(position)
+    is_open = open_ground(position)
 
     seconds = {name: [] for name in scenes}
     occlusion = {}
