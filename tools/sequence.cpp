@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <span>
 #include <string>
 
 #include "tools/console.h"
@@ -17,12 +18,11 @@ constexpr const char* kSequenceGroup = "Sequences";
 
 // Inputs that are not given by position.
 constexpr const char* kInputOptions[] = {"environment", "brick", "like", "mesh", "camera-file"};
-// Inputs behind a word, or words (--group NAME=FILE, --orient up).
-constexpr const char* kWordOptions[] = {"group", "orient", "cube"};
+// Inputs behind a word, or numbers (--group NAME=FILE, --cube 0,0,0,1).
+constexpr const char* kWordOptions[] = {"group", "cube"};
 
-template <std::size_t kCount>
-bool isOneOf(const CLI::Option& option, const char* const (&names)[kCount]) {
-  return std::any_of(std::begin(names), std::end(names),
+bool isOneOf(const CLI::Option& option, std::span<const char* const> names) {
+  return std::any_of(names.begin(), names.end(),
                      [&](const char* name) { return option.check_lname(name); });
 }
 
@@ -33,8 +33,13 @@ bool isInputOption(const CLI::Option& option) {
 struct FileName {
   std::string name;
   bool is_output = false;
-  bool may_be_word = false;
 };
+
+// The file that a value of --group or --cube names; empty for numbers.
+std::string fileBehindWord(const std::string& value) {
+  const bool is_numbers = value.find_first_not_of("+-.0123456789eE, ") == std::string::npos;
+  return is_numbers ? "" : filesIn(value).back();
+}
 
 // The files that a parsed command names.
 std::vector<FileName> fileNames(const CLI::App& command) {
@@ -42,9 +47,9 @@ std::vector<FileName> fileNames(const CLI::App& command) {
   for (const CLI::Option* const option : command.get_options()) {
     const bool is_output = isOutputOption(*option);
     if (option->count() == 0 || (!is_output && !isInputOption(*option))) continue;
-    const bool may_be_word = isOneOf(*option, kWordOptions);
-    for (const std::string& name : option->results()) {
-      names.push_back({name, is_output, may_be_word});
+    for (const std::string& value : option->results()) {
+      const std::string name = isOneOf(*option, kWordOptions) ? fileBehindWord(value) : value;
+      if (!name.empty()) names.push_back({name, is_output});
     }
   }
   return names;
@@ -132,13 +137,8 @@ bool isUpToDate(const CLI::App& command) {
   bool has_output = false;
   for (const FileName& file : fileNames(command)) {
     struct ::stat info {};
-    const std::vector<std::string> readings = filesIn(file.name);
-    const bool is_there = std::any_of(
-        readings.begin(), readings.end(),
-        [&](const std::string& reading) { return ::stat(reading.c_str(), &info) == 0; });
-    if (!is_there && file.may_be_word) continue;
     // A file that is missing is for the command to make, or to report
-    if (!is_there) return false;
+    if (::stat(file.name.c_str(), &info) != 0) return false;
     if (!file.is_output) {
       if (isLater(info.st_mtim, newest_input)) newest_input = info.st_mtim;
     } else if (!has_output || isLater(oldest_output, info.st_mtim)) {

@@ -26,6 +26,7 @@
 #include "bounce/bounce_crew.h"
 #include "bounce/bounce_radiosity.h"
 #include "bounce/glossy_bounce.h"
+#include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/parallel.h"
 #include "core/seconds_since.h"
@@ -131,6 +132,7 @@ class Bouncer {
 
 Result<BounceStats> Bouncer::run() {
   SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path_, scene_path_, "scene"));
+  noteSceneName(result_path_, progress_);
   SURFEIT_ASSIGN_OR_RETURN(scene_, SceneFile::open(scene_path_, sceneAccess(gather_options_)));
   SURFEIT_RETURN_IF_ERROR(checkScene());
   SURFEIT_RETURN_IF_ERROR(checkMemory());

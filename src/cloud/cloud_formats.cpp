@@ -261,6 +261,15 @@ const CloudFormat* formatWritten(const std::string& path) {
   return nullptr;
 }
 
+void noteSceneName(const std::string& output, Progress& progress) {
+  const CloudFormat* const format = formatWritten(output);
+  if (output == "-" || format == nullptr) return;
+  progress.note(fmt::format(
+      "{}: a scene, under a name of {} files: other programs will not open it, name it .sft; "
+      "convert writes clouds",
+      output, format->name));
+}
+
 std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes) {
   return hasExtension(path, ".vdb") ? count * (row_bytes + sizeof(VdbEntry)) : 0;
 }

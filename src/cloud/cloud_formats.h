@@ -65,6 +65,9 @@ Result<std::optional<ColorRange>> colorRangeFor(std::span<const std::string> inp
 // it.
 const CloudFormat* formatWritten(const std::string& path);
 
+// Tells of a scene that gets the name of a cloud.
+void noteSceneName(const std::string& output, Progress& progress);
+
 // What the writer of `path` holds of so many rows until its end: 0 but for OpenVDB, whose tree is
 // sorted in memory (RowWriterOptions::memory_bytes).
 std::uint64_t heldWriterBytes(const std::string& path, std::uint64_t count, std::size_t row_bytes);

@@ -138,7 +138,7 @@ class Indexer {
 Result<IndexStats> Indexer::run() {
   SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
   noteIndexRules(totals_, *reader_, options_, progress_);
-  noteNameOfCloud(output_, progress_);
+  noteSceneName(output_, progress_);
   freeSamples();
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "cloud/cloud_formats.h"
 #include "index/stray_note.h"
 
 namespace surfeit {
@@ -84,15 +83,6 @@ void noteRepeats(const IndexStats& stats, const IndexOptions& options, Progress&
                     "(--overlap thin keeps one at a place, as tiles that overlap need)",
                     stats.repeated_surfels));
   }
-}
-
-void noteNameOfCloud(const std::string& output, Progress& progress) {
-  const CloudFormat* const format = formatWritten(output);
-  if (output == "-" || format == nullptr) return;
-  progress.note(fmt::format(
-      "{}: a scene, under a name of {} files: other programs will not open it, name it .sft; "
-      "convert writes clouds",
-      output, format->name));
 }
 
 void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress) {

@@ -16,9 +16,6 @@ void noteStrays(const CloudTotals& totals, const glm::dvec3& origin, bool is_ori
 void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
                     const IndexOptions& options, Progress& progress);
 
-// A scene that gets the name of a cloud.
-void noteNameOfCloud(const std::string& output, Progress& progress);
-
 // How many surfels lie on no surface, of those that got normals.
 void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress);
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/parallel.h"
 #include "index/index_notes.h"
@@ -122,6 +123,7 @@ class IndexMerge {
         const std::unique_ptr<SceneWriter> writer,
         SceneWriter::create(job_.output, description.header(options.full_precision),
                             description.identity(options.full_precision)));
+    noteSceneName(job_.output, progress_);
     progress_.beginPhase("merge", expected(), "surfels");
     StoredSlabs slabs(job_, plan_, memory.slabs);
     SURFEIT_RETURN_IF_ERROR(stitchOctree(slabs, *writer, memory.slabs, progress_));

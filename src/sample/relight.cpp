@@ -13,6 +13,7 @@
 #include <optional>
 #include <utility>
 
+#include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/job_limits.h"
 #include "core/parallel.h"
@@ -188,6 +189,7 @@ Result<RelightStats> Relighter::run() {
 
 Status Relighter::openScene() {
   SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path_, scene_path_, "scene"));
+  noteSceneName(result_path_, progress_);
   SURFEIT_ASSIGN_OR_RETURN(scene_, SceneFile::open(scene_path_));
   stats_.surfels = scene_.header().surfel_count;
   if (!scene_.header().channels.albedo) {

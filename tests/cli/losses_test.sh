@@ -179,6 +179,8 @@ scenesUnderNamesOfCloudsAreTold() {
   leavesNothing strict
   run 0 index city.ply -o even.sft --strict
   run 0 index city.ply -o even.ply.scene --strict
+  run 0 bounce even.sft -o lit.ply --quality draft
+  says "lit.ply: a scene, under a name of PLY files"
 }
 
 runCase

@@ -138,6 +138,28 @@ inputsOfOptionsAreOfTheFrame() {
   touch mesh.2.obj
   run 0 "${relight[@]}"
   says "frame 2 (2 of 2)" "2 frames: 1 done, 1 up to date, 0 failed"
+  # The cube of another scene, or numbers
+  local cubes=(index street.000#.ply -o cube.#.sft --memory 64M --frames 1-2 --newer --cube)
+  run 0 "${cubes[@]}" named.#.sft
+  run 0 "${cubes[@]}" named.#.sft
+  says "2 frames: 0 done, 2 up to date, 0 failed"
+  touch named.1.sft
+  run 0 "${cubes[@]}" named.#.sft
+  says "2 frames: 1 done, 1 up to date, 0 failed"
+  run 0 "${cubes[@]}" -2000,-2000,-2000,4000
+  says "2 frames: 0 done, 2 up to date, 0 failed"
+  rm named.2.sft
+  run 1 "${cubes[@]}" named.#.sft
+  says "named.2.sft"
+  # An input whose name holds that of another file
+  for frame in 1 2; do
+    mv "mesh.$frame.obj" "a=mesh.$frame.obj"
+  done
+  run 0 sample a=mesh.#.obj -o again.#.ply --count 300 --frames 1-2 --newer
+  mv a=mesh.2.obj mesh.2.obj
+  touch -d "2001-01-01" mesh.2.obj
+  run 1 sample a=mesh.#.obj -o again.#.ply --count 300 --frames 1-2 --newer
+  says "a=mesh.2.obj" "2 frames: 0 done, 1 up to date, 1 failed"
 }
 
 # The peak of a frame does not count against the budget of the next.

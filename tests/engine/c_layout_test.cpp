@@ -1,4 +1,4 @@
-// The layout of the structs of the C API, which compiled callers hold: members keep their places. A
+// The layout of the structs of the C API on 64-bit systems, which compiled callers hold: members keep their places. A
 // struct with `size` may get members at its end; the others never change.
 #include <gtest/gtest.h>
 
