@@ -220,5 +220,54 @@ TEST(PacketRaster, AWallThatIsTouchedCoversHalf) {
   }
 }
 
+// Walls one behind the other, 1 apart, each of its own color on both sides.
+constexpr int kWalls = 5;
+glm::vec3 colorOfWall(int wall) { return {wall % 2 == 0, wall % 3 == 0, .2f * float(wall)}; }
+
+std::vector<Surfel> parallelWalls(float surfels_apart) {
+  std::vector<Surfel> walls;
+  const int side = int(std::lround(8 / surfels_apart));
+  for (int i = 0; i < kWalls * 2 * side * side; ++i) {
+    const int place = i / (kWalls * 2), wall = i % kWalls;
+    const float facing = i / kWalls % 2 == 0 ? 1.f : -1.f;
+    Surfel surfel;
+    surfel.position = {float(wall) + .01f * facing, surfels_apart * (float(place % side) + .5f) - 4,
+                       surfels_apart * (float(place / side) + .5f) - 4};
+    surfel.normal = {facing, 0, 0};
+    surfel.area = surfels_apart * surfels_apart;
+    surfel.radius = .75f * surfels_apart;
+    surfel.radiosity = colorOfWall(wall);
+    walls.push_back(surfel);
+  }
+  return walls;
+}
+
+// The centre of the packet lies between other walls than most of its receivers.
+TEST(PacketRaster, ReceiversBetweenWallsSeeTheNearestOne) {
+  for (const float apart : {.5f, .25f}) {
+    const std::vector<Surfel> walls = parallelWalls(apart);
+    std::vector<LocalReceiver> receivers;
+    for (int i = 0; i < int(kPacketReceivers); ++i) {
+      const float facing = i % 2 == 0 ? 1.f : -1.f;
+      const float x = float(i / 2 % (kWalls - 1)) + .3f + .05f * float(i / 8);
+      receivers.push_back({{x, .1f * float(i % 3), .1f}, {facing, 0, 0}});
+    }
+    const GatherRules rules(GatherMode::kBleeding, {});
+    for (const PacketKernel& kernel : packetKernels()) {
+      PacketRaster packet(rules, kernel), alone(rules, kernel);
+      const auto add = [&](PacketRaster& raster) { raster.addSurfels(walls); };
+      const std::vector<GatherResult> results = gathered(packet, receivers, add);
+      for (std::size_t i = 0; i < receivers.size(); ++i) {
+        const GatherResult own = gathered(alone, std::span(receivers).subspan(i, 1), add)[0];
+        const int nearest = int(receivers[i].position.x) + (i % 2 == 0 ? 1 : 0);
+        for (int c = 0; c < 3; ++c) {
+          EXPECT_NEAR(results[i].irradiance[c], own.irradiance[c], .01) << apart << ' ' << i;
+          EXPECT_NEAR(results[i].irradiance[c], colorOfWall(nearest)[c], .06) << apart << ' ' << i;
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace surfeit

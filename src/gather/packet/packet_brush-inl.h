@@ -59,8 +59,23 @@ class Brush {
   void EndFace() { hull_.CloseAll(); }
 
   HWY_INLINE void DrawPatch(const Patch& patch) {
-    Sight sight = See(canvas_, patch, receivers_);
-    M seen = SeenAsPatch(patch, receivers_, sight);
+    DrawSeen(patch, See(canvas_, patch, receivers_), hn::FirstN(D(), kStep));
+  }
+  // In these lanes alone.
+  void DrawPatch(const Patch& patch, M lanes) {
+    DrawSeen(patch, See(canvas_, patch, receivers_), lanes);
+  }
+  // The lanes that may see some of it, as bits, and how far from all lanes it is.
+  std::uint32_t LanesThatSee(const Patch& patch, V& distance_sq) const {
+    const Sight sight = See(canvas_, patch, receivers_);
+    distance_sq = sight.distance_sq;
+    return LaneBits(hn::Or(sight.traced, SeenAsPatch(patch, receivers_, sight)));
+  }
+
+ private:
+  HWY_INLINE void DrawSeen(const Patch& patch, Sight sight, M lanes) {
+    M seen = hn::And(lanes, SeenAsPatch(patch, receivers_, sight));
+    sight.traced = hn::And(lanes, sight.traced);
     if (patch.parts != 0) {
       const M counts = hn::Gt(LoadLanes(canvas_.parts[patch.parts].of, lane_), hn::Zero(D()));
       seen = hn::And(seen, counts);
@@ -75,8 +90,6 @@ class Brush {
       if (recorder_) Record(patch.kind, sight);
     }
   }
-
- private:
   void Record(CubeKind kind, const Sight& sight) const {
     const V distance = hn::Sqrt(sight.distance_sq);
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {

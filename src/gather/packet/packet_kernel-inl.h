@@ -14,6 +14,8 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 
 #include "core/spherical_harmonics.h"
 #include "gather/packet/packet_brush-inl.h"
@@ -21,6 +23,7 @@
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
 #include "gather/packet/packet_lobe-inl.h"
+#include "gather/packet/packet_order-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {
@@ -156,6 +159,7 @@ void DrawAll(const PacketCanvas& canvas, const Patch* patches,
   for (std::size_t lane = 0; lane < canvas.receiver_count; lane += kStep) {
     Brush<Kind> brush(canvas, lane);
     int face = -1;
+    OwnOrders<Kind> own_orders(canvas, patches, lane);
     for (std::size_t i = 0; i < order.size(); ++i) {
       const auto* const later = reinterpret_cast<const char*>(
           patchOf(order[std::min(i + kPatchesAhead, order.size() - 1)]));
@@ -166,6 +170,12 @@ void DrawAll(const PacketCanvas& canvas, const Patch* patches,
         face = draw_order::face(order[i]);
         brush.BeginFace(face);
         (*canvas.is_face_used)[std::size_t(face)] = true;
+        const std::size_t among = own_orders.Count(order.subspan(i));
+        if (among > 1) {
+          own_orders.Draw(brush, order.subspan(i, among));
+          i += among - 1;
+          continue;
+        }
       }
       brush.DrawPatch(*patchOf(order[i]));
     }

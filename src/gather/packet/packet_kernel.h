@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
+#include <vector>
 
 #include "core/symmetric_matrix.h"
 #include "gather/cut/cut.h"
@@ -146,9 +147,10 @@ struct PacketCanvas {
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
   const SeenPixels* seen;
-  const PacketParts* parts;    // of the patches
-  const PacketLights* lights;  // of the patches
-  PixelRecorder* recorder;     // of what the first receiver sees; null: nobody's
+  const PacketParts* parts;             // of the patches
+  const PacketLights* lights;           // of the patches
+  PixelRecorder* recorder;              // of what the first receiver sees; null: nobody's
+  std::vector<std::uint64_t>* scratch;  // of the drawing; grows
 };
 
 struct RoughSight {
@@ -165,6 +167,8 @@ inline std::uint64_t key(int face, float distance_sq, std::uint32_t index) {
   const std::uint64_t distance = std::bit_cast<std::uint32_t>(distance_sq) >> 2;
   return static_cast<std::uint64_t>(face) << 61 | distance << 32 | index;
 }
+// Its bits of the distance.
+inline std::uint64_t distance(std::uint64_t key) { return key << 3 >> 35; }
 inline int face(std::uint64_t key) { return static_cast<int>(key >> 61); }
 inline std::uint32_t index(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
 }  // namespace draw_order

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/vec3.hpp>
 
 #include "gather/cut/vectors_of_3-inl.h"
@@ -31,6 +32,13 @@ using M = hn::Mask<D>;
 constexpr std::size_t kStep = hn::MaxLanes(D());
 
 inline V Splat(float value) { return hn::Set(D(), value); }
+// Lanes as bits, the first one lowest.
+inline std::uint32_t LaneBits(M lanes) {
+  std::uint8_t bytes[8] = {};  // as many as are stored at least
+  static_assert(kStep <= 16);
+  hn::StoreMaskBits(D(), lanes, bytes);
+  return bytes[0] | std::uint32_t{bytes[1]} << 8;
+}
 inline V LoadLanes(const std::array<float, kPacketReceivers>& column, std::size_t lane) {
   return hn::Load(D(), column.data() + lane);
 }

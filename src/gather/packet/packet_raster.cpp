@@ -396,7 +396,8 @@ PacketCanvas PacketRaster::canvas() const {
           .seen = &seen_,
           .parts = parts_.data(),
           .lights = lights_.data(),
-          .recorder = recorder_};
+          .recorder = recorder_,
+          .scratch = &order_scratch_};
 }
 
 void PacketRaster::sort() { sortByUpperHalf(order_, order_count_, order_scratch_); }

@@ -129,7 +129,8 @@ class PacketRaster {
   std::vector<Patch> patches_;
   std::vector<PacketParts> parts_;
   std::vector<PacketLights> lights_;
-  std::vector<std::uint64_t> order_, order_scratch_;  // see draw_order; grow by doubling
+  std::vector<std::uint64_t> order_;
+  mutable std::vector<std::uint64_t> order_scratch_;  // see draw_order; grow by doubling
   std::size_t order_count_ = 0;
 };
 

@@ -78,6 +78,13 @@ struct Fidelity {
   // than .3. 1: AO RMSE of spheres .0128 instead of .0045.)
   float nested = 0.3f;
 
+  // Radii of a packet, from its centre, within which patches are drawn to each receiver in the
+  // order of its own distances. Patches in one direction of a receiver need 1 (OwnOrders); those
+  // that lie beside each other need more. (Light of 100,000 receivers of a city of as many surfels
+  // beside each of them alone, rms over the mean: 12.5 % with 0, 5.4 with 1, 1.6 with 1.5, 1.5 with
+  // 2, for 1, 1.1, 1.3, 1.4 times the time.)
+  float own_order = 1.5f;
+
   // Part of half its side by which a patch is widened in the hull. (AO RMSE with .7, .75, .8, .9:
   // bunny, scattered .0054, .0046, .0042, .0037; city .0049, .0052, .0053, .0057.)
   float hull_widening = 0.75f;
