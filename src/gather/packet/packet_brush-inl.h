@@ -65,10 +65,9 @@ class Brush {
   void DrawPatch(const Patch& patch, M lanes) {
     DrawSeen(patch, See(canvas_, patch, receivers_), lanes);
   }
-  // The lanes that may see some of it, as bits, and how far from all lanes it is.
-  std::uint32_t LanesThatSee(const Patch& patch, V& distance_sq) const {
+  // The lanes that may see some of it, as bits.
+  std::uint32_t LanesThatSee(const Patch& patch) const {
     const Sight sight = See(canvas_, patch, receivers_);
-    distance_sq = sight.distance_sq;
     return LaneBits(hn::Or(sight.traced, SeenAsPatch(patch, receivers_, sight)));
   }
 

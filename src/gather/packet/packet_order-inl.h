@@ -10,9 +10,10 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,7 @@ class OwnOrders {
   OwnOrders(const PacketCanvas& canvas, const Patch* patches, std::size_t lane)
       : canvas_(canvas),
         patches_(patches),
+        lane_(lane),
         lane_count_(std::min(kStep, canvas.receiver_count - lane)) {
     const float radius = kFidelity.own_order * canvas.packet_radius;
     among_ = draw_order::distance(draw_order::key(0, radius * radius, 0));
@@ -52,32 +54,35 @@ class OwnOrders {
 
   // Draws these to one receiver after the other, in the order of its own distances.
   void Draw(Brush<Kind>& brush, std::span<const std::uint64_t> order) const {
-    std::vector<std::uint64_t>& own = *canvas_.scratch;
-    if (own.size() < lane_count_ * order.size()) own.resize(lane_count_ * order.size());
-    std::array<std::size_t, kStep> counts{};
-    HWY_ALIGN std::array<float, kStep> distances;
-    for (const std::uint64_t key : order) {
-      const std::uint32_t index = draw_order::index(key);
-      V distance_sq;
-      std::uint32_t seen = brush.LanesThatSee(patches_[index], distance_sq);
-      hn::Store(distance_sq, D(), distances.data());
-      for (std::size_t k = 0; k < lane_count_; ++k, seen >>= 1) {
-        if ((seen & 1) == 0) continue;
-        own[k * order.size() + counts[k]++] = draw_order::key(0, distances[k], index);
-      }
+    std::vector<std::uint64_t>& scratch = *canvas_.scratch;
+    if (scratch.size() < 2 * order.size()) scratch.resize(2 * order.size());
+    const auto seen = std::span(scratch).first(order.size());
+    const auto own = std::span(scratch).subspan(order.size(), order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      seen[i] = brush.LanesThatSee(patches_[draw_order::index(order[i])]);
     }
     for (std::size_t k = 0; k < lane_count_; ++k) {
-      const auto keys = std::span(own).subspan(k * order.size(), counts[k]);
-      std::sort(keys.begin(), keys.end());
+      const PacketLanes& lanes = *canvas_.lanes;
+      const glm::vec3 place(lanes.x[lane_ + k], lanes.y[lane_ + k], lanes.z[lane_ + k]);
+      std::size_t count = 0;
+      for (std::size_t i = 0; i < order.size(); ++i) {
+        if ((seen[i] >> k & 1) == 0) continue;
+        const std::uint32_t index = draw_order::index(order[i]);
+        const glm::vec3 middle = patches_[index].position - place;
+        own[count++] = draw_order::key(0, glm::dot(middle, middle), index);
+      }
+      std::sort(own.begin(), own.begin() + std::ptrdiff_t(count));
       const M only = hn::Eq(hn::Iota(D(), 0), Splat(float(k)));
-      for (const std::uint64_t key : keys) brush.DrawPatch(patches_[draw_order::index(key)], only);
+      for (const std::uint64_t key : own.first(count)) {
+        brush.DrawPatch(patches_[draw_order::index(key)], only);
+      }
     }
   }
 
  private:
   const PacketCanvas& canvas_;
   const Patch* const patches_;
-  const std::size_t lane_count_;
+  const std::size_t lane_, lane_count_;
   std::uint64_t among_;  // distances of what lies among them are less
 };
 
