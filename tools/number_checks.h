@@ -5,8 +5,12 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <string>
+
+#include "surfeit/generate.h"
+#include "surfeit/status.h"
 
 namespace surfeit {
 
@@ -25,5 +29,15 @@ inline CLI::Validator numberCheck(bool may_be_zero) {
 
 inline const CLI::Validator kPositiveNumber = numberCheck(false);
 inline const CLI::Validator kNonNegativeNumber = numberCheck(true);
+
+// Counts such as 500k, 10M or 4096 (parseSurfelCount), as digits: for CLI::Option::transform.
+inline const CLI::Validator kUnitCount(
+    [](std::string& text) {
+      const Result<std::uint64_t> count = parseSurfelCount(text);
+      if (!count.ok()) return count.status().message();
+      text = std::to_string(*count);
+      return std::string();
+    },
+    "COUNT");
 
 }  // namespace surfeit

@@ -170,9 +170,10 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
   addCloudOutputOption(app, arguments.output, "Cloud to write");
   CLI::Option* const count =
       app.add_option("--count", arguments.options.count,
-                     "Number of surfels, distributed by area; long thin triangles add some")
+                     "Number of surfels, such as 500k, distributed by area; long thin triangles "
+                     "add some")
           ->capture_default_str()
-          ->check(kPositiveNumber);
+          ->transform(kUnitCount);
   CLI::Option* const spacing =
       app.add_option("--spacing", arguments.options.spacing,
                      "Distance between surfels in scene units, instead of a count")
@@ -185,7 +186,7 @@ void addSampleOptions(CLI::App& app, SampleArguments& arguments) {
       app.add_option("--photons", arguments.photons,
                      "Instead of surfels, trace this many photons from the lights and write where "
                      "they arrive, for surfeit radiance")
-          ->check(kPositiveNumber)
+          ->transform(kUnitCount)
           ->excludes(count)
           ->excludes(spacing);
   for (CLI::Option* const camera : cameras) camera->excludes(photons);

@@ -38,6 +38,16 @@ camerasHaveTheirErrors() {
   leavesNothing no.ply
 }
 
+countsHaveUnits() {
+  "$cornell_scene" .
+  run 0 sample cornell.obj -o digits.ply --count 2500 --light-samples 1
+  run 0 sample cornell.obj -o units.ply --count 2.5k --light-samples 1
+  cmp digits.ply units.ply || fail "2.5k surfels are not 2500"
+  run 0 sample cornell.obj -o digits.ply --photons 2000
+  run 0 sample cornell.obj -o units.ply --photons 2k
+  cmp digits.ply units.ply || fail "2k photons are not 2000"
+}
+
 linesAreHairWhereTheyHaveAWidth() {
   printf 'v 0 0 0\nv 0 1 0\nv 0 2 0\nv 1 0 0\nv 1 3 0\nl 1 2 3\nl 4 5\n' > lines.obj
   run 3 sample lines.obj -o no.ply

@@ -89,6 +89,7 @@ class Brush {
       if (recorder_) Record(patch.kind, sight);
     }
   }
+
   void Record(CubeKind kind, const Sight& sight) const {
     const V distance = hn::Sqrt(sight.distance_sq);
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {

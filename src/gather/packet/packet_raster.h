@@ -3,8 +3,9 @@
 // the packet's cut gives, sorts it by distance from the packet's centre, draws it front to back and
 // integrates (memo 3.4 and 3.5).
 //
-// Each lane is the raster of one receiver; what the lanes share is the cut and the order. A rough
-// node is seen from the packet's centre. A packet of one receiver is the definition.
+// Each lane is the raster of one receiver; what the lanes share is the walk and the order of what
+// lies outside the packet (packet_order-inl.h). A rough node is seen from the packet's centre. A
+// packet of one receiver is the definition.
 //
 // Contributions come front to back, in the order of the middles of their depth ranges. Coverage
 // adds up within a layer and covers between layers: neighbouring surfels of one surface share a
@@ -129,8 +130,8 @@ class PacketRaster {
   std::vector<Patch> patches_;
   std::vector<PacketParts> parts_;
   std::vector<PacketLights> lights_;
-  std::vector<std::uint64_t> order_;
-  mutable std::vector<std::uint64_t> order_scratch_;  // see draw_order; grow by doubling
+  std::vector<std::uint64_t> order_;  // see draw_order; grows by doubling
+  mutable std::vector<std::uint64_t> order_scratch_;
   std::size_t order_count_ = 0;
 };
 
