@@ -223,9 +223,10 @@ impossibleValuesAreUsageErrors() {
   says "expected keep or thin"
   run 2 "${index[@]}" --precision double
   run 2 sample cornell.obj -o result.ply --count 0
-  says "expected a number of 1 to 2^40"
+  says "expected a whole number of 1 to 2^40"
   run 2 sample cornell.obj -o result.ply --count 3000000000000000
   run 2 sample cornell.obj -o result.ply --count 3x
+  run 2 sample cornell.obj -o result.ply --count 2.7
   run 2 sample cornell.obj -o result.ply --photons -3
   run 2 sample cornell.obj -o result.ply --light-point "1 2 3"
   run 2 view cornell.ply -o result.png --channel nothing

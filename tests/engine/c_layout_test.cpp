@@ -1,5 +1,5 @@
-// The layout of the structs of the C API on 64-bit systems, which compiled callers hold: members keep their places. A
-// struct with `size` may get members at its end; the others never change.
+// The layout of the structs of the C API on 64-bit systems, which compiled callers hold: members
+// keep their places. A struct with `size` may get members at its end; the others never change.
 #include <gtest/gtest.h>
 
 #include <cstddef>

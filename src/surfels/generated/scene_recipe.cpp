@@ -100,10 +100,11 @@ Result<std::uint64_t> parseSurfelCount(std::string_view text) {
   for (const auto& [name, its_factor] : kUnits) {
     if (unit == name) factor = its_factor;
   }
-  const double count = value * factor;
-  if (error != std::errc() || !(count >= 1 && count <= double(kMaxRecipeSurfels))) {
+  const double count = std::round(value * factor);
+  const bool is_whole = std::abs(count - value * factor) <= 1e-12 * count;  // 1.005k is rounded
+  if (error != std::errc() || !is_whole || !(count >= 1 && count <= double(kMaxRecipeSurfels))) {
     return Status::invalidArgument(
-        fmt::format("found {}, expected a number of 1 to 2^40, such as 500k, 10M, 1G or 4096",
+        fmt::format("found {}, expected a whole number of 1 to 2^40, such as 500k, 10M, 1G or 4096",
                     quoteText(text)));
   }
   return static_cast<std::uint64_t>(count);
