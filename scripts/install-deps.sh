@@ -12,7 +12,7 @@ packages=(
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
   libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev
   # Python package, its tests and examples, and pictures of docs/gallery.md
-  python3 python3-dev python3-numpy pybind11-dev python3-pytest python3-matplotlib
+  python3 python3-dev python3-numpy pybind11-dev python3-pytest python3-matplotlib mypy
   # Its wheel
   python3-setuptools python3-wheel python3-pip python3-venv
   # Tests; GNU parallel runs one of the jobs of `surfeit plan`

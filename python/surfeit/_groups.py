@@ -69,7 +69,8 @@ def _pairs_of(given: Any, name: str) -> List[Tuple[Any, Any]]:
         if not isinstance(text, str) or "=" not in text:
             raise ValueError(f"{name}: found {text!r}, expected {{groups: value}}, such as "
                              '{"walls": .5, "2,5-7": 2}')
-        pairs.append(tuple(text.rsplit("=", 1)))
+        groups, _, value = text.rpartition("=")
+        pairs.append((groups, value))
     return pairs
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Tuple
 
 from ._arguments import is_path, path_of
 from ._looks import numbers_of
@@ -70,7 +70,7 @@ def with_lights(options: Dict[str, Any], gain: Any = None) -> Dict[str, Any]:
             gains = _gains_of(gain)
         else:
             taken["gain"] = of_all
-    known = set()
+    known: Set[str] = set()
     for name, count in _LIGHTS.items():
         if taken.get(name) is None:
             continue
@@ -115,7 +115,7 @@ def crop_of(crop: Any) -> List[int]:
 _DETAILS = ("pixels", "max_solid_angle", "stereo", "fov", "size", "camera_crop")
 
 
-def with_cameras(options: Dict[str, Any]) -> Dict[str, Any]:
+def with_cameras(options: Mapping[str, Any]) -> Dict[str, Any]:
     """The same options, with cameras as seven numbers: eye, look-at, field of view (NaN: `fov`)."""
     taken = dict(options)
     if taken.get("camera") is not None:

@@ -135,8 +135,9 @@ def cube(scene: Union[PathLike, Scene], at: Optional[Sequence[float]] = None,
         if name.startswith("bounce_"):
             raise TypeError(f"{name}: a cube has the light before the look of bounce light")
     path = scene_path(scene)
-    drawing = {name: settings[name] for name in _PICTURE if settings.get(name) is not None}
-    options = _gather_options(path, {name: value for name, value in settings.items()
+    given: Mapping[str, Any] = settings
+    drawing = {name: given[name] for name in _PICTURE if given.get(name) is not None}
+    options = _gather_options(path, {name: value for name, value in given.items()
                                      if name not in _PICTURE})
     if picture is not None:
         options.setdefault("outputs", ["occlusion", "irradiance"])

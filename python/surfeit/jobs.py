@@ -76,7 +76,7 @@ def _index_options(settings: Mapping[str, Any], group: Any) -> Stats:
     """Named groups as pairs; the cube of another scene, and its origin, as numbers."""
     options = options_of(settings)
     like = options.get("cube")
-    if is_path(like) or isinstance(like, Scene):
+    if like is not None and (is_path(like) or isinstance(like, Scene)):
         info = _surfeit.scene_info(scene_path(like))
         options["cube"] = list(info["cube"])
         options.setdefault("origin", list(info["origin"]))
