@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Whether two releases of the program write the same bytes: every command, over modes, outputs,
-# qualities, orders, budgets and threads, on scenes of their own making.
+# Whether two releases of the program write the same bytes: every command but tune, which prints
+# seconds, over modes, outputs, qualities, orders, budgets and threads, on scenes of their own making.
 #
 #   scripts/compare_releases.sh OLD_SURFEIT NEW_SURFEIT [SCENE_PROGRAM]
 #
@@ -92,6 +92,26 @@ makes gather_sides sides.ply gather city_1.sft every.ply -o sides.ply --mode ble
 makes bounce bounced.sft bounce city_1.sft -o bounced.sft --bounces 2 --quality draft
 makes brick values.vdb brick bleeding.draft.ply -o values.vdb
 makes cloud_of_scene scene.ply convert city_1.sft -o scene.ply
+makes lookup looked_up.ply lookup bleeding.draft.ply every.ply -o looked_up.ply
+makes lookup_brick looked_up_brick.ply lookup values.vdb every.ply -o looked_up_brick.ply
+for shard in 1 2 3; do
+  makes "shard_$shard" "sharded.ply.shard-$shard-of-3" \
+    gather city_1.sft every.ply -o sharded.ply --shard $shard/3 --mode bleeding --quality draft \
+    --threads 1  # several write what they have gathered as soon as they have it
+done
+makes merge sharded.ply merge city_1.sft every.ply -o sharded.ply
+for pass in count distribute build; do
+  for shard in 1 2; do
+    both "index_${pass}_$shard" index city.ply -o parts.sft --pass $pass --shard $shard/2
+  done
+done
+makes index_merge parts.sft index city.ply -o parts.sft --pass merge --shards 2
+makes relight relit.sft relight city_1.sft -o relit.sft --light-point "0 200 0 9 9 9"
+makes cube cube.exr cube city_1.sft --receivers every.ply --number 7 -o cube.exr --mode bleeding
+makes ptfilter filtered.ply ptfilter -filter occlusion -maxsolidangle .1 every.ply -o filtered.ply
+both plan plan city_1.sft every.ply -o planned.ply --shards 2 --memory 64M --time 30m --slurm
+both info info city_1.sft
+both info_cloud info every.ply
 both verify verify city_1.sft
 
 if [[ -n ${scene_program:-} ]]; then
@@ -101,6 +121,11 @@ if [[ -n ${scene_program:-} ]]; then
   makes index_sampled sampled.sft index sampled.ply -o sampled.sft
   makes gather_sampled baked.ply gather sampled.sft sampled.ply -o baked.ply --mode bleeding
   makes view picture.png view baked.ply -o picture.png --size 200x200
+  makes passes passes.exr view sampled.ply -o unused.png --passes passes.exr --size 200x200
+  makes gather_passes lit.exr gather sampled.sft passes.exr -o lit.exr --mode bleeding --quality draft
+  makes composite composed.png composite passes.exr lit.exr -o composed.png
+  makes photons photons.ply sample "$mesh" -o photons.ply --photons 20000 --light-point "0 1.5 0 1 1 1"
+  makes radiance radiance.ply radiance photons.ply -o radiance.ply
 fi
 echo "$same files the same, $different different"
 ((different == 0))
