@@ -1,6 +1,6 @@
 // The engine as callers use it, through its public headers alone:
 //
-//   engine_bench calls SCENE.sft [--receivers 20480] [--call 256] [--memory 64 ...]
+//   engine_bench calls SCENE.sft [--receivers 20480] [--call 256] [--memory 64 ...] [--rounds 5]
 //     many small calls against one call of all: processor time and hits, in turns
 //   engine_bench forest [--trees 10000] [--surfels 1M] [--receivers 20480] [--memory 512]
 //     instances of one tree: rate beside that of the single tree, resident memory, and the error
@@ -81,7 +81,7 @@ std::vector<Receiver> receiversAbove(const glm::dvec3& min, const glm::dvec3& ma
 }
 
 void measureCalls(const std::string& path, std::size_t count, std::size_t call,
-                  const std::vector<std::uint64_t>& budgets) {
+                  const std::vector<std::uint64_t>& budgets, int rounds) {
   fmt::print("{:>10} {:>12} {:>12} {:>7} {:>9} {:>9} {:>9}\n", "memory", "one call /s",
              fmt::format("of {} /s", call), "ratio", "hits %", "hits %", "peak MiB");
   for (const std::uint64_t memory : budgets) {
@@ -109,7 +109,7 @@ void measureCalls(const std::string& path, std::size_t count, std::size_t call,
     std::vector<double> at_once, by_calls, ratios;
     double hits_at_once = 0, hits_by_calls = 0;
     measured(receivers.size(), hits_at_once);  // warm
-    for (int round = 0; round < 5; ++round) {
+    for (int round = 0; round < rounds; ++round) {
       at_once.push_back(measured(receivers.size(), hits_at_once));
       by_calls.push_back(measured(call, hits_by_calls));
       ratios.push_back(by_calls.back() / at_once.back());
@@ -349,6 +349,7 @@ int run(int argc, char** argv) {
   std::string scene;
   std::size_t receivers = 20'480, call = 256, trees = 10'000, surfels = 1'000'000;
   std::vector<std::uint64_t> budgets = {64};
+  int rounds = 5;
   std::size_t forest_receivers = 20'480;
   std::uint64_t memory = 512;
   CLI::App* const calls = app.add_subcommand("calls", "Many small calls against one of all");
@@ -356,6 +357,7 @@ int run(int argc, char** argv) {
   calls->add_option("--receivers", receivers);
   calls->add_option("--call", call);
   calls->add_option("--memory", budgets, "MiB, several");
+  calls->add_option("--rounds", rounds);
   CLI::App* const forest = app.add_subcommand("forest", "Instances of a tree");
   forest->add_option("--trees", trees);
   forest->add_option("--surfels", surfels);
@@ -364,7 +366,7 @@ int run(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   if (calls->parsed()) {
     for (std::uint64_t& each : budgets) each <<= 20;
-    measureCalls(scene, receivers, call, budgets);
+    measureCalls(scene, receivers, call, budgets, rounds);
   } else {
     measureForest(trees, surfels, forest_receivers, memory << 20);
   }
