@@ -31,8 +31,10 @@ inline constexpr double kMostBounceLight = .03;
 
 // A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
 // by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.
-inline constexpr double kUsualStep = .004, kMostStep = .015;
-inline constexpr double kUnusualSteps = 200;
+inline constexpr double kUsualStep = .004, kMostStep = .008;
+inline constexpr double kUnusualSteps = 100;
+// Light, rms over the mean of a scene: of half of the scenes, and of nine tenths.
+inline constexpr double kMedianLightStep = .002, kLargeLightStep = .06;
 
 // The same scene moved, turned by quarters, and twice as large. Results of the exact gather differ
 // by rounding, of the default by other cells of the octree as well: RMS over a scene. Goals: .002

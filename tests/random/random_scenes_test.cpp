@@ -133,7 +133,7 @@ TEST_P(RandomScenes, OcclusionIsTheSameWithoutLight) {
 }
 
 TEST_P(RandomScenes, CompanyChangesLittle) {
-  std::vector<double> steps;
+  std::vector<double> steps, light;
   for (std::uint64_t seed = first(); seed < first() + kBatch; ++seed) {
     const RandomScene scene = makeRandomScene(seed);
     const auto cloud = indexed(scene.surfels);
@@ -142,6 +142,7 @@ TEST_P(RandomScenes, CompanyChangesLittle) {
     const auto together = valueOf(cloud->gatherTogether(scene.plainReceivers(), rules));
     const auto alone = valueOf(cloud->gatherAlone(scene.plainReceivers(), rules));
     ASSERT_EQ(together.size(), alone.size());
+    light.push_back(differencesOf(together, alone).irradiance_rms);
     for (std::size_t i = 0; i < alone.size(); ++i) {
       steps.push_back(std::abs(double(together[i].occlusion) - double(alone[i].occlusion)));
       EXPECT_LE(steps.back(), kMostStep) << "receiver " << i << ' ' << scene.describe();
@@ -149,9 +150,12 @@ TEST_P(RandomScenes, CompanyChangesLittle) {
   }
   const auto unusual =
       std::count_if(steps.begin(), steps.end(), [](double step) { return step > kUsualStep; });
-  std::printf("company %d..: more than .004: %d of %d, most %.4f\n", int(first()), int(unusual),
-              int(steps.size()), quantile(steps, 1));
+  std::printf("company %d..: more than .004: %d of %d, most %.4f; light %.4f, %.4f at 90 %%\n",
+              int(first()), int(unusual), int(steps.size()), quantile(steps, 1),
+              quantile(light, .5), quantile(light, .9));
   EXPECT_LE(double(unusual), std::max(1., kUnusualSteps / 1e4 * double(steps.size())));
+  EXPECT_LE(quantile(light, .5), kMedianLightStep);
+  EXPECT_LE(quantile(light, .9), kLargeLightStep);
 }
 
 // Moves, turns and scales a scene.
