@@ -124,7 +124,7 @@ def points_in_and_out(connection, count, memory, settings):
     step("gather", lambda: held.update(scene.gather(positions, normals, **settings)))
     arrays = sum(array.nbytes for array in (positions, normals, held["area"], held["occlusion"]))
     assert np.isfinite(held["occlusion"]).all()
-    connection.send((arrays, 12 * count, steps))
+    connection.send((arrays, steps))
 
 
 def print_points(count, memory, settings):
@@ -133,10 +133,10 @@ def print_points(count, memory, settings):
     child = context.Process(target=points_in_and_out, args=(theirs, count, memory, settings))
     child.start()
     theirs.close()
-    arrays, order, steps = ours.recv()
+    arrays, steps = ours.recv()
     child.join()
-    print(f"arrays {arrays / 2**20:.0f} MiB in and out, the order of the receivers "
-          f"{order / 2**20:.0f} MiB, scene {os.path.getsize('points.sft') / 2**20:.0f} MiB\n")
+    print(f"arrays {arrays / 2**20:.0f} MiB in and out, scene "
+          f"{os.path.getsize('points.sft') / 2**20:.0f} MiB\n")
     print("| step | s | CPU s | most resident, MiB |\n|---|---|---|---|")
     for name, seconds, cpu, resident in steps:
         print(f"| {name} | {seconds:.0f} | {cpu:.0f} | {resident / 2**20:.0f} |")

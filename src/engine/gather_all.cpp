@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -76,6 +77,29 @@ class GroupedReceivers {
   std::atomic<std::size_t> next_{0};
 };
 
+// A part of the engine's budget. The caches give way meanwhile.
+class BudgetPart {
+ public:
+  explicit BudgetPart(EngineState& engine) : engine_(engine) {}
+  BudgetPart(const BudgetPart&) = delete;
+  BudgetPart& operator=(const BudgetPart&) = delete;
+  ~BudgetPart() { engine_.giveBack(bytes_, 0); }
+
+  Status take(std::uint64_t bytes, const std::string& what) {
+    SURFEIT_RETURN_IF_ERROR(engine_.take(bytes, 0, what));
+    bytes_ += bytes;
+    return {};
+  }
+  void giveBack(std::uint64_t bytes) {
+    engine_.giveBack(bytes, 0);
+    bytes_ -= bytes;
+  }
+
+ private:
+  EngineState& engine_;
+  std::uint64_t bytes_ = 0;
+};
+
 }  // namespace
 
 // Receivers that are not valid come last: they must not change the company of the others.
@@ -114,7 +138,12 @@ Status Gatherer::gatherAll(ReceiverArray& receivers, Progress& progress, int thr
       others.push_back(std::move(*more));
     }
     progress.beginPhase("gather", count, "receivers");
+    BudgetPart order_part(state_->world->engine());
+    const std::uint64_t key_bytes = count * sizeof(CurveKey);
+    SURFEIT_RETURN_IF_ERROR(order_part.take(key_bytes + count * sizeof(std::uint32_t),
+                                            fmt::format("the order of {} receivers", count)));
     GroupedReceivers groups(receivers, state_->curveOrder(receivers), run);
+    order_part.giveBack(key_bytes);
     std::atomic<std::size_t> taken{0};
     FirstFailure failure;
     return runOnThreads(int(others.size()) + 1, failure, "gather", [&] {

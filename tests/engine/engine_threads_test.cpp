@@ -89,5 +89,41 @@ TEST_F(EngineThreadsTest, AllAtOnceIsTheSameForAnyThreads) {
   EXPECT_LT(difference.mean_occlusion, .002);
 }
 
+// The same receiver again and again.
+class RepeatedReceiver : public ReceiverArray {
+ public:
+  explicit RepeatedReceiver(std::size_t count) : count_(count) {}
+  std::size_t count() const override { return count_; }
+  Receiver receiver(std::size_t) const override { return {}; }
+  void setResult(std::size_t, const GatherResult&) override {}
+
+ private:
+  const std::size_t count_;
+};
+
+struct Stopped : Progress {
+  bool isCancelled() const override { return true; }
+};
+
+TEST_F(EngineThreadsTest, TheOrderOfReceiversIsOfTheBudget) {
+  RepeatedReceiver receivers(1 << 21);  // an order of 24 MiB
+  for (const std::uint64_t memory : {24 * kMiB, 64 * kMiB}) {
+    Engine engine = makeEngine(memory, 1);
+    const Scene scene = valueOrFail(engine.open(sceneFile(5)));
+    Gatherer gatherer = valueOrFail(engine.gatherer(scene, bleedingSettings()));
+    const std::uint64_t held = engine.statistics().held_bytes;
+    Stopped stopped;
+    const Status status = gatherer.gatherAll(receivers, stopped);
+    if (memory == 24 * kMiB) {
+      EXPECT_EQ(status.code(), StatusCode::kBudgetTooSmall);
+      EXPECT_NE(status.message().find("order of 2097152 receivers"), std::string::npos)
+          << status.message();
+    } else {
+      EXPECT_EQ(status.code(), StatusCode::kInterrupted) << status.message();
+    }
+    EXPECT_EQ(engine.statistics().held_bytes, held);
+  }
+}
+
 }  // namespace
 }  // namespace surfeit
