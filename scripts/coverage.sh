@@ -16,7 +16,7 @@ mkdir -p "$build"
 cmake -S . -B "$build" -G Ninja -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG="-O0 -g1 --coverage" \
   -D CMAKE_CXX_COMPILER_LAUNCHER=ccache -D SURFEIT_BUILD_BENCH=OFF -D SURFEIT_PYTHON=OFF > "$build.log" 2>&1 ||
   { cat "$build.log" >&2; exit 1; }
-cmake --build "$build" --parallel --target "${tests[@]##*/}" > "$build.log" 2>&1 || { tail -40 "$build.log" >&2; exit 1; }
+cmake --build "$build" ${JOBS:+--parallel $JOBS} --target "${tests[@]##*/}" > "$build.log" 2>&1 || { tail -40 "$build.log" >&2; exit 1; }
 find "$build" -name '*.gcda' -delete
 for test in "${tests[@]}"; do
   "$build/tests/$test" --gtest_brief=1
