@@ -268,6 +268,7 @@ void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t par
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
   patch.lets_through = facet.opacity < 1;
   if (patch.lets_through) patch.opacity = facetOpacity(facet);
+  patch.is_solid = facetLayers(facet) >= kFidelity.least_filled;
   patch.shape = shapeOf(facet.covariance);
   patch.area = facet.area;
   patch.most_area = mostVisibleArea(facet);

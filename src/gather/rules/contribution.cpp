@@ -145,10 +145,14 @@ float mostVisibleArea(const Facet& facet) {
   return std::min(facet.area, kPi * facet.radius * facet.radius);
 }
 
-float facetOpacity(const Facet& facet) {
+float facetLayers(const Facet& facet) {
   const float across = quadraticForm(adjugate(facet.covariance), glm::normalize(facet.normal));
   const float ellipse = 4 * kPi * std::sqrt(std::max(0.f, across));
-  const float depth = ellipse > 0 ? std::max(1.f, facet.area / ellipse) : 1;
+  return ellipse > 0 ? facet.area / ellipse : 1;
+}
+
+float facetOpacity(const Facet& facet) {
+  const float depth = std::max(1.f, facetLayers(facet));
   return layersOpacity(facet.opacity, depth) / depth;
 }
 

@@ -46,6 +46,9 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 
 // The largest area that a facet may show in any direction.
 float mostVisibleArea(const Facet& facet);
+// The area of a facet over that of the ellipse that spreads as it does: about 1 for a piece of
+// surface, less where it has gaps, more where it lies behind itself.
+float facetLayers(const Facet& facet);
 // What a translucent facet hides of what its area covers. More area than that of the ellipse that
 // spreads as it does lies behind itself, and is as many layers.
 float facetOpacity(const Facet& facet);

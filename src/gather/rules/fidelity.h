@@ -85,6 +85,11 @@ struct Fidelity {
   // 2, for 1, 1.1, 1.3, 1.4 times the time.)
   float own_order = 1.5f;
 
+  // Part of its outline, the ellipse with its covariance, that a flat node or facet fills for its
+  // hull to be widened. One that fills less has gaps, as a fence has, and they stay open. (A
+  // rectangle fills .95, a triangle or an L .83, two squares that touch at a corner .72.)
+  float least_filled = 0.75f;
+
   // Part of half its side by which a patch is widened in the hull. (AO RMSE with .7, .75, .8, .9:
   // bunny, scattered .0054, .0046, .0042, .0037; city .0049, .0052, .0053, .0057.)
   float hull_widening = 0.75f;
