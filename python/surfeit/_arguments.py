@@ -175,6 +175,14 @@ def _plain(array: np.ndarray, name: str) -> np.ndarray:
     return array.astype(np.float64)
 
 
+def _unmasked(values: Any, name: str) -> np.ndarray:
+    """As an array; masked values have no number, and are refused."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise ValueError(f"{name}: found {np.ma.count_masked(values)} masked values, expected numbers: "
+                         "leave their rows out, or give them numbers with .filled()")
+    return np.asarray(values)
+
+
 def columns_of_channel(name: str, values: int) -> Sequence[str]:
     """Names of the columns of a channel: "normal" and 3 values are nx, ny, nz."""
     if values == 1:
@@ -197,7 +205,7 @@ def columns_of(arrays: Mapping[str, Any]) -> List[Tuple[str, np.ndarray]]:
     _check_channels(arrays)
     columns: List[Tuple[str, np.ndarray]] = []
     for name, value in arrays.items():
-        array = _plain(np.asarray(value), name)
+        array = _plain(_unmasked(value, name), name)
         if array.ndim == 1:
             columns.append((name, array))
             continue
@@ -257,7 +265,7 @@ def component(name: str, function: str) -> Any:
 
 def leading_shape(positions: Any) -> Tuple[np.ndarray, Tuple[int, ...]]:
     """Positions (..., 3) as (n, 3), and what stood in place of n."""
-    array = np.asarray(positions)
+    array = _unmasked(positions, "positions")
     if array.ndim == 0 or array.shape[-1] != 3:
         raise ValueError(f"positions: found shape {array.shape}, expected (..., 3)")
     return array.reshape(-1, 3), array.shape[:-1]
@@ -266,7 +274,7 @@ def leading_shape(positions: Any) -> Tuple[np.ndarray, Tuple[int, ...]]:
 def flat(vectors: Any) -> Optional[np.ndarray]:
     if vectors is None:
         return None
-    array = np.asarray(vectors)
+    array = _unmasked(vectors, "normals or views")
     return array if array.ndim == 2 else array.reshape(-1, array.shape[-1] if array.ndim else 1)
 
 

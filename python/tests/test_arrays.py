@@ -190,3 +190,17 @@ def test_integers_that_lose_digits_are_told(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         surfeit.write(tmp_path / "a.ply", {"position": places, "id": np.array([1, 2**53])})
+
+
+def test_masked_values_are_refused(tmp_path, scene, receivers):
+    points = np.ma.array(receivers[0][:4], mask=[[0, 0, 0]] * 3 + [[0, 0, 1]])
+    area = np.full(4, 0.5)
+    for call in (lambda: surfeit.index({"position": points, "area": area}, tmp_path / "a.sft"),
+                 lambda: surfeit.index({"position": points.data, "area": np.ma.masked_less(area, 1)},
+                                       tmp_path / "a.sft"),
+                 lambda: surfeit.write(tmp_path / "a.ply", {"position": points}),
+                 lambda: scene.gather(points), lambda: scene.gather(points.data, points)):
+        with pytest.raises(ValueError, match="found [14] masked values"):
+            call()
+    whole = np.ma.array(receivers[0][:4], mask=np.zeros((4, 3)))
+    assert scene.gather(whole)["occlusion"].shape == (4,)

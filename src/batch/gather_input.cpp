@@ -93,7 +93,7 @@ void GatherInput::note(Progress& progress) const {
     progress.note(fmt::format("{}: no normals: gathering over the whole sphere", reader_->path()));
   }
   for (const std::string& note :
-       notesOfLookalikes(receivers(), /* lacks_color= */ false, !mapping_.hasNormals())) {
+       notesOfLookalikes(receivers(), {.normal = !mapping_.hasNormals()})) {
     progress.note(fmt::format("{}: {}", reader_->path(), note));
   }
   for (const std::string& note : reader_->notes()) {

@@ -44,6 +44,11 @@ constexpr std::string_view kSplatStems[] = {"f_dc_", "f_rest_", "scale_", "rot_"
 constexpr std::string_view kSingles[] = {"radius", "pscale", "width", "area", "two_sided", "group",
                                          "alpha",  "id",     "rgb",   "rgba", "intensity"};
 
+// Single values that look like colors, and like widths.
+constexpr std::string_view kGrays[] = {"gray", "grey", "luminance", "brightness"};
+constexpr std::string_view kSizes[] = {"diameter", "size", "surfel_size", "point_size",
+                                       "pointsize"};
+
 std::string lowerOf(std::string_view text) {
   std::string lower(text);
   std::transform(lower.begin(), lower.end(), lower.begin(),
@@ -179,6 +184,21 @@ class LookalikeFinder {
     }
   }
 
+  bool has(std::string_view lower) const { return lower_.contains(std::string(lower)); }
+  // Properties of these names, in lower case.
+  template <typename Names>
+  std::vector<std::string> singles(const Names& names) const {
+    std::vector<std::string> found;
+    for (const std::string_view name : names) {
+      for (const std::string& each :
+           {std::string(name), std::string(kScalarPrefix) + std::string(name)}) {
+        const auto entry = lower_.find(each);
+        if (entry != lower_.end()) found.push_back(entry->second);
+      }
+    }
+    return found;
+  }
+
   // `words` in lower case. `is_wanted` gets the name and where the word stands in it.
   template <typename IsWanted>
   void tell(const Triple& words, const Triple& ours, std::string_view channel, IsWanted is_wanted,
@@ -219,12 +239,12 @@ class LookalikeFinder {
 
 std::vector<std::string> knownNames(const RowLayout& element) { return Namer(element).names(); }
 
-std::vector<std::string> notesOfLookalikes(const RowLayout& element, bool lacks_color,
-                                           bool lacks_normal) {
+std::vector<std::string> notesOfLookalikes(const RowLayout& element,
+                                           const LackingChannels& lacking) {
   std::vector<std::string> notes;
-  if (!lacks_color && !lacks_normal) return notes;
+  if (!lacking.color && !lacking.normal && !lacking.size) return notes;
   LookalikeFinder finder(element);
-  if (lacks_color) {
+  if (lacking.color) {
     for (const Triple& words : kColorWords) {
       const auto is_wanted = [&](std::string_view name, std::size_t at) {
         return isWord(name, at, words[0].size());
@@ -232,8 +252,21 @@ std::vector<std::string> notesOfLookalikes(const RowLayout& element, bool lacks_
       finder.tell(words, {kColorNames[0], kColorNames[1], kColorNames[2]}, "color", is_wanted,
                   notes);
     }
+    for (const std::string& name : finder.singles(kGrays)) {
+      notes.push_back(
+          fmt::format("property {0} looks like a color and is not read: surfeit convert "
+                      "--set 'radiosity = {0}' makes one of it",
+                      name));
+    }
+    if (finder.has("f_dc_0")) {
+      notes.push_back(
+          "properties f_dc_0 f_dc_1 f_dc_2 look like colors of splats and are not read without the "
+          "other properties of splats: surfeit convert --set 'radiosity = f_dc * .28209 + .5' "
+          "makes "
+          "colors of them");
+    }
   }
-  if (lacks_normal) {
+  if (lacking.normal) {
     const auto is_wanted = [&](std::string_view name, std::size_t at) {
       const std::string lower = lowerOf(name);
       return lower.find("norm") != lower.npos || (at > 0 && lower[at - 1] == 'n') ||
@@ -241,6 +274,14 @@ std::vector<std::string> notesOfLookalikes(const RowLayout& element, bool lacks_
     };
     finder.tell(kAxes, {kNormalNames[0], kNormalNames[1], kNormalNames[2]}, "normal", is_wanted,
                 notes);
+  }
+  if (lacking.size) {
+    for (const std::string& name : finder.singles(kSizes)) {
+      notes.push_back(
+          fmt::format("property {0} looks like the width of surfels and is not read: "
+                      "--channels {0}=width",
+                      name));
+    }
   }
   return notes;
 }

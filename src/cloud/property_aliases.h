@@ -18,7 +18,10 @@ std::vector<std::string> knownNames(const RowLayout& element);
 
 // One sentence for each triple of properties of a row that is called like a color, or a normal, but
 // is not read as one, with the --channels that reads it.
-std::vector<std::string> notesOfLookalikes(const RowLayout& element, bool lacks_color,
-                                           bool lacks_normal);
+struct LackingChannels {
+  bool color = false, normal = false, size = false;
+};
+std::vector<std::string> notesOfLookalikes(const RowLayout& element,
+                                           const LackingChannels& lacking);
 
 }  // namespace surfeit

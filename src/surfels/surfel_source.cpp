@@ -38,8 +38,10 @@ class RowSurfelSource final : public SurfelSource {
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = reader_->notes();
     const CloudChannels& has = mapping_.channels();
-    const bool lacks_color = !has.radiosity && !has.albedo;
-    for (std::string& note : notesOfLookalikes(reader_->element(), lacks_color, !has.normal)) {
+    const LackingChannels lacking = {.color = !has.radiosity && !has.albedo,
+                                     .normal = !has.normal,
+                                     .size = !has.radius && !has.area};
+    for (std::string& note : notesOfLookalikes(reader_->element(), lacking)) {
       notes.push_back(std::move(note));
     }
     noteOpacity(notes);

@@ -297,6 +297,16 @@ TEST_F(ColorReaderTest, LookalikesAreTold) {
   EXPECT_THAT(
       notes("red green blue vertex_normal_x vertex_normal_y vertex_normal_z", "0 1 0 0 0 1"),
       ElementsAre(HasSubstr("--channels vertex_normal=normal")));
+  EXPECT_THAT(notes("Gray nx ny nz", "1 0 0 1"),
+              ElementsAre(HasSubstr("--set 'radiosity = Gray'")));
+  EXPECT_THAT(notes("scalar_luminance nx ny nz", "1 0 0 1"),
+              ElementsAre(HasSubstr("property scalar_luminance looks like a color")));
+  EXPECT_THAT(notes("f_dc_0 f_dc_1 f_dc_2 nx ny nz", "0 1 0 0 0 1"),
+              ElementsAre(HasSubstr("look like colors of splats")));
+  EXPECT_THAT(notes("red green blue nx ny nz diameter", "0 1 0 0 0 1 2"),
+              ElementsAre(HasSubstr("--channels diameter=width")));
+  EXPECT_THAT(notes("red green blue nx ny nz diameter radius", "0 1 0 0 0 1 2 1"), IsEmpty());
+  EXPECT_THAT(notes("red green blue nx ny nz gray", "0 1 0 0 0 1 2"), IsEmpty());
   // What is there, and what we know, is not told
   EXPECT_THAT(notes("foo_r foo_g foo_b red green blue nx ny nz", "0 1 0 0 0 1 0 0 1"), IsEmpty());
   EXPECT_THAT(notes("irradiance_r irradiance_g irradiance_b nx ny nz", "0 1 0 0 0 1"), IsEmpty());

@@ -201,7 +201,7 @@ TEST_F(PlyReaderTest, BatchesOfAnySizeGiveTheSameRows) {
 
 TEST_F(PlyReaderTest, AsciiNumbersComeInManySpellings) {
   const auto rows = readAll(
-      "ply\nformat ascii 1.0\nelement v 7\nproperty float x\nproperty double y\nproperty char n\n"
+      "ply\nformat ascii 1.0\nelement v 7\nproperty float v\nproperty double y\nproperty char n\n"
       "end_header\n+1.5 1E2 +7\n\n  .5\t-0\t-128 \r\nnan -inf 127\nNaN INF 0\n1e999 -1e999 0\n"
       "1e-60 1e-400 0\n3.5e38 16777217 0");
   ASSERT_TRUE(rows.ok()) << rows.status().message();

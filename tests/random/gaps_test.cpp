@@ -50,7 +50,8 @@ double trueOcclusion(const Fence& fence, const glm::vec3& eye) {
   int hits = 0;
   for (int i = 0; i < kDirections; ++i) {
     for (int j = 0; j < kDirections; ++j) {
-      const float u = (float(i) + .5f) / kDirections, angle = 6.2831853f * (float(j) + .5f) / kDirections;
+      const float u = (float(i) + .5f) / kDirections,
+                  angle = 6.2831853f * (float(j) + .5f) / kDirections;
       const float across = std::sqrt(u), forward = std::sqrt(1 - u), t = -eye.y / forward;
       hits += fence.hasBoard(eye.x + t * across * std::cos(angle),
                              eye.z + t * across * std::sin(angle));
@@ -67,8 +68,8 @@ glm::mat3 turned() {
 
 TEST(Gaps, FencesAreNotClosed) {
   for (const glm::mat3& turn : {glm::mat3(1), turned()}) {
-    for (const Fence& fence : {Fence{.05f, .5f}, Fence{.1f, .5f}, Fence{.05f, .25f},
-                               Fence{.05f, .625f}}) {
+    for (const Fence& fence :
+         {Fence{.05f, .5f}, Fence{.1f, .5f}, Fence{.05f, .25f}, Fence{.05f, .625f}}) {
       const auto scene = IndexedScene::make(surfelsOf(fence, turn));
       ASSERT_TRUE(scene.ok()) << scene.status().message();
       for (const float distance : {.5f, 1.f, 2.f}) {

@@ -1,6 +1,8 @@
 #include "cloud/ply/ply_number.h"
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <type_traits>
@@ -81,6 +83,24 @@ bool parsePlyNumber(std::string_view text, ValueType type, std::byte* out) {
       return storeReal<T>(text, out);
     }
   });
+}
+
+bool floatHolds(std::string_view text) {
+  double value = 0, power = 0;
+  float single = 0;
+  const auto read = [](std::string_view number, ValueType type, auto& out) {
+    return parsePlyNumber(number, type, reinterpret_cast<std::byte*>(&out));
+  };
+  if (!read(text, ValueType::kFloat64, value) || !std::isfinite(value)) return true;
+  if (!read(text, ValueType::kFloat32, single)) return true;
+  const std::size_t exponent_at = std::min(text.find_first_of("eE"), text.size());
+  const std::size_t point_at = std::min(text.find('.'), exponent_at);
+  double decimals = point_at < exponent_at ? double(exponent_at - point_at - 1) : 0;
+  if (exponent_at < text.size() && read(text.substr(exponent_at + 1), ValueType::kFloat64, power)) {
+    decimals -= power;
+  }
+  // A little more than half a unit: floats are often exactly half way, and both sides are rounded
+  return std::abs(double(single) - value) <= (0.5 + 1e-6) * std::pow(10., -decimals);
 }
 
 char* formatPlyNumber(const std::byte* bytes, ValueType type, char* out) {

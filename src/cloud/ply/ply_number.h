@@ -18,6 +18,10 @@ inline constexpr std::size_t kLongestPlyNumber = 32;
 // of that type. Reals too large for the type become infinite, and too small ones zero.
 bool parsePlyNumber(std::string_view text, ValueType type, std::byte* out);
 
+// Whether the float next to the number that `text` spells gives it back, written with as many
+// decimals. So do floats that a program wrote with more decimals than they have.
+bool floatHolds(std::string_view text);
+
 // Writes the shortest text that reads back as the value at `bytes` to `out`, which has room for
 // kLongestPlyNumber characters. Returns its end.
 char* formatPlyNumber(const std::byte* bytes, ValueType type, char* out);

@@ -11,6 +11,7 @@
 
 #include "cloud/ply/ply_cursor.h"
 #include "cloud/ply/ply_number.h"
+#include "cloud/ply/ply_positions.h"
 
 namespace surfeit {
 namespace {
@@ -373,6 +374,7 @@ Result<PlyReader> PlyReader::open(const std::string& path, Access access) {
   SURFEIT_ASSIGN_OR_RETURN(ByteInput file, ByteInput::open(path, access));
   auto state = std::make_unique<State>(std::move(file));
   SURFEIT_ASSIGN_OR_RETURN(state->header, readPlyHeader(state->file()));
+  SURFEIT_RETURN_IF_ERROR(widenPositions(state->file(), state->header));
   SURFEIT_RETURN_IF_ERROR(state->checkCounts());
   state->element_begin = {state->header.data_offset};
   state->cursor.jumpTo(state->header.data_offset);

@@ -6,40 +6,13 @@
 #include <cstring>
 #include <limits>
 
+#include "cloud/ply/ply_number.h"
 #include "cloud/text/xyz_layout.h"
 
 namespace surfeit {
 namespace {
 
 constexpr int kFloatDigits = 6;  // so many are given back by every float
-
-// 10 to the power of -n, for the usual numbers of decimals without a call.
-double tenth(double decimals) {
-  constexpr double kTenths[] = {1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
-  if (decimals >= 0 && decimals <= 10) return kTenths[static_cast<std::size_t>(decimals)];
-  return std::pow(10.0, -decimals);
-}
-
-// Whether the float next to a number gives it back, written with as many decimals. So do floats
-// that a program wrote with more decimals than they have.
-bool isFloat(std::string_view word, double value) {
-  std::byte single[4];
-  const char* const end = word.data() + word.size();
-  if (!std::isfinite(value)) return true;
-  if (parseTextNumber(word.data(), end, ValueType::kFloat32, single) == nullptr) return true;
-  const std::size_t exponent_at = std::min(word.find_first_of("eE"), word.size());
-  const std::size_t point_at = std::min(word.find('.'), exponent_at);
-  double decimals = point_at < exponent_at ? double(exponent_at - point_at - 1) : 0;
-  std::byte exponent[8];
-  const std::string_view exponent_text = word.substr(std::min(exponent_at + 1, word.size()));
-  if (!exponent_text.empty() &&
-      parseTextNumber(exponent_text.data(), end, ValueType::kFloat64, exponent) == end) {
-    decimals -= rowValue(exponent, ValueType::kFloat64);
-  }
-  // A little more than half a unit: floats are often exactly half way, and both sides are rounded
-  const double half_unit = (0.5 + 1e-6) * tenth(decimals);
-  return std::abs(rowValue(single, ValueType::kFloat32) - value) <= half_unit;
-}
 
 bool isShortNumber(std::string_view word) {
   int digits = 0;
@@ -128,7 +101,7 @@ class XyzScanner {
     column.least = std::min(column.least, value);
     column.largest = std::max(column.largest, value);
     if (column.are_wholes) column.are_wholes = value == std::floor(value) && std::isfinite(value);
-    if (column.are_floats && !isShortNumber(word)) column.are_floats = isFloat(word, value);
+    if (column.are_floats && !isShortNumber(word)) column.are_floats = floatHolds(word);
   }
 
   void takeVectors() {
