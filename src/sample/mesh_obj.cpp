@@ -30,6 +30,7 @@ struct ParsedObj {
   tinyobj::attrib_t attributes;
   std::vector<tinyobj::shape_t> shapes;
   std::vector<tinyobj::material_t> materials;
+  ObjVertexColors colors;
   std::map<std::string, MaterialSource> sources;
   std::string warnings;
   std::uint64_t free_form_statements = 0;
@@ -43,7 +44,7 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   std::string errors;
   bool ok = false;
   try {
-    // Polygons stay whole and colors are not made up: we want to see what the file says
+    // Polygons stay whole, and colors come from the lines: we want to see what the file says
     ok = tinyobj::LoadObj(&parsed.attributes, &parsed.shapes, &parsed.materials, &parsed.warnings,
                           &errors, &stream, &material_files, false, false);
   } catch (const std::bad_alloc&) {
@@ -54,6 +55,7 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   SURFEIT_RETURN_IF_ERROR(lines.status());
   SURFEIT_RETURN_IF_ERROR(material_files.status());
   parsed.free_form_statements = lines.freeFormStatements();
+  parsed.colors = lines.takeColors();
   parsed.sources = material_files.sources();
   if (ok) return {};
   while (!errors.empty() && errors.back() == '\n') errors.pop_back();
@@ -113,14 +115,11 @@ class ObjImporter {
       : path_(path), parsed_(parsed), builder_(builder), mesh_(builder.mesh), progress_(progress) {
     has_normals_ = !parsed.attributes.normals.empty();
     has_uvs_ = !parsed.attributes.texcoords.empty();
-    has_colors_ = !parsed.attributes.colors.empty();
+    has_colors_ = !parsed.colors.empty();
     vertex_begin_ = builder.position.size();
     if (has_normals_) mesh_.normal.resize(vertex_begin_, glm::vec3(0));
     if (has_uvs_) mesh_.uv.resize(vertex_begin_, glm::vec2(0));
-    if (has_colors_) {
-      mesh_.color.resize(vertex_begin_, glm::vec3(1));
-      findColorRange();
-    }
+    if (has_colors_) mesh_.color.resize(vertex_begin_, glm::vec3(1));
 
     // Material ids of the file follow the one for faces without a material
     material_begin_ = std::uint32_t(mesh_.materials.size());
@@ -343,20 +342,16 @@ class ObjImporter {
                                                   line, vertex + 1, vertices));
           }
           const double* const at = &parsed_.attributes.vertices[3 * std::size_t(vertex)];
-          points.push_back({{at[0], at[1], at[2]}, options.width, colorOf(vertex)});
+          points.push_back(
+              {{at[0], at[1], at[2]},
+               options.width,
+               has_colors_ ? parsed_.colors.linear(std::size_t(vertex)) : glm::vec3(1)});
         }
         ++line;
         SURFEIT_RETURN_IF_ERROR(visit(std::span<const CurvePoint>(points)));
       }
     }
     return {};
-  }
-
-  glm::vec3 colorOf(int vertex) const {
-    if (!has_colors_) return glm::vec3(1);
-    const double* const code = &parsed_.attributes.colors[3 * std::size_t(vertex)];
-    const glm::vec3 srgb = glm::dvec3(code[0], code[1], code[2]) / double(largest_color_);
-    return {linearFromSrgb(srgb.x), linearFromSrgb(srgb.y), linearFromSrgb(srgb.z)};
   }
 
   // Gives the corners of ribbons, which have none, neutral normals and texture coordinates.
@@ -405,23 +400,8 @@ class ObjImporter {
                              ? glm::vec2(attributes.texcoords[i], attributes.texcoords[i + 1])
                              : glm::vec2(0));
     }
-    if (has_colors_) {
-      const glm::vec3 srgb = vector(attributes.colors, corner.vertex) / largest_color_;
-      mesh_.color.emplace_back(linearFromSrgb(srgb.x), linearFromSrgb(srgb.y),
-                               linearFromSrgb(srgb.z));
-    }
+    if (has_colors_) mesh_.color.push_back(parsed_.colors.linear(std::size_t(corner.vertex)));
     return found->second;
-  }
-
-  // Colors are sRGB, from 0 to 1 or in codes of 8 bits.
-  void findColorRange() {
-    double most = 0;
-    for (const double value : parsed_.attributes.colors) most = std::max(most, value);
-    if (most <= 1) return;
-    largest_color_ = 255;
-    progress_.note(fmt::format(
-        "{}: colors of vertices are 0-255 (the largest is {:g}): read as sRGB of 8 bits", path_,
-        most));
   }
 
   void noteOptions(const std::string& name, const tinyobj::texture_option_t& options) {
@@ -466,7 +446,6 @@ class ObjImporter {
   std::map<std::pair<std::uint32_t, std::uint8_t>, std::uint32_t> grouped_;  // copies of materials
   std::unordered_map<Corner, std::uint64_t, CornerHash> vertices_;
   std::map<std::string, std::uint32_t> textures_, masks_;
-  double largest_color_ = 1;
 };
 
 }  // namespace
@@ -476,6 +455,7 @@ Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo,
   ParsedObj parsed;
   SURFEIT_RETURN_IF_ERROR(parseObj(path, parsed));
   noteWarnings(path, parsed.warnings, progress);
+  for (const std::string& note : parsed.colors.notes()) progress.note(path + ": " + note);
   noteLeftOut(path, parsed, curves.width > 0, progress);
   ObjImporter importer(path, parsed, default_albedo, builder, progress);
   importer.importMaterials();

@@ -38,13 +38,18 @@ bool isOneOf(std::string_view word, const std::string_view (&words)[N]) {
   return std::find(std::begin(words), std::end(words), word) != std::end(words);
 }
 
-bool isNumber(std::string_view word) {
+bool isNumber(std::string_view word, double& value) {
   if (word.starts_with('+')) word.remove_prefix(1);
-  double value = 0;
+  value = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   // Too large or too small for a double is a number, too; the parser knows no nan and no inf
   return error != std::errc::invalid_argument && end == word.data() + word.size() &&
          std::isfinite(value);
+}
+
+bool isNumber(std::string_view word) {
+  double value;
+  return isNumber(word, value);
 }
 
 constexpr std::string_view kNumberStatements[] = {"v",  "vn", "vt", "Ka", "Kd",
@@ -145,6 +150,7 @@ bool ObjLines::readLine() {
     if (!readPhysicalLine()) return joined > 0 && status_.ok();
     const std::string_view text = trimmed(physical_);
     const bool is_comment = joined == 0 && text.starts_with('#');
+    if (is_comment && text.starts_with("#MRGB")) colors_.addZBrushLine();
     if (is_comment || !text.ends_with('\\')) {
       line_ += physical_;
       break;
@@ -186,11 +192,19 @@ void ObjLines::rewriteLine() {
     line_ = "d " + std::string(rest);
     checkNumbers(std::string_view(line_).substr(2));
   } else if (isOneOf(word, kNumberStatements) && checkNumbers(rest)) {
+    if (word == "v") keepPlace(rest);
     noteMaterial(word, rest);
     completeColor(word, rest);
   } else if (word == "Tf") {
     completeColor(word, rest);
   }
+}
+
+void ObjLines::keepPlace(std::string_view rest) {
+  colors_.addVertex(values_);
+  if (values_.size() <= 3) return;
+  for (int i = 0; i < 3; ++i) takeWord(rest);
+  line_.resize(std::size_t(rest.data() - line_.data()));
 }
 
 // One value is that of all three colors.
@@ -229,9 +243,14 @@ void ObjLines::dropComment() {
 }
 
 bool ObjLines::checkNumbers(std::string_view numbers) {
+  values_.clear();
   while (!numbers.empty()) {
     const std::string_view word = takeWord(numbers);
-    if (isNumber(word)) continue;
+    double value;
+    if (isNumber(word, value)) {
+      values_.push_back(value);
+      continue;
+    }
     const bool has_comma = word.find(',') != std::string_view::npos;
     status_ = Status::corruption(fmt::format(
         "{}: line {}: found \"{}\", expected a number{}", input_.path(), number_,
