@@ -229,6 +229,7 @@ void ObjLines::noteMaterial(std::string_view word, std::string_view rest) {
   if (word == "newmtl") {
     const auto [material, is_new] = materials_.try_emplace(std::string(rest), false);
     has_kd_ = is_new ? &material->second : nullptr;
+    if (!is_new) repeated_.insert(material->first);
   } else if (word == "Kd" && has_kd_ != nullptr) {
     *has_kd_ = true;
   }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <streambuf>
 #include <string>
 #include <string_view>
@@ -33,6 +34,8 @@ class ObjLines final : public std::streambuf {
   ObjVertexColors takeColors() { return std::move(colors_); }
   // Materials that the file defines, and whether they have a Kd; of several of one name the first.
   const std::map<std::string, bool>& materials() const { return materials_; }
+  // Names that several of its materials have.
+  const std::set<std::string>& repeatedMaterials() const { return repeated_; }
 
  protected:
   int_type underflow() override;
@@ -59,6 +62,7 @@ class ObjLines final : public std::streambuf {
   ObjVertexColors colors_;
   std::vector<double> values_;  // of the numbers that checkNumbers() saw
   std::map<std::string, bool> materials_;
+  std::set<std::string> repeated_;
   bool* has_kd_ = nullptr;  // of the material that is being defined
   bool is_at_end_ = false;
 };
