@@ -25,6 +25,12 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
 
+// By the mark at the front, or by the zero byte of an ASCII character.
+bool isUtf16(std::string_view begin) {
+  return begin.starts_with("\xff\xfe") || begin.starts_with("\xfe\xff") ||
+         begin.substr(0, 2).find('\0') != std::string_view::npos;
+}
+
 // Takes the first word off.
 std::string_view takeWord(std::string_view& text) {
   const std::size_t end = std::min(text.find_first_of(kBlanks), text.size());
@@ -53,7 +59,7 @@ bool isNumber(std::string_view word) {
 }
 
 constexpr std::string_view kNumberStatements[] = {"v",  "vn", "vt", "Ka", "Kd",
-                                                  "Ks", "Ke", "d",  "Tr"};
+                                                  "Ks", "Ke", "Tf", "d",  "Tr"};
 constexpr std::string_view kIndexStatements[] = {"f", "l", "p"};
 constexpr std::string_view kNameStatements[] = {"usemtl", "newmtl", "mtllib"};
 constexpr std::string_view kColorStatements[] = {"Ka", "Kd", "Ks", "Ke", "Tf"};
@@ -130,6 +136,13 @@ bool ObjLines::readPhysicalLine() {
         input_.readSome(offset_, std::as_writable_bytes(std::span(buffer_)));
     if (!count.ok()) status_ = count.status();
     buffer_.resize(count.ok() ? *count : 0);
+    if (offset_ == 0 && isUtf16({buffer_.data(), buffer_.size()})) {
+      status_ =
+          Status::corruption(fmt::format("{0}: found text in UTF-16, expected UTF-8 or ASCII: "
+                                         "`iconv -f UTF-16 -t UTF-8 {0} > NEW` "
+                                         "converts it",
+                                         input_.path()));
+    }
     offset_ += buffer_.size();
     if (!status_.ok()) return false;
     if (buffer_.empty()) {
@@ -195,8 +208,6 @@ void ObjLines::rewriteLine() {
     if (word == "v") keepPlace(rest);
     noteMaterial(word, rest);
     completeColor(word, rest);
-  } else if (word == "Tf") {
-    completeColor(word, rest);
   }
 }
 
@@ -252,10 +263,14 @@ bool ObjLines::checkNumbers(std::string_view numbers) {
       values_.push_back(value);
       continue;
     }
-    const bool has_comma = word.find(',') != std::string_view::npos;
-    status_ = Status::corruption(fmt::format(
-        "{}: line {}: found \"{}\", expected a number{}", input_.path(), number_,
-        word.substr(0, 40), has_comma ? " with a decimal point: replace commas by points" : ""));
+    std::string_view advice;
+    if (word.find(',') != std::string_view::npos) {
+      advice = " with a decimal point: replace commas by points";
+    } else if (values_.empty() && (word == "spectral" || word == "xyz")) {
+      advice = ": spectra and CIE XYZ are not read, replace them by red, green and blue";
+    }
+    status_ = Status::corruption(fmt::format("{}: line {}: found \"{}\", expected a number{}",
+                                             input_.path(), number_, word.substr(0, 40), advice));
     return false;
   }
   return true;
