@@ -76,8 +76,7 @@ void ObjMaterials::noteFacesWithoutUv() const {
     if (material.mask != kNoTexture) add("map_d");
     progress_.note(
         fmt::format("{}: {} of {} faces of material \"{}\" have no texture coordinates: they get "
-                    "its Kd, Ke and "
-                    "d without {} (unwrap the mesh)",
+                    "its Kd, Ke and d without {} (unwrap the mesh)",
                     path_, bare.faces, bare.faces_of_all, shown(parsed.name), maps));
   }
 }
@@ -87,11 +86,12 @@ void ObjMaterials::import(int id, const MaterialSource& source) {
   Material material;
   if (source.has_kd) material.albedo = reflectanceOf(parsed);
   material.emission = float(kPi) * colorOf(parsed, "Ke", parsed.emission, kNoLimit);
+  // Written so that NaN is opaque
+  material.opacity = parsed.dissolve < 1 ? float(std::max(parsed.dissolve, 0.0)) : 1;
   if (!(parsed.dissolve >= 0 && parsed.dissolve <= 1)) {
-    note(parsed, fmt::format("has d {:g} (or Tr {:g}): read as d {}, expected 0 to 1",
-                             parsed.dissolve, 1 - parsed.dissolve, parsed.dissolve > 1 ? 1 : 0));
+    note(parsed, fmt::format("has d {:g} (or Tr {:g}): read as d {:g}, expected 0 to 1",
+                             parsed.dissolve, 1 - parsed.dissolve, material.opacity));
   }
-  material.opacity = float(std::clamp(parsed.dissolve, 0.0, 1.0));
   importScattering(parsed, material);
 
   Material bare = material;

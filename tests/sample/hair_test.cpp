@@ -19,6 +19,7 @@ namespace surfeit {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class HairMesh : public SceneFiles {
@@ -220,6 +221,21 @@ TEST_F(HairMesh, WhatIsWrongIsTold) {
   const auto mesh = loadMeshes({write("a.hair", hair.bytes() + "more")}, glm::vec3(1), notes_);
   EXPECT_TRUE(mesh.ok());
   EXPECT_THAT(notes_.notes.back(), HasSubstr("4 bytes behind the last array"));
+}
+
+TEST_F(HairMesh, ColorsAndTransparenciesThatAreCutAreTold) {
+  Hair hair = tuft(2);
+  hair.colors.assign(hair.points.size(), glm::vec3(0, .5f, 1));
+  hair.colors[3].y = 1.5f;
+  hair.transparency.assign(hair.points.size(), 0);
+  hair.transparency[4] = -.5f;
+  ASSERT_TRUE(loadMeshes({write("a.hair", hair.bytes())}, glm::vec3(1), notes_).ok());
+  EXPECT_THAT(notes_.notes, ElementsAre(HasSubstr("a.hair: 2 points have a color or transp")));
+  notes_.notes.clear();
+  hair = tuft(2);
+  hair.default_color = {255, 0, 0};
+  ASSERT_TRUE(loadMeshes({write("a.hair", hair.bytes())}, glm::vec3(1), notes_).ok());
+  EXPECT_THAT(notes_.notes, ElementsAre(HasSubstr("10 points have a color")));
 }
 
 TEST_F(HairMesh, LinesOfObjFilesAreCurvesWhereTheyGetAWidth) {
