@@ -20,6 +20,18 @@ bool isFinite(const CurvePoint& point) {
   return std::isfinite(sum.x) && std::isfinite(sum.y) && std::isfinite(sum.z);
 }
 
+Status checkPoints(const std::string& path, std::uint64_t strand,
+                   std::span<const CurvePoint> points) {
+  for (const CurvePoint& point : points) {
+    if (isFinite(point) && point.width >= 0) continue;
+    return Status::corruption(fmt::format(
+        "{}: strand {}: found a point ({}, {}, {}) of width {:g}, expected {}", path, strand,
+        point.position.x, point.position.y, point.position.z, point.width,
+        isFinite(point) ? "a width of 0 or more (--curve-width gives one)" : "finite values"));
+  }
+  return {};
+}
+
 // A unit vector across a unit vector, at that angle about it.
 glm::dvec3 acrossAt(const glm::dvec3& along, double angle) {
   const glm::dvec3 axis = std::abs(along.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
@@ -63,12 +75,8 @@ bool StrandChoice::keeps(std::uint64_t strand) const {
 
 Status CurveRibbons::add(std::span<const CurvePoint> points, std::uint64_t strand, double growth) {
   points_.clear();
+  SURFEIT_RETURN_IF_ERROR(checkPoints(path_, strand, points));
   for (const CurvePoint& point : points) {
-    if (!isFinite(point) || !(point.width >= 0)) {
-      return Status::corruption(fmt::format(
-          "{}: strand {}: found a point ({}, {}, {}) of width {}, expected finite values", path_,
-          strand, point.position.x, point.position.y, point.position.z, point.width));
-    }
     if (points_.empty() || points_.back().position != point.position) points_.push_back(point);
   }
   if (points_.size() < 2) {
@@ -113,18 +121,19 @@ Status addStrands(const std::string& path, std::uint64_t count, const CurveOptio
 
   // Growth of the strands that stand for others, so that the sum of areas stays; this looks at all
   double growth = 1, area = 0, kept_area = 0;
-  SURFEIT_RETURN_IF_ERROR(
-      for_each([&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
-        const double own = curveArea(points);
-        area += own;
-        if (choice.keeps(strand)) kept_area += own;
-        return {};
-      }));
+  const auto measure = [&](std::uint64_t strand, std::span<const CurvePoint> points) -> Status {
+    SURFEIT_RETURN_IF_ERROR(checkPoints(path, strand, points));
+    const double own = curveArea(points);
+    area += own;
+    if (choice.keeps(strand)) kept_area += own;
+    return {};
+  };
+  SURFEIT_RETURN_IF_ERROR(for_each(measure));
   if (!(area > 0) || !std::isfinite(area)) {
     return Status::corruption(fmt::format(
-        "{}: strands have no width, or places are not finite, expected a thickness (--curve-width "
-        "gives one)",
-        path));
+        "{}: found strands of an area of {:g}, expected a finite one above 0: a thickness "
+        "(--curve-width gives one)",
+        path, area));
   }
   if (!choice.keepsAll()) {
     if (!(kept_area > 0)) {

@@ -130,8 +130,12 @@ class HairFile {
   const HairHeader& header() const { return header_; }
   std::uint64_t bytesBehind() const { return file_->size() - end_; }
 
+  // Points whose color or transparency had to be cut, among those that were visited last.
+  std::uint64_t cutPoints() const { return cut_points_; }
+
   // Calls visit(strand, points) for each; the points are overwritten by the next.
-  Status forEachStrand(const Progress& progress, const StrandVisit& visit) const {
+  Status forEachStrand(const Progress& progress, const StrandVisit& visit) {
+    cut_points_ = 0;
     const auto stream = [&](HairArray array, std::size_t i, std::uint64_t bytes) {
       return HairStream(*file_, offset_[i], header_.has(array) ? bytes : 0);
     };
@@ -181,13 +185,15 @@ class HairFile {
   }
 
   Status readPoint(HairStream& places, HairStream& widths, HairStream& clears, HairStream& colors,
-                   CurvePoint& point) const {
+                   CurvePoint& point) {
     std::array<float, 3> place{}, color{header_.color.x, header_.color.y, header_.color.z};
     float width = header_.thickness, clear = header_.transparency;
     SURFEIT_RETURN_IF_ERROR(places.read(place));
     if (header_.has(kThickness)) SURFEIT_RETURN_IF_ERROR(widths.read(width));
     if (header_.has(kTransparency)) SURFEIT_RETURN_IF_ERROR(clears.read(clear));
     if (header_.has(kColors)) SURFEIT_RETURN_IF_ERROR(colors.read(color));
+    const auto isPart = [](float value) { return value >= 0 && value <= 1; };
+    if (!isPart(clear) || !std::all_of(color.begin(), color.end(), isPart)) ++cut_points_;
     point.position = {place[0], place[1], place[2]};
     // What is partly clear covers as a thinner strand does
     const double there = 1 - std::clamp(double(clear), 0.0, 1.0);
@@ -205,22 +211,28 @@ class HairFile {
   std::unique_ptr<InputFile> file_;
   HairHeader header_;
   CurveOptions options_;
-  std::uint64_t offset_[5] = {}, end_ = 0;
+  std::uint64_t offset_[5] = {}, end_ = 0, cut_points_ = 0;
 };
 
 }  // namespace
 
 Status loadHairMesh(const std::string& path, const CurveOptions& options, MeshBuilder& builder,
                     Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(const HairFile hair, HairFile::open(path, options));
+  SURFEIT_ASSIGN_OR_RETURN(HairFile hair, HairFile::open(path, options));
   if (hair.bytesBehind() > 0) {
     progress.note(
         fmt::format("{}: {} bytes behind the last array are ignored", path, hair.bytesBehind()));
   }
-  return addStrands(
+  SURFEIT_RETURN_IF_ERROR(addStrands(
       path, hair.header().strands, options,
       [&](const StrandVisit& visit) { return hair.forEachStrand(progress, visit); }, builder,
-      progress);
+      progress));
+  if (hair.cutPoints() > 0) {
+    progress.note(fmt::format(
+        "{}: {} points have a color or transparency outside 0 to 1, which is cut (colors are sRGB)",
+        path, hair.cutPoints()));
+  }
+  return {};
 }
 
 }  // namespace surfeit

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <exception>
-#include <filesystem>
 #include <istream>
 #include <map>
 #include <new>
@@ -15,11 +14,11 @@
 #include <unordered_map>
 
 #define TINYOBJLOADER_IMPLEMENTATION
-#include "core/spherical_harmonics.h"
 #include "sample/curves.h"
 #include "sample/mesh_builder.h"
 #include "sample/obj_lines.h"
 #include "sample/obj_material_files.h"
+#include "sample/obj_materials.h"
 #include "storage/file.h"
 
 namespace surfeit {
@@ -30,8 +29,10 @@ struct ParsedObj {
   tinyobj::attrib_t attributes;
   std::vector<tinyobj::shape_t> shapes;
   std::vector<tinyobj::material_t> materials;
+  ObjVertexColors colors;
   std::map<std::string, MaterialSource> sources;
   std::string warnings;
+  std::vector<std::string> notes;  // of material files
   std::uint64_t free_form_statements = 0;
 };
 
@@ -43,7 +44,7 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   std::string errors;
   bool ok = false;
   try {
-    // Polygons stay whole and colors are not made up: we want to see what the file says
+    // Polygons stay whole, and colors come from the lines: we want to see what the file says
     ok = tinyobj::LoadObj(&parsed.attributes, &parsed.shapes, &parsed.materials, &parsed.warnings,
                           &errors, &stream, &material_files, false, false);
   } catch (const std::bad_alloc&) {
@@ -54,7 +55,9 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   SURFEIT_RETURN_IF_ERROR(lines.status());
   SURFEIT_RETURN_IF_ERROR(material_files.status());
   parsed.free_form_statements = lines.freeFormStatements();
+  parsed.colors = lines.takeColors();
   parsed.sources = material_files.sources();
+  parsed.notes = material_files.notes();
   if (ok) return {};
   while (!errors.empty() && errors.back() == '\n') errors.pop_back();
   return Status::corruption(fmt::format("{}: {}", path, errors));
@@ -105,65 +108,33 @@ struct CornerHash {
   }
 };
 
+// Of faces without a material. Colors of vertices are the albedo; only without them the default
+// steps in.
+Material plainMaterial(const ParsedObj& parsed, const glm::vec3& default_albedo) {
+  Material plain;
+  plain.albedo = parsed.colors.empty() ? default_albedo : glm::vec3(1);
+  return plain;
+}
+
 // Turns parsed shapes into triangles of one mesh.
 class ObjImporter {
  public:
   ObjImporter(const std::string& path, const ParsedObj& parsed, const glm::vec3& default_albedo,
               MeshBuilder& builder, Progress& progress)
-      : path_(path), parsed_(parsed), builder_(builder), mesh_(builder.mesh), progress_(progress) {
+      : path_(path),
+        parsed_(parsed),
+        builder_(builder),
+        mesh_(builder.mesh),
+        progress_(progress),
+        materials_(path, parsed.materials, parsed.sources, plainMaterial(parsed, default_albedo),
+                   builder.mesh, progress) {
     has_normals_ = !parsed.attributes.normals.empty();
     has_uvs_ = !parsed.attributes.texcoords.empty();
-    has_colors_ = !parsed.attributes.colors.empty();
+    has_colors_ = !parsed.colors.empty();
     vertex_begin_ = builder.position.size();
     if (has_normals_) mesh_.normal.resize(vertex_begin_, glm::vec3(0));
     if (has_uvs_) mesh_.uv.resize(vertex_begin_, glm::vec2(0));
-    if (has_colors_) {
-      mesh_.color.resize(vertex_begin_, glm::vec3(1));
-      findColorRange();
-    }
-
-    // Material ids of the file follow the one for faces without a material
-    material_begin_ = std::uint32_t(mesh_.materials.size());
-    Material plain;
-    plain.albedo = has_colors_ ? glm::vec3(1) : default_albedo;
-    mesh_.materials.push_back(plain);
-  }
-
-  void importMaterials() {
-    for (const tinyobj::material_t& parsed : parsed_.materials) {
-      Material material;
-      material.albedo = {parsed.diffuse[0], parsed.diffuse[1], parsed.diffuse[2]};
-      material.emission =
-          kPi * glm::vec3(parsed.emission[0], parsed.emission[1], parsed.emission[2]);
-      // Written so that NaN is opaque, and becomes 0 below
-      material.opacity = parsed.dissolve < 1 ? float(std::max(parsed.dissolve, 0.0)) : 1;
-      for (int i = 0; i < 3; ++i) {
-        if (!(material.albedo[i] >= 0)) material.albedo[i] = 0;
-        if (!(material.emission[i] >= 0)) material.emission[i] = 0;
-      }
-      const auto source = parsed_.sources.find(parsed.name);
-      const MaterialSource of =
-          source != parsed_.sources.end() ? source->second : MaterialSource{{}, true};
-      if (!parsed.diffuse_texname.empty()) {
-        noteOptions(parsed.diffuse_texname, parsed.diffuse_texopt);
-        material.texture =
-            findPicture(parsed.diffuse_texname, of.directory, mesh_.textures, textures_);
-      }
-      if (!parsed.emissive_texname.empty()) importGlow(parsed, of.directory, material);
-      if (!parsed.alpha_texname.empty()) {
-        noteOptions(parsed.alpha_texname, parsed.alpha_texopt);
-        material.mask = findPicture(parsed.alpha_texname, of.directory, mesh_.masks, masks_);
-      }
-      importScattering(parsed, material);
-      if (!of.has_kd) importWithoutKd(parsed, material);
-      if (material.opacity == 0) {
-        progress_.note(
-            fmt::format("{}: material \"{}\" is clear (d 0 or Tr 1): its faces give no surfels and "
-                        "shade nothing",
-                        path_, shown(parsed.name)));
-      }
-      mesh_.materials.push_back(material);
-    }
+    if (has_colors_) mesh_.color.resize(vertex_begin_, glm::vec3(1));
   }
 
   Status importFaces() {
@@ -176,18 +147,20 @@ class ObjImporter {
         const std::size_t count = faces.num_face_vertices[i];
         if (count > faces.indices.size() - index) return tooManyCorners();
         corners.clear();
-        for (std::size_t k = 0; k < count; ++k) {
+        bool has_uv = true;
+        for (const std::size_t end = index + count; index < end; ++index) {
           SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t corner,
-                                   importCorner(faces.indices[index + k], face));
+                                   importCorner(faces.indices[index], face));
           corners.push_back(corner);
+          has_uv = has_uv && faces.indices[index].texcoord_index >= 0;
         }
-        index += count;
         const int id = i < faces.material_ids.size() ? faces.material_ids[i] : -1;
-        SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t material, materialOf(shape.name, id));
+        SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t material, materialOf(shape.name, id, has_uv));
         SURFEIT_RETURN_IF_ERROR(builder_.addFace(corners, material, vertex_begin_, path_, face));
       }
       if (index != faces.indices.size()) return tooManyCorners();
     }
+    materials_.noteFacesWithoutUv();
     return {};
   }
 
@@ -207,7 +180,7 @@ class ObjImporter {
       return {};
     };
     SURFEIT_RETURN_IF_ERROR(forEachLine(options, measure));
-    Material material = mesh_.materials[material_begin_];
+    Material material = mesh_.materials[materials_.plain()];
     material.is_two_sided = true;
     if (builder_.groups == SampleGroups::kObject || builder_.groups == SampleGroups::kMaterial) {
       progress_.note(fmt::format(
@@ -235,13 +208,12 @@ class ObjImporter {
  private:
   // The material of a face with that id. Groups by object have copies of materials, one for each
   // object that they are on.
-  Result<std::uint32_t> materialOf(const std::string& object, int id) {
-    const bool has_material = id >= 0 && std::size_t(id) < parsed_.materials.size();
-    const std::uint32_t material = material_begin_ + (has_material ? 1 + std::uint32_t(id) : 0u);
+  Result<std::uint32_t> materialOf(const std::string& object, int id, bool has_uv) {
+    const std::uint32_t material = materials_.ofFace(id, has_uv);
     const bool is_by_material = builder_.groups == SampleGroups::kMaterial;
     if (!is_by_material && builder_.groups != SampleGroups::kObject) return material;
     std::string name = object;
-    if (is_by_material) name = has_material ? parsed_.materials[std::size_t(id)].name : "";
+    if (is_by_material) name = materials_.has(id) ? parsed_.materials[std::size_t(id)].name : "";
     std::replace(name.begin(), name.end(), kNameBlank, ' ');
     if (name.empty()) return material;
 
@@ -254,77 +226,6 @@ class ObjImporter {
       mesh_.materials.push_back(grouped);
     }
     return copy->second;
-  }
-
-  // Illumination models of MTL: 3, 5 and 8 reflect, 4, 6, 7 and 9 refract. Others let through Tf
-  // where it says more than the default of exporters, which is all or nothing.
-  void importScattering(const tinyobj::material_t& parsed, Material& material) {
-    const auto color = [](const double(&rgb)[3]) {
-      glm::vec3 result(0);
-      for (int i = 0; i < 3; ++i) result[i] = rgb[i] > 0 ? float(std::min(rgb[i], 1.0)) : 0;
-      return result;
-    };
-    const glm::vec3 filter = color(parsed.transmittance);
-    const bool has_filter = filter != glm::vec3(0) && filter != glm::vec3(1);
-    switch (parsed.illum) {
-      case 3:
-      case 5:
-      case 8:
-        material.scattering = Scattering::kMirror;
-        material.specular = color(parsed.specular);
-        break;
-      case 4:
-      case 6:
-      case 7:
-      case 9:
-        material.scattering = Scattering::kGlass;
-        if (has_filter) material.transmission = filter;
-        if (parsed.ior > 1 && parsed.ior < 10) {
-          material.index = float(parsed.ior);
-        } else {
-          progress_.note(
-              fmt::format("{}: material \"{}\" refracts (illum {}) with Ni {}: read as {}", path_,
-                          shown(parsed.name), parsed.illum, parsed.ior, material.index));
-        }
-        break;
-      default:
-        if (!has_filter || material.opacity < 1) break;
-        material.scattering = Scattering::kTranslucent;
-        material.transmission = filter;
-    }
-  }
-
-  // What a picture of colors multiplies is Kd, as of emission Ke. Without either a surface that
-  // neither shines, mirrors nor refracts is none without a material.
-  void importWithoutKd(const tinyobj::material_t& parsed, Material& material) {
-    if (!parsed.diffuse_texname.empty()) {
-      material.albedo = glm::vec3(1);
-      progress_.note(fmt::format("{}: material \"{}\" has map_Kd and no Kd: read as Kd 1 1 1",
-                                 path_, shown(parsed.name)));
-      return;
-    }
-    if (material.opacity == 0 || material.emission != glm::vec3(0) ||
-        material.scattering == Scattering::kMirror || material.scattering == Scattering::kGlass) {
-      return;
-    }
-    material.albedo = mesh_.materials[material_begin_].albedo;
-    progress_.note(
-        fmt::format("{}: material \"{}\" has no Kd: it has the color of what has no material "
-                    "(--albedo)",
-                    path_, shown(parsed.name)));
-  }
-
-  // What a picture of emission multiplies is Ke; files that say only map_Ke mean the picture alone.
-  void importGlow(const tinyobj::material_t& parsed, const std::string& directory,
-                  Material& material) {
-    noteOptions(parsed.emissive_texname, parsed.emissive_texopt);
-    material.glow = findPicture(parsed.emissive_texname, directory, mesh_.textures, textures_);
-    if (material.glow == kNoTexture || material.emission != glm::vec3(0)) return;
-    material.emission = glm::vec3(kPi);
-    progress_.note(fmt::format(
-        "{}: material \"{}\" has map_Ke and no Ke: read as Ke 1 1 1, a radiance of 1 where the "
-        "picture is white",
-        path_, shown(parsed.name)));
   }
 
   template <typename Visit>
@@ -343,20 +244,16 @@ class ObjImporter {
                                                   line, vertex + 1, vertices));
           }
           const double* const at = &parsed_.attributes.vertices[3 * std::size_t(vertex)];
-          points.push_back({{at[0], at[1], at[2]}, options.width, colorOf(vertex)});
+          points.push_back(
+              {{at[0], at[1], at[2]},
+               options.width,
+               has_colors_ ? parsed_.colors.linear(std::size_t(vertex)) : glm::vec3(1)});
         }
         ++line;
         SURFEIT_RETURN_IF_ERROR(visit(std::span<const CurvePoint>(points)));
       }
     }
     return {};
-  }
-
-  glm::vec3 colorOf(int vertex) const {
-    if (!has_colors_) return glm::vec3(1);
-    const double* const code = &parsed_.attributes.colors[3 * std::size_t(vertex)];
-    const glm::vec3 srgb = glm::dvec3(code[0], code[1], code[2]) / double(largest_color_);
-    return {linearFromSrgb(srgb.x), linearFromSrgb(srgb.y), linearFromSrgb(srgb.z)};
   }
 
   // Gives the corners of ribbons, which have none, neutral normals and texture coordinates.
@@ -405,53 +302,7 @@ class ObjImporter {
                              ? glm::vec2(attributes.texcoords[i], attributes.texcoords[i + 1])
                              : glm::vec2(0));
     }
-    if (has_colors_) {
-      const glm::vec3 srgb = vector(attributes.colors, corner.vertex) / largest_color_;
-      mesh_.color.emplace_back(linearFromSrgb(srgb.x), linearFromSrgb(srgb.y),
-                               linearFromSrgb(srgb.z));
-    }
-    return found->second;
-  }
-
-  // Colors are sRGB, from 0 to 1 or in codes of 8 bits.
-  void findColorRange() {
-    double most = 0;
-    for (const double value : parsed_.attributes.colors) most = std::max(most, value);
-    if (most <= 1) return;
-    largest_color_ = 255;
-    progress_.note(fmt::format(
-        "{}: colors of vertices are 0-255 (the largest is {:g}): read as sRGB of 8 bits", path_,
-        most));
-  }
-
-  void noteOptions(const std::string& name, const tinyobj::texture_option_t& options) {
-    const std::string note = noteOfOptions(name, options);
-    if (!note.empty()) progress_.note(path_ + ": " + note);
-  }
-
-  // Index of the picture of that name, of a material file in `directory`; one that cannot be read
-  // is told once and left out.
-  template <typename Picture>
-  std::uint32_t findPicture(const std::string& name, const std::string& directory,
-                            std::vector<Picture>& pictures,
-                            std::map<std::string, std::uint32_t>& known) {
-    const std::string path = findPictureFile(name, {directoryOf(path_), directory});
-    const auto [found, is_new] = known.try_emplace(path, kNoTexture);
-    if (!is_new) return found->second;
-    Result<Picture> loaded = Picture::load(path);
-    if (!loaded.ok()) {
-      progress_.note(fmt::format("{}: texture left out: {}", path_, loaded.status().message()));
-      return kNoTexture;
-    }
-    if constexpr (std::is_same_v<Picture, Texture>) {
-      if (loaded->hasAlpha()) {
-        progress_.note(fmt::format(
-            "{}: the alpha of texture {} is not used: map_d {} in the material cuts by it", path_,
-            name, name));
-      }
-    }
-    found->second = std::uint32_t(pictures.size());
-    pictures.push_back(std::move(*loaded));
+    if (has_colors_) mesh_.color.push_back(parsed_.colors.linear(std::size_t(corner.vertex)));
     return found->second;
   }
 
@@ -462,11 +313,9 @@ class ObjImporter {
   Progress& progress_;
   bool has_normals_, has_uvs_, has_colors_;
   std::uint64_t vertex_begin_;
-  std::uint32_t material_begin_;
+  ObjMaterials materials_;
   std::map<std::pair<std::uint32_t, std::uint8_t>, std::uint32_t> grouped_;  // copies of materials
   std::unordered_map<Corner, std::uint64_t, CornerHash> vertices_;
-  std::map<std::string, std::uint32_t> textures_, masks_;
-  double largest_color_ = 1;
 };
 
 }  // namespace
@@ -476,9 +325,10 @@ Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo,
   ParsedObj parsed;
   SURFEIT_RETURN_IF_ERROR(parseObj(path, parsed));
   noteWarnings(path, parsed.warnings, progress);
+  for (const std::string& note : parsed.notes) progress.note(note);
+  for (const std::string& note : parsed.colors.notes()) progress.note(path + ": " + note);
   noteLeftOut(path, parsed, curves.width > 0, progress);
   ObjImporter importer(path, parsed, default_albedo, builder, progress);
-  importer.importMaterials();
   SURFEIT_RETURN_IF_ERROR(importer.importFaces());
   if (curves.width > 0) return importer.importLines(curves);
   return {};

@@ -25,6 +25,12 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
 
+// By the mark at the front, or by the zero byte of an ASCII character.
+bool isUtf16(std::string_view begin) {
+  return begin.starts_with("\xff\xfe") || begin.starts_with("\xfe\xff") ||
+         begin.substr(0, 2).find('\0') != std::string_view::npos;
+}
+
 // Takes the first word off.
 std::string_view takeWord(std::string_view& text) {
   const std::size_t end = std::min(text.find_first_of(kBlanks), text.size());
@@ -38,17 +44,22 @@ bool isOneOf(std::string_view word, const std::string_view (&words)[N]) {
   return std::find(std::begin(words), std::end(words), word) != std::end(words);
 }
 
-bool isNumber(std::string_view word) {
+bool isNumber(std::string_view word, double& value) {
   if (word.starts_with('+')) word.remove_prefix(1);
-  double value = 0;
+  value = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   // Too large or too small for a double is a number, too; the parser knows no nan and no inf
   return error != std::errc::invalid_argument && end == word.data() + word.size() &&
          std::isfinite(value);
 }
 
+bool isNumber(std::string_view word) {
+  double value;
+  return isNumber(word, value);
+}
+
 constexpr std::string_view kNumberStatements[] = {"v",  "vn", "vt", "Ka", "Kd",
-                                                  "Ks", "Ke", "d",  "Tr"};
+                                                  "Ks", "Ke", "Tf", "d",  "Tr"};
 constexpr std::string_view kIndexStatements[] = {"f", "l", "p"};
 constexpr std::string_view kNameStatements[] = {"usemtl", "newmtl", "mtllib"};
 constexpr std::string_view kColorStatements[] = {"Ka", "Kd", "Ks", "Ke", "Tf"};
@@ -125,6 +136,13 @@ bool ObjLines::readPhysicalLine() {
         input_.readSome(offset_, std::as_writable_bytes(std::span(buffer_)));
     if (!count.ok()) status_ = count.status();
     buffer_.resize(count.ok() ? *count : 0);
+    if (offset_ == 0 && isUtf16({buffer_.data(), buffer_.size()})) {
+      status_ =
+          Status::corruption(fmt::format("{0}: found text in UTF-16, expected UTF-8 or ASCII: "
+                                         "`iconv -f UTF-16 -t UTF-8 {0} > NEW` "
+                                         "converts it",
+                                         input_.path()));
+    }
     offset_ += buffer_.size();
     if (!status_.ok()) return false;
     if (buffer_.empty()) {
@@ -145,6 +163,7 @@ bool ObjLines::readLine() {
     if (!readPhysicalLine()) return joined > 0 && status_.ok();
     const std::string_view text = trimmed(physical_);
     const bool is_comment = joined == 0 && text.starts_with('#');
+    if (is_comment && text.starts_with("#MRGB")) colors_.addZBrushLine();
     if (is_comment || !text.ends_with('\\')) {
       line_ += physical_;
       break;
@@ -186,11 +205,17 @@ void ObjLines::rewriteLine() {
     line_ = "d " + std::string(rest);
     checkNumbers(std::string_view(line_).substr(2));
   } else if (isOneOf(word, kNumberStatements) && checkNumbers(rest)) {
+    if (word == "v") keepPlace(rest);
     noteMaterial(word, rest);
     completeColor(word, rest);
-  } else if (word == "Tf") {
-    completeColor(word, rest);
   }
+}
+
+void ObjLines::keepPlace(std::string_view rest) {
+  colors_.addVertex(values_);
+  if (values_.size() <= 3) return;
+  for (int i = 0; i < 3; ++i) takeWord(rest);
+  line_.resize(std::size_t(rest.data() - line_.data()));
 }
 
 // One value is that of all three colors.
@@ -215,6 +240,7 @@ void ObjLines::noteMaterial(std::string_view word, std::string_view rest) {
   if (word == "newmtl") {
     const auto [material, is_new] = materials_.try_emplace(std::string(rest), false);
     has_kd_ = is_new ? &material->second : nullptr;
+    if (!is_new) repeated_.insert(material->first);
   } else if (word == "Kd" && has_kd_ != nullptr) {
     *has_kd_ = true;
   }
@@ -229,13 +255,22 @@ void ObjLines::dropComment() {
 }
 
 bool ObjLines::checkNumbers(std::string_view numbers) {
+  values_.clear();
   while (!numbers.empty()) {
     const std::string_view word = takeWord(numbers);
-    if (isNumber(word)) continue;
-    const bool has_comma = word.find(',') != std::string_view::npos;
-    status_ = Status::corruption(fmt::format(
-        "{}: line {}: found \"{}\", expected a number{}", input_.path(), number_,
-        word.substr(0, 40), has_comma ? " with a decimal point: replace commas by points" : ""));
+    double value;
+    if (isNumber(word, value)) {
+      values_.push_back(value);
+      continue;
+    }
+    std::string_view advice;
+    if (word.find(',') != std::string_view::npos) {
+      advice = " with a decimal point: replace commas by points";
+    } else if (values_.empty() && (word == "spectral" || word == "xyz")) {
+      advice = ": spectra and CIE XYZ are not read, replace them by red, green and blue";
+    }
+    status_ = Status::corruption(fmt::format("{}: line {}: found \"{}\", expected a number{}",
+                                             input_.path(), number_, word.substr(0, 40), advice));
     return false;
   }
   return true;

@@ -3,11 +3,14 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <streambuf>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "sample/obj_vertex_colors.h"
 #include "storage/byte_input.h"
 #include "surfeit/status.h"
 
@@ -18,7 +21,8 @@ inline constexpr char kNameBlank = '\x01';
 
 // Feeds a parser: lines that a backslash continues are one, names of materials and their files hold
 // kNameBlank for blanks, line ends are \n and a byte order mark is gone. Statements of MTL may have
-// any case, and the values that they may leave out are there. Numbers are looked at,
+// any case, and the values that they may leave out are there. Vertices are places alone: their
+// colors are kept here, since the parser drops all when one is missing. Numbers are looked at,
 // since the parser takes what is none as 0 (decimal commas most often): status() then names file
 // and line, and reading ends there, as it does when the file cannot be read.
 class ObjLines final : public std::streambuf {
@@ -27,8 +31,11 @@ class ObjLines final : public std::streambuf {
 
   const Status& status() const { return status_; }
   std::uint64_t freeFormStatements() const { return free_form_; }
+  ObjVertexColors takeColors() { return std::move(colors_); }
   // Materials that the file defines, and whether they have a Kd; of several of one name the first.
   const std::map<std::string, bool>& materials() const { return materials_; }
+  // Names that several of its materials have.
+  const std::set<std::string>& repeatedMaterials() const { return repeated_; }
 
  protected:
   int_type underflow() override;
@@ -38,6 +45,7 @@ class ObjLines final : public std::streambuf {
   bool readLine();
   void rewriteLine();
   void spellStatement();
+  void keepPlace(std::string_view rest);
   void completeColor(std::string_view word, std::string_view rest);
   void dropComment();
   void noteMaterial(std::string_view word, std::string_view rest);
@@ -51,7 +59,10 @@ class ObjLines final : public std::streambuf {
   std::string physical_, line_;  // as read; what the parser gets
   std::uint64_t number_ = 0;     // of the last line read, from 1
   std::uint64_t free_form_ = 0;
+  ObjVertexColors colors_;
+  std::vector<double> values_;  // of the numbers that checkNumbers() saw
   std::map<std::string, bool> materials_;
+  std::set<std::string> repeated_;
   bool* has_kd_ = nullptr;  // of the material that is being defined
   bool is_at_end_ = false;
 };

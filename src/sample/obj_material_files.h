@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <istream>
 #include <map>
+#include <set>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -78,6 +79,8 @@ class MaterialFiles final : public tinyobj::MaterialReader {
   const Status& status() const { return status_; }
   // By name.
   const std::map<std::string, MaterialSource>& sources() const { return sources_; }
+  // What the user should know of the files that were read.
+  const std::vector<std::string>& notes() const { return notes_; }
   // The files that were read.
   const std::vector<std::string>& paths() const { return paths_; }
 
@@ -116,6 +119,10 @@ class MaterialFiles final : public tinyobj::MaterialReader {
 
   void load(const std::string& path, std::vector<tinyobj::material_t>* materials,
             std::map<std::string, int>* ids, std::string* warnings, std::string* errors) {
+    std::error_code ignored;
+    for (const std::string& known : paths_) {
+      if (std::filesystem::equivalent(known, path, ignored)) return;
+    }
     paths_.push_back(path);
     Result<ByteInput> input = ByteInput::open(path);
     if (!input.ok()) {
@@ -129,14 +136,21 @@ class MaterialFiles final : public tinyobj::MaterialReader {
     *warnings += warned;
     *errors += failed;
     if (!lines.status().ok()) status_ = lines.status();
+    std::set<std::string> repeated = lines.repeatedMaterials();
     for (const auto& [name, has_kd] : lines.materials()) {
-      sources_.try_emplace(name, MaterialSource{directoryOf(path), has_kd});
+      const MaterialSource source{directoryOf(path), has_kd};
+      if (!sources_.try_emplace(name, source).second) repeated.insert(name);
     }
+    if (repeated.empty()) return;
+    const std::string more =
+        repeated.size() > 1 ? " (and " + std::to_string(repeated.size() - 1) + " more)" : "";
+    notes_.push_back(path + ": material \"" + shown(*repeated.begin()) + "\"" + more +
+                     " is defined again: the first definition counts (rename the others)");
   }
 
   std::string directory_;
   std::map<std::string, MaterialSource> sources_;
-  std::vector<std::string> paths_;
+  std::vector<std::string> notes_, paths_;
   Status status_;
 };
 

@@ -8,6 +8,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <span>
+#include <string_view>
 #include <utility>
 
 #include "core/assert.h"
@@ -16,6 +18,8 @@
 
 namespace surfeit {
 namespace {
+
+using std::string_view_literals::operator""sv;
 
 std::array<float, 256> makeSrgbTable() {
   std::array<float, 256> table{};
@@ -52,13 +56,62 @@ struct Picture {
   std::vector<std::uint8_t> texels;  // rgba
 };
 
+// Pictures that the library does not read, by what stands at a place of theirs.
+struct OtherPicture {
+  std::size_t offset;
+  std::string_view magic;
+  const char* name;
+  const char* advice = "convert it to PNG of 8 bits";
+};
+constexpr const char* kLightAdvice =
+    "save it as PNG, with the largest value at white, and multiply by that in Kd or Ke";
+constexpr OtherPicture kOtherPictures[] = {
+    {8, "WEBP"sv, "WebP"},
+    {0, "II*\0"sv, "TIFF"},
+    {0, "MM\0*"sv, "TIFF"},
+    {0, "II+\0"sv, "TIFF (BigTIFF)"},
+    {0, "MM\0+"sv, "TIFF (BigTIFF)"},
+    {0, "\x76\x2f\x31\x01"sv, "OpenEXR", kLightAdvice},
+    {4, "ftypavif"sv, "AVIF"},
+    {4, "ftypheic"sv, "HEIC"},
+    {4, "ftypmif1"sv, "HEIC or AVIF"},
+    {0, "DDS "sv, "DDS"},
+    {0, "\xabKTX"sv, "KTX"},
+    {4, "jP  "sv, "JPEG 2000"},
+    {0, "\xff\x4f\xff\x51"sv, "JPEG 2000"},
+    {4, "JXL "sv, "JPEG XL"},
+    {0, "\xff\x0a"sv, "JPEG XL"},
+    {0, "\x01\xda"sv, "SGI"},
+    {0, "Ptex"sv, "Ptex"},
+    {0, "qoif"sv, "QOI"},
+    {0, "<svg"sv, "SVG"},
+    {0, "\0\0\x01\0"sv, "ICO"},
+    {0, "version https://git-lfs"sv, "a pointer of Git LFS",
+     "fetch the file itself: `git lfs pull`"},
+};
+
+// Of a file that the library does not decode.
+Status notAPicture(const InputFile& file) {
+  std::array<char, 32> begin{};
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                           file.readSome(0, std::as_writable_bytes(std::span(begin))));
+  const std::string_view text(begin.data(), count);
+  for (const OtherPicture& other : kOtherPictures) {
+    if (text.size() < other.offset || !text.substr(other.offset).starts_with(other.magic)) continue;
+    return Status::corruption(fmt::format("{}: found {}, expected PNG, JPEG, TGA or BMP: {}",
+                                          file.path(), other.name, other.advice));
+  }
+  return Status::corruption(
+      fmt::format("{}: not a picture: {}", file.path(), stbi_failure_reason()));
+}
+
 Result<Picture> loadPicture(const std::string& path) {
   // Our own open first: stb_image does not tell a missing file from a damaged one
   SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
   int width = 0, height = 0, channels = 0;
   constexpr std::uint64_t kMaxTexels = std::uint64_t{1} << 28;
   if (stbi_info(path.c_str(), &width, &height, &channels) == 0 || width <= 0 || height <= 0) {
-    return Status::corruption(fmt::format("{}: not a picture: {}", path, stbi_failure_reason()));
+    return notAPicture(file);
   }
   if (std::uint64_t(width) * std::uint64_t(height) > kMaxTexels) {
     return Status::corruption(
@@ -67,9 +120,8 @@ Result<Picture> loadPicture(const std::string& path) {
   // The library would cut light at 1 and code it by a curve that is not sRGB's
   if (stbi_is_hdr(path.c_str()) != 0) {
     return Status::corruption(fmt::format(
-        "{}: found a Radiance picture, which textures are not made of, expected 8 bits a color: "
-        "save it as PNG, with the largest value at white, and multiply by that in Kd or Ke",
-        path));
+        "{}: found a Radiance picture, which textures are not made of, expected 8 bits a color: {}",
+        path, kLightAdvice));
   }
   unsigned char* const texels = stbi_load(path.c_str(), &width, &height, &channels, 4);
   if (texels == nullptr) {

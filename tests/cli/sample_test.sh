@@ -72,4 +72,23 @@ causticsAreAMapOfTheirOwn() {
   run 2 sample m.obj -o same.ply --photons 10 --caustic-photons same.ply --light-point "0 1 0 1 1 1"
 }
 
+whatMaterialsLackIsRefusedByStrict() {
+  printf 'P6 1 1 255\n\x33\x33\x33' > t.ppm
+  printf 'newmtl a\nKd 1 1 1\nmap_Kd t.ppm\nnewmtl b\nKd 200 100 50\n' > m.mtl
+  local square='mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\n'
+  printf "$square"'usemtl a\nf 1 2 3 4\n' > bare.obj
+  printf "$square"'usemtl a\nf 1/1 2/1 3/1 4/1\n' > full.obj
+  local light=(--count 64 --light-directional "0 0 -1  1 1 1")
+  run 3 sample bare.obj -o no.ply --strict "${light[@]}"
+  says "(refused by --strict)"
+  says 'material "b" has Kd 200 100 50: read as sRGB of 8 bits'
+  printf 'newmtl a\nKd 1 1 1\nmap_Kd t.ppm\n' > m.mtl
+  run 3 sample bare.obj -o no.ply --strict "${light[@]}"
+  says '1 of 1 faces of material "a" have no texture coordinates'
+  run 0 sample full.obj -o full.ply --strict "${light[@]}"
+  run 0 sample bare.obj -o white.ply "${light[@]}"
+  cmp -s full.ply white.ply && fail "the picture does not matter"
+  leavesNothing no.ply
+}
+
 runCase

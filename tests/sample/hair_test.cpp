@@ -18,6 +18,8 @@
 namespace surfeit {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class HairMesh : public SceneFiles {
@@ -193,14 +195,47 @@ TEST_F(HairMesh, WhatIsWrongIsTold) {
   EXPECT_THAT(messageOf(write("a.hair", bytes)), HasSubstr("expected 51539"));
   hair = tuft(20);
   hair.default_thickness = 0;
-  EXPECT_THAT(messageOf(write("a.hair", hair.bytes())), HasSubstr("--curve-width"));
+  EXPECT_THAT(messageOf(write("a.hair", hair.bytes())),
+              HasSubstr("an area of 0, expected a finite one above 0: a thickness (--curve-width"));
   hair = tuft(20);
   hair.points[7].x = std::nanf("");
-  EXPECT_THAT(messageOf(write("a.hair", hair.bytes())), HasSubstr("a.hair"));
+  EXPECT_THAT(messageOf(write("a.hair", hair.bytes())),
+              AllOf(HasSubstr("a.hair: strand 1: found a point (nan, "),
+                    HasSubstr("expected finite values")));
+  // In a strand that is kept or not, and in the header
+  hair = tuft(20);
+  hair.thickness.assign(hair.points.size(), 0.02f);
+  hair.thickness[7] = -.5f;
+  const std::string said = "of width -0.5, expected a width of 0 or more (--curve-width gives one)";
+  for (const std::uint64_t strands : {0, 1, 2}) {
+    CurveOptions curves;
+    curves.strands = strands;
+    const auto mesh = loadMeshes({write("a.hair", hair.bytes())}, glm::vec3(1), notes_, curves);
+    EXPECT_THAT(mesh.status().message(), AllOf(HasSubstr("a.hair: strand 1: "), HasSubstr(said)));
+  }
+  hair = tuft(20);
+  hair.default_thickness = -.5f;
+  EXPECT_THAT(messageOf(write("a.hair", hair.bytes())),
+              AllOf(HasSubstr("strand 0"), HasSubstr(said)));
   hair = tuft(20);
   const auto mesh = loadMeshes({write("a.hair", hair.bytes() + "more")}, glm::vec3(1), notes_);
   EXPECT_TRUE(mesh.ok());
   EXPECT_THAT(notes_.notes.back(), HasSubstr("4 bytes behind the last array"));
+}
+
+TEST_F(HairMesh, ColorsAndTransparenciesThatAreCutAreTold) {
+  Hair hair = tuft(2);
+  hair.colors.assign(hair.points.size(), glm::vec3(0, .5f, 1));
+  hair.colors[3].y = 1.5f;
+  hair.transparency.assign(hair.points.size(), 0);
+  hair.transparency[4] = -.5f;
+  ASSERT_TRUE(loadMeshes({write("a.hair", hair.bytes())}, glm::vec3(1), notes_).ok());
+  EXPECT_THAT(notes_.notes, ElementsAre(HasSubstr("a.hair: 2 points have a color or transp")));
+  notes_.notes.clear();
+  hair = tuft(2);
+  hair.default_color = {255, 0, 0};
+  ASSERT_TRUE(loadMeshes({write("a.hair", hair.bytes())}, glm::vec3(1), notes_).ok());
+  EXPECT_THAT(notes_.notes, ElementsAre(HasSubstr("10 points have a color")));
 }
 
 TEST_F(HairMesh, LinesOfObjFilesAreCurvesWhereTheyGetAWidth) {

@@ -255,6 +255,47 @@ TEST_F(ObjFiles, WhatIsNoNumberIsRefusedWithItsLine) {
   EXPECT_TRUE(load(write("m.obj", "v +1 -2e-3 3.E1 # one, two\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")).ok());
 }
 
+TEST_F(ObjFiles, ColorsInSpectraAndCieAreRefusedWithTheWayOut) {
+  for (const std::string statement : {"Ka", "Kd", "Ks", "Ke", "Tf", "kd"}) {
+    for (const std::string color : {"spectral paint.rfl 1", "xyz 0.5 .25 .125"}) {
+      write("m.mtl", "newmtl a\n" + statement + " " + color + "\n");
+      const Result<Mesh> mesh =
+          load(write("m.obj", std::string("mtllib m.mtl\n") + kSquare + "usemtl a\nf 1 2 3\n"));
+      EXPECT_THAT(mesh.status().message(),
+                  testing::AllOf(HasSubstr("m.mtl: line 2: found \"" + color.substr(0, 3)),
+                                 HasSubstr("replace them by red, green and blue")));
+    }
+  }
+  EXPECT_THAT(load(write("m.obj", std::string(kSquare) + "v 1 2 xyz\n")).status().message(),
+              testing::Not(HasSubstr("CIE")));
+}
+
+TEST_F(ObjFiles, TextInUtf16IsRefusedWithTheWayOut) {
+  const std::string text = kSquare + std::string("f 1 2 3 4\n");
+  const auto wide = [](const std::string& of, bool is_big_endian, bool has_mark) {
+    std::string bytes;
+    if (has_mark) bytes = is_big_endian ? "\xfe\xff" : "\xff\xfe";
+    for (const char c : of) {
+      if (is_big_endian) bytes += '\0';
+      bytes += c;
+      if (!is_big_endian) bytes += '\0';
+    }
+    return bytes;
+  };
+  for (const bool is_big_endian : {false, true}) {
+    for (const bool has_mark : {false, true}) {
+      const Status obj = load(write("m.obj", wide(text, is_big_endian, has_mark))).status();
+      EXPECT_EQ(obj.code(), StatusCode::kCorruption);
+      EXPECT_THAT(obj.message(),
+                  testing::AllOf(HasSubstr("m.obj: found text in UTF-16, expected UTF-8"),
+                                 HasSubstr("iconv -f UTF-16")));
+      write("m.mtl", wide("newmtl a\nKd 1 0 0\n", is_big_endian, has_mark));
+      EXPECT_THAT(load(write("a.obj", "mtllib m.mtl\nusemtl a\n" + text)).status().message(),
+                  HasSubstr("m.mtl: found text in UTF-16"));
+    }
+  }
+}
+
 TEST_F(ObjFiles, NamesOfMaterialsAndTheirFilesMayHaveBlanks) {
   write("my paints.mtl", "newmtl red paint\nKd 0.7 0.1 0.1\nnewmtl red\nKd 0 0 1\n");
   write("a.mtl", "newmtl blue  paint\nKd 0.1 0.1 0.7\n");
@@ -289,11 +330,11 @@ TEST_F(ObjFiles, DissolveAndMasksSayHowMuchIsThere) {
                 "vt 0.25 0.5\nvt 0.75 0.5\nusemtl leaf\nf 1/5 2/5 3/5\nf 1/6 2/6 3/6\nf 1 2 3\n"));
   ASSERT_TRUE(mesh.ok()) << mesh.status().message();
   EXPECT_FALSE(mesh->isOpaque());
-  const float expected[] = {.3f, .75f, .5f, .5f, 0, .25f};
-  for (std::uint32_t i = 0; i < 5; ++i) {
+  const float expected[] = {.3f, .75f, .5f, .5f, 0, .5f};
+  for (std::uint32_t i = 0; i < 6; ++i) {
     EXPECT_NEAR(surfacePoint(*mesh, i, .3f, .3f).opacity, expected[i], 1e-6f) << i;
   }
-  EXPECT_TRUE(notes_.notes.empty());
+  EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("1 of 3 faces of material \"leaf\"")));
 }
 
 TEST_F(ObjFiles, ClearMaterialsAreTold) {

@@ -41,6 +41,39 @@ TEST_F(TextureFiles, MissingIsAnIoErrorAndGarbageIsCorruption) {
   EXPECT_NE(garbage.status().message().find("garbage.png"), std::string::npos);
 }
 
+TEST_F(TextureFiles, PicturesOfOtherFormatsAreNamed) {
+  using namespace std::string_literals;
+  struct Case {
+    std::string begin;
+    std::string said;
+  };
+  const std::string convert = ", expected PNG, JPEG, TGA or BMP: convert it to PNG of 8 bits";
+  const std::vector<Case> cases = {
+      {"RIFF\x40\0\0\0WEBPVP8 "s, "found WebP" + convert},
+      {"II*\0\x08\0\0\0"s, "found TIFF" + convert},
+      {"MM\0*\0\0\0\x08"s, "found TIFF" + convert},
+      {"\x76\x2f\x31\x01\x02\0\0\0"s, "found OpenEXR"},
+      {"\0\0\0\x1c"s + "ftypavif"s, "found AVIF" + convert},
+      {"DDS \x7c\0\0\0"s, "found DDS" + convert},
+      {"\0\0\0\x0cjP  \r\n"s, "found JPEG 2000" + convert},
+      {"version https://git-lfs.github.com/spec/v1\n"s,
+       "found a pointer of Git LFS, expected PNG, JPEG, TGA or BMP: fetch"},
+      {"RIFF\x40\0\0\0WAVEfmt "s, "not a picture"},
+      {"II"s, "not a picture"},
+      {""s, "not a picture"},
+  };
+  for (const Case& of : cases) {
+    // The name says nothing
+    const std::string file =
+        write("t.png", of.begin.empty() ? "" : of.begin + std::string(64, 'x'));
+    for (const Status& status : {Texture::load(file).status(), Mask::load(file).status()}) {
+      EXPECT_EQ(status.code(), StatusCode::kCorruption);
+      EXPECT_NE(status.message().find("t.png: " + of.said), std::string::npos)
+          << status.message() << ", expected " << of.said;
+    }
+  }
+}
+
 TEST_F(TextureFiles, LightWithoutALimitIsRefusedWithTheWayOut) {
   const std::string picture =
       "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n" + std::string("\x80\x80\x80\x85");
