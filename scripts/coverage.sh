@@ -13,7 +13,7 @@ folders=(src/cache src/storage src/octree/page)
 tests=(core/core_test cache/cache_test io/io_test io/corpus_test octree/octree_test)
 
 mkdir -p "$build"
-cmake -S . -B "$build" -G Ninja -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG="-O0 -g1 --coverage" \
+cmake -S . -B "$build" -G Ninja -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG="-O0 -g1 --coverage -fprofile-update=atomic" \
   -D CMAKE_CXX_COMPILER_LAUNCHER=ccache -D SURFEIT_BUILD_BENCH=OFF -D SURFEIT_PYTHON=OFF > "$build.log" 2>&1 ||
   { cat "$build.log" >&2; exit 1; }
 cmake --build "$build" ${JOBS:+--parallel $JOBS} --target "${tests[@]##*/}" > "$build.log" 2>&1 || { tail -40 "$build.log" >&2; exit 1; }
@@ -25,7 +25,7 @@ done
 filters=()
 for folder in "${folders[@]}"; do filters+=(--filter "$folder/"); done
 gcovr --root . --object-directory "$build" "${filters[@]}" --exclude-throw-branches \
-  --exclude-unreachable-branches --branches --csv --output "$build.csv"
+  --exclude-unreachable-branches --branches --csv --output "$build.csv" "$build"
 python3 - "$build.csv" <<'PYTHON'
 import collections
 import csv
