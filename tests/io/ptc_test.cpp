@@ -200,6 +200,26 @@ TEST_F(PtcFiles, RadiusComesFromAreaOrWidthWhereThereIsNone) {
   EXPECT_FLOAT_EQ(float(valueOf(*reader, readAllRows(*reader), 0, "radius")), 1.5f);
 }
 
+TEST_F(PtcFiles, PointsWithoutRadiiAreReadWithoutSizes) {
+  for (const std::size_t count : {1, 25'000}) {
+    const auto columns = properties({"x", "y", "z", "radius"});
+    std::vector<std::byte> rows = floatRows(count, columns.size());
+    for (std::size_t i = 0; i < count; ++i) std::memset(rows.data() + (4 * i + 3) * 4, 0, 4);
+    writePtc("a.ptc", columns, rows);
+    std::unique_ptr<RowReader> reader = openGood("a.ptc");
+    EXPECT_EQ(reader->element().find("radius"), nullptr);
+    EXPECT_THAT(reader->notes(), ElementsAre(HasSubstr("all radii are 0")));
+    const float two = 2;
+    for (std::size_t i = 0; i < count; i += 2) {
+      std::memcpy(rows.data() + (4 * i + 3) * 4, &two, sizeof two);
+    }
+    writePtc("a.ptc", columns, rows);
+    reader = openGood("a.ptc");
+    EXPECT_EQ(valueOf(*reader, readAllRows(*reader), 0, "radius"), 2);
+    EXPECT_THAT(reader->notes(), ElementsAre());
+  }
+}
+
 TEST_F(PtcFiles, OtherTypesBecomeFloatsWithANote) {
   std::vector<RowProperty> columns = {rowProperty("x", ValueType::kFloat64),
                                       rowProperty("y", ValueType::kFloat64),
@@ -263,7 +283,10 @@ TEST_F(PtcFiles, TwinVariablesGetNamesOfTheirOwn) {
                       {std::string(60, 'n'), ChannelKind::kFloat},
                       {std::string(60, 'n'), ChannelKind::kFloat}};
   std::vector<std::byte> bytes = formatPtcHeader(header);
+  const float one = 1;
+  constexpr std::size_t kRadiusAt = 16;
   bytes.resize(bytes.size() + header.recordBytes());
+  std::memcpy(bytes.data() + bytes.size() - header.recordBytes() + kRadiusAt, &one, sizeof one);
   write("a.ptc", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   const std::unique_ptr<RowReader> reader = openGood("a.ptc");
   ASSERT_NE(reader, nullptr);
@@ -305,7 +328,7 @@ TEST_F(PtcFiles, EveryTruncationIsFound) {
 }
 
 TEST_F(PtcFiles, BytesAfterTheLastPointAreNoted) {
-  writePtc("a.ptc", properties({"x", "y", "z"}), floatRows(3, 3));
+  writePtc("a.ptc", properties({"x", "y", "z", "radius"}), floatRows(3, 4));
   write("b.ptc", contents("a.ptc") + "abc");
   EXPECT_THAT(openGood("b.ptc")->notes(), ElementsAre(HasSubstr("3 bytes after the last point")));
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstring>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,25 @@ namespace {
 
 constexpr std::size_t kNormalOffset = 12, kRadiusOffset = 16;
 constexpr std::size_t kTwinNameChars = 48;
+constexpr std::uint64_t kRadiusSamples = 10'000;
+
+// Whether the points have no sizes: each has a radius, and so zero stands for none. By a sample of
+// the whole file; false for a compressed one, which cannot be read here and there.
+Result<bool> lacksRadii(ByteInput& input, const PtcHeader& header) {
+  if (!input.size() || header.count == 0) return false;
+  const std::uint64_t samples = std::min(header.count, kRadiusSamples);
+  for (std::uint64_t i = 0; i < samples; ++i) {
+    const std::uint64_t point = i * (header.count / samples);
+    float radius = 0;
+    SURFEIT_ASSIGN_OR_RETURN(
+        const std::size_t size,
+        input.readSome(header.data_offset + point * header.recordBytes() + kRadiusOffset,
+                       std::as_writable_bytes(std::span(&radius, 1))));
+    if (size < sizeof radius) return false;  // the reader says that the file ends early
+    if (radius != 0) return false;
+  }
+  return true;
+}
 
 class PtcReader : public FixedRecordReader {
  public:
@@ -22,7 +42,9 @@ class PtcReader : public FixedRecordReader {
                                                  const RowReaderOptions& options) {
     SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path, options.access));
     SURFEIT_ASSIGN_OR_RETURN(PtcHeader header, readPtcHeader(input));
+    SURFEIT_ASSIGN_OR_RETURN(const bool lacks_radii, lacksRadii(input, header));
     auto reader = std::unique_ptr<PtcReader>(new PtcReader(std::move(input), std::move(header)));
+    reader->lacks_radii_ = lacks_radii;
     SURFEIT_RETURN_IF_ERROR(reader->addChannels(options.channels));
     SURFEIT_RETURN_IF_ERROR(
         reader->setRecords(reader->header_.data_offset, reader->header_.recordBytes()));
@@ -35,6 +57,7 @@ class PtcReader : public FixedRecordReader {
 
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes;
+    if (lacks_radii_) notes.emplace_back("all radii are 0: the points are read without sizes");
     if (trailingBytes() > 0) {
       notes.push_back(fmt::format("{} bytes after the last point are not read", trailingBytes()));
     }
@@ -57,7 +80,11 @@ class PtcReader : public FixedRecordReader {
     SURFEIT_RETURN_IF_ERROR(addFloats("P", ChannelKind::kPoint, 3, offset, renames));
     SURFEIT_ASSIGN_OR_RETURN(normal_row_offset_, add("N", ChannelKind::kNormal, 3, renames));
     offset = kRadiusOffset;
-    SURFEIT_RETURN_IF_ERROR(addFloats("radius", ChannelKind::kFloat, 1, offset, renames));
+    if (lacks_radii_) {
+      offset += sizeof(float);
+    } else {
+      SURFEIT_RETURN_IF_ERROR(addFloats("radius", ChannelKind::kFloat, 1, offset, renames));
+    }
     for (const PtcVariable& variable : header_.variables) {
       SURFEIT_RETURN_IF_ERROR(
           addFloats(variable.name, variable.kind, variable.floatCount(), offset, renames));
@@ -124,6 +151,7 @@ class PtcReader : public FixedRecordReader {
   }
 
   PtcHeader header_;
+  bool lacks_radii_ = false;
   std::vector<Copy> copies_;
   std::optional<std::size_t> normal_row_offset_;
 };
