@@ -10,6 +10,7 @@
 #include "cloud/cloud_formats.h"
 #include "cloud/property_aliases.h"
 #include "cloud/row_reader.h"
+#include "core/crs_comment.h"
 #include "core/up_comment.h"
 #include "surfels/generated/recipe_surfel_source.h"
 #include "surfels/generated/scene_recipe.h"
@@ -43,6 +44,9 @@ class RowSurfelSource final : public SurfelSource {
       notes.push_back(std::move(note));
     }
     noteOpacity(notes);
+    if (std::string note = noteOfDegrees(statedCrs(comments())); !note.empty()) {
+      notes.push_back(std::move(note));
+    }
     if (!alpha_note_) alpha_note_ = noteOfAlpha();
     if (!alpha_note_->empty()) notes.push_back(*alpha_note_);
     return notes;

@@ -400,6 +400,23 @@ TEST_F(LasTest, CoordinateReferenceSystemsAreTold) {
   EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 34735, keys({1, 1, 0, 9, 3072, 0, 1, 32767}))}),
               ElementsAre("crs by GeoTIFF keys without a code"));
   EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 34735, "x")}), IsEmpty());
+
+  // The model says what a code is of: projected, geographic, geocentric
+  const auto crsOfKeys = [&](std::vector<std::uint16_t> words) {
+    words.insert(words.begin(), {1, 1, 0, std::uint16_t(words.size() / 4)});
+    const std::vector<std::string> found = crsOf({lasRecord("LASF_Projection", 34735, keys(words))});
+    return found.size() == 1 ? found[0] : "";
+  };
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 2, 2048, 0, 1, 4269}), "crs geographic EPSG:4269");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 3, 2048, 0, 1, 4978}), "crs geocentric EPSG:4978");
+  EXPECT_EQ(crsOfKeys({2048, 0, 1, 4978}), "crs geocentric EPSG:4978");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 2, 2048, 0, 1, 32767}),
+            "crs geographic by GeoTIFF keys without a code");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 1, 2048, 0, 1, 4269, 3072, 0, 1, 32767}),
+            "crs by GeoTIFF keys without a code");
+  EXPECT_EQ(crsOfKeys({2048, 0, 1, 4269, 3072, 0, 1, 2992}), "crs EPSG:2992");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 1, 3072, 0, 1, 26910, 4099, 0, 1, 9003}),
+            "crs EPSG:26910 vertical unit 9003");
 }
 
 TEST_F(LasTest, RecordsOfVariableLengthMayBeDamaged) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/crs_comment.h"
 #include "io/compressed_files.h"
 #include "io/convert_tables.h"
 #include "io/las_test_file.h"
@@ -395,11 +396,60 @@ TEST_F(LasWriterTest, CoordinateReferenceSystemsGoThroughPly) {
   EXPECT_EQ(lasSummaryOf(bytesOf("c.las")).minor, 2u);  // later formats know text alone
   EXPECT_EQ(lasSummaryOf(bytesOf("c.las")).format, 3u);
 
+  // All that the keys say, of every model
+  for (const std::vector<std::uint16_t>& words :
+       {std::vector<std::uint16_t>{1, 1, 0, 2, 1024, 0, 1, 2, 2048, 0, 1, 4326},
+        {1, 1, 0, 2, 1024, 0, 1, 3, 2048, 0, 1, 4978},
+        {1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 26910, 4099, 0, 1, 9003},
+        {1, 1, 0, 4, 1024, 0, 1, 1, 3072, 0, 1, 2263, 4096, 0, 1, 6360, 4099, 0, 1, 9003}}) {
+    const std::string record(reinterpret_cast<const char*>(words.data()), 2 * words.size());
+    write("f.las", withRecords(makeLas(2, 3, 3), {lasRecord("LASF_Projection", 34735, record)}));
+    convertOk({"f.las"}, "b.ply", all());
+    convertOk({"b.ply"}, "c.las");
+    EXPECT_EQ(lasRecordOf(bytesOf("c.las"), "LASF_Projection", 34735), record) << words[7];
+  }
+
   // Tiles are merged with the system of the first
   write("d.las", bytesOf("a.las"));
   convertOk({"a.las", "d.las"}, "e.las", all());
   EXPECT_EQ(lasRecordOf(bytesOf("e.las"), "LASF_Projection", 34735), key_bytes);
   EXPECT_EQ(lasSummaryOf(bytesOf("e.las")).count, 6u);
+}
+
+// Positions that are moved or scaled are not those of the system any more.
+TEST_F(LasWriterTest, MovedPointsLoseTheirCoordinateReferenceSystem) {
+  const std::vector<std::uint16_t> keys = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 2263};
+  const std::string key_bytes(reinterpret_cast<const char*>(keys.data()), 2 * keys.size());
+  write("keys.las",
+        withRecords(makeLas(2, 3, 3), {lasRecord("LASF_Projection", 34735, key_bytes)}));
+  write("text.las",
+        withRecords(makeLas(4, 6, 3), {lasRecord("LASF_Projection", 2112, "PROJCS[\"x\", 1]")}));
+  const auto hasCrs = [&](const std::string& input, const std::string& output,
+                          const ConvertOptions& options) {
+    convertOk({input}, output, options);
+    const auto reader = openRowReader(path(output));
+    EXPECT_TRUE(reader.ok());
+    return reader.ok() && !statedCrs((*reader)->comments()).empty();
+  };
+  ConvertOptions scaled = all(), turned = all(), set = all(), cropped = all();
+  scaled.transform = {0.3048, 0, 0, 0, 0, 0.3048, 0, 0, 0, 0, 0.3048, 0};
+  turned.up = UpAxis::kY;
+  set.assignments = {"x = x - 1000000"};
+  cropped.crop = CropBox{{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
+  for (const char* input : {"keys.las", "text.las"}) {
+    for (const char* output : {"moved.las", "moved.ply"}) {
+      SCOPED_TRACE(std::string(input) + " " + output);
+      for (const ConvertOptions& moved : {scaled, turned, set}) {
+        EXPECT_FALSE(hasCrs(input, output, moved));
+        EXPECT_THAT(notes_, Contains(AllOf(HasSubstr("is not kept, because positions are moved"),
+                                           HasSubstr(input[0] == 'k' ? "EPSG:2263" : "PROJCS"))));
+      }
+      for (const ConvertOptions& kept : {all(), cropped}) {
+        EXPECT_TRUE(hasCrs(input, output, kept));
+        EXPECT_THAT(notes_, Not(Contains(HasSubstr("reference system"))));
+      }
+    }
+  }
 }
 
 TEST_F(LasWriterTest, LongNamesAreToldApart) {

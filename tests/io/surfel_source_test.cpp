@@ -209,6 +209,17 @@ TEST_F(SurfelSourceTest, EmptyCloudHasNoSurfels) {
   EXPECT_TRUE(readAll(*source).empty());
 }
 
+TEST_F(SurfelSourceTest, DegreesAreTold) {
+  const auto notesOf = [&](const std::string& crs) {
+    write("a.ply", "ply\nformat ascii 1.0\ncomment crs " + crs +
+                       "\nelement vertex 1\nproperty double x\nproperty double y\nproperty "
+                       "double z\nend_header\n16.37 48.2 171\n");
+    return open(path("a.ply"))->notes();
+  };
+  EXPECT_THAT(notesOf("EPSG:4326"), testing::ElementsAre(testing::HasSubstr("are degrees")));
+  EXPECT_THAT(notesOf("EPSG:32633"), testing::IsEmpty());
+}
+
 TEST_F(SurfelSourceTest, CloudAfterAnotherElementIsFound) {
   write("a.ply",
         "ply\nformat ascii 1.0\nelement camera 1\nproperty list uchar float view\n"
