@@ -246,7 +246,7 @@ TEST_F(LasWriterTest, OtherCloudsBecomeVersion14WithExtraBytes) {
   EXPECT_EQ(std::string(&lasRecordOf(las, "LASF_Spec", 4)[4]), "NormalX");
   EXPECT_EQ(getLas<std::uint64_t>(las, 255), 100u);
   EXPECT_THAT(notes_,
-              AllOf(Contains(HasSubstr("1 comments are not kept")),
+              AllOf(Contains(HasSubstr("LAS has no place for comments: 1 are not kept")),
                     Contains(HasSubstr("return 1 of 1")), Not(Contains(HasSubstr("move")))));
   convertOk({"b.las"}, "c.ply");
   for (const char* name : {"x", "y", "z"}) {
@@ -305,9 +305,12 @@ TEST_F(LasWriterTest, LinearColorsBecomeShadesOf16Bits) {
   EXPECT_NEAR(getLas<std::uint16_t>(lasPoint(las, 0), 34), 0.7353570 * 65535, 1);
   EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 1), 30), 65535);
   EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 1), 34), 0);
-  EXPECT_THAT(notes_, AllOf(Contains(HasSubstr("becomes sRGB of 16 bits")),
-                            Contains(HasSubstr("1 values of red are not from 0 to 1")),
-                            Contains(HasSubstr("1 values of blue are not"))));
+  EXPECT_THAT(notes_,
+              AllOf(Contains(HasSubstr("becomes sRGB of 16 bits")),
+                    Contains(HasSubstr("1 values of red are not from 0 to 1")),
+                    Contains(HasSubstr("1 values of green are not from 0 to 1")),
+                    Contains(HasSubstr("1 values of blue are not numbers and become black")),
+                    Not(Contains(HasSubstr("blue are not from 0 to 1")))));
 }
 
 // What a color is follows from the input, where that is not LAS.
@@ -449,6 +452,31 @@ TEST_F(LasWriterTest, MovedPointsLoseTheirCoordinateReferenceSystem) {
         EXPECT_THAT(notes_, Not(Contains(HasSubstr("reference system"))));
       }
     }
+  }
+}
+
+TEST_F(LasWriterTest, CommentsThatAreLostAreTold) {
+  const auto notesOf = [&](const std::string& comments, const std::string& output) {
+    write("a.ply", "ply\nformat ascii 1.0\n" + comments +
+                       "element vertex 1\nproperty double x\nproperty double y\nproperty double "
+                       "z\nproperty uchar group\nend_header\n1 2 3 1\n");
+    convertOk({"a.ply"}, output);
+    return notes_;
+  };
+  const std::string crs = "comment crs EPSG:32610\n", name = "comment group 1 lamp\n";
+  for (const char* output : {"b.prt", "b.bgeo", "b.pdb", "b.ptc", "b.las"}) {
+    SCOPED_TRACE(output);
+    const bool is_las = std::string(output) == "b.las";
+    const std::vector<std::string> notes = notesOf(crs + name + "comment by a test\n", output);
+    EXPECT_THAT(notes, Contains(HasSubstr("has no place for the names of object groups")));
+    EXPECT_THAT(notes, Contains(HasSubstr(is_las ? "1 are not kept"
+                                                 : "2 are not kept, the coordinate reference "
+                                                   "system among them")));
+    EXPECT_THAT(notesOf("comment up z\n", output), Not(Contains(HasSubstr("not kept"))));
+    EXPECT_THAT(
+        notesOf("comment by a test\n", output),
+        AllOf(Contains(HasSubstr("1 are not kept")), Not(Contains(HasSubstr("reference system"))),
+              Not(Contains(HasSubstr("object groups")))));
   }
 }
 

@@ -19,9 +19,11 @@ double srgbCodeOf(double light) {
   return light <= 0.0031308 ? light * 12.92 : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }
 
-// Stores shades of 16 bits. Returns how many colors are brighter than white or no color.
+// Stores shades of 16 bits. Returns how many are brighter than white or darker than black, and
+// counts those that are no numbers.
 std::size_t encodeShades(const LasColumn& column, const std::byte* rows, std::size_t row_bytes,
-                         std::size_t count, std::byte* records, std::size_t record_bytes) {
+                         std::size_t count, std::byte* records, std::size_t record_bytes,
+                         std::uint64_t& no_numbers) {
   std::size_t misfits = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const double value =
@@ -31,7 +33,7 @@ std::size_t encodeShades(const LasColumn& column, const std::byte* rows, std::si
       shade = static_cast<std::uint16_t>(value * 257);
     } else {
       const double light = value > 0 ? std::min(value, 1.0) : 0;
-      misfits += light != value;
+      std::isnan(value) ? ++no_numbers : misfits += light != value;
       shade = static_cast<std::uint16_t>(std::nearbyint(srgbCodeOf(light) * 65535));
     }
     std::memcpy(records + i * record_bytes + column.value.record_offset, &shade, sizeof shade);
@@ -49,7 +51,10 @@ void setBits(const LasField& field, unsigned value, std::byte* record) {
 }  // namespace
 
 LasEncoder::LasEncoder(LasPlan plan, const LasGrid& grid)
-    : plan_(std::move(plan)), grid_(grid), misfits_(plan_.columns.size()) {
+    : plan_(std::move(plan)),
+      grid_(grid),
+      misfits_(plan_.columns.size()),
+      no_numbers_(plan_.columns.size()) {
   least_.fill(kMostStored);
   most_.fill(kLeastStored);
 }
@@ -61,9 +66,10 @@ Status LasEncoder::encode(const std::byte* rows, std::size_t row_bytes, std::siz
   std::byte* const to = records.data() + at;
   for (std::size_t c = 0; c < plan_.columns.size(); ++c) {
     const LasColumn& column = plan_.columns[c];
-    misfits_[c] += column.coding == LasColumn::Coding::kValue
-                       ? encodeLas(column.value, rows, row_bytes, count, to, record_bytes)
-                       : encodeShades(column, rows, row_bytes, count, to, record_bytes);
+    misfits_[c] +=
+        column.coding == LasColumn::Coding::kValue
+            ? encodeLas(column.value, rows, row_bytes, count, to, record_bytes)
+            : encodeShades(column, rows, row_bytes, count, to, record_bytes, no_numbers_[c]);
   }
   for (std::size_t i = 0; i < count; ++i, ++count_) {
     std::byte* const record = to + i * record_bytes;
@@ -144,6 +150,10 @@ std::vector<std::string> LasEncoder::notes() const {
         largest_move_, *std::max_element(grid_.scale.begin(), grid_.scale.end()), spacing));
   }
   for (std::size_t c = 0; c < misfits_.size(); ++c) {
+    if (no_numbers_[c] > 0) {
+      notes.push_back(fmt::format("{} values of {} are not numbers and become black",
+                                  no_numbers_[c], plan_.columns[c].property));
+    }
     if (misfits_[c] == 0) continue;
     const bool is_color = plan_.columns[c].coding != LasColumn::Coding::kValue;
     notes.push_back(fmt::format("{} values of {} {}", misfits_[c], plan_.columns[c].property,

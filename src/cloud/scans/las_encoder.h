@@ -47,7 +47,7 @@ class LasEncoder {
   std::uint64_t count_ = 0;
   std::array<std::int32_t, 3> least_, most_, last_{};
   std::array<std::uint64_t, 15> returns_{};
-  std::vector<std::uint64_t> misfits_;  // by column
+  std::vector<std::uint64_t> misfits_, no_numbers_;  // by column
   std::uint64_t without_position_ = 0;
   double largest_move_ = 0, largest_value_ = 0;
 };
