@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::int32_t kLeastStored = std::numeric_limits<std::int32_t>::min();
 constexpr std::int32_t kMostStored = std::numeric_limits<std::int32_t>::max();
+constexpr double kExactPart = 0.01;  // of a step: floats that were multiples of it differ less
 
 // From scene-linear light to a code from 0 to 1 (IEC 61966-2-1).
 double srgbCodeOf(double light) {
@@ -41,6 +42,22 @@ std::size_t encodeShades(const LasColumn& column, const std::byte* rows, std::si
   return misfits;
 }
 
+// How far the farthest of scaled values is from what is stored of it; 0 where rounding explains it.
+double largestChange(const LasValue& value, const std::byte* rows, std::size_t row_bytes,
+                     std::size_t count) {
+  double largest = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double given = rowValue(rows + i * row_bytes + value.row_offset, value.type);
+    const double read =
+        std::nearbyint((given - value.origin) / value.scale) * value.scale + value.origin;
+    const double change = std::abs(read - given);
+    const double noise = std::abs(value.scale) * kExactPart +
+                         8 * std::numeric_limits<double>::epsilon() * std::abs(given);
+    if (change > noise) largest = std::max(largest, change);
+  }
+  return largest;
+}
+
 unsigned bitsOf(const LasField& field, const std::byte* record) {
   return static_cast<unsigned>(record[field.offset]) >> field.shift & ((1u << field.bit_count) - 1);
 }
@@ -54,7 +71,8 @@ LasEncoder::LasEncoder(LasPlan plan, const LasGrid& grid)
     : plan_(std::move(plan)),
       grid_(grid),
       misfits_(plan_.columns.size()),
-      no_numbers_(plan_.columns.size()) {
+      no_numbers_(plan_.columns.size()),
+      changes_(plan_.columns.size()) {
   least_.fill(kMostStored);
   most_.fill(kLeastStored);
 }
@@ -70,6 +88,11 @@ Status LasEncoder::encode(const std::byte* rows, std::size_t row_bytes, std::siz
         column.coding == LasColumn::Coding::kValue
             ? encodeLas(column.value, rows, row_bytes, count, to, record_bytes)
             : encodeShades(column, rows, row_bytes, count, to, record_bytes, no_numbers_[c]);
+  }
+  for (std::size_t c = 0; c < plan_.columns.size(); ++c) {
+    const LasValue& value = plan_.columns[c].value;
+    if (!value.is_scaled) continue;
+    changes_[c] = std::max(changes_[c], largestChange(value, rows, row_bytes, count));
   }
   for (std::size_t i = 0; i < count; ++i, ++count_) {
     std::byte* const record = to + i * record_bytes;
@@ -154,6 +177,11 @@ std::vector<std::string> LasEncoder::notes() const {
       notes.push_back(fmt::format("{} values of {} are not numbers and become black",
                                   no_numbers_[c], plan_.columns[c].property));
     }
+    if (changes_[c] > 0) {
+      notes.push_back(fmt::format("{} changes by up to {:.2g}, since LAS stores multiples of {:g}",
+                                  plan_.columns[c].property, changes_[c],
+                                  plan_.columns[c].value.scale));
+    }
     if (misfits_[c] == 0) continue;
     const bool is_color = plan_.columns[c].coding != LasColumn::Coding::kValue;
     notes.push_back(fmt::format("{} values of {} {}", misfits_[c], plan_.columns[c].property,
@@ -177,7 +205,8 @@ bool keepsLasValues(const LasColumn& column, const std::byte* rows, std::size_t 
   LasValue value = column.value;
   value.record_offset = 0;
   if (encodeLas(value, rows, row_bytes, count, records.data(), kRecord) > 0) return false;
-  const double tolerance = value.is_scaled ? value.scale / 100 : 0;
+  // The nearest step is near enough, and how near is told
+  const double tolerance = value.is_scaled ? std::abs(value.scale) * (0.5 + kExactPart) : 0;
   value.row_offset = 0;
   value.type =
       value.bit_count != 0 || !value.is_scaled ? plyTypeOf(value.stored) : ValueType::kFloat64;
