@@ -22,6 +22,7 @@
 #include "cloud/particles/prt_writer.h"
 #include "cloud/particles/ptc_reader.h"
 #include "cloud/particles/ptc_writer.h"
+#include "cloud/parts/lost_comments.h"
 #include "cloud/ply/ply_rows.h"
 #include "cloud/scans/las_reader.h"
 #include "cloud/scans/las_writer.h"
@@ -32,8 +33,6 @@
 #include "cloud/vdb/vdb_output.h"
 #include "cloud/vdb/vdb_reader.h"
 #include "cloud/vdb/vdb_writer.h"
-#include "core/crs_comment.h"
-#include "core/group_comment.h"
 #include "core/text_case.h"
 #include "core/up_comment.h"
 #include "storage/byte_output.h"
@@ -294,25 +293,8 @@ void noteLostUpAxis(const std::string& path, const CloudFormat& format,
 void noteLostComments(const std::string& path, const CloudFormat& format,
                       const RowWriterOptions& options) {
   if (format.create != createPtc || options.progress == nullptr) return;
-  const auto isName = [](const std::string& comment) {
-    return statedGroupName(comment).has_value();
-  };
-  const auto isUp = [](const std::string& comment) {
-    return statedUpAxis(std::span(&comment, 1)).has_value();
-  };
-  const auto names = std::count_if(options.comments.begin(), options.comments.end(), isName);
-  const auto others = std::ssize(options.comments) - names -
-                      std::count_if(options.comments.begin(), options.comments.end(), isUp);
-  if (names > 0) {
-    options.progress->note(
-        fmt::format("{}: {} has no place for the names of object groups: they stay numbers", path,
-                    format.name));
-  }
-  if (others > 0) {
-    const bool has_crs = !statedCrs(options.comments).empty();
-    options.progress->note(
-        fmt::format("{}: {} has no place for comments: {} are not kept{}", path, format.name,
-                    others, has_crs ? ", the coordinate reference system among them" : ""));
+  for (const std::string& note : notesOfLostComments(format.name, options.comments)) {
+    options.progress->note(fmt::format("{}: {}", path, note));
   }
 }
 

@@ -40,6 +40,7 @@ void addValues(const std::byte* rows, std::size_t count, std::size_t row_bytes,
 
 bool isSettled(const ColorSample& sample) {
   if (sample.is_decided) return true;
+  if (sample.ends_with_light) return sample.largest > (sample.type == ValueType::kUint8 ? 1 : 0);
   if (isFloatType(sample.type)) return !sample.are_wholes;
   return sample.largest > (valueTypeBytes(sample.type) <= 2 ? kMostOfCameras : 65535);
 }

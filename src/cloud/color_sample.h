@@ -21,6 +21,7 @@ struct ColorSample {
   std::vector<std::size_t> properties;  // indices into the element's
   ValueType type = ValueType::kUint8;   // the widest of them
   bool is_decided = false;              // whatever its values are
+  bool ends_with_light = false;         // at a value above 0, of bytes above 1
   const RowProperty* alpha = nullptr;   // beside it, whose white is that of the color
 
   double least = std::numeric_limits<double>::infinity();

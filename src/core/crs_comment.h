@@ -9,6 +9,10 @@
 namespace surfeit {
 
 inline constexpr std::string_view kCrsComment = "crs ";
+// In front of what GeoTIFF keys of a system of degrees tell, and of one about the Earth's centre.
+inline constexpr std::string_view kGeographicWord = "geographic ";
+inline constexpr std::string_view kGeocentricWord = "geocentric ";
+inline constexpr unsigned kGeocentricCode = 4978;  // of WGS 84
 
 // What the first comment of that form says; empty when none does.
 inline std::string_view statedCrs(std::span<const std::string> comments) {
@@ -30,6 +34,12 @@ inline std::string_view epsgCodeOf(std::string_view crs) {
   if (begin == crs.npos) return {};
   return crs.substr(begin, crs.find_first_not_of(kDigits, begin) - begin);
 }
+
+// Whether x and y are longitudes and latitudes in degrees, as far as the text tells.
+bool isGeographicCrs(std::string_view crs);
+
+// What is to be told of such a system, with the way out; empty for others.
+std::string noteOfDegrees(std::string_view crs);
 
 // Whether two systems are one, as far as their texts tell: text and keys of one system differ.
 inline bool isSameCrs(std::string_view a, std::string_view b) {

@@ -24,14 +24,6 @@ inline std::optional<UpAxis> statedUpAxis(std::span<const std::string> comments)
   return std::nullopt;
 }
 
-// Whether there are others.
-inline bool hasOtherComments(std::span<const std::string> comments) {
-  for (const std::string& comment : comments) {
-    if (!statedUpAxis(std::span(&comment, 1))) return true;
-  }
-  return false;
-}
-
 // Makes the comments say that axis.
 inline void stateUpAxis(UpAxis up, std::vector<std::string>& comments) {
   std::erase_if(comments, [](const std::string& comment) {

@@ -288,9 +288,11 @@ class Converter {
     // The grid of a volume and the camera of a picture are those of the places that rows had
     SURFEIT_ASSIGN_OR_RETURN(
         assignments_, ChannelAssignment::createAll(options_.assignments, writing_.properties));
-    if (options_.like.empty() && std::any_of(assignments_.begin(), assignments_.end(),
-                                             [](const auto& made) { return made.movesRows(); })) {
-      writing_.like = nullptr;
+    const bool are_set = std::any_of(assignments_.begin(), assignments_.end(),
+                                     [](const auto& made) { return made.movesRows(); });
+    if (are_set && options_.like.empty()) writing_.like = nullptr;
+    if (are_set || !transform_.isIdentity()) {
+      MergedComments::forgetCrs(output_, writing_.comments, progress_);
     }
     SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(output_, writing_));
     noteOfWriter();

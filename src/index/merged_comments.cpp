@@ -64,6 +64,19 @@ std::vector<std::string> MergedComments::notes(bool are_turned) const {
   return notes;
 }
 
+void MergedComments::forgetCrs(const std::string& path, std::vector<std::string>& comments,
+                               Progress& progress) {
+  const std::string crs(statedCrs(comments));
+  if (crs.empty()) return;
+  std::erase_if(comments, [](const auto& comment) { return comment.starts_with(kCrsComment); });
+  if (const std::string degrees = noteOfDegrees(crs); !degrees.empty()) {
+    progress.note(fmt::format("{}: {}", path, degrees));
+  }
+  progress.note(fmt::format(
+      "{}: the coordinate reference system {} is not kept, because positions are moved or scaled",
+      path, crs.substr(0, kMostCrsChars)));
+}
+
 Result<UpAxis> MergedComments::turnedFrom(UpAxis to) const {
   const UpAxis other = to == UpAxis::kY ? UpAxis::kZ : UpAxis::kY;
   const UpAxis first = ups_.front().axis.value_or(other);

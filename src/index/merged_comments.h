@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/up_axis.h"
 
@@ -37,6 +38,11 @@ class MergedComments {
   // Where a cloud says something else than those before it: of the coordinate reference system, the
   // name of a group and, unless all are turned, the axis that is up.
   std::vector<std::string> notes(bool are_turned) const;
+
+  // Where the positions of `path` are moved: takes the coordinate reference system out of its
+  // comments, and tells it, and that degrees were taken for lengths.
+  static void forgetCrs(const std::string& path, std::vector<std::string>& comments,
+                        Progress& progress);
 
   // The axis that is up before `to` is: where a cloud does not say, the other of y and z.
   // kInvalidArgument where clouds differ.

@@ -10,7 +10,9 @@
 #include "cloud/cloud_formats.h"
 #include "cloud/property_aliases.h"
 #include "cloud/row_reader.h"
+#include "core/crs_comment.h"
 #include "core/up_comment.h"
+#include "surfels/dark_colors.h"
 #include "surfels/generated/recipe_surfel_source.h"
 #include "surfels/generated/scene_recipe.h"
 #include "surfels/unused_alpha.h"
@@ -45,8 +47,11 @@ class RowSurfelSource final : public SurfelSource {
       notes.push_back(std::move(note));
     }
     noteOpacity(notes);
-    if (!alpha_note_) alpha_note_ = noteOfAlpha();
-    if (!alpha_note_->empty()) notes.push_back(*alpha_note_);
+    if (std::string note = noteOfDegrees(statedCrs(comments())); !note.empty()) {
+      notes.push_back(std::move(note));
+    }
+    if (!row_notes_) row_notes_ = notesOfRows();
+    notes.insert(notes.end(), row_notes_->begin(), row_notes_->end());
     return notes;
   }
 
@@ -110,10 +115,14 @@ class RowSurfelSource final : public SurfelSource {
 
  private:
   // Looks at rows, and so only before anyone else does. A failure will be the reader's, too.
-  std::string noteOfAlpha() const {
-    if (!is_untouched_) return {};
-    const Result<std::string> note = noteOfUnusedAlpha(*reader_, mapping_.channels().opacity);
-    return note.ok() ? *note : std::string();
+  std::vector<std::string> notesOfRows() const {
+    std::vector<std::string> notes;
+    if (!is_untouched_) return notes;
+    for (const Result<std::string>& note :
+         {noteOfUnusedAlpha(*reader_, mapping_.channels().opacity), noteOfDarkColors(*reader_)}) {
+      if (note.ok() && !note->empty()) notes.push_back(*note);
+    }
+    return notes;
   }
 
   // What of an opacity is not used.
@@ -134,7 +143,7 @@ class RowSurfelSource final : public SurfelSource {
   SurfelMapping mapping_;
   bool is_strict_;
   bool is_untouched_ = true;  // no row was read
-  mutable std::optional<std::string> alpha_note_;
+  mutable std::optional<std::vector<std::string>> row_notes_;
 
   // Of read(): rows in the buffer that are still to be decoded, the first of them record_
   SurfelDefects defects_;

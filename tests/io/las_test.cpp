@@ -374,6 +374,53 @@ TEST_F(LasTest, ExtraBytesThatDoNotFitAreTold) {
   EXPECT_THAT(notesOf(lasDescriptor("a", 1).substr(0, 100), 1), IsEmpty());
 }
 
+TEST_F(LasTest, BytesWithoutADescriptionAreNoVectors) {
+  const auto rowWith = [&](std::size_t extra, const std::string& descriptors) {
+    const std::string text = makeLas(4, 6, 3, extra);
+    return describeRow(openGood(descriptors.empty()
+                                    ? text
+                                    : withRecords(text, {lasRecord("LASF_Spec", 4, descriptors)}))
+                           ->element());
+  };
+  EXPECT_EQ(rowWith(3, ""), rowOf(6) +
+                                ", uchar extra_bytes_0, uchar extra_bytes_1, uchar "
+                                "extra_bytes_2");
+  EXPECT_EQ(rowWith(1, ""), rowOf(6) + ", uchar extra_bytes_0");
+  EXPECT_EQ(rowWith(3, lasDescriptor("raw", 0, 3)),
+            rowOf(6) + ", uchar raw_0, uchar raw_1, uchar raw_2");
+  RowReaderOptions options;
+  options.channels = *parseChannelRenames("extra_bytes=mine");
+  write("a.las", makeLas(4, 6, 3, 3));
+  EXPECT_THAT(describeRow(openOk(openLas, path("a.las"), options)->element()),
+              HasSubstr("uchar mine_0, uchar mine_1, uchar mine_2"));
+  options.channels = *parseChannelRenames("extra_bytes=-");
+  EXPECT_EQ(describeRow(openOk(openLas, path("a.las"), options)->element()), rowOf(6));
+}
+
+TEST_F(LasTest, SeveralRecordsDescribeExtraBytes) {
+  const std::string a = lasRecord("LASF_Spec", 4, lasDescriptor("a", 9)),
+                    b = lasRecord("LASF_Spec", 4, lasDescriptor("b", 10));
+  const auto both = openGood(withRecords(makeLas(4, 6, 3, 12), {a, b}));
+  EXPECT_EQ(describeRow(both->element()), rowOf(6) + ", float a, double b");
+  // The same one again describes nothing more
+  const auto twice = openGood(withRecords(makeLas(4, 6, 3, 4), {a, a}));
+  EXPECT_EQ(describeRow(twice->element()), rowOf(6) + ", float a");
+  EXPECT_THAT(twice->notes(), IsEmpty());
+}
+
+TEST_F(LasTest, IntegersOf64BitsAreTold) {
+  for (const int type : {7, 8}) {
+    for (const int scaled : {0, 8, 16}) {
+      const std::string descriptor = lasDescriptor("ns", type, scaled, 1);
+      EXPECT_THAT(
+          openGood(withRecords(makeLas(4, 6, 3, 8), {lasRecord("LASF_Spec", 4, descriptor)}))
+              ->notes(),
+          ElementsAre(HasSubstr("exact to 2^53: 'ns'")))
+          << type << " " << scaled;
+    }
+  }
+}
+
 // --- Coordinates
 
 TEST_F(LasTest, CoordinateReferenceSystemsAreTold) {
@@ -400,6 +447,24 @@ TEST_F(LasTest, CoordinateReferenceSystemsAreTold) {
   EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 34735, keys({1, 1, 0, 9, 3072, 0, 1, 32767}))}),
               ElementsAre("crs by GeoTIFF keys without a code"));
   EXPECT_THAT(crsOf({lasRecord("LASF_Projection", 34735, "x")}), IsEmpty());
+
+  // The model says what a code is of: projected, geographic, geocentric
+  const auto crsOfKeys = [&](std::vector<std::uint16_t> words) {
+    words.insert(words.begin(), {1, 1, 0, std::uint16_t(words.size() / 4)});
+    const std::vector<std::string> found =
+        crsOf({lasRecord("LASF_Projection", 34735, keys(words))});
+    return found.size() == 1 ? found[0] : "";
+  };
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 2, 2048, 0, 1, 4269}), "crs geographic EPSG:4269");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 3, 2048, 0, 1, 4978}), "crs geocentric EPSG:4978");
+  EXPECT_EQ(crsOfKeys({2048, 0, 1, 4978}), "crs geocentric EPSG:4978");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 2, 2048, 0, 1, 32767}),
+            "crs geographic by GeoTIFF keys without a code");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 1, 2048, 0, 1, 4269, 3072, 0, 1, 32767}),
+            "crs by GeoTIFF keys without a code");
+  EXPECT_EQ(crsOfKeys({2048, 0, 1, 4269, 3072, 0, 1, 2992}), "crs EPSG:2992");
+  EXPECT_EQ(crsOfKeys({1024, 0, 1, 1, 3072, 0, 1, 26910, 4099, 0, 1, 9003}),
+            "crs EPSG:26910 vertical unit 9003");
 }
 
 TEST_F(LasTest, RecordsOfVariableLengthMayBeDamaged) {

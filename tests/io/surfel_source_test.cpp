@@ -209,6 +209,37 @@ TEST_F(SurfelSourceTest, EmptyCloudHasNoSurfels) {
   EXPECT_TRUE(readAll(*source).empty());
 }
 
+TEST_F(SurfelSourceTest, BlackColorsAreTold) {
+  const auto notesOf = [&](const std::string& type, const std::string& colors) {
+    std::vector<std::string> properties = {"float x", "float y", "float z"};
+    for (const char* name : {" red", " green", " blue"}) properties.push_back(type + name);
+    return open(cloud(properties, {"1 2 3 0 0 0", "2 3 4 " + colors}))->notes();
+  };
+  for (const char* type : {"uchar", "ushort", "float", "double"}) {
+    EXPECT_THAT(notesOf(type, "0 0 0"),
+                testing::ElementsAre(testing::HasSubstr("colors are all 0: surfels are black")))
+        << type;
+  }
+  EXPECT_THAT(notesOf("uchar", "1 0 1"),
+              testing::ElementsAre(testing::HasSubstr("colors are 0 or 1 in uchar")));
+  for (const char* type : {"uchar", "float"}) {
+    EXPECT_THAT(notesOf(type, "0 0 255"), testing::Each(testing::Not(testing::HasSubstr("black"))))
+        << type;
+  }
+  EXPECT_THAT(notesOf("float", "0 0.25 0"), testing::IsEmpty());
+}
+
+TEST_F(SurfelSourceTest, DegreesAreTold) {
+  const auto notesOf = [&](const std::string& crs) {
+    write("a.ply", "ply\nformat ascii 1.0\ncomment crs " + crs +
+                       "\nelement vertex 1\nproperty double x\nproperty double y\nproperty "
+                       "double z\nend_header\n16.37 48.2 171\n");
+    return open(path("a.ply"))->notes();
+  };
+  EXPECT_THAT(notesOf("EPSG:4326"), testing::ElementsAre(testing::HasSubstr("are degrees")));
+  EXPECT_THAT(notesOf("EPSG:32633"), testing::IsEmpty());
+}
+
 TEST_F(SurfelSourceTest, CloudAfterAnotherElementIsFound) {
   write("a.ply",
         "ply\nformat ascii 1.0\nelement camera 1\nproperty list uchar float view\n"

@@ -7,9 +7,9 @@
 #include <limits>
 #include <utility>
 
+#include "cloud/parts/lost_comments.h"
 #include "cloud/parts/word_channels.h"
 #include "core/assert.h"
-#include "core/up_comment.h"
 #include "storage/byte_output.h"
 
 namespace surfeit {
@@ -47,7 +47,9 @@ class BgeoWriter final : public RowWriter {
       return Status::invalidArgument(
           fmt::format("{}: no position, which BGEO files must have", output_.path()));
     }
-    if (hasOtherComments(options.comments)) notes_.push_back("comments are not kept");
+    for (std::string& note : notesOfLostComments("BGEO", options.comments)) {
+      notes_.push_back(std::move(note));
+    }
     return writeHeader(plan, *position);
   }
 

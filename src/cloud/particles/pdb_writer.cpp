@@ -7,10 +7,10 @@
 #include <limits>
 #include <utility>
 
+#include "cloud/parts/lost_comments.h"
 #include "cloud/parts/spooled_input.h"
 #include "cloud/parts/word_channels.h"
 #include "core/assert.h"
-#include "core/up_comment.h"
 #include "storage/byte_coding.h"
 #include "storage/byte_output.h"
 #include "storage/file.h"
@@ -48,7 +48,9 @@ class PdbWriter final : public RowWriter {
       return Status::invalidArgument(
           fmt::format("{}: no position, which PDB files must have", output_.path()));
     }
-    if (hasOtherComments(options.comments)) notes_.push_back("comments are not kept");
+    for (std::string& note : notesOfLostComments("PDB", options.comments)) {
+      notes_.push_back(std::move(note));
+    }
     for (const PlannedChannel& planned : plan) {
       if (planned.name != "position") continue;
       addColumn(planned);  // the first, as all programs write it

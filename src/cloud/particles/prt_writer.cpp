@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "cloud/parts/channel_encoder.h"
+#include "cloud/parts/lost_comments.h"
 #include "core/assert.h"
-#include "core/up_comment.h"
 #include "storage/byte_coding.h"
 #include "storage/byte_output.h"
 
@@ -51,7 +51,9 @@ class PrtWriter final : public RowWriter {
       return Status::invalidArgument(
           fmt::format("{}: no position, which PRT files must have", output_.path()));
     }
-    if (hasOtherComments(options.comments)) notes_.push_back("comments are not kept");
+    for (std::string& note : notesOfLostComments("PRT", options.comments)) {
+      notes_.push_back(std::move(note));
+    }
     SURFEIT_RETURN_IF_ERROR(writeHeader(plan));
     is_ready_ = deflateInit(&zlib_, Z_DEFAULT_COMPRESSION) == Z_OK;
     return is_ready_ ? Status() : Status::failed(output_.path() + ": no memory for zlib");

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cstring>
 #include <string_view>
+#include <vector>
 
 #include "cloud/scans/las_format.h"
 #include "core/crs_comment.h"
@@ -17,9 +18,9 @@ namespace {
 // Keys of GeoTIFF, and what a code says that has none
 constexpr std::uint16_t kModelType = 1024, kCitation = 1026, kGeographic = 2048,
                         kGeographicCitation = 2049, kProjected = 3072, kProjectedCitation = 3073,
-                        kVertical = 4096, kUserDefined = 32767;
-constexpr std::uint16_t kProjectedModel = 1, kGeographicModel = 2;
-constexpr std::string_view kEpsg = "EPSG:", kGeographicEpsg = "geographic EPSG:";
+                        kVertical = 4096, kVerticalUnit = 4099, kUserDefined = 32767;
+constexpr std::uint16_t kProjectedModel = 1, kGeographicModel = 2, kGeocentricModel = 3;
+constexpr std::string_view kEpsg = "EPSG:", kUnitWords = " vertical unit ";
 constexpr std::size_t kMostData = 65535;  // of a record before the points
 
 // One line of printable text.
@@ -44,6 +45,78 @@ std::optional<T> numberIn(std::string_view text) {
   return number;
 }
 
+std::string_view wordOf(std::uint16_t model) {
+  if (model == kGeographicModel) return kGeographicWord;
+  return model == kGeocentricModel ? kGeocentricWord : std::string_view();
+}
+
+// What the keys of a system say that have one number each; 0: not said.
+struct Keys {
+  std::uint16_t model = 0, projected = 0, geographic = 0, vertical = 0, vertical_unit = 0;
+
+  std::uint16_t* find(std::uint16_t key) {
+    switch (key) {
+      case kModelType:
+        return &model;
+      case kProjected:
+        return &projected;
+      case kGeographic:
+        return &geographic;
+      case kVertical:
+        return &vertical;
+      case kVerticalUnit:
+        return &vertical_unit;
+      default:
+        return nullptr;
+    }
+  }
+
+  // Degrees have no projection. A system about the Earth's centre has its code where those have it.
+  std::uint16_t kind() const {
+    const bool says_kind = model >= kProjectedModel && model <= kGeocentricModel;
+    if (says_kind && model != kGeographicModel) return model;
+    if (geographic == kGeocentricCode) return kGeocentricModel;
+    if (says_kind) return model;
+    return projected == 0 && geographic != 0 ? kGeographicModel : kProjectedModel;
+  }
+  std::uint16_t code() const {
+    const std::uint16_t stated =
+        kind() == kProjectedModel || geographic == 0 ? projected : geographic;
+    return stated == kUserDefined ? std::uint16_t{0} : stated;
+  }
+};
+
+// The number behind `words`, where these end what stands before the first blank of `text`; else 0.
+std::uint16_t numberBehind(std::string_view text, std::string_view words) {
+  const std::size_t at = text.find(words);
+  if (at == text.npos || at > text.find(' ')) return 0;
+  return numberIn<std::uint16_t>(text.substr(at + words.size())).value_or(0);
+}
+
+// The words of the keys of "EPSG:2992+5703", "geographic EPSG:4326" and the like; none: of others.
+std::vector<std::uint16_t> keysOf(std::string_view text) {
+  const bool is_geographic = isGeographicCrs(text);
+  bool is_geocentric = text.starts_with(kGeocentricWord);
+  if (is_geocentric) text.remove_prefix(kGeocentricWord.size());
+  if (text.starts_with(kGeographicWord)) text.remove_prefix(kGeographicWord.size());
+  const std::uint16_t code = text.starts_with(kEpsg) ? numberBehind(text, kEpsg) : 0;
+  if (code == 0) return {};
+  is_geocentric = is_geocentric || code == kGeocentricCode;
+  std::vector<std::uint16_t> words = {1, 1, 0, 0};
+  const auto put = [&words](std::uint16_t key, std::uint16_t value) {
+    if (value == 0) return;
+    words.insert(words.end(), {key, 0, 1, value});
+    ++words[3];
+  };
+  put(kModelType, is_geocentric   ? kGeocentricModel
+                  : is_geographic ? kGeographicModel
+                                  : kProjectedModel);
+  put(is_geocentric || is_geographic ? kGeographic : kProjected, code);
+  put(kVertical, numberBehind(text, "+"));
+  put(kVerticalUnit, numberBehind(text, kUnitWords));
+  return words;
+}
+
 }  // namespace
 
 void LasCrs::add(std::uint16_t record_number, Bytes data) {
@@ -66,15 +139,15 @@ std::vector<std::string> LasCrs::comments() const {
 }
 
 std::string LasCrs::keysComment() const {
-  std::uint16_t projected = 0, geographic = 0, vertical = 0;
+  Keys said;
   std::string citation;
   // Four words each, behind four that tell of the version: key, where its value is, how many, value
   for (std::size_t at = 4; at + 4 <= keys_.size(); at += 4) {
     const std::uint16_t key = keys_[at], place = keys_[at + 1], count = keys_[at + 2],
                         value = keys_[at + 3];
-    if (key == kProjected && place == 0) projected = value;
-    if (key == kGeographic && place == 0) geographic = value;
-    if (key == kVertical && place == 0) vertical = value;
+    if (std::uint16_t* const number = said.find(key); number != nullptr && place == 0) {
+      *number = value;
+    }
     const bool is_citation = key == kProjectedCitation || (key == kCitation && citation.empty()) ||
                              (key == kGeographicCitation && citation.empty());
     if (is_citation && place == kLasGeoTextRecord && value < key_text_.size()) {
@@ -82,17 +155,18 @@ std::string LasCrs::keysComment() const {
       while (citation.ends_with('|')) citation.pop_back();
     }
   }
-  std::string text;
-  if (projected != 0 && projected != kUserDefined) {
-    text = fmt::format("{}{}", kEpsg, projected);
-  } else if (projected == 0 && geographic != 0 && geographic != kUserDefined) {
-    text = fmt::format("{}{}", kGeographicEpsg, geographic);
+  if (keys_.size() <= 4) return {};
+  std::string text(wordOf(said.kind()));
+  if (said.code() != 0) {
+    text += fmt::format("{}{}", kEpsg, said.code());
+    if (said.vertical != 0 && said.vertical != kUserDefined) {
+      text += fmt::format("+{}", said.vertical);
+    }
+    if (said.vertical_unit != 0) text += fmt::format("{}{}", kUnitWords, said.vertical_unit);
+    if (!citation.empty()) text += " " + citation;
+  } else {
+    text += citation.empty() ? "by GeoTIFF keys without a code" : citation;
   }
-  if (!text.empty() && vertical != 0 && vertical != kUserDefined) {
-    text += fmt::format("+{}", vertical);
-  }
-  if (!citation.empty()) text += (text.empty() ? "" : " ") + citation;
-  if (text.empty() && keys_.size() > 4) text = "by GeoTIFF keys without a code";
   return text;
 }
 
@@ -108,26 +182,10 @@ std::optional<LasCrsRecord> lasCrsRecord(std::span<const std::string> comments) 
       writer.put(std::uint8_t{0});
       return record;
     }
-    const bool is_geographic = text.starts_with(kGeographicEpsg);
-    if (!is_geographic && !text.starts_with(kEpsg)) continue;
-    text.remove_prefix(is_geographic ? kGeographicEpsg.size() : kEpsg.size());
-    const std::optional<std::uint16_t> code = numberIn<std::uint16_t>(text);
-    if (!code) continue;
-    const std::size_t plus = text.find('+');
-    const std::optional<std::uint16_t> vertical =
-        plus < text.find(' ') ? numberIn<std::uint16_t>(text.substr(plus + 1)) : std::nullopt;
+    const std::vector<std::uint16_t> keys = keysOf(text);
+    if (keys.empty()) continue;
     record.number = kLasGeoKeysRecord;
-    const auto putKey = [&writer](std::uint16_t key, std::uint16_t value) {
-      for (const std::uint16_t word : {key, std::uint16_t{0}, std::uint16_t{1}, value}) {
-        writer.put(word);
-      }
-    };
-    for (const int word : {1, 1, 0, vertical ? 3 : 2}) {
-      writer.put(static_cast<std::uint16_t>(word));
-    }
-    putKey(kModelType, is_geographic ? kGeographicModel : kProjectedModel);
-    putKey(is_geographic ? kGeographic : kProjected, *code);
-    if (vertical) putKey(kVertical, *vertical);
+    for (const std::uint16_t word : keys) writer.put(word);
     return record;
   }
   return {};

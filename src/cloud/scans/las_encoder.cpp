@@ -13,15 +13,18 @@ namespace {
 
 constexpr std::int32_t kLeastStored = std::numeric_limits<std::int32_t>::min();
 constexpr std::int32_t kMostStored = std::numeric_limits<std::int32_t>::max();
+constexpr double kExactPart = 0.01;  // of a step: floats that were multiples of it differ less
 
 // From scene-linear light to a code from 0 to 1 (IEC 61966-2-1).
 double srgbCodeOf(double light) {
   return light <= 0.0031308 ? light * 12.92 : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }
 
-// Stores shades of 16 bits. Returns how many colors are brighter than white or no color.
+// Stores shades of 16 bits. Returns how many are brighter than white or darker than black, and
+// counts those that are no numbers.
 std::size_t encodeShades(const LasColumn& column, const std::byte* rows, std::size_t row_bytes,
-                         std::size_t count, std::byte* records, std::size_t record_bytes) {
+                         std::size_t count, std::byte* records, std::size_t record_bytes,
+                         std::uint64_t& no_numbers) {
   std::size_t misfits = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const double value =
@@ -31,12 +34,28 @@ std::size_t encodeShades(const LasColumn& column, const std::byte* rows, std::si
       shade = static_cast<std::uint16_t>(value * 257);
     } else {
       const double light = value > 0 ? std::min(value, 1.0) : 0;
-      misfits += light != value;
+      std::isnan(value) ? ++no_numbers : misfits += light != value;
       shade = static_cast<std::uint16_t>(std::nearbyint(srgbCodeOf(light) * 65535));
     }
     std::memcpy(records + i * record_bytes + column.value.record_offset, &shade, sizeof shade);
   }
   return misfits;
+}
+
+// How far the farthest of scaled values is from what is stored of it; 0 where rounding explains it.
+double largestChange(const LasValue& value, const std::byte* rows, std::size_t row_bytes,
+                     std::size_t count) {
+  double largest = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double given = rowValue(rows + i * row_bytes + value.row_offset, value.type);
+    const double read =
+        std::nearbyint((given - value.origin) / value.scale) * value.scale + value.origin;
+    const double change = std::abs(read - given);
+    const double noise = std::abs(value.scale) * kExactPart +
+                         8 * std::numeric_limits<double>::epsilon() * std::abs(given);
+    if (change > noise) largest = std::max(largest, change);
+  }
+  return largest;
 }
 
 unsigned bitsOf(const LasField& field, const std::byte* record) {
@@ -49,7 +68,11 @@ void setBits(const LasField& field, unsigned value, std::byte* record) {
 }  // namespace
 
 LasEncoder::LasEncoder(LasPlan plan, const LasGrid& grid)
-    : plan_(std::move(plan)), grid_(grid), misfits_(plan_.columns.size()) {
+    : plan_(std::move(plan)),
+      grid_(grid),
+      misfits_(plan_.columns.size()),
+      no_numbers_(plan_.columns.size()),
+      changes_(plan_.columns.size()) {
   least_.fill(kMostStored);
   most_.fill(kLeastStored);
 }
@@ -61,9 +84,15 @@ Status LasEncoder::encode(const std::byte* rows, std::size_t row_bytes, std::siz
   std::byte* const to = records.data() + at;
   for (std::size_t c = 0; c < plan_.columns.size(); ++c) {
     const LasColumn& column = plan_.columns[c];
-    misfits_[c] += column.coding == LasColumn::Coding::kValue
-                       ? encodeLas(column.value, rows, row_bytes, count, to, record_bytes)
-                       : encodeShades(column, rows, row_bytes, count, to, record_bytes);
+    misfits_[c] +=
+        column.coding == LasColumn::Coding::kValue
+            ? encodeLas(column.value, rows, row_bytes, count, to, record_bytes)
+            : encodeShades(column, rows, row_bytes, count, to, record_bytes, no_numbers_[c]);
+  }
+  for (std::size_t c = 0; c < plan_.columns.size(); ++c) {
+    const LasValue& value = plan_.columns[c].value;
+    if (!value.is_scaled) continue;
+    changes_[c] = std::max(changes_[c], largestChange(value, rows, row_bytes, count));
   }
   for (std::size_t i = 0; i < count; ++i, ++count_) {
     std::byte* const record = to + i * record_bytes;
@@ -144,6 +173,15 @@ std::vector<std::string> LasEncoder::notes() const {
         largest_move_, *std::max_element(grid_.scale.begin(), grid_.scale.end()), spacing));
   }
   for (std::size_t c = 0; c < misfits_.size(); ++c) {
+    if (no_numbers_[c] > 0) {
+      notes.push_back(fmt::format("{} values of {} are not numbers and become black",
+                                  no_numbers_[c], plan_.columns[c].property));
+    }
+    if (changes_[c] > 0) {
+      notes.push_back(fmt::format("{} changes by up to {:.2g}, since LAS stores multiples of {:g}",
+                                  plan_.columns[c].property, changes_[c],
+                                  plan_.columns[c].value.scale));
+    }
     if (misfits_[c] == 0) continue;
     const bool is_color = plan_.columns[c].coding != LasColumn::Coding::kValue;
     notes.push_back(fmt::format("{} values of {} {}", misfits_[c], plan_.columns[c].property,
@@ -167,7 +205,8 @@ bool keepsLasValues(const LasColumn& column, const std::byte* rows, std::size_t 
   LasValue value = column.value;
   value.record_offset = 0;
   if (encodeLas(value, rows, row_bytes, count, records.data(), kRecord) > 0) return false;
-  const double tolerance = value.is_scaled ? value.scale / 100 : 0;
+  // The nearest step is near enough, and how near is told
+  const double tolerance = value.is_scaled ? std::abs(value.scale) * (0.5 + kExactPart) : 0;
   value.row_offset = 0;
   value.type =
       value.bit_count != 0 || !value.is_scaled ? plyTypeOf(value.stored) : ValueType::kFloat64;

@@ -47,12 +47,14 @@ class LasEncoder {
   std::uint64_t count_ = 0;
   std::array<std::int32_t, 3> least_, most_, last_{};
   std::array<std::uint64_t, 15> returns_{};
-  std::vector<std::uint64_t> misfits_;  // by column
+  std::vector<std::uint64_t> misfits_, no_numbers_;  // by column
+  std::vector<double> changes_;                      // by column, of scaled values
   std::uint64_t without_position_ = 0;
   double largest_move_ = 0, largest_value_ = 0;
 };
 
-// Whether values of such a column, which `count` rows have, are what a file would hold.
+// Whether values of such a column, which `count` rows have, are what a file would hold: the number
+// itself, or of scaled ones the nearest step.
 bool keepsLasValues(const LasColumn& column, const std::byte* rows, std::size_t row_bytes,
                     std::size_t count);
 

@@ -297,10 +297,13 @@ Status readRecords(ByteInput& input, LasHeader& header) {
   std::size_t other_count = 0;
   for (const LasRecord& record : records) {
     const bool is_extra = record.user == kLasSpecUser && record.number == kLasExtraBytesRecord;
-    if (is_extra && header.descriptors.empty()) {
-      SURFEIT_ASSIGN_OR_RETURN(header.descriptors, readData(input, record));
-      header.descriptors.resize(header.descriptors.size() / kLasDescriptorBytes *
-                                kLasDescriptorBytes);
+    if (is_extra && header.descriptors.size() < kMaxRecordBytes) {
+      SURFEIT_ASSIGN_OR_RETURN(std::vector<std::byte> data, readData(input, record));
+      data.resize(data.size() / kLasDescriptorBytes * kLasDescriptorBytes);
+      // One record describes what follows that of another; some writers repeat theirs at the end
+      if (data != header.descriptors) {
+        header.descriptors.insert(header.descriptors.end(), data.begin(), data.end());
+      }
     } else if (record.user == kLasProjectionUser) {
       SURFEIT_ASSIGN_OR_RETURN(const std::vector<std::byte> data, readData(input, record));
       crs.add(record.number, data);
@@ -348,7 +351,7 @@ struct Descriptor {
 LasField fieldOf(const Descriptor& descriptor, std::size_t offset,
                  std::vector<std::string>& notes) {
   LasField field;
-  field.name = descriptor.name.empty() ? "extra_bytes" : descriptor.name;
+  field.name = descriptor.name.empty() ? std::string(kLasExtraBytes) : descriptor.name;
   field.components = descriptor.components;
   field.stored = descriptor.type;
   field.type = plyTypeOf(descriptor.type);
@@ -368,9 +371,8 @@ LasField fieldOf(const Descriptor& descriptor, std::size_t offset,
     field.scale[i] = 1;
     field.origin[i] = 0;
   }
-  if (field.is_scaled) {
-    field.type = ValueType::kFloat64;
-  } else if (field.stored == LasType::kUint64 || field.stored == LasType::kInt64) {
+  if (field.is_scaled) field.type = ValueType::kFloat64;
+  if (field.stored == LasType::kUint64 || field.stored == LasType::kInt64) {
     notes.push_back(fmt::format("integers of 64 bits become float64, exact to 2^53: {}", name));
   }
   if (descriptor.type != LasType::kBytes && (descriptor.options & 1) != 0) {
@@ -412,7 +414,7 @@ std::vector<LasField> LasHeader::fields(std::vector<std::string>* told) const {
         fmt::format("{} bytes of every point without a description are not kept", left));
   } else if (left > 0) {
     LasField field;
-    field.name = "extra_bytes";
+    field.name = kLasExtraBytes;
     field.stored = LasType::kBytes;
     field.components = left;
     field.offset = offset;

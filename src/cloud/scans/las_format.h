@@ -40,6 +40,8 @@ inline constexpr std::string_view kLasSpecUser = "LASF_Spec",
 inline constexpr std::uint16_t kLasExtraBytesRecord = 4, kLasWktRecord = 2112,
                                kLasGeoKeysRecord = 34735, kLasGeoTextRecord = 34737;
 inline constexpr std::size_t kLasDescriptorBytes = 192;
+// What extra bytes are called that have no name.
+inline constexpr std::string_view kLasExtraBytes = "extra_bytes";
 
 // A header that was read, and what is needed to write one like it.
 struct LasHeader {

@@ -167,6 +167,16 @@ std::vector<std::string> lasPropertyNames(const LasField& field,
                                        ? normalAxis(field.name)
                                        : std::nullopt;
   if (axis) return {std::string("n") + *axis};
+  // Bytes without a meaning are no vector, however many
+  if (field.stored == LasType::kBytes && (field.components > 1 || field.name == kLasExtraBytes)) {
+    std::vector<std::string> names;
+    for (const std::string& name : propertyNames(field.name, 1, field.kind, renames)) {
+      for (std::size_t i = 0; i < field.components; ++i) {
+        names.push_back(fmt::format("{}_{}", name, i));
+      }
+    }
+    return names;
+  }
   return propertyNames(field.name, field.components, field.kind, renames);
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "cloud/parts/lost_comments.h"
 #include "cloud/parts/spooled_input.h"
 #include "cloud/scans/las_crs.h"
 #include "cloud/scans/las_encoder.h"
@@ -122,11 +123,8 @@ class LasWriter final : public RowWriter {
 
   // Comments that do not tell of coordinates have no place.
   void noteComments() {
-    const auto lost = std::count_if(comments_.begin(), comments_.end(), [](const auto& comment) {
-      return !comment.starts_with(kCrsComment);
-    });
-    if (lost > 0) notes_.push_back(fmt::format("{} comments are not kept", lost));
-    const bool has_crs = std::size_t(lost) < comments_.size();
+    notes_ = notesOfLostComments("LAS", comments_, /* keeps_crs= */ true);
+    const bool has_crs = !statedCrs(comments_).empty();
     if (!like_ && has_crs && !crs_) {
       notes_.push_back("the coordinate reference system is not kept: it has no code and no text");
     }
