@@ -408,19 +408,6 @@ TEST_F(LasTest, SeveralRecordsDescribeExtraBytes) {
   EXPECT_THAT(twice->notes(), IsEmpty());
 }
 
-TEST_F(LasTest, IntegersOf64BitsAreTold) {
-  for (const int type : {7, 8}) {
-    for (const int scaled : {0, 8, 16}) {
-      const std::string descriptor = lasDescriptor("ns", type, scaled, 1);
-      EXPECT_THAT(
-          openGood(withRecords(makeLas(4, 6, 3, 8), {lasRecord("LASF_Spec", 4, descriptor)}))
-              ->notes(),
-          ElementsAre(HasSubstr("exact to 2^53: 'ns'")))
-          << type << " " << scaled;
-    }
-  }
-}
-
 // --- Coordinates
 
 TEST_F(LasTest, CoordinateReferenceSystemsAreTold) {

@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "core/crs_comment.h"
 #include "io/compressed_files.h"
 #include "io/convert_tables.h"
 #include "io/las_test_file.h"
@@ -289,30 +288,6 @@ TEST_F(LasWriterTest, ScalesKeepTheDigitsOfSmallAndLargeClouds) {
   }
 }
 
-TEST_F(LasWriterTest, LinearColorsBecomeShadesOf16Bits) {
-  Table table = tableOf({{"x", kFloat},
-                         {"y", kFloat},
-                         {"z", kFloat},
-                         {"red", kFloat},
-                         {"green", kFloat},
-                         {"blue", kFloat}});
-  table.rows = {{0, 0, 0, 0, 1, 0.5}, {1, 0, 0, 3, -1, std::nan("")}};
-  writeTable("a.ply", table);
-  convertOk({"a.ply"}, "b.las");
-  const std::string las = bytesOf("b.las");
-  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 30), 0);
-  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 32), 65535);
-  EXPECT_NEAR(getLas<std::uint16_t>(lasPoint(las, 0), 34), 0.7353570 * 65535, 1);
-  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 1), 30), 65535);
-  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 1), 34), 0);
-  EXPECT_THAT(notes_,
-              AllOf(Contains(HasSubstr("becomes sRGB of 16 bits")),
-                    Contains(HasSubstr("1 values of red are not from 0 to 1")),
-                    Contains(HasSubstr("1 values of green are not from 0 to 1")),
-                    Contains(HasSubstr("1 values of blue are not numbers and become black")),
-                    Not(Contains(HasSubstr("blue are not from 0 to 1")))));
-}
-
 // What a color is follows from the input, where that is not LAS.
 TEST_F(LasWriterTest, ColorsTo255InFloatsAreTheSameShades) {
   Table table = tableOf({{"x", kFloat},
@@ -364,25 +339,6 @@ TEST_F(LasWriterTest, ValuesThatNoFieldHoldsAreExtraBytes) {
   EXPECT_EQ(getLas<std::uint16_t>(bytesOf("b.las"), 105), 30);
 }
 
-// Whole degrees of old point formats are no multiples of .006.
-TEST_F(LasWriterTest, AnglesBecomeTheNearestStep) {
-  for (const ValueType type : {ValueType::kInt8, kFloat}) {
-    Table table = tableOf({{"x", kFloat}, {"y", kFloat}, {"z", kFloat}, {"scan_angle", type}});
-    table.rows = {{0, 0, 0, 10}, {1, 0, 0, -17}, {2, 0, 0, 0}};
-    writeTable("a.ply", table);
-    convertOk({"a.ply"}, "b.las");
-    EXPECT_EQ(getLas<std::uint16_t>(bytesOf("b.las"), 105), 30);
-    EXPECT_EQ(getLas<std::int16_t>(lasPoint(bytesOf("b.las"), 0), 18), 1667);
-    EXPECT_EQ(getLas<std::int16_t>(lasPoint(bytesOf("b.las"), 1), 18), -2833);
-    EXPECT_THAT(notes_, Contains(HasSubstr("scan_angle changes by up to 0.002, since LAS stores "
-                                           "multiples of 0.006")));
-    table.rows = {{0, 0, 0, 6}, {1, 0, 0, -12}};
-    writeTable("a.ply", table);
-    convertOk({"a.ply"}, "b.las");
-    EXPECT_THAT(notes_, Not(Contains(HasSubstr("scan_angle"))));
-  }
-}
-
 TEST_F(LasWriterTest, PointsWithoutAPositionAreWithheld) {
   Table table =
       pointsOf({{1, 2, 3}, {std::nan(""), 2, 3}, {4, std::numeric_limits<double>::infinity(), 3}});
@@ -431,67 +387,6 @@ TEST_F(LasWriterTest, CoordinateReferenceSystemsGoThroughPly) {
   convertOk({"a.las", "d.las"}, "e.las", all());
   EXPECT_EQ(lasRecordOf(bytesOf("e.las"), "LASF_Projection", 34735), key_bytes);
   EXPECT_EQ(lasSummaryOf(bytesOf("e.las")).count, 6u);
-}
-
-// Positions that are moved or scaled are not those of the system any more.
-TEST_F(LasWriterTest, MovedPointsLoseTheirCoordinateReferenceSystem) {
-  const std::vector<std::uint16_t> keys = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 2263};
-  const std::string key_bytes(reinterpret_cast<const char*>(keys.data()), 2 * keys.size());
-  write("keys.las",
-        withRecords(makeLas(2, 3, 3), {lasRecord("LASF_Projection", 34735, key_bytes)}));
-  write("text.las",
-        withRecords(makeLas(4, 6, 3), {lasRecord("LASF_Projection", 2112, "PROJCS[\"x\", 1]")}));
-  const auto hasCrs = [&](const std::string& input, const std::string& output,
-                          const ConvertOptions& options) {
-    convertOk({input}, output, options);
-    const auto reader = openRowReader(path(output));
-    EXPECT_TRUE(reader.ok());
-    return reader.ok() && !statedCrs((*reader)->comments()).empty();
-  };
-  ConvertOptions scaled = all(), turned = all(), set = all(), cropped = all();
-  scaled.transform = {0.3048, 0, 0, 0, 0, 0.3048, 0, 0, 0, 0, 0.3048, 0};
-  turned.up = UpAxis::kY;
-  set.assignments = {"x = x - 1000000"};
-  cropped.crop = CropBox{{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
-  for (const char* input : {"keys.las", "text.las"}) {
-    for (const char* output : {"moved.las", "moved.ply"}) {
-      SCOPED_TRACE(std::string(input) + " " + output);
-      for (const ConvertOptions& moved : {scaled, turned, set}) {
-        EXPECT_FALSE(hasCrs(input, output, moved));
-        EXPECT_THAT(notes_, Contains(AllOf(HasSubstr("is not kept, because positions are moved"),
-                                           HasSubstr(input[0] == 'k' ? "EPSG:2263" : "PROJCS"))));
-      }
-      for (const ConvertOptions& kept : {all(), cropped}) {
-        EXPECT_TRUE(hasCrs(input, output, kept));
-        EXPECT_THAT(notes_, Not(Contains(HasSubstr("reference system"))));
-      }
-    }
-  }
-}
-
-TEST_F(LasWriterTest, CommentsThatAreLostAreTold) {
-  const auto notesOf = [&](const std::string& comments, const std::string& output) {
-    write("a.ply", "ply\nformat ascii 1.0\n" + comments +
-                       "element vertex 1\nproperty double x\nproperty double y\nproperty double "
-                       "z\nproperty uchar group\nend_header\n1 2 3 1\n");
-    convertOk({"a.ply"}, output);
-    return notes_;
-  };
-  const std::string crs = "comment crs EPSG:32610\n", name = "comment group 1 lamp\n";
-  for (const char* output : {"b.prt", "b.bgeo", "b.pdb", "b.ptc", "b.las"}) {
-    SCOPED_TRACE(output);
-    const bool is_las = std::string(output) == "b.las";
-    const std::vector<std::string> notes = notesOf(crs + name + "comment by a test\n", output);
-    EXPECT_THAT(notes, Contains(HasSubstr("has no place for the names of object groups")));
-    EXPECT_THAT(notes, Contains(HasSubstr(is_las ? "1 are not kept"
-                                                 : "2 are not kept, the coordinate reference "
-                                                   "system among them")));
-    EXPECT_THAT(notesOf("comment up z\n", output), Not(Contains(HasSubstr("not kept"))));
-    EXPECT_THAT(
-        notesOf("comment by a test\n", output),
-        AllOf(Contains(HasSubstr("1 are not kept")), Not(Contains(HasSubstr("reference system"))),
-              Not(Contains(HasSubstr("object groups")))));
-  }
 }
 
 TEST_F(LasWriterTest, LongNamesAreToldApart) {
