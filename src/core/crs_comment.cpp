@@ -24,8 +24,7 @@ constexpr std::uint32_t kGeographicCodes[] = {
     4267, 4269, 4152, 4759, 6318, 6319, 4617, 4955,        // North America
     4258, 4937, 4230, 4277, 4289, 4313, 4314,              // Europe
     4612, 6668, 6697, 4490, 4480,                          // Japan, China
-    4283, 4939, 7843, 7844, 4167, 4959, 4674, 4989};       // Oceania, South America // ITRF2014,
-                                                      // ITRF2020
+    4283, 4939, 7843, 7844, 4167, 4959, 4674, 4989};       // Oceania, South America
 
 // Where the first of such texts begins; npos: none does.
 template <typename Names>
