@@ -261,9 +261,7 @@ std::vector<std::string> notesOfLookalikes(const RowLayout& element,
     if (finder.has("f_dc_0")) {
       notes.push_back(
           "properties f_dc_0 f_dc_1 f_dc_2 look like colors of splats and are not read without the "
-          "other properties of splats: surfeit convert --set 'radiosity = f_dc * .28209 + .5' "
-          "makes "
-          "colors of them");
+          "rest of a splat: surfeit convert --set 'radiosity = f_dc * .28209 + .5' makes colors");
     }
   }
   if (lacking.normal) {
