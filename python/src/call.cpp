@@ -1,5 +1,7 @@
 #include "call.h"
 
+#include <malloc.h>
+
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -133,6 +135,9 @@ void run(const py::object& watcher, const std::function<Status(Progress&)>& work
     }
   }
   const Status status = working.join();
+#ifdef __GLIBC__
+  malloc_trim(0);  // what a job has held is for the next one, and for the caller
+#endif
   if (raised != nullptr) std::rethrow_exception(raised);
   check(status);
 }
