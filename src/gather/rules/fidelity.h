@@ -87,8 +87,9 @@ struct Fidelity {
 
   // Part of its outline, the ellipse with its covariance, that a flat node or facet fills for its
   // hull to be widened. One that fills less has gaps, as a fence has, and they stay open. (A
-  // rectangle fills .95, a triangle or an L .83, two squares that touch at a corner .72.)
-  float least_filled = 0.75f;
+  // rectangle fills .95, a triangle or an L .83, two squares that touch at a corner .72, boards
+  // with gaps as wide as they are .48.)
+  float least_filled = 0.7f;
 
   // Part of half its side by which a patch is widened in the hull. (AO RMSE with .7, .75, .8, .9:
   // bunny, scattered .0054, .0046, .0042, .0037; city .0049, .0052, .0053, .0057.)
