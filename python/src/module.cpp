@@ -1,5 +1,6 @@
 // The module surfeit._surfeit: the library as plainly as Python can call it. The package surfeit
 // stands on it and is what users see.
+#include <malloc.h>
 #include <pybind11/pybind11.h>
 
 #include "bindings.h"
@@ -7,6 +8,11 @@
 #include "surfeit/version.h"
 
 PYBIND11_MODULE(_surfeit, module) {
+#ifdef __GLIBC__
+  // Else blocks of up to 32 MiB come to lie in heaps of threads, which keep them: index left 100
+  // MiB
+  mallopt(M_MMAP_THRESHOLD, 16 << 20);
+#endif
   module.doc() = "The surfeit library. Use the package surfeit instead.";
   module.attr("__version__") = surfeit::kVersion;
   module.def("memory_limit", &surfeit::memoryLimitBytes);
