@@ -132,10 +132,10 @@ class SURFEIT_API Gatherer {
   // own coordinates, else a curve within the bounds of the receivers. Works on `threads` threads
   // (0: EngineOptions::threads), this one among them, with this gatherer and others made for the
   // call, as far as the budget has room for them. Takes 12 bytes per receiver of the budget while
-  // it sorts, and 4 until it ends. At most 4 billion receivers. Results depend only on world, settings and receivers. For
-  // one scene in its own coordinates, and with a max_variation of 0, they have the bits of
-  // gatherCloud (surfeit/bake.h). Errors: as gather, and
-  // kBudgetTooSmall with the least budget that works.
+  // it sorts, and 4 until it ends. At most 4 billion receivers. Results depend only on world,
+  // settings and receivers. For one scene in its own coordinates, and with a max_variation of 0,
+  // they have the bits of gatherCloud (surfeit/bake.h). Errors: as gather, and kBudgetTooSmall with
+  // the least budget that works.
   Status gatherAll(ReceiverArray& receivers, Progress& progress, int threads = 1);
 
   // A gatherer of the same world for another thread; the two share data where they can. Errors:

@@ -131,12 +131,6 @@ Status Gatherer::gatherAll(ReceiverArray& receivers, Progress& progress, int thr
     if (threads <= 0) threads = state_->world->engine().options.threads;
     const std::size_t run = state_->gatherer.size();
     const std::size_t runs = (count + run - 1) / run;
-    std::vector<Gatherer> others;
-    while (others.size() + 1 < std::min(runs, static_cast<std::size_t>(threads))) {
-      Result<Gatherer> more = another();
-      if (!more.ok()) break;  // fewer do the same in a longer time
-      others.push_back(std::move(*more));
-    }
     progress.beginPhase("gather", count, "receivers");
     BudgetPart order_part(state_->world->engine());
     const std::uint64_t key_bytes = count * sizeof(CurveKey);
@@ -144,6 +138,12 @@ Status Gatherer::gatherAll(ReceiverArray& receivers, Progress& progress, int thr
                                             fmt::format("the order of {} receivers", count)));
     GroupedReceivers groups(receivers, state_->curveOrder(receivers), run);
     order_part.giveBack(key_bytes);
+    std::vector<Gatherer> others;
+    while (others.size() + 1 < std::min(runs, static_cast<std::size_t>(threads))) {
+      Result<Gatherer> more = another();
+      if (!more.ok()) break;  // fewer do the same in a longer time
+      others.push_back(std::move(*more));
+    }
     std::atomic<std::size_t> taken{0};
     FirstFailure failure;
     return runOnThreads(int(others.size()) + 1, failure, "gather", [&] {

@@ -48,6 +48,13 @@ inline void setValue(const RowProperty& property, double value, std::byte* row) 
 
 class ConvertTest : public DirectoryTest {
  protected:
+  // Takes every record, also those of LAS that are left out by default.
+  static ConvertOptions all() {
+    ConvertOptions options;
+    options.filter = "true";
+    return options;
+  }
+
   void writeTable(const std::string& name, const Table& table) const {
     RowWriterOptions options;
     options.properties = table.properties;

@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -23,19 +21,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-class LasLossTest : public ConvertTest {
- protected:
-  std::string bytesOf(const std::string& name) const {
-    std::ifstream file(path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-
-  ConvertOptions all() const {
-    ConvertOptions options;
-    options.filter = "true";
-    return options;
-  }
-};
+class LasLossTest : public ConvertTest {};
 
 TEST_F(LasLossTest, IntegersOf64BitsAreTold) {
   for (const int type : {7, 8}) {
@@ -60,7 +46,7 @@ TEST_F(LasLossTest, LinearColorsBecomeShadesOf16Bits) {
   table.rows = {{0, 0, 0, 0, 1, 0.5}, {1, 0, 0, 3, -1, std::nan("")}};
   writeTable("a.ply", table);
   convertOk({"a.ply"}, "b.las");
-  const std::string las = bytesOf("b.las");
+  const std::string las = contents("b.las");
   EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 30), 0);
   EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 32), 65535);
   EXPECT_NEAR(getLas<std::uint16_t>(lasPoint(las, 0), 34), 0.7353570 * 65535, 1);
@@ -142,9 +128,9 @@ TEST_F(LasLossTest, AnglesBecomeTheNearestStep) {
     table.rows = {{0, 0, 0, 10}, {1, 0, 0, -17}, {2, 0, 0, 0}};
     writeTable("a.ply", table);
     convertOk({"a.ply"}, "b.las");
-    EXPECT_EQ(getLas<std::uint16_t>(bytesOf("b.las"), 105), 30);
-    EXPECT_EQ(getLas<std::int16_t>(lasPoint(bytesOf("b.las"), 0), 18), 1667);
-    EXPECT_EQ(getLas<std::int16_t>(lasPoint(bytesOf("b.las"), 1), 18), -2833);
+    EXPECT_EQ(getLas<std::uint16_t>(contents("b.las"), 105), 30);
+    EXPECT_EQ(getLas<std::int16_t>(lasPoint(contents("b.las"), 0), 18), 1667);
+    EXPECT_EQ(getLas<std::int16_t>(lasPoint(contents("b.las"), 1), 18), -2833);
     EXPECT_THAT(notes_, Contains(HasSubstr("scan_angle changes by up to 0.002, since LAS stores "
                                            "multiples of 0.006")));
     table.rows = {{0, 0, 0, 6}, {1, 0, 0, -12}};

@@ -5,8 +5,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -25,19 +23,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-class LasWriterTest : public ConvertTest {
- protected:
-  std::string bytesOf(const std::string& name) const {
-    std::ifstream file(path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-
-  ConvertOptions all() const {
-    ConvertOptions options;
-    options.filter = "true";
-    return options;
-  }
-};
+class LasWriterTest : public ConvertTest {};
 
 // --- From LAS to LAS
 
@@ -54,7 +40,7 @@ TEST_F(LasWriterTest, PointsOfEveryFormatStayTheSameBytes) {
       }
       write("a.las", text);
       convertOk({"a.las"}, "b.las", all());
-      const std::string copy = bytesOf("b.las");
+      const std::string copy = contents("b.las");
       EXPECT_EQ(std::uint8_t(copy[104]), format);
       EXPECT_EQ(copy[25], text[25]);
       EXPECT_TRUE(lasPoints(copy, 90) == lasPoints(text, 90));
@@ -68,7 +54,7 @@ TEST_F(LasWriterTest, PointsOfEveryFormatStayTheSameBytes) {
       }
       // Once more, it is the same file
       convertOk({"b.las"}, "c.las", all());
-      EXPECT_TRUE(bytesOf("c.las") == copy);
+      EXPECT_TRUE(contents("c.las") == copy);
     }
   }
 }
@@ -80,7 +66,7 @@ TEST_F(LasWriterTest, HeadersCountAndBoundWhatIsWritten) {
   ConvertOptions options;
   options.filter = "return_number <= 2";
   convertOk({"a.las"}, "b.las", options);
-  const std::string las = bytesOf("b.las");
+  const std::string las = contents("b.las");
   const LasSummary summary = lasSummaryOf(las);
   EXPECT_EQ(summary.count, 14u);  // of 15 numbers in turn
   EXPECT_EQ(getLas<std::uint64_t>(las, 255), 7u);
@@ -96,9 +82,9 @@ TEST_F(LasWriterTest, HeadersCountAndBoundWhatIsWritten) {
   for (std::size_t i = 0; i < 9; ++i) fillPoint(text, i);
   write("a.las", text);
   convertOk({"a.las"}, "b.las", all());
-  EXPECT_EQ(getLas<std::uint32_t>(bytesOf("b.las"), 107), 9u);
-  EXPECT_EQ(getLas<std::uint32_t>(bytesOf("b.las"), 111), 2u);
-  EXPECT_EQ(getLas<std::uint64_t>(bytesOf("b.las"), 255), 2u);
+  EXPECT_EQ(getLas<std::uint32_t>(contents("b.las"), 107), 9u);
+  EXPECT_EQ(getLas<std::uint32_t>(contents("b.las"), 111), 2u);
+  EXPECT_EQ(getLas<std::uint64_t>(contents("b.las"), 255), 2u);
 }
 
 TEST_F(LasWriterTest, RecordsBehindThePointsAreCopied) {
@@ -113,7 +99,7 @@ TEST_F(LasWriterTest, RecordsBehindThePointsAreCopied) {
   ConvertOptions options = all();
   options.every = 2;
   convertOk({"a.las"}, "b.las", options);
-  const std::string las = bytesOf("b.las");
+  const std::string las = contents("b.las");
   EXPECT_EQ(getLas<std::uint64_t>(las, 247), 20u);
   const std::size_t end = getLas<std::uint32_t>(las, 96) + 20 * 30;
   EXPECT_EQ(getLas<std::uint64_t>(las, 235), end);
@@ -127,9 +113,9 @@ TEST_F(LasWriterTest, OldHeadersBecomeVersion12) {
   putLas(text, 4, std::uint32_t(0xABCDEF));  // reserved then, the encoding now
   write("a.las", text);
   convertOk({"a.las"}, "b.las", all());
-  EXPECT_EQ(bytesOf("b.las")[25], 2);
-  EXPECT_EQ(getLas<std::uint32_t>(bytesOf("b.las"), 4), 0u);
-  EXPECT_TRUE(lasPoints(bytesOf("b.las"), 4) == lasPoints(text, 4));
+  EXPECT_EQ(contents("b.las")[25], 2);
+  EXPECT_EQ(getLas<std::uint32_t>(contents("b.las"), 4), 0u);
+  EXPECT_TRUE(lasPoints(contents("b.las"), 4) == lasPoints(text, 4));
 }
 
 TEST_F(LasWriterTest, ResultsAreExtraBytesOfTheSamePoints) {
@@ -169,7 +155,7 @@ TEST_F(LasWriterTest, ResultsAreExtraBytesOfTheSamePoints) {
   ASSERT_TRUE((*writer)->finish().ok());
 
   // 34 bytes as they were, then 4 floats, a byte and a double
-  const std::string las = bytesOf("b.las");
+  const std::string las = contents("b.las");
   ASSERT_EQ(getLas<std::uint16_t>(las, 105), 34 + 16 + 1 + 8);
   const std::string described = lasRecordOf(las, "LASF_Spec", 4);
   ASSERT_EQ(described.size(), 6 * 192u);
@@ -195,9 +181,9 @@ TEST_F(LasWriterTest, DroppedAndMovedPointsAreNoCopies) {
   ConvertOptions options = all();
   options.drop = {"h", "intensity"};
   convertOk({"a.las"}, "b.las", options);
-  EXPECT_EQ(getLas<std::uint16_t>(bytesOf("b.las"), 105), 34);
-  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(bytesOf("b.las"), 2), 12), 0);
-  EXPECT_EQ(lasPoint(bytesOf("b.las"), 2).substr(14), lasPoint(text, 2).substr(14, 20));
+  EXPECT_EQ(getLas<std::uint16_t>(contents("b.las"), 105), 34);
+  EXPECT_EQ(getLas<std::uint16_t>(lasPoint(contents("b.las"), 2), 12), 0);
+  EXPECT_EQ(lasPoint(contents("b.las"), 2).substr(14), lasPoint(text, 2).substr(14, 20));
 
   // Moved by more than 32 bits hold: of a scale and an offset of its own
   options.transform[3] = 1e9;
@@ -229,7 +215,7 @@ TEST_F(LasWriterTest, OtherCloudsBecomeVersion14WithExtraBytes) {
   }
   writeTable("a.ply", table);
   convertOk({"a.ply"}, "b.las");
-  const std::string las = bytesOf("b.las");
+  const std::string las = contents("b.las");
   const LasSummary summary = lasSummaryOf(las);
   EXPECT_EQ(summary.minor, 4u);
   EXPECT_EQ(summary.format, 7u);
@@ -282,7 +268,7 @@ TEST_F(LasWriterTest, ScalesKeepTheDigitsOfSmallAndLargeClouds) {
         EXPECT_THAT(notes_,
                     Contains(AllOf(HasSubstr("points move by up to"), HasSubstr("spacing"))));
       }
-      const double scale = getLas<double>(bytesOf("b.las"), 131);
+      const double scale = getLas<double>(contents("b.las"), 131);
       EXPECT_NEAR(std::log10(scale), std::round(std::log10(scale)), 1e-9);
     }
   }
@@ -299,7 +285,7 @@ TEST_F(LasWriterTest, ColorsTo255InFloatsAreTheSameShades) {
   table.rows = {{0, 0, 0, 200, 0, 17}, {1, 1, 1, 255, 90, 3}};
   writeTable("a.ply", table);
   convertOk({"a.ply"}, "b.las");
-  const std::string las = bytesOf("b.las");
+  const std::string las = contents("b.las");
   EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 30), 200 * 257);
   EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 0), 34), 17 * 257);
   EXPECT_EQ(getLas<std::uint16_t>(lasPoint(las, 1), 32), 90 * 257);
@@ -336,7 +322,7 @@ TEST_F(LasWriterTest, ValuesThatNoFieldHoldsAreExtraBytes) {
   convertOk({"a.ply"}, "b.las");
   EXPECT_THAT(column(readTable("b.las"), "intensity"), ElementsAre(65535, 300));
   EXPECT_THAT(column(readTable("b.las"), "return_number"), ElementsAre(1, 15));
-  EXPECT_EQ(getLas<std::uint16_t>(bytesOf("b.las"), 105), 30);
+  EXPECT_EQ(getLas<std::uint16_t>(contents("b.las"), 105), 30);
 }
 
 TEST_F(LasWriterTest, PointsWithoutAPositionAreWithheld) {
@@ -346,8 +332,8 @@ TEST_F(LasWriterTest, PointsWithoutAPositionAreWithheld) {
   convertOk({"a.ply"}, "b.las");
   EXPECT_THAT(notes_,
               Contains(HasSubstr("2 points without a finite position are written as with")));
-  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).count, 3u);
-  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).most[0], 1);
+  EXPECT_EQ(lasSummaryOf(contents("b.las")).count, 3u);
+  EXPECT_EQ(lasSummaryOf(contents("b.las")).most[0], 1);
   EXPECT_THAT(column(readTable("b.las"), "x"), ElementsAre(1));
 }
 
@@ -356,8 +342,8 @@ TEST_F(LasWriterTest, CoordinateReferenceSystemsGoThroughPly) {
   write("a.las", withRecords(makeLas(4, 6, 3), {lasRecord("LASF_Projection", 2112, text)}));
   convertOk({"a.las"}, "b.ply", all());
   convertOk({"b.ply"}, "c.las");
-  EXPECT_EQ(lasRecordOf(bytesOf("c.las"), "LASF_Projection", 2112).substr(0, text.size()), text);
-  EXPECT_EQ(getLas<std::uint16_t>(bytesOf("c.las"), 6), 16);
+  EXPECT_EQ(lasRecordOf(contents("c.las"), "LASF_Projection", 2112).substr(0, text.size()), text);
+  EXPECT_EQ(getLas<std::uint16_t>(contents("c.las"), 6), 16);
   EXPECT_THAT(notes_, Not(Contains(HasSubstr("comment"))));
 
   const std::vector<std::uint16_t> keys = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 32610};
@@ -365,9 +351,9 @@ TEST_F(LasWriterTest, CoordinateReferenceSystemsGoThroughPly) {
   write("a.las", withRecords(makeLas(2, 3, 3), {lasRecord("LASF_Projection", 34735, key_bytes)}));
   convertOk({"a.las"}, "b.ply", all());
   convertOk({"b.ply"}, "c.las");
-  EXPECT_EQ(lasRecordOf(bytesOf("c.las"), "LASF_Projection", 34735), key_bytes);
-  EXPECT_EQ(lasSummaryOf(bytesOf("c.las")).minor, 2u);  // later formats know text alone
-  EXPECT_EQ(lasSummaryOf(bytesOf("c.las")).format, 3u);
+  EXPECT_EQ(lasRecordOf(contents("c.las"), "LASF_Projection", 34735), key_bytes);
+  EXPECT_EQ(lasSummaryOf(contents("c.las")).minor, 2u);  // later formats know text alone
+  EXPECT_EQ(lasSummaryOf(contents("c.las")).format, 3u);
 
   // All that the keys say, of every model
   for (const std::vector<std::uint16_t>& words :
@@ -379,14 +365,14 @@ TEST_F(LasWriterTest, CoordinateReferenceSystemsGoThroughPly) {
     write("f.las", withRecords(makeLas(2, 3, 3), {lasRecord("LASF_Projection", 34735, record)}));
     convertOk({"f.las"}, "b.ply", all());
     convertOk({"b.ply"}, "c.las");
-    EXPECT_EQ(lasRecordOf(bytesOf("c.las"), "LASF_Projection", 34735), record) << words[7];
+    EXPECT_EQ(lasRecordOf(contents("c.las"), "LASF_Projection", 34735), record) << words[7];
   }
 
   // Tiles are merged with the system of the first
-  write("d.las", bytesOf("a.las"));
+  write("d.las", contents("a.las"));
   convertOk({"a.las", "d.las"}, "e.las", all());
-  EXPECT_EQ(lasRecordOf(bytesOf("e.las"), "LASF_Projection", 34735), key_bytes);
-  EXPECT_EQ(lasSummaryOf(bytesOf("e.las")).count, 6u);
+  EXPECT_EQ(lasRecordOf(contents("e.las"), "LASF_Projection", 34735), key_bytes);
+  EXPECT_EQ(lasSummaryOf(contents("e.las")).count, 6u);
 }
 
 TEST_F(LasWriterTest, LongNamesAreToldApart) {
@@ -422,8 +408,8 @@ TEST_F(LasWriterTest, WhatDoesNotFitIsRefused) {
 TEST_F(LasWriterTest, EmptyAndCompressedFilesAreWritten) {
   writeTable("a.ply", pointsOf({}));
   convertOk({"a.ply"}, "b.las");
-  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).count, 0u);
-  EXPECT_EQ(lasSummaryOf(bytesOf("b.las")).most[0], 0);
+  EXPECT_EQ(lasSummaryOf(contents("b.las")).count, 0u);
+  EXPECT_EQ(lasSummaryOf(contents("b.las")).most[0], 0);
   EXPECT_EQ(readTable("b.las").rows.size(), 0u);
   writeTable("a.ply", pointsOf({{1, 2, 3}, {4, 5, 6}}));
   convertOk({"a.ply"}, "b.las.gz");
@@ -451,7 +437,7 @@ TEST_F(SharedLasTest, FilesOfOthersStayTheSameBytes) {
     std::filesystem::copy_file(kShared / name, path("a.las"),
                                std::filesystem::copy_options::overwrite_existing);
     convertOk({"a.las"}, "b.las", all());
-    const std::string before = bytesOf("a.las"), after = bytesOf("b.las");
+    const std::string before = contents("a.las"), after = contents("b.las");
     const std::uint32_t count = getLas<std::uint32_t>(before, 107);
     EXPECT_EQ(getLas<std::uint32_t>(after, 107), count);
     EXPECT_TRUE(lasPoints(after, count) == lasPoints(before, count));
