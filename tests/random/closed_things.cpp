@@ -65,6 +65,12 @@ void addBox(std::vector<Surfel>& cloud, int count, const glm::vec3& centre, floa
   }
 }
 
+glm::mat3 slanted() {
+  const glm::vec3 x = glm::normalize(glm::vec3(2, 1, -1)), y0(0.3f, 1, 0.7f);
+  const glm::vec3 z = glm::normalize(glm::cross(x, y0));
+  return {x, glm::cross(z, x), z};
+}
+
 std::vector<Surfel> hiddenLamp() {
   std::vector<Surfel> lamp;
   addSheet(lamp, 2000, {-.4f, -.4f, -3}, {.8f, 0, 0}, {0, .8f, 0}, 1);

@@ -2,6 +2,7 @@
 // Disks are scattered by a third of their spacing.
 #pragma once
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -20,6 +21,9 @@ void addSheet(std::vector<Surfel>& cloud, int count, const glm::vec3& corner, co
               const glm::vec3& v, float radiosity = 0);
 // About `count` disks of a cube, facing out.
 void addBox(std::vector<Surfel>& cloud, int count, const glm::vec3& centre, float side);
+
+// A turn that leaves no axis where it was.
+glm::mat3 slanted();
 
 // What stands around the origin, a unit large, hides the lamp from all the receivers.
 std::vector<Surfel> hiddenLamp();

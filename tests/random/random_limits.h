@@ -42,7 +42,8 @@ inline constexpr double kMedianLightStep = .002, kLargeLightStep = .06;
 struct InvarianceLimits {
   double exact, fast;
 };
-inline constexpr InvarianceLimits kMovedLimits = {.001, .01};
+// Nodes decide which two-sided surfels are of a sheet, and another place has other nodes.
+inline constexpr InvarianceLimits kMovedLimits = {.005, .01};
 inline constexpr InvarianceLimits kTurnedLimits = {.004, .005};
 inline constexpr InvarianceLimits kScaledLimits = {0, 0};
 

@@ -12,6 +12,7 @@
 #include <span>
 
 #include "core/curve_key.h"
+#include "gather/rules/contribution.h"
 #include "gather/rules/fidelity.h"
 #include "gather/rules/gather_rules.h"
 #include "gather/rules/receiver.h"
@@ -92,9 +93,9 @@ using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const Packet
 SiblingClassifier fastestSiblingClassifier();
 
 // Calls visit.node(const Node&, const LaneParts*) for the nodes that some receiver sees as a whole,
-// visit.leaf(const Node&) and visit.surfels(std::span<const Surfel>, const LaneParts*) for leaves
-// that some receiver looks into. The parts say how much they count for each receiver; null: wholly
-// for all. Surfels of groups that are not seen are left out.
+// visit.leaf(const Node&, bool) and visit.surfels(std::span<const Surfel>, const LaneParts*) for
+// leaves that some receiver looks into; the bool: isSheet(parent). The parts say how much they
+// count for each receiver; null: wholly for all. Surfels of groups that are not seen are left out.
 // `Reader` has the functions of PagedOctree::Reader. The order depends on octree and view alone.
 // A visitor with visit.instance(const Node&, const LaneParts*), which returns a Status, takes
 // leaves that some receiver may see by that alone (InstanceTree). One thread at a time.
@@ -120,7 +121,8 @@ class CutWalk {
               Visit&& visit, const LaneParts* all = nullptr) {
     nodes_visited_ = surfels_visited_ = 0;
     std::size_t stack_count = 0;
-    stack_[stack_count++] = {kRootRange, all != nullptr, all != nullptr ? *all : LaneParts{}};
+    stack_[stack_count++] = {kRootRange, all != nullptr, false,
+                             all != nullptr ? *all : LaneParts{}};
     while (stack_count > 0) {
       const Siblings from = stack_[--stack_count];
       SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings, octree.nodes(from.range));
@@ -153,7 +155,7 @@ class CutWalk {
         }
         if (node.isLeaf()) {
           if constexpr (!requires { visit.instance(node, whole); }) {
-            visit.leaf(node);
+            visit.leaf(node, from.are_of_sheet);
             SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
               surfels_visited_ += run.size();
               visitSeen(run, below, visit);
@@ -163,6 +165,7 @@ class CutWalk {
           Siblings& next = stack_[stack_count++];
           next.range = childrenOf(node);
           next.has_parts = below != nullptr;
+          next.are_of_sheet = isSheet(node);
           if (below != nullptr) next.parts = *below;
         } else {
           return Status::corruption("octree: deeper than its curve has levels");
@@ -225,6 +228,7 @@ class CutWalk {
   struct Siblings {
     NodeRange range;
     bool has_parts;
+    bool are_of_sheet;  // isSheet(parent)
     LaneParts parts;
   };
   std::array<Siblings, kStackSize> stack_;
@@ -234,7 +238,7 @@ class CutWalk {
 // For walks that are made for the pages they touch.
 struct IgnoreCut {
   void node(const Node&, const LaneParts*) {}
-  void leaf(const Node&) {}
+  void leaf(const Node&, bool) {}
   void surfels(std::span<const Surfel>, const LaneParts*) {}
 };
 

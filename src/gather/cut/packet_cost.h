@@ -34,7 +34,7 @@ class PacketCost {
   void node(const Node& node, const LaneParts*) {
     add(node, float(std::max<int>(1, node.facet_count)));
   }
-  void leaf(const Node& node) { add(node, float(node.surfel_count)); }
+  void leaf(const Node& node, bool) { add(node, float(node.surfel_count)); }
   void surfels(std::span<const Surfel>, const LaneParts*) {}
 
   // What a packet of this radius around the receiver takes, in some unit of time. A node of s

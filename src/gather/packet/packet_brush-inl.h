@@ -205,24 +205,12 @@ class Brush {
         hn::MulAdd(Splat(patch.disk_area), cosine, hn::Mul(Splat(patch.round_area), distance)),
         hn::Mul(Splat(patch.most_area), distance));
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
-    const Parallelogram shape = OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w);
-    const Cover cover = MakeCover(patch, sight, distance, hn::Sub(Splat(1), sight.near_part));
+    V part = hn::Sub(Splat(1), sight.near_part);
+    const Parallelogram shape =
+        OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w, part);
+    const Cover cover = MakeCover(patch, sight, distance, part);
     CoverParallelogram(shape, seen, cover);
     if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
-  }
-
-  // At the rim of a curved thing, a part of a piece faces the receiver whose mean normal does not:
-  // as SeeRoughNode has it, with normals spread evenly. All times the distance.
-  static V RimCosine(V facing, V range) {
-    const V sum = hn::Max(hn::Zero(D()), hn::Sub(range, facing));
-    const V rim = hn::Div(hn::Mul(sum, sum), hn::Mul(Splat(4), range));
-    return hn::IfThenElse(hn::Lt(hn::Neg(facing), range), rim, hn::Neg(facing));
-  }
-
-  // Fronts and backs together.
-  static V RimOfBoth(V cosine, V range) {
-    const V rim = hn::Div(hn::MulAdd(cosine, cosine, hn::Mul(range, range)), hn::Add(range, range));
-    return hn::IfThenElse(hn::Lt(cosine, range), rim, cosine);
   }
 
   // The shape of a patch on the plane of the face; it may lie outside the face. `area`: the visible
@@ -234,7 +222,10 @@ class Brush {
   // of .0031 for the bunny.) Distances along the axis vary over a large patch: the mean of 1 / w^3
   // is greater than that of its middle, and the middle of the image lies farther out than the image
   // of the middle (docs/algorithm.md, "The raster cube").
-  HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse) const {
+  //
+  // A patch with gaps is spread over its outline, and covers as much less of it: times `part`.
+  HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse,
+                                  V& part) const {
     const V one = Splat(1), least = Splat(kFidelity.least_spread);
     const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
     const Normal normal = InRaster(patch.normal);
@@ -261,8 +252,13 @@ class Brush {
     const V extent = hn::Min(one, hn::Mul(Splat(patch.area), inverse_sq));
     const V depth = hn::NegMulAdd(n_axis, n_axis, one);
     const V bulge = hn::MulAdd(extent, hn::Mul(Splat(0.5f), depth), one);
-    const V half_area =
+    V half_area =
         hn::Mul(hn::Mul(Splat(0.25f), area), hn::Mul(hn::Mul(inverse, inverse_sq), bulge));
+    if (patch.is_spread) {
+      const V even = EvenPart(patch, half_area, hn::Mul(row_a, c), inverse_sq);
+      half_area = hn::Div(half_area, even);
+      part = hn::Mul(part, even);
+    }
     const V half_u_sq = hn::Max(hn::Mul(half_area, ratio), Splat(1e-30f));
     const V inverse_half_u = InverseSqrt(half_u_sq);
     const V shift = hn::Mul(extent, Splat(1.f / 3));

@@ -12,13 +12,14 @@ namespace {
 struct DrawCut {
   PacketRaster& raster;
   const PagedOctree::Reader& octree;
+  bool is_sheet = false;  // the last leaf
   void setFrame(const InstanceFrame* frame) { raster.setFrame(frame); }
   void node(const Node& node, const LaneParts* parts) {
     raster.addNode(node, parts, octree.lobesOf(node));
   }
-  void leaf(const Node&) {}
+  void leaf(const Node& node, bool is_of_sheet) { is_sheet = is_of_sheet || isSheet(node); }
   void surfels(std::span<const Surfel> run, const LaneParts* parts) {
-    raster.addSurfels(run, parts, octree.lobesOf(run));
+    raster.addSurfels(run, parts, octree.lobesOf(run), is_sheet);
   }
 };
 

@@ -34,7 +34,7 @@ struct PixelContent;
 // order than they are made in.
 struct alignas(64) Patch {
   glm::vec3 position{0};
-  float radius = 0;
+  float radius = 0;     // of a facet: the root of three times the trace of its covariance
   glm::vec3 normal{0};  // of a node: times its flatness; zero: looks round
   // How it spreads, a covariance of trace 2: of a disk I - n n^T, of a sphere the identity
   SymmetricMatrix shape{};
@@ -49,10 +49,11 @@ struct alignas(64) Patch {
   float overlap = 0;
   float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
   float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
-  bool lets_through = false;  // it is translucent: nothing closes what it leaves open
+  bool lets_through = false;  // it is translucent, or a fence: nothing closes what it leaves open
   // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
   // alone
   bool is_solid = true;
+  bool is_spread = false;  // a facet that may have gaps: it is spread evenly over its outline
   bool is_ribbon = false;  // a ray traced surfel is a rectangle, not a disk
   // From where it is seen: before its front alone; from both sides of a two-sided disk or facet;
   // from both, though it sends light from its front alone; or as something else says

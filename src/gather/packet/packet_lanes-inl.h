@@ -251,6 +251,36 @@ inline V HalfSide(const Patch& patch, const glm::vec3& normal, int axis) {
   return Splat(patch.radius * std::sqrt(std::max(0.f, 1 - normal[axis] * normal[axis])));
 }
 
+// At the rim of a curved thing, a part of a piece faces the receiver whose mean normal does not:
+// as SeeRoughNode has it, with normals spread evenly. All times the distance.
+inline V RimCosine(V facing, V range) {
+  const V sum = hn::Max(hn::Zero(D()), hn::Sub(range, facing));
+  const V rim = hn::Div(hn::Mul(sum, sum), hn::Mul(Splat(4), range));
+  return hn::IfThenElse(hn::Lt(hn::Neg(facing), range), rim, hn::Neg(facing));
+}
+
+// Fronts and backs together.
+inline V RimOfBoth(V cosine, V range) {
+  const V rim = hn::Div(hn::MulAdd(cosine, cosine, hn::Mul(range, range)), hn::Add(range, range));
+  return hn::IfThenElse(hn::Lt(cosine, range), rim, cosine);
+}
+
+// The part of its outline that a patch covers when it is spread over it: 1 where it fills it.
+// `half_area`: a quarter of its own area on the face; `spread_sq`: the determinant of its spread
+// there, where it is one unit away.
+inline V EvenPart(const Patch& patch, V half_area, V spread_sq, V inverse_sq) {
+  constexpr float kOfRectangle = 0.95f;  // pi / 3.3 of an ellipse with its covariance
+  // The ellipse is 4 pi times the root of the determinant of the covariance, which is the spread
+  // times a sixth of the square of the radius
+  const float scale = 4 / (kPi * patch.radius * patch.radius * 2 / 3);
+  const V ellipse_inverse = hn::Div(InverseSqrt(spread_sq), inverse_sq);
+  const V fill = hn::Mul(hn::Mul(Splat(scale), half_area), ellipse_inverse);
+  const float steepness = (kOfRectangle - kFidelity.least_filled) / kFidelity.least_filled;
+  const V even = hn::Div(fill, hn::NegMulAdd(Splat(steepness), fill, Splat(kOfRectangle)));
+  return hn::IfThenElse(hn::Lt(fill, Splat(kFidelity.least_filled)), hn::Max(even, Splat(0.01f)),
+                        Splat(1));
+}
+
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace surfeit

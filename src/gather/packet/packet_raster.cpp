@@ -219,12 +219,17 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
   const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
   gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
   if (node.isRough()) return addRoughNode(node, parts);
-  if (node.isFlat()) return addFacet(facetOf(node), CubeKind::kFlatNode, parts, lobeOf(0));
+  if (node.isFlat()) {
+    return addFacet(node, facetOf(node), CubeKind::kFlatNode, parts, lobeOf(0));
+  }
+  const bool is_thicket = isThicket(node);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
-      addFacet(node.facet(i), CubeKind::kFacet, parts, lobeOf(i));
+      Facet facet = node.facet(i);
+      facet.is_thicket = facet.is_thicket && is_thicket;
+      addFacet(node, facet, CubeKind::kFacet, parts, lobeOf(i));
     }
   }
 }
@@ -250,8 +255,8 @@ void PacketRaster::addLobe(const Lobe& lobe, const glm::vec3& normal) {
   kernel_.seeLobe(lanes_, receiver_count_, patch, light, lights_.emplace_back());
 }
 
-void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts,
-                            const Lobe* lobe) {
+void PacketRaster::addFacet(const Node& node, const Facet& facet, CubeKind kind,
+                            std::uint32_t parts, const Lobe* lobe) {
   if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(facet.position))) return;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - local_centre_;
@@ -268,12 +273,14 @@ void PacketRaster::addFacet(const Facet& facet, CubeKind kind, std::uint32_t par
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
   patch.lets_through = facet.opacity < 1;
   if (patch.lets_through) patch.opacity = facetOpacity(facet);
-  patch.is_solid = facetLayers(facet) >= kFidelity.least_filled;
+  patch.is_solid = isFilled(node, facet);
+  patch.lets_through = patch.lets_through || !patch.is_solid;
+  patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);
-  patch.area = facet.area;
+  patch.disk_area = facet.area;
+  patch.area = patch.is_spread ? std::max(facet.area, largestOutline(facet)) : facet.area;
   patch.most_area = mostVisibleArea(facet);
   if (sides != GatherSides::kBack) patch.radiosity = gain_ * facet.radiosity;
-  patch.disk_area = facet.area;
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + local_radius_ / distance;
   if (is_rim) patch.range = range;
@@ -328,7 +335,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts,
-                              std::span<const Lobe> lobes) {
+                              std::span<const Lobe> lobes, bool are_sheet) {
   const std::uint32_t parts = keepParts(lane_parts);
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
@@ -363,7 +370,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.lets_through = surfel.transparency != 0;
     if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
     patch.thicket = thicketPart(surfel);
-    patch.is_solid = mayTile(surfel);
+    patch.is_solid = mayTile(surfel) || are_sheet;
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float size = nearFieldSize(patch.radius, ribbon);
     const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;

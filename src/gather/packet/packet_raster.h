@@ -68,9 +68,10 @@ class PacketRaster {
                const NodeLobes* lobes = nullptr);
   // Adds a patch as it is, in the frame of the receivers.
   void addPatch(const Patch& patch);
-  // Adds those of the surfels that some receiver may see. `lobes`: as many, or none.
+  // Adds those of the surfels that some receiver may see. `lobes`: as many, or none. `are_sheet`:
+  // those of a leaf that isSheet().
   void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr,
-                  std::span<const Lobe> lobes = {});
+                  std::span<const Lobe> lobes = {}, bool are_sheet = false);
 
   // Sorts what was added, and draws it.
   void sort();
@@ -96,7 +97,9 @@ class PacketRaster {
  private:
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   std::uint32_t keepParts(const LaneParts* parts);
-  void addFacet(const Facet& facet, CubeKind kind, std::uint32_t parts, const Lobe* lobe);
+  // A facet of the node, or all of a flat one.
+  void addFacet(const Node& node, const Facet& facet, CubeKind kind, std::uint32_t parts,
+                const Lobe* lobe);
   void addLobe(const Lobe& lobe, const glm::vec3& normal);
   void addRoughNode(const Node& node, std::uint32_t parts);
   std::uint32_t facesThatSee(const Patch& patch) const;

@@ -63,7 +63,7 @@ float normalRange(const glm::vec3& normal) {
 
 Facet facetOf(const Node& node) {
   return {.position = node.position,
-          .radius = node.radius,
+          .radius = std::sqrt(3 * node.covariance.trace()),
           .normal = node.flatness * node.normal,
           .area = node.area,
           .radiosity = node.radiosity,
@@ -110,14 +110,18 @@ float partsOfBand0(const Node& node) {
 // less.
 float spherePart(const Node& node) { return std::clamp(0.5f * (partsOfBand0(node) - 2), 0.f, 1.f); }
 
-// The ellipse that spreads as the node does, projected along the direction. The covariance is
-// stored in steps of 1/255 of its trace: that much is added, lest a thin wire has no outline.
+// The ellipse of what has this covariance, projected along the direction.
+float ellipseArea(const SymmetricMatrix& covariance, const glm::vec3& direction) {
+  return 4 * kPi * std::sqrt(std::max(0.f, quadraticForm(adjugate(covariance), direction)));
+}
+
+// The covariance is stored in steps of 1/255 of its trace: that much is added, lest a thin wire has
+// no outline.
 float ellipseArea(const Node& node, const glm::vec3& direction) {
   constexpr float kStep = 1.f / 255;
   SymmetricMatrix spread = node.covariance;
   for (std::size_t i = 0; i < 3; ++i) spread.entries[i] += kStep * node.covariance.trace();
-  const float determinant = quadraticForm(adjugate(spread), direction);
-  return 4 * kPi * std::sqrt(std::max(0.f, determinant));
+  return ellipseArea(spread, direction);
 }
 }  // namespace
 
@@ -145,10 +149,24 @@ float mostVisibleArea(const Facet& facet) {
   return std::min(facet.area, kPi * facet.radius * facet.radius);
 }
 
+// The root of two principal moments is at most half of the trace.
+float largestOutline(const Facet& facet) { return 2 * kPi * facet.covariance.trace(); }
+
 float facetLayers(const Facet& facet) {
-  const float across = quadraticForm(adjugate(facet.covariance), glm::normalize(facet.normal));
-  const float ellipse = 4 * kPi * std::sqrt(std::max(0.f, across));
+  const float ellipse = ellipseArea(facet.covariance, glm::normalize(facet.normal));
   return ellipse > 0 ? facet.area / ellipse : 1;
+}
+
+bool isFilled(const Node& node, const Facet& facet) {
+  const float layers = facetLayers(facet);
+  if (layers >= kFidelity.least_filled) return true;
+  const glm::vec3 direction = glm::normalize(facet.normal);
+  float shown = 0;
+  for (std::size_t i = 0; i < node.facet_count; ++i) {
+    const float cosine = glm::dot(direction, node.facets[i].meanNormal());
+    if (node.isTwoSided(i) || cosine > 0) shown += float(node.facets[i].area) * std::abs(cosine);
+  }
+  return layers * node.area * (1.f / 65535) * shown >= kFidelity.least_filled * facet.area;
 }
 
 float facetOpacity(const Facet& facet) {
@@ -160,6 +178,38 @@ float reachOf(const Facet& facet, const glm::vec3& direction) {
   // What overlaps hides behind its own layer as behind others: it needs none
   if (facet.is_thicket) return 0;
   return layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+}
+
+bool isSheet(const Node& node) {
+  constexpr std::uint8_t kAnyTwoSided = ((1u << kMostFacets) - 1) * kNodeTwoSided;
+  if ((node.flags & kAnyTwoSided) == 0) return false;
+  // Surfels of a piece: a few may be leaves
+  constexpr float kFewest = 3;
+  const float fewest = kFewest * node.area / float(node.surfel_count);
+  if (node.isFlat()) return node.area >= fewest && isFilled(node, facetOf(node));
+  float area = 0;
+  for (std::size_t i = 0; i < node.facet_count; ++i) {
+    const Facet facet = node.facet(i);
+    if (facet.area >= fewest && isFilled(node, facet)) area += facet.area;
+  }
+  return area >= kFidelity.least_filled * node.area;
+}
+
+namespace {
+// How much of a volume something with this covariance fills, 0 to 1: all where it spreads alike in
+// all directions, nothing where it lies on a plane.
+float volumePart(const SymmetricMatrix& covariance) {
+  const float trace = covariance.trace();
+  if (!(trace >= std::numeric_limits<float>::min())) return 0;
+  const SymmetricMatrix c = (1 / trace) * covariance, minors = adjugate(c);
+  const float determinant =
+      c(0, 0) * minors(0, 0) + c(0, 1) * minors(0, 1) + c(0, 2) * minors(0, 2);
+  return minors.trace() > 0 ? std::clamp(9 * determinant / minors.trace(), 0.f, 1.f) : 0;
+}
+}  // namespace
+
+bool isThicket(const Node& node) {
+  return !isSheet(node) && volumePart(node.covariance) > kFidelity.thin_volume;
 }
 
 float thicketPart(const Surfel& surfel) {

@@ -44,11 +44,16 @@ struct SeenPart {
 SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
                   GatherSides sides);
 
-// The largest area that a facet may show in any direction.
+// The largest area that a facet may show in any direction, and the largest that it may be spread
+// over.
 float mostVisibleArea(const Facet& facet);
+float largestOutline(const Facet& facet);
 // The area of a facet over that of the ellipse that spreads as it does: about 1 for a piece of
 // surface, less where it has gaps, more where it lies behind itself.
 float facetLayers(const Facet& facet);
+// Whether a facet of a node, or a flat node, has no gaps, seen head-on: with all that other facets
+// show in that direction it fills its outline, as the slopes of folds do together.
+bool isFilled(const Node& node, const Facet& facet);
 // What a translucent facet hides of what its area covers. More area than that of the ellipse that
 // spreads as it does lies behind itself, and is as many layers.
 float facetOpacity(const Facet& facet);
@@ -70,6 +75,12 @@ float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius, const gl
 // Whether a surfel is a tile of a surface by all that it tells: spheres and two-sided ones, leaves,
 // may stand alone.
 inline bool mayTile(const Surfel& surfel) { return !surfel.isSphere() && !surfel.isTwoSided(); }
+// Whether two-sided surfels of a node lie side by side, on a plane or on each of a few, and fill
+// it: then they are tiles of a surface as well. One alone may be a leaf.
+bool isSheet(const Node& node);
+// Whether two-sided facets of a node lie before and behind each other anywhere, as leaves do: it is
+// no sheet, and no thin slab either, as half of a sheet in folds is.
+bool isThicket(const Node& node);
 // How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
 float thicketPart(const Surfel& surfel);
 // How much of a rough node is leaves or hair, 0..1: what of it is two-sided.

@@ -97,6 +97,11 @@ struct Fidelity {
 
   // --- Leaves, hair and grass ("Thickets", "Ribbons") ---
 
+  // Part, 0 to 1, of a ball that a node spreads as, 9 det C / (trace C trace adj C) of its
+  // covariance C. One that spreads as less is a slab with a tenth of its width: no leaves lie
+  // behind each other in it.
+  float thin_volume = 0.1f;
+
   // Part of a disk. A two-sided surfel without a longer side that fills less is a piece of a
   // ribbon.
   float ribbon_part = 0.15f;
