@@ -95,6 +95,7 @@ std::size_t unpack(const NumberChange& change, std::byte* row, std::size_t count
       bits = static_cast<std::uint32_t>(value);
     } else {
       bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+      if (bits == kNoPackedColor) bits = 0;
     }
     const std::uint8_t codes[4] = {
         static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),

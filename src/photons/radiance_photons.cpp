@@ -124,7 +124,7 @@ std::uint64_t PhotonDefects::total() const {
 }
 
 std::string PhotonDefects::describe() const {
-  std::string text = surfel.describe();
+  std::string text = surfel.describeKinds();
   const auto add = [&text](const SurfelDefects::Kind& kind, const char* what) {
     if (kind.count == 0) return;
     text += fmt::format("{}{} record{} with {} (first: record {})", text.empty() ? "" : ", ",
