@@ -84,6 +84,30 @@ TEST_F(CloudDoubtsTest, ConvertTellsNumbersThatStandForNoValue) {
   EXPECT_THAT(notes.notes, Contains(AllOf(HasSubstr("a.csv: z is -9999 in 1 of 2"))));
 }
 
+// --- Names and comments that a format changes or loses
+
+TEST_F(CloudDoubtsTest, NamesThatOpenVdbChangesAreTold) {
+  write("a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+        "float z\nproperty float my-value\nproperty float Q.x\nproperty float "
+        "plain_2\nend_header\n1 2 3 4 5 6\n");
+  KeepNotes notes;
+  ASSERT_TRUE(convertClouds({path("a.ply")}, path("b.vdb"), {}, notes).ok());
+  EXPECT_THAT(notes.notes, ElementsAre(HasSubstr("'my-value' is written as my_value"),
+                                       HasSubstr("'Q.x' is written as Q_x")));
+}
+
+TEST_F(CloudDoubtsTest, ObjectInformationOfPlyIsAComment) {
+  write("a.ply",
+        "ply\nformat ascii 1.0\nobj_info num_cols 12\ncomment by a test\nobj_info\nelement vertex "
+        "1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n");
+  KeepNotes notes;
+  ASSERT_TRUE(convertClouds({path("a.ply")}, path("b.ply"), {}, notes).ok());
+  EXPECT_THAT(open(path("b.ply"))->comments(), ElementsAre("obj_info num_cols 12", "by a test"));
+  ASSERT_TRUE(convertClouds({path("a.ply")}, path("b.prt"), {}, notes).ok());
+  EXPECT_THAT(notes.notes, Contains(HasSubstr("no place for comments: 2 are not kept")));
+}
+
 // --- Packed colors
 
 // Alpha 255 and red above 127 are the bits of a nan, and colors; those of the nan of texts are
