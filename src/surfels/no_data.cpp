@@ -11,6 +11,8 @@
 #include <limits>
 #include <vector>
 
+#include "cloud/surfel_names.h"
+
 namespace surfeit {
 namespace {
 
@@ -110,6 +112,60 @@ class Column {
   double largest_ = -std::numeric_limits<double>::infinity();
 };
 
+// Places of a cloud that lies elsewhere: those at 0 0 0.
+class Origins {
+ public:
+  explicit Origins(const RowLayout& element) : row_bytes_(element.row_bytes) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      axes_[axis] = element.find(kPositionNames[axis]);
+      has_place_ = has_place_ && axes_[axis] != nullptr && !axes_[axis]->is_list;
+    }
+  }
+
+  void add(Bytes rows) {
+    if (!has_place_) return;
+    for (std::size_t at = 0; at < rows.size(); at += row_bytes_) {
+      double place[3];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        place[axis] = rowValue(&rows[at + axes_[axis]->offset], axes_[axis]->type);
+      }
+      if (place[0] == 0 && place[1] == 0 && place[2] == 0) {
+        ++count_;
+        continue;
+      }
+      ++others_;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (!(std::abs(place[axis]) < 1e19) || isNoDataNumber(place[axis])) continue;
+        least_[axis] = std::min(least_[axis], place[axis]);
+        largest_[axis] = std::max(largest_[axis], place[axis]);
+      }
+    }
+  }
+
+  // Records at 0 0 0 where all others, which are several, lie farther away than they lie apart;
+  // else 0.
+  std::uint64_t strayCount() const {
+    constexpr std::uint64_t kLeastOthers = 8;
+    if (others_ < kLeastOthers) return 0;
+    double width = 0, gap = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (least_[axis] > largest_[axis]) return 0;
+      width = std::max(width, largest_[axis] - least_[axis]);
+      gap = std::max({gap, least_[axis], -largest_[axis]});
+    }
+    return gap > width ? count_ : 0;
+  }
+
+ private:
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const RowProperty* axes_[3] = {};
+  bool has_place_ = true;
+  std::size_t row_bytes_;
+  std::uint64_t count_ = 0, others_ = 0;
+  double least_[3] = {kInfinity, kInfinity, kInfinity};
+  double largest_[3] = {-kInfinity, -kInfinity, -kInfinity};
+};
+
 // Properties that can hold such a number; the first so many.
 std::vector<Column> columnsOf(const RowLayout& element) {
   std::vector<Column> columns;
@@ -123,7 +179,7 @@ std::vector<Column> columnsOf(const RowLayout& element) {
 }
 
 // Returns how many rows were seen.
-Result<std::uint64_t> look(RowReader& reader, std::vector<Column>& columns) {
+Result<std::uint64_t> look(RowReader& reader, std::vector<Column>& columns, Origins& origins) {
   const std::uint64_t row_count = reader.element().count;
   const std::size_t row_bytes = reader.element().row_bytes;
   const bool takes_places = reader.isSeekable() && row_count > kPlaces * kRowsOfPlace;
@@ -140,6 +196,7 @@ Result<std::uint64_t> look(RowReader& reader, std::vector<Column>& columns) {
     const Result<Bytes> rows = reader.readRows(at_once, buffer);
     if (!rows.ok() || rows->empty()) break;
     for (Column& column : columns) column.add(*rows);
+    origins.add(*rows);
     seen += rows->size() / row_bytes;
   }
   SURFEIT_RETURN_IF_ERROR(reader.rewind());
@@ -151,8 +208,13 @@ Result<std::uint64_t> look(RowReader& reader, std::vector<Column>& columns) {
 Result<std::string> noteOfNoData(RowReader& reader) {
   std::vector<Column> columns = columnsOf(reader.element());
   if (columns.empty()) return std::string();
-  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t seen, look(reader, columns));
+  Origins origins(reader.element());
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t seen, look(reader, columns, origins));
   std::string found, filter;
+  if (const std::uint64_t count = origins.strayCount(); count > 0) {
+    found = fmt::format("x y z are 0 in {}", count);
+    filter = "(x != 0 or y != 0 or z != 0)";
+  }
   std::size_t told = 0;
   for (std::size_t i = 0; i < columns.size();) {
     const Column::Found no_data = columns[i].noData();

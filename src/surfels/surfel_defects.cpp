@@ -95,20 +95,30 @@ std::string SurfelDefects::describeKinds() const {
   for (const KindName& row : kKindNames) {
     const Kind& kind = this->*row.kind;
     if (kind.count == 0) continue;
-    text += fmt::format("{}{}", text.empty() ? "" : ", ", kind.describe(row.name));
+    text += fmt::format("{}{}", text.empty() ? "" : ", ",
+                        kind.describe(std::string_view(kind.property) == "coverage"
+                                          ? "a coverage that is not above 0 and at most 1"
+                                          : row.name));
   }
   return text;
 }
 
 std::string SurfelDefects::wayOut() const {
   std::vector<std::string> drops;
+  bool lacks_place = false;
   for (const KindName& row : kKindNames) {
-    const std::string_view channel = channelOf((this->*row.kind).property);
+    const Kind& kind = this->*row.kind;
+    const std::string_view channel = channelOf(kind.property);
+    const bool has_property = kind.count > 0 && kind.property[0] != '\0';
+    lacks_place = lacks_place || (has_property && channel.empty());
     const std::string drop = fmt::format("{}=-", channel);
     const bool is_known = std::find(drops.begin(), drops.end(), drop) != drops.end();
     if (!channel.empty() && !is_known) drops.push_back(drop);
   }
-  if (drops.empty()) return {};
+  if (drops.empty()) {
+    return lacks_place ? "; a record without a place is no surfel: --filter leaves such records out"
+                       : "";
+  }
   return fmt::format("; --channels {} reads such records without {}, convert --set changes values",
                      fmt::join(drops, ","), drops.size() > 1 ? "these" : "it");
 }

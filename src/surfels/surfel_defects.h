@@ -38,7 +38,7 @@ struct SurfelDefects {
   // is 0.
   std::string describeKinds() const;
   // "; --channels normal=- reads ...": how to read such records without their bad properties;
-  // empty where a bad property is part of the place, or total() is 0.
+  // empty where properties are not known.
   std::string wayOut() const;
   // Both.
   std::string describe() const { return describeKinds() + wayOut(); }

@@ -70,6 +70,52 @@ TEST_F(CloudDoubtsTest, NumbersThatStandForNoValueAreTold) {
               ElementsAre(HasSubstr("height is -32768 in 1 of 3")));
 }
 
+TEST_F(CloudDoubtsTest, PlacesAtZeroFarFromAllOthersAreTold) {
+  const auto grid = [](double x, int zeros) {
+    std::string text;
+    for (int i = 0; i < 20; ++i) {
+      text += std::to_string(x + i % 5) + " " + std::to_string(i / 5) + " 7\n";
+      if (i < zeros) text += "0 0 0\n";
+    }
+    return text;
+  };
+  EXPECT_THAT(textNotes(grid(500000, 3)),
+              ElementsAre(AllOf(HasSubstr("x y z are 0 in 3 of 23 records"),
+                                HasSubstr("\"(x != 0 or y != 0 or z != 0)\""))));
+  EXPECT_THAT(textNotes(grid(-500, 1)), ElementsAre(HasSubstr("x y z are 0 in 1 of 21")));
+  EXPECT_THAT(textNotes(grid(500000, 3), "(x != 0 or y != 0 or z != 0)"),
+              Not(Contains(HasSubstr("are 0"))));
+  EXPECT_THAT(textNotes(grid(500000, 0)), IsEmpty());
+  EXPECT_THAT(textNotes("-3 0 0\n3 0 9\n" + grid(-2, 3)), IsEmpty());
+  EXPECT_THAT(textNotes("0 0 0\n5 5 5\n"), IsEmpty());
+}
+
+TEST_F(CloudDoubtsTest, SkippedRecordsNameThePropertyAndTheWayOut) {
+  const auto skipped = [&](const std::vector<std::string>& more, const std::string& row) {
+    const auto source = open(cloud(xyzAnd(more), {"1 2 3 1", row}));
+    readAll(*source);
+    return source->defects().describe();
+  };
+  EXPECT_EQ(skipped({"float radius"}, "1 2 3 -4"),
+            "1 record with a radius that is not positive (first: record 1, whose radius is -4); "
+            "--channels radius=- reads such records without it, convert --set changes values");
+  EXPECT_THAT(skipped({"float pscale"}, "1 2 3 0"), HasSubstr("--channels pscale=-"));
+  EXPECT_THAT(skipped({"float opacity"}, "1 2 3 1.5"),
+              AllOf(HasSubstr("whose opacity is 1.5"), HasSubstr("--channels opacity=-")));
+  EXPECT_THAT(skipped({"float radius"}, "1 nan 3 1"),
+              AllOf(HasSubstr("whose y is nan"), HasSubstr("--filter")));
+  EXPECT_THAT(skipped({"float radius"}, "1 2 1e13 1"), HasSubstr("whose z is 1e+13"));
+}
+
+TEST_F(CloudDoubtsTest, CoveragesOutOfRangeAreCalledSo) {
+  const auto source =
+      open(cloud(xyzAnd({"float radius", "float coverage"}), {"1 2 3 1 .5", "1 2 3 1 50"}));
+  readAll(*source);
+  EXPECT_THAT(source->defects().describe(),
+              HasSubstr("1 record with a coverage that is not above 0 and at most 1 (first: record "
+                        "1, whose coverage is 50)"));
+}
+
 TEST_F(CloudDoubtsTest, ValuesAmongOthersAreNoSuchNumbers) {
   EXPECT_THAT(textNotes("1 2 -9999\n1 2 -20000\n1 2 10000\n"), IsEmpty());
   EXPECT_THAT(textNotes("1 2 -999\n1 2 -1300\n1 2 200\n"), IsEmpty());
@@ -151,6 +197,31 @@ TEST_F(CloudDoubtsTest, PackedColorsThatAreNanAreTold) {
               Contains(HasSubstr("rgb is nan in 1 of 2 records")));
   EXPECT_THAT(notesOf({"float rgb"}, {"1 2 3 1.7e-38", "1 2 3 1.8385e-38"}),
               Not(Contains(HasSubstr("nan"))));
+}
+
+// As 0xFFC83214 is printed from an integer with a sign.
+TEST_F(CloudDoubtsTest, PackedColorsMayBeNegativeIntegers) {
+  for (const char* number : {"-3657196", "4291310100", "13120020"}) {
+    write("a.txt", std::string("x y z rgb\n1 2 3 ") + number + "\n");
+    const auto source = open(path("a.txt"));
+    ASSERT_NE(source, nullptr);
+    const std::vector<Surfel> surfels = readAll(*source);
+    ASSERT_EQ(surfels.size(), 1u);
+    EXPECT_NEAR(surfels[0].albedo.x, .5776, 1e-3) << number;  // 200
+    EXPECT_NEAR(surfels[0].albedo.y, .0319, 1e-3) << number;  // 50
+  }
+}
+
+TEST_F(CloudDoubtsTest, FieldsOfPcdThatComeAgainAreTold) {
+  const auto notes = [&](const std::string& fields) {
+    write("a.pcd", "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z " + fields +
+                       "\nSIZE 4 4 4 4 4\nTYPE F F F F F\nCOUNT 1 1 1 1 1\nWIDTH 1\nHEIGHT "
+                       "1\nPOINTS 1\nDATA ascii\n1 2 3 4 5\n");
+    return open(path("a.pcd"))->notes();
+  };
+  EXPECT_THAT(notes("intensity intensity"), ElementsAre(HasSubstr("'intensity' comes 2 times")));
+  EXPECT_THAT(notes("intensity label"), IsEmpty());
+  EXPECT_THAT(notes("_ _"), IsEmpty());
 }
 
 // --- Channels without effect

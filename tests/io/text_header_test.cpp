@@ -52,6 +52,8 @@ TEST(XyzUnits, AreTakenOffNames) {
   EXPECT_EQ(split("Easting ( us-ft )"), "Easting|us-ft");
   EXPECT_EQ(split("Radius_mm"), "Radius|mm");
   EXPECT_EQ(split("theta (deg)"), "theta|deg");
+  EXPECT_EQ(split("z/mm"), "z|mm");
+  EXPECT_EQ(split(" X "), "X|");
   // A letter behind a line is a unit behind the name of a length alone
   EXPECT_EQ(split("n_m"), "n_m|");
   EXPECT_EQ(split("x_"), "x_|");
@@ -120,7 +122,8 @@ TEST_F(TextHeaderTest, AnAIsAlphaBesideTheColor) {
 TEST_F(TextHeaderTest, CommentsBehindValuesAreTold) {
   for (const char* text :
        {"1 2 3 # a note\n4 5 6\n", "1,2,3, # 7\n4,5,6\n", "1;2;3 // a, b\n4;5;6\n",
-        "x y z\n1 2 3\t% 9 9\n4 5 6\n", "x,y,z # all my points\n1,2,3 #\n4,5,6\n"}) {
+        "x y z\n1 2 3\t% 9 9\n4 5 6\n", "x,y,z # all my points\n1,2,3 #\n4,5,6\n",
+        "x y z // here\n1 2 3 // ok\n4 5 6\n"}) {
     EXPECT_EQ(valueIn(text, 0, "z"), 3) << text;
     EXPECT_EQ(valueIn(text, 1, "x"), 4) << text;
     EXPECT_EQ(openText(text)->element().properties.size(), 3u) << text;

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -227,6 +228,13 @@ std::vector<std::string> notesOf(const PcdHeader& header) {
   std::vector<std::string> notes;
   if (header.has_view_point) {
     notes.emplace_back("the view point is not kept: positions are as the file has them");
+  }
+  std::map<std::string, int> times;
+  for (const PcdField& field : header.fields) times[field.name] += field.isPadding() ? 0 : 1;
+  for (const auto& [name, count] : times) {
+    if (count < 2) continue;
+    notes.push_back(fmt::format("field {} comes {} times: the later ones get numbers behind it",
+                                quoteText(name), count));
   }
   for (const PcdField& field : header.fields) {
     const bool is_wide = field.type == StoredType::kInt64 || field.type == StoredType::kUint64;

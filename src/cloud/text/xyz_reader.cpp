@@ -147,7 +147,10 @@ class XyzReader final : public CountedRowReader {
     const std::string_view line = trimmedLine(lines.substr(0, lines.find('\n')));
     std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns + 1);
     // What looks like a comment is a value where there is a name for it
-    if (words.size() != head_.header().file_names.size()) {
+    const std::vector<std::string>& named = head_.header().file_names;
+    const bool has_comment_names = std::any_of(named.begin(), named.end(),
+                                               [](std::string_view s) { return isTextComment(s); });
+    if (words.size() != named.size() || has_comment_names) {
       words = wordsOf(withoutComment(line), kMaxXyzColumns + 1);
     }
     const bool ends_with_empty = !line.empty() && isTextComma(line.back()) &&

@@ -97,6 +97,7 @@ std::vector<Length> lengthsOf(std::span<const std::string> names,
 }  // namespace
 
 NameWithUnit splitUnit(std::string_view word) {
+  word = trimmedLine(word);
   const std::size_t bracket = word.find_first_of("([");
   const bool has_brackets = bracket != word.npos && bracket > 0 && bracket + 1 < word.size() &&
                             (word.back() == ')' || word.back() == ']');
@@ -104,7 +105,7 @@ NameWithUnit splitUnit(std::string_view word) {
     return {trimmedLine(word.substr(0, bracket)),
             trimmedLine(word.substr(bracket + 1, word.size() - bracket - 2))};
   }
-  const std::size_t line = word.rfind('_');
+  const std::size_t line = word.find_last_of("_/");
   if (line == word.npos || line == 0) return {word, {}};
   const std::string_view unit = word.substr(line + 1);
   constexpr std::string_view kNames[] = {"x",      "y",      "z",     "easting",  "northing",

@@ -1,4 +1,4 @@
-// Units behind the names of columns: "x [m]", "radius (mm)", "Y_ft".
+// Units behind the names of columns: "x [m]", "radius (mm)", "Y_ft", "z/mm".
 #pragma once
 
 #include <span>
@@ -7,7 +7,8 @@
 
 namespace surfeit {
 
-// A name as a file has it, and the unit behind it: in brackets, or a length behind a line below.
+// A name as a file has it, without blanks around it, and the unit behind it: in brackets, or a
+// length behind a line below or a stroke (x_mm, x/mm).
 struct NameWithUnit {
   std::string_view name, unit;  // the unit without brackets; empty where there is none
 };
