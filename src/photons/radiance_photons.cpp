@@ -132,7 +132,7 @@ std::string PhotonDefects::describe() const {
   };
   add(no_normal, "a normal of zero");
   add(invalid_power, "a power that is negative, not finite or too large");
-  return text;
+  return text + surfel.wayOut();
 }
 
 Result<PhotonMapping> PhotonMapping::create(const RowLayout& element, const std::string& path) {
