@@ -312,10 +312,12 @@ std::vector<std::string> notesOfLookalikes(const RowLayout& element,
   }
   if (lacking.opacity) {
     for (const std::string& name : finder.singles(kTransparencies)) {
+      const ValueType type = element.find(name)->type;
+      const int white = isFloatType(type) ? 1 : valueTypeBytes(type) == 1 ? 255 : 65535;
       notes.push_back(fmt::format(
           "property {0} looks like what surfels let through and is not read: convert --set "
-          "\"alpha = 1 - {0}\", then --channels alpha=opacity",
-          name));
+          "\"alpha = {1} - {0}\", then --channels alpha=opacity",
+          name, white));
     }
   }
   if (lacking.size) {

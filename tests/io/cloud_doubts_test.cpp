@@ -255,6 +255,8 @@ TEST_F(CloudDoubtsTest, AlphaBesideColorsByOtherNamesIsTold) {
   for (const char* name : {"transparency", "scalar_Transparency"}) {
     EXPECT_THAT(notesOf({std::string("float ") + name}, {"1 2 3 .5"}),
                 ElementsAre(AllOf(HasSubstr(name), HasSubstr("--channels alpha=opacity"))));
+    EXPECT_THAT(notesOf({std::string("uchar ") + name}, {"1 2 3 128"}),
+                ElementsAre(HasSubstr("alpha = 255 - ")));
   }
 }
 
