@@ -235,6 +235,7 @@ nlohmann::json plyJson(const CloudInfo& info) {
     json["elements"].push_back(
         {{"name", element.name}, {"count", element.count}, {"properties", properties}});
   }
+  if (!info.surfels && !info.notes.empty()) json["notes"] = info.notes;
   addSurfels(info, json);
   return json;
 }

@@ -374,6 +374,11 @@ class ColorPlan {
         "{} is a color packed into {} of type {}: read as{}", packed.name,
         is_number || !isFloatType(packed.type) ? "whole numbers" : "the bits of numbers",
         valueTypeName(packed.type), fmt::format(" {}", fmt::join(names, " "))));
+    if (is_number || sample.no_colors == 0) return;
+    notes_.push_back(fmt::format(
+        "{} is nan in {} of {} records looked at, which is no color and becomes black: texts lose "
+        "the bits of colors with alpha 255 and red above 127; write the color as whole numbers",
+        packed.name, sample.no_colors, sample.seen));
   }
 
   const RowReader& reader_;

@@ -1,9 +1,12 @@
 #include "cloud/color_sample.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <type_traits>
+
+#include "cloud/number_change.h"
 
 namespace surfeit {
 namespace {
@@ -21,7 +24,10 @@ void addValues(const std::byte* rows, std::size_t count, std::size_t row_bytes,
       T stored;
       std::memcpy(&stored, at, sizeof stored);
       const double value = static_cast<double>(stored);
+      ++sample.seen;
       if constexpr (std::is_floating_point_v<T>) {
+        const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(stored));
+        sample.no_colors += bits == kNoPackedColor ? 1 : 0;
         if (!std::isfinite(value)) {
           sample.has_non_finite = true;
           continue;

@@ -30,6 +30,7 @@ struct ColorSample {
   std::uint64_t positive = 0;
   bool are_wholes = true;
   bool has_non_finite = false;
+  std::uint64_t seen = 0, no_colors = 0;  // values; reals among them whose bits are kNoPackedColor
   double largest_alpha = 0;
 
   bool isOpacity() const { return channel == kOpacity; }

@@ -91,10 +91,13 @@ std::size_t unpack(const NumberChange& change, std::byte* row, std::size_t count
     if constexpr (std::is_integral_v<T>) {
       bits = static_cast<std::uint32_t>(value);
     } else if (change.kind == NumberChange::Kind::kPackedNumber) {
-      if (!(value >= 0 && value <= 4294967295.0 && value == std::floor(value))) return i;
-      bits = static_cast<std::uint32_t>(value);
+      // Signed integers have alpha above 127 below 0
+      if (!(value >= -2147483648.0 && value <= 4294967295.0 && value == std::floor(value)))
+        return i;
+      bits = static_cast<std::uint32_t>(static_cast<std::int64_t>(value));
     } else {
       bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+      if (bits == kNoPackedColor) bits = 0;
     }
     const std::uint8_t codes[4] = {
         static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),

@@ -8,6 +8,10 @@
 
 namespace surfeit {
 
+// The bits of the nan that texts and most programs have. As a packed color they are none: black, as
+// all other nan (alpha 255, red 128 or more) are colors.
+inline constexpr std::uint32_t kNoPackedColor = 0x7fc00000;
+
 // What is done to the numbers of a property. They become others at the same place of a row.
 struct NumberChange {
   enum class Kind {

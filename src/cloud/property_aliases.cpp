@@ -24,6 +24,7 @@ using Triple = std::array<std::string_view, 3>;
 
 // What stands behind a stem: color_red, color_r, color_0, ...
 constexpr Triple kColorWords[] = {{"red", "green", "blue"}, {"r", "g", "b"}, {"rf", "gf", "bf"}};
+constexpr std::string_view kAlphaWords[] = {"alpha", "a", "af"};  // beside each of these
 constexpr Triple kNumbers = {"0", "1", "2"};
 constexpr Triple kAxes = {"x", "y", "z"};
 
@@ -34,6 +35,9 @@ constexpr std::string_view kColorStems[] = {"",     "diffuse_", "color_", "colou
 constexpr std::string_view kNormalStems[] = {"n",     "normal_", "normal", "n_",
                                              "norm_", "norm",    "nor_",   "normals_"};
 constexpr std::string_view kPositionStems[] = {"", "position_", "pos_", "p_"};
+
+// Single values that are one less an opacity.
+constexpr std::string_view kTransparencies[] = {"transparency", "transparence"};
 
 // What CloudCompare writes in front of the names of its scalar fields.
 constexpr std::string_view kScalarPrefix = "scalar_";
@@ -129,12 +133,25 @@ class Namer {
       if (ours[0] != kColorNames[0]) {
         if (takeTriple(ours, stem, kAxes)) return;
       } else {
-        for (const Triple& words : kColorWords) {
-          if (takeTriple(ours, stem, words)) return;
+        for (std::size_t i = 0; i < std::size(kColorWords); ++i) {
+          if (!takeTriple(ours, stem, kColorWords[i])) continue;
+          return takeAlpha(stem, {kAlphaWords[i], kAlphaWords[0]});
         }
       }
       // color0 would be a name that numbers colors
-      if (stem.ends_with('_') && takeTriple(ours, stem, kNumbers)) return;
+      if (!stem.ends_with('_') || !takeTriple(ours, stem, kNumbers)) continue;
+      if (ours[0] == kColorNames[0]) takeAlpha(stem, {"3", kAlphaWords[0]});
+      return;
+    }
+  }
+
+  // What stands beside a color of that stem.
+  void takeAlpha(std::string_view stem, std::array<std::string_view, 2> words) {
+    for (const std::string_view word : words) {
+      for (const std::string_view prefix : {std::string_view(), kScalarPrefix}) {
+        const auto found = find(std::string(prefix) + std::string(stem) + std::string(word));
+        if (found && !has("alpha")) give(*found, "alpha");
+      }
     }
   }
 
@@ -220,6 +237,26 @@ class LookalikeFinder {
     }
   }
 
+  // Names of normals of which one or two are there.
+  void tellIncomplete(std::vector<std::string>& notes) const {
+    for (const std::string_view stem : kNormalStems) {
+      std::string names, drops;
+      int count = 0;
+      for (const std::string_view axis : kAxes) {
+        const auto entry = lower_.find(std::string(stem) + std::string(axis));
+        if (entry == lower_.end()) continue;
+        ++count;
+        names += fmt::format("{}{}", names.empty() ? "" : " ", entry->second);
+        drops += fmt::format("{}{}=-", drops.empty() ? "" : ",", entry->second);
+      }
+      if (count == 0 || count == 3) continue;
+      notes.push_back(fmt::format(
+          "properties {} look like a normal that lacks a component, and are not read: surfeit "
+          "normals finds whole ones, --channels {} leaves them out",
+          names, drops));
+    }
+  }
+
  private:
   // foo=color where the three are a channel, else the properties one by one.
   std::string renaming(const std::array<std::string, 3>& names, const Triple& ours,
@@ -242,7 +279,6 @@ std::vector<std::string> knownNames(const RowLayout& element) { return Namer(ele
 std::vector<std::string> notesOfLookalikes(const RowLayout& element,
                                            const LackingChannels& lacking) {
   std::vector<std::string> notes;
-  if (!lacking.color && !lacking.normal && !lacking.size) return notes;
   LookalikeFinder finder(element);
   if (lacking.color) {
     for (const Triple& words : kColorWords) {
@@ -272,6 +308,17 @@ std::vector<std::string> notesOfLookalikes(const RowLayout& element,
     };
     finder.tell(kAxes, {kNormalNames[0], kNormalNames[1], kNormalNames[2]}, "normal", is_wanted,
                 notes);
+    finder.tellIncomplete(notes);
+  }
+  if (lacking.opacity) {
+    for (const std::string& name : finder.singles(kTransparencies)) {
+      const ValueType type = element.find(name)->type;
+      const int white = isFloatType(type) ? 1 : valueTypeBytes(type) == 1 ? 255 : 65535;
+      notes.push_back(fmt::format(
+          "property {0} looks like what surfels let through and is not read: convert --set "
+          "\"alpha = {1} - {0}\", then --channels alpha=opacity",
+          name, white));
+    }
   }
   if (lacking.size) {
     for (const std::string& name : finder.singles(kSizes)) {

@@ -16,10 +16,10 @@ namespace surfeit {
 // not know, and those of lists, stay as they are.
 std::vector<std::string> knownNames(const RowLayout& element);
 
-// One sentence for each triple of properties of a row that is called like a color, or a normal, but
-// is not read as one, with the --channels that reads it.
+// One sentence for each property, or triple of them, that is called like a color, a normal, a size
+// or an opacity, but is not read as one, with the --channels that reads it.
 struct LackingChannels {
-  bool color = false, normal = false, size = false;
+  bool color = false, normal = false, size = false, opacity = false;
 };
 std::vector<std::string> notesOfLookalikes(const RowLayout& element,
                                            const LackingChannels& lacking);

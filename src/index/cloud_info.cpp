@@ -1,5 +1,8 @@
 #include "surfeit/cloud_info.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -73,7 +76,12 @@ Status addSurfels(const std::string& path, const RowReaderOptions& options, Clou
                   Progress& progress) {
   Result<std::unique_ptr<SurfelSource>> source =
       openSurfelSource(path, /* strict= */ false, options);
-  if (!source.ok()) return {};
+  if (!source.ok()) {
+    std::string_view why = source.status().message();
+    if (why.starts_with(path)) why.remove_prefix(std::min(path.size() + 2, why.size()));
+    info.notes.push_back(fmt::format("no surfels: {}", why));
+    return {};
+  }
   // Before rows are read: notes may look at some
   std::vector<std::string> notes = (*source)->notes();
   SURFEIT_ASSIGN_OR_RETURN(CloudScan scan, scanSurfels(**source, glm::dvec3(0), progress));

@@ -113,6 +113,9 @@ void CloudTotals::add(std::span<const Surfel> added) {
     covering += surfel.radius > 0 && surfel.area < 0 ? 1 : 0;
     missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
     spheres += surfel.isSphere() ? 1 : 0;
+    const float albedo = std::max({surfel.albedo.x, surfel.albedo.y, surfel.albedo.z});
+    bright += albedo > 1 ? 1 : 0;
+    largest_albedo = std::max(largest_albedo, albedo);
     bounds.add(surfel.position);
     content += XXH3_64bits(&surfel, sizeof surfel);
   }
@@ -130,6 +133,8 @@ void CloudTotals::add(const CloudTotals& other) {
   covering += other.covering;
   missing_radius += other.missing_radius;
   spheres += other.spheres;
+  bright += other.bright;
+  largest_albedo = std::max(largest_albedo, other.largest_albedo);
   sample.insert(sample.end(), other.sample.begin(), other.sample.end());
 }
 

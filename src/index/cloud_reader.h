@@ -37,6 +37,8 @@ struct CloudTotals {
   CloudChannels channels;
   std::uint64_t missing_both = 0, missing_area = 0, missing_radius = 0, spheres = 0;
   std::uint64_t covering = 0;  // surfels that have a coverage instead of an area
+  std::uint64_t bright = 0;    // surfels with an albedo above 1
+  float largest_albedo = 0;    // of any component
   std::vector<Surfel> sample;  // surfels from all over the inputs
 
   void add(std::span<const Surfel> surfels);

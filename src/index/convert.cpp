@@ -30,6 +30,7 @@
 #include "core/up_comment.h"
 #include "index/grid_thinner.h"
 #include "index/merged_comments.h"
+#include "index/reader_notes.h"
 #include "index/scene_rows.h"
 #include "storage/file.h"
 #include "storage/output_target.h"
@@ -194,9 +195,7 @@ class Converter {
       stats_.records += element.count;
       rows_to_write_ += element.count / options_.every + (element.count % options_.every != 0);
       union_.add(element);
-      for (const std::string& note : reader->notes()) {
-        progress_.note(fmt::format("{}: {}", path, note));
-      }
+      tellNotes(*reader, progress_);
       merged_.add(path, reader->comments());
       SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
       stats_.input_bytes += file.size();

@@ -35,11 +35,23 @@ void noteSmallness(const CloudTotals& totals, Progress& progress) {
       width, kLeastWidth));
 }
 
+// A quantized scene has an albedo of 1 at most.
+void noteBrightness(const CloudTotals& totals, bool full_precision, Progress& progress) {
+  if (totals.bright == 0) return;
+  progress.note(fmt::format(
+      "{} of {} surfels have an albedo above 1, up to {:.4g}, and so would reflect more light than "
+      "they get: {}. Where colors are light, --channels color=radiosity reads them as such alone; "
+      "else convert --set \"albedo = min(albedo, 1)\"",
+      totals.bright, totals.surfels, totals.largest_albedo,
+      full_precision ? "it is kept (--precision full)" : "it is 1 in the scene"));
+}
+
 void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
                     const IndexOptions& options, Progress& progress) {
   for (const std::string& note : reader.notesOfFloats(totals)) progress.note(note);
   noteStrays(totals, reader.origin(), true, progress);
   noteSmallness(totals, progress);
+  noteBrightness(totals, options.full_precision, progress);
   if (totals.missing_both > 0) {
     progress.note(
         fmt::format("{} surfels have neither radius nor area: both follow from the "

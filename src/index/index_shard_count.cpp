@@ -37,10 +37,16 @@ constexpr bool CloudChannels::*kChannelFlags[] = {
     &CloudChannels::group,     &CloudChannels::long_side, &CloudChannels::opacity};
 
 json jsonOf(const CloudTotals& totals) {
-  json text = {{"surfels", totals.surfels},           {"skipped", totals.skipped},
-               {"content", totals.content},           {"missing_both", totals.missing_both},
-               {"missing_area", totals.missing_area}, {"missing_radius", totals.missing_radius},
-               {"spheres", totals.spheres},           {"covering", totals.covering}};
+  json text = {{"surfels", totals.surfels},
+               {"skipped", totals.skipped},
+               {"content", totals.content},
+               {"missing_both", totals.missing_both},
+               {"missing_area", totals.missing_area},
+               {"missing_radius", totals.missing_radius},
+               {"spheres", totals.spheres},
+               {"covering", totals.covering},
+               {"bright", totals.bright},
+               {"largest_albedo", totals.largest_albedo}};
   json channels = json::array();
   for (const auto flag : kChannelFlags) channels.push_back(totals.channels.*flag);
   text["channels"] = channels;
@@ -237,6 +243,8 @@ bool totalsOf(const json& facts, CloudTotals& totals) {
     totals.missing_radius = text.at("missing_radius").get<std::uint64_t>();
     totals.spheres = text.at("spheres").get<std::uint64_t>();
     totals.covering = text.at("covering").get<std::uint64_t>();
+    totals.bright = text.at("bright").get<std::uint64_t>();
+    totals.largest_albedo = text.at("largest_albedo").get<float>();
     const json& channels = text.at("channels");
     for (std::size_t i = 0; i < std::size(kChannelFlags); ++i) {
       totals.channels.*kChannelFlags[i] = channels.at(i).get<bool>();

@@ -124,7 +124,7 @@ std::uint64_t PhotonDefects::total() const {
 }
 
 std::string PhotonDefects::describe() const {
-  std::string text = surfel.describe();
+  std::string text = surfel.describeKinds();
   const auto add = [&text](const SurfelDefects::Kind& kind, const char* what) {
     if (kind.count == 0) return;
     text += fmt::format("{}{} record{} with {} (first: record {})", text.empty() ? "" : ", ",
@@ -132,7 +132,7 @@ std::string PhotonDefects::describe() const {
   };
   add(no_normal, "a normal of zero");
   add(invalid_power, "a power that is negative, not finite or too large");
-  return text;
+  return text + surfel.wayOut();
 }
 
 Result<PhotonMapping> PhotonMapping::create(const RowLayout& element, const std::string& path) {

@@ -34,61 +34,7 @@ const std::array<float, 256>& linearFromSrgb8() {
 // Whether a float can hold the value; false for NaN too.
 bool fitsFloat(double value) { return std::abs(value) <= std::numeric_limits<float>::max(); }
 
-struct KindName {
-  SurfelDefects::Kind SurfelDefects::*kind;
-  const char* name;
-};
-
-constexpr KindName kKindNames[] = {
-    {&SurfelDefects::non_finite, "a non-finite value"},
-    {&SurfelDefects::bad_radius, "a radius that is not positive"},
-    {&SurfelDefects::bad_area, "an area that is not positive"},
-    {&SurfelDefects::short_normal, "a normal too short to point"},
-    {&SurfelDefects::negative_color, "a negative radiosity or albedo"},
-    {&SurfelDefects::out_of_range, "a value too large to calculate with"},
-    {&SurfelDefects::bad_group, "a group that is not 0 to 63"},
-    {&SurfelDefects::bad_opacity, "an opacity that is not above 0 and at most 1"},
-};
-
 }  // namespace
-
-std::uint64_t SurfelDefects::total() const {
-  std::uint64_t sum = 0;
-  for (const KindName& row : kKindNames) sum += (this->*row.kind).count;
-  return sum;
-}
-
-std::uint64_t SurfelDefects::firstRecord() const {
-  SURFEIT_ASSERT(total() > 0);
-  std::uint64_t first = std::numeric_limits<std::uint64_t>::max();
-  for (const KindName& row : kKindNames) {
-    const Kind& kind = this->*row.kind;
-    if (kind.count > 0) first = std::min(first, kind.first_record);
-  }
-  return first;
-}
-
-void SurfelDefects::add(const SurfelDefects& other) {
-  for (const KindName& row : kKindNames) {
-    Kind& kind = this->*row.kind;
-    const Kind& more = other.*row.kind;
-    if (more.count == 0) continue;
-    kind.first_record =
-        kind.count == 0 ? more.first_record : std::min(kind.first_record, more.first_record);
-    kind.count += more.count;
-  }
-}
-
-std::string SurfelDefects::describe() const {
-  std::string text;
-  for (const KindName& row : kKindNames) {
-    const Kind& kind = this->*row.kind;
-    if (kind.count == 0) continue;
-    text += fmt::format("{}{} record{} with {} (first: record {})", text.empty() ? "" : ", ",
-                        kind.count, kind.count == 1 ? "" : "s", row.name, kind.first_record);
-  }
-  return text;
-}
 
 // The property of that name, absent when the element has none. `name` must outlive the mapping.
 Result<SurfelMapping::Field> SurfelMapping::findField(const RowLayout& element, const char* name,
@@ -112,13 +58,18 @@ Result<bool> SurfelMapping::findTriple(const RowLayout& element, const char* con
                                        const std::string& path, Field (&fields)[3]) {
   const char* missing = nullptr;
   const char* found = nullptr;
+  std::string drops;
   for (int i = 0; i < 3; ++i) {
     SURFEIT_ASSIGN_OR_RETURN(fields[i], findField(element, names[i], path));
     (fields[i].isPresent() ? found : missing) = names[i];
+    if (fields[i].isPresent()) drops += fmt::format("{}{}=-", drops.empty() ? "" : ",", names[i]);
   }
   if (found != nullptr && missing != nullptr) {
-    return Status::corruption(fmt::format("{}: element {}: found property {} without {}", path,
-                                          element.name, found, missing));
+    const std::string advice = std::string_view(names[0]) == kPositionNames[0]
+                                   ? ""
+                                   : fmt::format(": --channels {} leaves out what there is", drops);
+    return Status::corruption(fmt::format("{}: element {}: found property {} without {}{}", path,
+                                          element.name, found, missing, advice));
   }
   return found != nullptr;
 }
@@ -369,9 +320,7 @@ bool SurfelMapping::decode(const std::byte* row, std::uint64_t record, Surfel& s
                            SurfelDefects& defects) const {
   const Defect defect = decodeRow(row, surfel);
   if (defect.kind == nullptr) return true;
-  SurfelDefects::Kind& kind = defects.*defect.kind;
-  if (kind.count == 0 || record < kind.first_record) kind.first_record = record;
-  ++kind.count;
+  (defects.*defect.kind).add(record, defect.property, defect.value);
   return false;
 }
 

@@ -16,32 +16,9 @@
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "surfels/float_row_decoder.h"
+#include "surfels/surfel_defects.h"
 
 namespace surfeit {
-
-// Records that hold no valid surfel, by kind, each with the number of the first (from 0).
-struct SurfelDefects {
-  struct Kind {
-    std::uint64_t count = 0;
-    std::uint64_t first_record = 0;
-  };
-  Kind non_finite;      // a NaN or infinity in any property that is used
-  Kind bad_radius;      // radius zero or negative, where the cloud has radii
-  Kind bad_area;        // area zero or negative, where the cloud has areas
-  Kind short_normal;    // a normal that is not zero (a sphere) but too short (< 1e-6) to point
-  Kind negative_color;  // negative radiosity or albedo
-  Kind out_of_range;    // beyond kLargestLength, kLargestArea or kLargestColor
-  Kind bad_group;       // group that is no whole number from 0 to 63, where the cloud has groups
-  Kind bad_opacity;     // opacity that is 0 or less (nothing is there), or above 1
-
-  std::uint64_t total() const;
-  // Number of the first record with any defect. Only when total() is not 0.
-  std::uint64_t firstRecord() const;
-  // Takes in the defects of another part of the same file. In any order the sum is the same.
-  void add(const SurfelDefects& other);
-  // "3 records with a non-finite value (first: record 17), ..."; empty when total() is 0.
-  std::string describe() const;
-};
 
 // Turns rows of an element into surfels by property name:
 //   x y z                      position (required)

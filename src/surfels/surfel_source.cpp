@@ -15,6 +15,7 @@
 #include "surfels/dark_colors.h"
 #include "surfels/generated/recipe_surfel_source.h"
 #include "surfels/generated/scene_recipe.h"
+#include "surfels/no_data.h"
 #include "surfels/unused_alpha.h"
 
 namespace surfeit {
@@ -42,11 +43,13 @@ class RowSurfelSource final : public SurfelSource {
     const CloudChannels& has = mapping_.channels();
     const LackingChannels lacking = {.color = !has.radiosity && !has.albedo,
                                      .normal = !has.normal,
-                                     .size = !has.radius && !has.area};
+                                     .size = !has.radius && !has.area,
+                                     .opacity = !has.opacity && !hasCoverage()};
     for (std::string& note : notesOfLookalikes(reader_->element(), lacking)) {
       notes.push_back(std::move(note));
     }
     noteOpacity(notes);
+    noteCoverage(notes);
     if (std::string note = noteOfDegrees(statedCrs(comments())); !note.empty()) {
       notes.push_back(std::move(note));
     }
@@ -119,7 +122,8 @@ class RowSurfelSource final : public SurfelSource {
     std::vector<std::string> notes;
     if (!is_untouched_) return notes;
     for (const Result<std::string>& note :
-         {noteOfUnusedAlpha(*reader_, mapping_.channels().opacity), noteOfDarkColors(*reader_)}) {
+         {noteOfUnusedAlpha(*reader_, mapping_.channels().opacity), noteOfDarkColors(*reader_),
+          noteOfNoData(*reader_)}) {
       if (note.ok() && !note->empty()) notes.push_back(*note);
     }
     return notes;
@@ -137,6 +141,21 @@ class RowSurfelSource final : public SurfelSource {
           "opacity_r opacity_g opacity_b are not used: a surfel has one opacity; --channels "
           "opacity_g=opacity takes the green one");
     }
+  }
+
+  // A coverage without effect.
+  void noteCoverage(std::vector<std::string>& notes) const {
+    if (mapping_.hasCoverage() || reader_->element().find("coverage") == nullptr) return;
+    const CloudChannels& has = mapping_.channels();
+    if (has.area) {
+      notes.push_back(
+          "coverage is not used beside area: convert --set \"area *= coverage\" multiplies both, "
+          "--channels coverage=- leaves it out");
+      return;
+    }
+    notes.push_back(
+        "coverage is not used without a radius: --channels coverage=opacity takes it for how "
+        "opaque surfels are, --channels coverage=- leaves it out");
   }
 
   std::unique_ptr<RowReader> reader_;

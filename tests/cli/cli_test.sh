@@ -371,7 +371,7 @@ nan 0.01 0.5 0 1 0
 0.4 0.01 0.5 0 1 0
 PLY
   run 0 gather cornell.sft receivers.ply -o result.ply --memory 64M
-  says "1 record with a non-finite value (first: record 1)"
+  says "1 record with a non-finite value (first: record 1, whose"
   exists result.ply
   rm result.ply
   run 3 gather cornell.sft receivers.ply -o result.ply --memory 64M --strict

@@ -44,7 +44,7 @@ alphaThatIsNotUsedIsTold() {
   saysNot "alpha of"
   run 0 index low.ply -o out.sft --channels alpha=opacity
   saysNot "alpha of"
-  says "skipped 1 record with an opacity that is not above 0 and at most 1 (first: record 2)"
+  says "skipped 1 record with an opacity that is not above 0 and at most 1 (first: record 2, whose opacity is 0)"
   gzip -k low.ply
   run 0 index low.ply.gz -o out.sft
   saysOnce "is below 255 and not used"
@@ -157,7 +157,7 @@ linesMayEndAsOnOldMacs() {
 whatIsSkippedIsToldOnce() {
   awk -v CONVFMT=%.10g 'BEGIN { print "x,y,z,radius"; for (i = 0; i < 200; ++i) print 500000 + i / 4 "," 5000000 + i % 7 "," i % 5 "," (i == 17 ? -1 : .5) }' > far.csv
   run 0 index far.csv -o out.sft -v
-  saysOnce "skipped 1 record with a radius that is not positive (first: record 17)"
+  saysOnce "skipped 1 record with a radius that is not positive (first: record 17, whose radius is -1)"
   gzip -k far.csv
   run 0 index far.csv.gz -o out.sft
   saysOnce "skipped 1 record"

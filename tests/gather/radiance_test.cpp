@@ -354,7 +354,8 @@ TEST_F(Radiance, InvalidPhotonsAreSkippedAndTold) {
   ASSERT_EQ(notes_.notes.size(), 1u);
   EXPECT_THAT(notes_.notes[0], HasSubstr("1 record with a normal of zero (first: record 7)"));
   EXPECT_THAT(notes_.notes[0], HasSubstr("2 records with a power that is negative"));
-  EXPECT_THAT(notes_.notes[0], HasSubstr("1 record with a non-finite value (first: record 10)"));
+  EXPECT_THAT(notes_.notes[0],
+              HasSubstr("1 record with a non-finite value (first: record 10, whose x is inf)"));
 
   RadianceOptions strict;
   strict.strict = true;

@@ -121,6 +121,42 @@ TEST_F(LasLossTest, CommentsThatAreLostAreTold) {
   }
 }
 
+// Units are told where they are not metres, by keys and by text.
+TEST_F(LasLossTest, UnitsThatAreNotMetresAreTold) {
+  const auto notesOf = [&](std::uint16_t number, const std::string& data) {
+    write("a.las", withRecords(makeLas(4, 6, 3), {lasRecord("LASF_Projection", number, data)}));
+    const auto reader = openLas(path("a.las"), {});
+    EXPECT_TRUE(reader.ok());
+    return reader.ok() ? (*reader)->notes() : std::vector<std::string>();
+  };
+  const auto ofKeys = [&](std::uint16_t unit, std::uint16_t vertical_unit) {
+    std::vector<std::uint16_t> words = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 2992};
+    if (unit != 0) words.insert(words.end(), {3076, 0, 1, unit});
+    if (vertical_unit != 0) words.insert(words.end(), {4099, 0, 1, vertical_unit});
+    return notesOf(34735, {reinterpret_cast<const char*>(words.data()), 2 * words.size()});
+  };
+  EXPECT_THAT(ofKeys(0, 0), testing::IsEmpty());
+  EXPECT_THAT(ofKeys(9001, 9001), testing::IsEmpty());
+  EXPECT_THAT(ofKeys(9002, 0),
+              ElementsAre(AllOf(HasSubstr("positions are in 'feet'"), HasSubstr("ft:m"))));
+  EXPECT_THAT(ofKeys(9003, 9003), ElementsAre(HasSubstr("convert --units us-ft:m")));
+  EXPECT_THAT(ofKeys(9001, 9002), ElementsAre(AllOf(HasSubstr("heights are in 'feet'"),
+                                                    HasSubstr("--set \"z *= 0.3048\""))));
+  EXPECT_THAT(ofKeys(9002, 9001), ElementsAre(HasSubstr("--set \"z *= 3.2808399\"")));
+  EXPECT_THAT(ofKeys(0, 9003), ElementsAre(HasSubstr("heights are in 'US survey feet'")));
+  EXPECT_THAT(ofKeys(9999, 0), ElementsAre(HasSubstr("'unit 9999 of EPSG'")));
+
+  const std::string degrees = "PROJCS[\"a\",GEOGCS[\"b\",UNIT[\"degree\",0.0174532925]],";
+  EXPECT_THAT(notesOf(2112, degrees + "UNIT[\"metre\",1]]"), testing::IsEmpty());
+  EXPECT_THAT(notesOf(2112, degrees + "UNIT[\"foot_survey_us\",0.3048006096012192]]"),
+              ElementsAre(HasSubstr("convert --units us-ft:m")));
+  EXPECT_THAT(notesOf(2112, "PROJCRS[\"a\",CS[Cartesian,2],LENGTHUNIT[\"foot\",0.3048]]"),
+              ElementsAre(HasSubstr("positions are in 'foot'")));
+  EXPECT_THAT(notesOf(2112, "COMPD_CS[\"c\"," + degrees +
+                                "UNIT[\"metre\",1]],VERT_CS[\"v\",UNIT[\"foot\",0.3048]]]"),
+              ElementsAre(HasSubstr("heights are in 'foot'")));
+}
+
 // Whole degrees of old point formats are no multiples of .006.
 TEST_F(LasLossTest, AnglesBecomeTheNearestStep) {
   for (const ValueType type : {ValueType::kInt8, kFloat}) {

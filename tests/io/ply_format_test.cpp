@@ -51,7 +51,7 @@ TEST(PlyHeader, BothSpellingsOfTypesAndCrLfAreRead) {
       "end_header\r\n1 2 3 4\r\n",
       "a.ply");
   ASSERT_TRUE(header.ok()) << header.status().message();
-  EXPECT_THAT(header->comments, ElementsAre("two  words"));
+  EXPECT_THAT(header->comments, ElementsAre("obj_info x", "two  words"));
   const std::vector<RowProperty>& properties = header->elements[0].properties;
   ASSERT_EQ(properties.size(), 4u);
   EXPECT_EQ(properties[0].type, ValueType::kInt8);

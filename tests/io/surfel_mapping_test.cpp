@@ -294,7 +294,10 @@ TEST(SurfelMapping, GroupsAreIntegersFromZeroTo63) {
   EXPECT_EQ(surfels[0].group, 0u);
   EXPECT_EQ(surfels[1].group, 63u);
   EXPECT_EQ(surfels[2].group, 5u);
-  EXPECT_EQ(defects.describe(), "3 records with a group that is not 0 to 63 (first: record 12)");
+  EXPECT_EQ(
+      defects.describe(),
+      "3 records with a group that is not 0 to 63 (first: record 12, whose light_group is 64); "
+      "--channels light_group=- reads such records without it, convert --set changes values");
   EXPECT_EQ(mapping.describeDefect(&rows[3 * 16]), "light_group is -1, expected 0 to 63");
 }
 
@@ -317,7 +320,9 @@ TEST(SurfelMapping, GroupsMayBeWholeFloats) {
     EXPECT_EQ(surfels[0].group, 0u);
     EXPECT_EQ(surfels[1].group, 63u);
     EXPECT_EQ(surfels[2].group, 5u);
-    EXPECT_EQ(defects.describe(), "3 records with a group that is not 0 to 63 (first: record 12)");
+    EXPECT_EQ(defects.describe(),
+              "3 records with a group that is not 0 to 63 (first: record 12, whose group is 64); "
+              "--channels group=- reads such records without it, convert --set changes values");
     EXPECT_EQ(mapping.describeDefect(&rows[4 * element.row_bytes]),
               "group is 2.5, expected 0 to 63");
   }

@@ -136,11 +136,14 @@ TEST_F(SurfelSourceTest, DefectsAreSkippedAndCountedByKind) {
     EXPECT_EQ(defects.short_normal.first_record, 6u);
     EXPECT_EQ(defects.negative_color.first_record, 7u);
     EXPECT_EQ(defects.describe(),
-              "3 records with a non-finite value (first: record 1), "
-              "2 records with a radius that is not positive (first: record 3), "
-              "1 record with an area that is not positive (first: record 5), "
-              "1 record with a normal too short to point (first: record 6), "
-              "1 record with a negative radiosity or albedo (first: record 7)");
+              "3 records with a non-finite value (first: record 1, whose y is nan), "
+              "2 records with a radius that is not positive (first: record 3, whose radius is 0), "
+              "1 record with an area that is not positive (first: record 5, whose area is 0), "
+              "1 record with a normal too short to point (first: record 6, whose length of nx, ny, "
+              "nz is 1e-09), "
+              "1 record with a negative radiosity or albedo (first: record 7, whose blue is -1); "
+              "--channels radius=-,area=-,normal=-,color=- reads such records without these, "
+              "convert --set changes values");
     ASSERT_TRUE(source->rewind().ok());
     EXPECT_EQ(source->defects().total(), 0u);
     EXPECT_EQ(source->defects().describe(), "");

@@ -88,7 +88,7 @@ TEST_F(TextCloudTest, CommasBetweenOtherSeparatorsAreDecimal) {
 
 TEST_F(TextCloudTest, UnitsOfPlacesAreTold) {
   for (const char* head :
-       {"X [ft],Y [ft],Z [ft]", "x (FT);y (FT);z (m)", "Easting(ft)\tNorthing(ft)\tElevation"}) {
+       {"X [ft],Y [ft],Z [ft]", "x (FT);y (FT);z (ft)", "Easting(ft)\tNorthing(ft)\tElevation"}) {
     EXPECT_EQ(rowOf(std::string(head) + "\n1;2;3\n", 0), "x=1 y=2 z=3") << head;
     EXPECT_THAT(notes_, Contains(HasSubstr("places are in 'ft'"))) << head;
   }

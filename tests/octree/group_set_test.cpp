@@ -107,7 +107,7 @@ TEST_F(GroupedSceneTest, RecordsOfNoGroupAreSkippedAndCounted) {
   EXPECT_EQ(indexFiles({path("a.ply")}, path("a.sft")).skipped_records, 2u);
   EXPECT_THAT(progress_.notes,
               testing::Contains(HasSubstr("2 records with a group that is not 0 to 63 (first: "
-                                          "record 1)")));
+                                          "record 1, whose light_group is 64)")));
   IndexOptions strict;
   strict.strict = true;
   EXPECT_THAT(indexClouds({path("a.ply")}, path("b.sft"), strict, progress_).status().message(),

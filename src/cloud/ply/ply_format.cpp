@@ -90,7 +90,11 @@ class HeaderParser {
 
  private:
   Status parseLine(std::string_view keyword, std::string_view rest) {
-    if (keyword.empty() || keyword == "obj_info") return {};
+    if (keyword.empty()) return {};
+    if (keyword == "obj_info" && !trimmed(rest).empty()) {
+      header_.comments.push_back(fmt::format("obj_info {}", trimmed(rest)));
+    }
+    if (keyword == "obj_info") return {};
     if (keyword == "comment") {
       if (!trimmed(rest).empty()) header_.comments.emplace_back(trimmed(rest));
       return {};

@@ -66,6 +66,8 @@ bool storeReal(std::string_view text, std::byte* out) {
   } else if (error != std::errc{}) {
     return false;
   }
+  // One nan, whatever sign it is printed with
+  if (std::isnan(value)) value = std::numeric_limits<T>::quiet_NaN();
   std::memcpy(out, &value, sizeof value);
   return true;
 }

@@ -93,7 +93,12 @@ struct PlyReader::State {
     SURFEIT_RETURN_IF_ERROR(cursor.failure());
     const std::string expected = fmt::format("{} of type {}", property.name, valueTypeName(type));
     if (!token.empty()) {
-      return damaged(fmt::format("found {}, expected {}", quoteText(token), expected));
+      const bool has_comma = token.find(',') != token.npos;
+      return damaged(fmt::format("found {}, expected {}{}", quoteText(token), expected,
+                                 has_comma
+                                     ? ": PLY has points before decimals and no commas; write "
+                                       "it with points"
+                                     : ""));
     }
     if (cursor.isAtEnd()) return endsEarly(expected);
     return damaged(fmt::format("line ends early, expected {}", expected));

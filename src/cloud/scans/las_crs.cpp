@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cloud/scans/las_format.h"
+#include "cloud/scans/las_units.h"
 #include "core/crs_comment.h"
 #include "storage/byte_coding.h"
 
@@ -18,7 +19,8 @@ namespace {
 // Keys of GeoTIFF, and what a code says that has none
 constexpr std::uint16_t kModelType = 1024, kCitation = 1026, kGeographic = 2048,
                         kGeographicCitation = 2049, kProjected = 3072, kProjectedCitation = 3073,
-                        kVertical = 4096, kVerticalUnit = 4099, kUserDefined = 32767;
+                        kProjectedUnit = 3076, kVertical = 4096, kVerticalUnit = 4099,
+                        kUserDefined = 32767;
 constexpr std::uint16_t kProjectedModel = 1, kGeographicModel = 2, kGeocentricModel = 3;
 constexpr std::string_view kEpsg = "EPSG:", kUnitWords = " vertical unit ";
 constexpr std::size_t kMostData = 65535;  // of a record before the points
@@ -52,7 +54,7 @@ std::string_view wordOf(std::uint16_t model) {
 
 // What the keys of a system say that have one number each; 0: not said.
 struct Keys {
-  std::uint16_t model = 0, projected = 0, geographic = 0, vertical = 0, vertical_unit = 0;
+  std::uint16_t model = 0, projected = 0, geographic = 0, vertical = 0, vertical_unit = 0, unit = 0;
 
   std::uint16_t* find(std::uint16_t key) {
     switch (key) {
@@ -66,6 +68,8 @@ struct Keys {
         return &vertical;
       case kVerticalUnit:
         return &vertical_unit;
+      case kProjectedUnit:
+        return &unit;
       default:
         return nullptr;
     }
@@ -136,6 +140,16 @@ std::vector<std::string> LasCrs::comments() const {
     comments.push_back(std::string(kCrsComment) + keys);
   }
   return comments;
+}
+
+std::string LasCrs::unitNote() const {
+  if (!text_.empty()) return noteOfLasUnits(lasUnitsOfText(text_));
+  Keys said;
+  for (std::size_t at = 4; at + 4 <= keys_.size(); at += 4) {
+    std::uint16_t* const number = said.find(keys_[at]);
+    if (number != nullptr && keys_[at + 1] == 0) *number = keys_[at + 3];
+  }
+  return noteOfLasUnits({lasUnitOfCode(said.unit), lasUnitOfCode(said.vertical_unit)});
 }
 
 std::string LasCrs::keysComment() const {

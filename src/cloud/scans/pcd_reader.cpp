@@ -6,10 +6,12 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "cloud/number_change.h"
 #include "cloud/parts/counted_row_reader.h"
 #include "cloud/parts/fixed_record_reader.h"
 #include "cloud/parts/property_renames.h"
@@ -22,6 +24,7 @@ namespace surfeit {
 namespace {
 
 constexpr std::size_t kTextBlockRows = 4096;
+constexpr std::size_t kPassBytes = 256 << 10;
 
 // How records become rows.
 class PcdLayout {
@@ -43,6 +46,10 @@ class PcdLayout {
                         layout.all_.properties[i].name, names[i]));
       }
       layout.addMove(layout.values_[i], element.row_bytes);
+      for (PackedReal& packed : layout.packed_) {
+        const std::size_t at = layout.values_[i].offset;
+        if (at >= packed.offset && at < packed.offset + 4) packed.to.push_back(element.row_bytes);
+      }
       element.properties.push_back(layout.all_.properties[i]);
       element.properties.back().name = names[i];
       element.properties.back().offset = element.row_bytes;
@@ -63,6 +70,10 @@ class PcdLayout {
                        [](const Move& move) { return move.from == move.to; });
   }
 
+  // Whether colors stand in floats, and how many that were decoded were nan: no color, and black.
+  bool hasPackedReals() const { return !packed_.empty(); }
+  std::uint64_t lostColors() const { return lost_colors_; }
+
   // What a text has for packed colors becomes their four bytes.
   void packColors(std::byte* records, std::size_t count) const {
     for (const std::size_t offset : packed_reals_) {
@@ -81,6 +92,7 @@ class PcdLayout {
       const StoredPlace place{move.type, false, move.components, record_bytes_};
       decodeStored(place, records + move.from, count, rows + move.to, row_bytes_);
     }
+    for (const PackedReal& packed : packed_) blacken(packed, records, count, rows);
   }
 
  private:
@@ -102,7 +114,25 @@ class PcdLayout {
         return static_cast<std::uint32_t>(static_cast<std::int32_t>(value));
       }
     }
-    return std::isnan(value) ? 0 : std::bit_cast<std::uint32_t>(static_cast<float>(value));
+    return std::isnan(value) ? kNoPackedColor
+                             : std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  }
+
+  struct PackedReal {             // a color in a float
+    std::size_t offset = 0;       // of a record
+    std::vector<std::size_t> to;  // places of its codes in a row
+  };
+
+  // Codes of no color.
+  void blacken(const PackedReal& packed, const std::byte* records, std::size_t count,
+               std::byte* rows) const {
+    for (std::size_t i = 0; i < count; ++i) {
+      std::uint32_t bits;
+      std::memcpy(&bits, records + i * record_bytes_ + packed.offset, sizeof bits);
+      if (bits != kNoPackedColor) continue;
+      ++lost_colors_;
+      for (const std::size_t to : packed.to) rows[i * row_bytes_ + to] = std::byte{0};
+    }
   }
 
   static bool isPosition(std::string_view name) {
@@ -127,6 +157,7 @@ class PcdLayout {
       }
     }
     if (field.isPackedColor()) {
+      if (field.type == StoredType::kFloat32) packed_.push_back({record_bytes_, {}});
       // Little-endian: blue is the first byte
       addProperty("red", {StoredType::kUint8, record_bytes_ + 2});
       addProperty("green", {StoredType::kUint8, record_bytes_ + 1});
@@ -182,6 +213,8 @@ class PcdLayout {
   std::vector<Move> moves_;
   bool moves_are_plain_ = true;
   std::vector<std::size_t> packed_reals_;  // where doubles stand in records that code colors
+  std::vector<PackedReal> packed_;
+  mutable std::uint64_t lost_colors_ = 0;
 };
 
 std::string nameOfFormat(const PcdHeader& header) {
@@ -195,6 +228,13 @@ std::vector<std::string> notesOf(const PcdHeader& header) {
   std::vector<std::string> notes;
   if (header.has_view_point) {
     notes.emplace_back("the view point is not kept: positions are as the file has them");
+  }
+  std::map<std::string, int> times;
+  for (const PcdField& field : header.fields) times[field.name] += field.isPadding() ? 0 : 1;
+  for (const auto& [name, count] : times) {
+    if (count < 2) continue;
+    notes.push_back(fmt::format("field {} comes {} times: the later ones get numbers behind it",
+                                quoteText(name), count));
   }
   for (const PcdField& field : header.fields) {
     const bool is_wide = field.type == StoredType::kInt64 || field.type == StoredType::kUint64;
@@ -220,11 +260,14 @@ class PcdBinaryReader final : public FixedRecordReader {
   std::string formatName() const override { return nameOfFormat(header_); }
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = notesOf(header_);
+    if (!note_.empty()) notes.push_back(note_);
     if (trailingBytes() > 0) {
       notes.push_back(fmt::format("{} bytes after the last point are not read", trailingBytes()));
     }
     return notes;
   }
+  const PcdLayout& layout() const { return layout_; }
+  void addNote(std::string note) { note_ = std::move(note); }
 
  private:
   void decodeRecords(const std::byte* records, std::size_t count, std::byte* rows) const override {
@@ -234,6 +277,7 @@ class PcdBinaryReader final : public FixedRecordReader {
 
   PcdHeader header_;
   PcdLayout layout_;
+  std::string note_;
 };
 
 class PcdTextReader final : public CountedRowReader {
@@ -252,6 +296,11 @@ class PcdTextReader final : public CountedRowReader {
     parser_.emplace(layout_.columns(), layout_.recordBytes(), TextExtras{});
     SURFEIT_RETURN_IF_ERROR(checkCount());
     return moveTo(0);
+  }
+
+  const PcdLayout& layout() const { return layout_; }
+  void addNote(std::string note) {
+    if (!note.empty()) notes_.push_back(std::move(note));
   }
 
  private:
@@ -312,6 +361,11 @@ class PcdCompressedReader final : public CountedRowReader {
 
   bool isSeekable() const override { return true; }
 
+  const PcdLayout& layout() const { return layout_; }
+  void addNote(std::string note) {
+    if (!note.empty()) notes_.push_back(std::move(note));
+  }
+
  private:
   // [ bytes that follow : u32 ] [ bytes that come out : u32 ] LZF
   Status unpack() {
@@ -369,11 +423,37 @@ class PcdCompressedReader final : public CountedRowReader {
   AlignedBuffer values_;
 };
 
+// How many colors are nan, of up to so many points at the begin; empty where there are none.
+template <typename Reader>
+Result<std::string> noteOfLostColors(Reader& reader) {
+  constexpr std::size_t kMostPoints = 65536;
+  if (!reader.layout().hasPackedReals()) return std::string();
+  const std::size_t at_once = std::max<std::size_t>(
+      1, kPassBytes / std::max<std::size_t>(1, reader.layout().recordBytes()));
+  std::uint64_t seen = 0;
+  AlignedBuffer buffer;
+  while (seen < kMostPoints) {
+    // Whoever reads the points is told of what is wrong with them
+    const Result<Bytes> rows = reader.readRows(at_once, buffer);
+    if (!rows.ok() || rows->empty()) break;
+    seen += rows->size() / reader.element().row_bytes;
+  }
+  const std::uint64_t lost = reader.layout().lostColors();
+  SURFEIT_RETURN_IF_ERROR(reader.rewind());
+  if (lost == 0) return std::string();
+  return fmt::format(
+      "the color is nan in {} of {} points looked at, which is none and becomes black: texts lose "
+      "the bits of colors with alpha 255 and red above 127; write PCD with TYPE U",
+      lost, seen);
+}
+
 template <typename Reader>
 Result<std::unique_ptr<RowReader>> openAs(ByteInput input, PcdHeader header,
                                           std::span<const ChannelRename> renames) {
   auto reader = std::make_unique<Reader>(std::move(input), std::move(header));
   SURFEIT_RETURN_IF_ERROR(reader->open(renames));
+  SURFEIT_ASSIGN_OR_RETURN(std::string note, noteOfLostColors(*reader));
+  reader->addNote(std::move(note));
   return std::unique_ptr<RowReader>(std::move(reader));
 }
 

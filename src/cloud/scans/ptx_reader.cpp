@@ -163,10 +163,11 @@ class PtxCursor {
       values_ = numbers.count;
     }
     if (numbers.count != values_ || values_ == 0) {
-      return damaged(fmt::format("found {}, expected {}", quoteText(line_),
-                                 values_ == 0
-                                     ? "4 or 7 numbers: x y z intensity, red green blue"
-                                     : fmt::format("{} numbers as in the points before", values_)));
+      return damaged(fmt::format(
+          "found {}, expected {}", quoteText(line_),
+          values_ == 0
+              ? "4 or 7 numbers with points before decimals: x y z intensity, red green blue"
+              : fmt::format("{} numbers as in the points before", values_)));
     }
     for (std::size_t i = kPlainValues; i < values_; ++i) {
       const double value = numbers.values[i];

@@ -178,6 +178,14 @@ bool isTextComment(std::string_view line) {
   return line.starts_with('#') || line.starts_with('%') || line.starts_with("//");
 }
 
+std::string_view withoutComment(std::string_view line) {
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    if (endsWord(line[i - 1]) && isTextComment(line.substr(i)))
+      return trimmedLine(line.substr(0, i));
+  }
+  return line;
+}
+
 std::vector<std::string_view> wordsOf(std::string_view line, std::size_t most) {
   std::vector<std::string_view> words;
   const char* at = line.data();
@@ -281,7 +289,7 @@ bool parseTextRow(std::string_view line, std::span<const TextColumn> columns, st
   // A comma may end the line, as some programs write it
   at = skipBlanks(at, end);
   if (at < end && isTextComma(*at)) at = skipBlanks(at + 1, end);
-  return at == end;
+  return at == end || (endsWord(at[-1]) && isTextComment({at, static_cast<std::size_t>(end - at)}));
 }
 
 std::string describeTextRow(std::string_view line, std::span<const TextColumn> columns) {
@@ -300,7 +308,10 @@ std::string describeTextRow(std::string_view line, std::span<const TextColumn> c
     }
   }
   const std::string_view found = words.size() > columns.size() ? words.back() : line;
-  return fmt::format("found {}, expected the end of the line", quoteText(found));
+  return fmt::format("found {}, expected the end of the line{}", quoteText(found),
+                     line.find(',') == line.npos
+                         ? ""
+                         : ": commas part values; where they stand before decimals, write points");
 }
 
 bool isTextExtra(std::string_view line, TextExtras extras) {

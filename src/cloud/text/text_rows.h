@@ -24,6 +24,8 @@ constexpr bool isTextComma(char c) { return c == ',' || c == ';' || c == '|'; }
 std::string_view trimmedLine(std::string_view line);
 // Whether a line, trimmed, is a comment: it begins with #, % or //.
 bool isTextComment(std::string_view line);
+// The line up to a comment behind values, which begins with #, % or // behind a blank or comma.
+std::string_view withoutComment(std::string_view line);
 // The words of a line; an empty one between two commas. No more than `most`.
 std::vector<std::string_view> wordsOf(std::string_view line, std::size_t most);
 
@@ -73,8 +75,8 @@ class LineSource {
   std::size_t begin_ = 0, lines_end_ = 0, end_ = 0;
 };
 
-// A value of every line. Words of columns that are not kept are passed over unseen; they may be
-// empty between commas.
+// A value of every line, behind the last of which a comment may stand. Words of columns that are
+// not kept are passed over unseen; they may be empty between commas.
 struct TextColumn {
   std::string name;  // for messages
   ValueType type = ValueType::kFloat32;

@@ -134,7 +134,7 @@ Result<TextDecimals> judgeDecimals(LineSource& source, bool has_names, bool all_
     const std::size_t bytes = lines.size();
     while (!lines.empty()) {
       const std::size_t end = std::min(lines.find('\n'), lines.size());
-      const std::string_view line = trimmedLine(lines.substr(0, end));
+      const std::string_view line = withoutComment(trimmedLine(lines.substr(0, end)));
       lines.remove_prefix(std::min(end + 1, lines.size()));
       ++line_count;
       if (line.empty() || isTextComment(line) || isTextCount(line)) continue;

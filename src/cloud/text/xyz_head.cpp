@@ -51,6 +51,7 @@ bool XyzHead::isData(std::string_view line) const {
   std::string text(line);
   std::replace(text.begin(), text.end(), '"', ' ');
   if (isDataOf(wordsOf(text, kMaxXyzColumns + 1))) return true;
+  if (isDataOf(wordsOf(withoutComment(text), kMaxXyzColumns + 1))) return true;
   std::replace(text.begin(), text.end(), ',', '.');
   return isDataOf(wordsOf(text, kMaxXyzColumns + 1));
 }

@@ -1,11 +1,16 @@
 #include "cloud/text/xyz_header.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <iterator>
 
 #include "cloud/parts/property_renames.h"
+#include "cloud/row_layout.h"
 #include "cloud/text/text_rows.h"
+#include "cloud/text/xyz_units.h"
 
 namespace surfeit {
 namespace {
@@ -164,14 +169,6 @@ Words split(std::string_view line, char separator) {
   return words;
 }
 
-// Where a unit in brackets begins behind a name; its size when there is none.
-std::size_t beginOfUnit(std::string_view name) {
-  const std::size_t bracket = name.find_first_of("([");
-  const bool has_unit =
-      bracket != name.npos && bracket > 0 && (name.back() == ')' || name.back() == ']');
-  return has_unit ? bracket : name.size();
-}
-
 std::string inLowerCase(std::string_view word) {
   std::string text(word);
   std::transform(text.begin(), text.end(), text.begin(),
@@ -179,20 +176,23 @@ std::string inLowerCase(std::string_view word) {
   return text;
 }
 
-// In lower case, without a unit in brackets.
-std::string plainName(std::string_view word) {
-  return inLowerCase(trimmedLine(word.substr(0, beginOfUnit(word))));
-}
+// In lower case, without a unit.
+std::string plainName(std::string_view word) { return inLowerCase(splitUnit(word).name); }
 
-// "ft" of "X [ft]"; metres, and no unit, are nothing.
-std::string unitOf(std::string_view word) {
-  const std::size_t begin = beginOfUnit(word);
-  if (begin + 2 > word.size()) return {};
-  const std::string unit =
-      inLowerCase(trimmedLine(word.substr(begin + 1, word.size() - begin - 2)));
-  const bool is_metres =
-      unit == "m" || unit == "metre" || unit == "metres" || unit == "meter" || unit == "meters";
-  return is_metres ? std::string() : unit;
+// Brackets behind a blank are part of the name before: x [m] y [m].
+Words withUnits(Words words) {
+  Words joined;
+  bool is_open = false;
+  for (std::string& word : words) {
+    const bool begins = !word.empty() && (word[0] == '[' || word[0] == '(');
+    if ((begins || is_open) && !joined.empty()) {
+      joined.back() += ' ' + word;
+      is_open = word.find_first_of(")]") == word.npos;
+    } else {
+      joined.push_back(std::move(word));
+    }
+  }
+  return is_open ? Words() : joined;
 }
 
 // The letters of the file made fit for a property.
@@ -214,6 +214,55 @@ bool hasFellows(std::string_view letter, const Words& plain) {
   return true;
 }
 
+// Of names that come twice those that stand together are the color: A B C R G B. `names` has the
+// first of each.
+void chooseColors(const Words& plain, Words& names) {
+  constexpr std::string_view kColors[] = {"red", "green", "blue"};
+  std::array<std::string, 3> aliases;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto found = std::find(names.begin(), names.end(), kColors[i]);
+    if (found == names.end()) return;
+    aliases[i] = plain[static_cast<std::size_t>(found - names.begin())];
+  }
+  // In this order before any other
+  const auto begin = std::search(plain.begin(), plain.end(), aliases.begin(), aliases.end());
+  auto at = begin;
+  for (at = begin == plain.end() ? plain.begin() : begin; plain.end() - at >= 3; ++at) {
+    if (std::is_permutation(aliases.begin(), aliases.end(), at)) break;
+  }
+  if (plain.end() - at < 3) return;
+  for (std::string& name : names) {
+    if (std::find(std::begin(kColors), std::end(kColors), name) != std::end(kColors)) name.clear();
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto found = std::find(at, plain.end(), aliases[i]);
+    names[static_cast<std::size_t>(found - plain.begin())] = kColors[i];
+  }
+}
+
+// An a is alpha beside the color.
+bool isBesideColor(const Words& names, std::size_t column) {
+  const auto is_color = [&](std::size_t i) {
+    return i < names.size() && (names[i] == "red" || names[i] == "green" || names[i] == "blue");
+  };
+  return is_color(column + 1) || (column > 0 && is_color(column - 1));
+}
+
+// Tells of names that stand over several columns, and what these are.
+std::string noteOfRepeats(const Words& words, const Words& names) {
+  std::string repeats;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (std::count(words.begin(), words.end(), words[i]) == 1) continue;
+    repeats += fmt::format("{}column {} ({}) is {}", repeats.empty() ? "" : ", ", i + 1,
+                           quoteText(words[i]), names[i]);
+  }
+  if (repeats.empty()) return {};
+  return fmt::format(
+      "names stand over several columns: {}; --channels NUMBER=NAME names them "
+      "otherwise, NUMBER=- drops them",
+      repeats);
+}
+
 XyzHeader headerOf(Words words) {
   Words plain;
   for (const std::string& word : words) plain.push_back(plainName(word));
@@ -225,10 +274,12 @@ XyzHeader headerOf(Words words) {
   // Names that we know
   Words names(words.size());
   for (const Alias& row : kAliases) {
+    if (row.alias == "alpha") chooseColors(plain, names);  // all colors have theirs
     const auto found = std::find(plain.begin(), plain.end(), row.alias);
     if (found == plain.end() || contains(names, row.name)) continue;
-    if (row.alias == "a" && !contains(names, "red")) continue;
-    std::string& name = names[static_cast<std::size_t>(found - plain.begin())];
+    const auto column = static_cast<std::size_t>(found - plain.begin());
+    if (row.alias == "a" && !isBesideColor(names, column)) continue;
+    std::string& name = names[column];
     if (name.empty() && hasFellows(row.alias, plain)) name = row.name;
   }
   XyzHeader header;
@@ -253,11 +304,8 @@ XyzHeader headerOf(Words words) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i].empty()) names[i] = distinct.add(fitName(words[i]));
   }
-  for (const std::string_view place : {"x", "y", "z"}) {
-    const auto found = std::find(names.begin(), names.end(), place);
-    if (!header.unit.empty() || found == names.end()) continue;
-    header.unit = unitOf(words[static_cast<std::size_t>(found - names.begin())]);
-  }
+  header.unit_note = noteOfUnits(names, words);
+  header.repeat_note = noteOfRepeats(words, names);
   header.names = std::move(names);
   header.file_names = std::move(words);
   return header;
@@ -274,12 +322,20 @@ XyzHeader parseXyzHeader(std::string_view line, std::size_t column_count) {
   for (const char separator : {';', '\t', ',', '|', ' '}) {
     if (separator != ' ' && line.find(separator) == line.npos) continue;
     Words words = split(line, separator);
+    if (separator == ' ') words = withUnits(std::move(words));
     if (words.size() > kMaxXyzColumns) continue;
     XyzHeader header = headerOf(std::move(words));
     if (header.file_names.empty()) continue;
     const bool fits = column_count == 0 || header.file_names.size() == column_count;
     if (fits || best.file_names.empty()) best = std::move(header);
     if (fits) break;
+  }
+  // Or a comment stands behind the names
+  const std::string_view names = withoutComment(line);
+  const bool fits = best.file_names.size() == column_count;
+  if (column_count > 0 && !fits && names.size() < line.size()) {
+    XyzHeader header = parseXyzHeader(names, column_count);
+    if (header.file_names.size() == column_count) return header;
   }
   return best;
 }

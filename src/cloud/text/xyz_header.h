@@ -16,9 +16,9 @@ struct XyzHeader {
   std::vector<std::string> names;
   // As the file has them, without quotes.
   std::vector<std::string> file_names;
-  // Of x, y and z, as names have them behind: "ft"; where they differ that of the first that is no
-  // m. Empty: m, or nothing is said.
-  std::string unit;
+  // What is to be told of units behind names, and of names that stand over several columns; empty
+  // where there are none.
+  std::string unit_note, repeat_note;
   // Why a line that names columns cannot be used; empty when it can.
   std::string refusal;
 };
@@ -26,8 +26,10 @@ struct XyzHeader {
 // Names of the columns when the line, a comment or not, names a position: x y z, easting northing
 // elevation (e n h), points:0 points:1 points:2. Names are parted by semicolons, tabs or commas,
 // and may have blanks then; else by blanks. Of several ways the one that gives `column_count` names
-// is taken, if any. Quotes around names and units behind them ("x (m)") are taken off; names that
-// we know are ours in any case (r g b are red green blue); a name that comes again gets a number.
+// is taken, if any. Quotes around names, units behind them (cloud/text/xyz_units.h) and a comment
+// behind all are taken off; names that we know are ours in any case (r g b are red green blue); of
+// colors that come again those that stand together are the color; any other name that comes again
+// gets a number.
 // Latitude and longitude are refused: they are angles.
 XyzHeader parseXyzHeader(std::string_view line, std::size_t column_count = 0);
 

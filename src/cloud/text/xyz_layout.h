@@ -22,6 +22,7 @@ struct XyzColumn {
   bool are_wholes = true;     // 235 and 235.0
   bool counts_rows = true;    // each is one more than that of the row before
   std::uint64_t missing = 0;  // rows whose cell has no value
+  std::uint64_t rounded = 0;  // rows with a whole number that no double holds
   double least = std::numeric_limits<double>::infinity();
   double largest = -std::numeric_limits<double>::infinity();
 
@@ -35,7 +36,8 @@ struct XyzTable {
   std::vector<bool> are_unit_vectors;
   // Lines of one whole number: the counts of scans
   std::uint64_t scan_count = 0;
-  std::string count_note;  // of the first count that is not that of the rows behind it
+  std::uint64_t commented_rows = 0;  // with a comment behind the values
+  std::string count_note;            // of the first count that is not that of the rows behind it
   // The first line that is not as the columns say: what to answer, and whether it has a comma
   Status refusal;
   bool has_comma_in_refused = false;

@@ -60,6 +60,7 @@ class XyzReader final : public CountedRowReader {
     SURFEIT_RETURN_IF_ERROR(nameColumns(table));
     noteScans(table);
     noteMissing(table);
+    noteRounded(table);
     element_.count = table.row_count;
     SURFEIT_RETURN_IF_ERROR(setColumns(names_, typeXyzColumns(table, names_)));
     return moveTo(0);
@@ -145,6 +146,13 @@ class XyzReader final : public CountedRowReader {
     SURFEIT_ASSIGN_OR_RETURN(const std::string_view lines, source_.lines());
     const std::string_view line = trimmedLine(lines.substr(0, lines.find('\n')));
     std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns + 1);
+    // What looks like a comment is a value where there is a name for it
+    const std::vector<std::string>& named = head_.header().file_names;
+    const bool has_comment_names = std::any_of(named.begin(), named.end(),
+                                               [](std::string_view s) { return isTextComment(s); });
+    if (words.size() != named.size() || has_comment_names) {
+      words = wordsOf(withoutComment(line), kMaxXyzColumns + 1);
+    }
     const bool ends_with_empty = !line.empty() && isTextComma(line.back()) &&
                                  head_.header().file_names.size() == words.size() + 1;
     if (ends_with_empty) words.emplace_back();
@@ -161,11 +169,9 @@ class XyzReader final : public CountedRowReader {
     head_.end(words.size());
     comments_ = head_.comments();
     if (!head_.note().empty()) notes_.push_back(head_.note());
-    if (const std::string& unit = head_.header().unit; !unit.empty()) {
-      notes_.push_back(fmt::format(
-          "places are in {}, as the names of columns say, and stay so: convert --units scales them",
-          quoteText(unit)));
-    }
+    const XyzHeader& header = head_.header();
+    if (!header.unit_note.empty()) notes_.push_back(header.unit_note);
+    if (!header.repeat_note.empty() && !hasNumbers()) notes_.push_back(header.repeat_note);
     SURFEIT_RETURN_IF_ERROR(checkHead(words.size()));
     names_ = head_.header().names;
     if (names_.empty()) {
@@ -200,10 +206,11 @@ class XyzReader final : public CountedRowReader {
           fmt::format("{}: the names of the columns: {}", path_, header.refusal));
     }
     if (!head_.otherNames().empty() && header.names.empty() && !hasNumbers()) {
-      return Status::corruption(fmt::format(
-          "{}: found columns named {}, expected x, y and z among them: say which are the position: "
-          "--channels 1=x,2=y,3=z (numbers of columns)",
-          path_, quoteText(fmt::format("{}", fmt::join(head_.otherNames(), " ")))));
+      return Status::corruption(
+          fmt::format("{}: found columns named {}, expected one x, y and z each among them: say "
+                      "which are the position: "
+                      "--channels 1=x,2=y,3=z (numbers of columns)",
+                      path_, quoteText(fmt::format("{}", fmt::join(head_.otherNames(), " ")))));
     }
     if (column_count == 0 || header.names.empty() || named == column_count) return {};
     return Status::corruption(fmt::format("{}: line {}: {} values, expected {} as the header has",
@@ -300,6 +307,19 @@ class XyzReader final : public CountedRowReader {
           fmt::format("{} scans, one after another, are read as one cloud", table.scan_count));
     }
     if (!table.count_note.empty()) notes_.push_back(table.count_note);
+  }
+
+  void noteRounded(const XyzTable& table) {
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (table.columns[i].rounded == 0) continue;
+      notes_.push_back(fmt::format(
+          "column {} ({}) has whole numbers beyond 2^53 in {} of {} rows, which doubles round: "
+          "shorten them in the file, or leave the column out by --channels {}=-",
+          i + 1, names_[i], table.columns[i].rounded, table.row_count, i + 1));
+    }
+    if (table.commented_rows == 0) return;
+    notes_.push_back(fmt::format("comments behind the values of {} of {} rows are not kept",
+                                 table.commented_rows, table.row_count));
   }
 
   void noteMissing(const XyzTable& table) {

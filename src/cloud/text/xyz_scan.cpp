@@ -12,7 +12,8 @@
 namespace surfeit {
 namespace {
 
-constexpr int kFloatDigits = 6;  // so many are given back by every float
+constexpr int kFloatDigits = 6;    // so many are given back by every float
+constexpr int kDoubleDigits = 15;  // and by every double
 
 bool isShortNumber(std::string_view word) {
   int digits = 0;
@@ -21,6 +22,18 @@ bool isShortNumber(std::string_view word) {
     digits += c >= '0' && c <= '9' ? 1 : 0;
   }
   return digits <= kFloatDigits;
+}
+
+// Whether a word is a whole number of more digits than the double that it became: it has others.
+bool isRoundedWhole(std::string_view word, double value) {
+  if (word.starts_with('-') || word.starts_with('+')) word.remove_prefix(1);
+  constexpr double kMostExact = 9007199254740992;  // 2^53
+  if (word.size() <= kDoubleDigits || std::abs(value) < kMostExact) return false;
+  if (!std::all_of(word.begin(), word.end(), [](char c) { return c >= '0' && c <= '9'; })) {
+    return false;
+  }
+  word.remove_prefix(std::min(word.find_first_not_of('0'), word.size()));
+  return fmt::format("{:.0f}", std::abs(value)) != word;
 }
 
 class XyzScanner {
@@ -49,7 +62,12 @@ class XyzScanner {
       at = word_end;
     }
     while (at < end && (isTextBlank(*at) || isTextComma(*at))) ++at;
-    if (at < end) return false;
+    if (at < end) {
+      const std::string_view rest(at, static_cast<std::size_t>(end - at));
+      if (at == line.data() || !isTextComment(rest)) return false;
+      if (!isTextBlank(at[-1]) && !isTextComma(at[-1])) return false;
+      ++table_.commented_rows;
+    }
     takeVectors();
     ++table_.row_count;
     ++rows_of_scan_;
@@ -100,6 +118,7 @@ class XyzScanner {
   static void takeValue(std::string_view word, double value, XyzColumn& column) {
     column.least = std::min(column.least, value);
     column.largest = std::max(column.largest, value);
+    if (isRoundedWhole(word, value)) ++column.rounded;
     if (column.are_wholes) column.are_wholes = value == std::floor(value) && std::isfinite(value);
     if (column.are_floats && !isShortNumber(word)) column.are_floats = floatHolds(word);
   }

@@ -93,6 +93,11 @@ Status VdbPointsWriter::declare(const RowWriterOptions& options) {
       return Status::invalidArgument(
           fmt::format("{}: two channels become attribute {}", path_, attribute.name));
     }
+    if (attribute.name == vdbName(channel.name) && attribute.name != channel.name) {
+      notes_.push_back(
+          fmt::format("OpenVDB has letters, digits and _ in names: {} is written as {}",
+                      quoteText(channel.name), attribute.name));
+    }
     if (attribute.kind == VdbWrittenAttribute::Kind::kPosition)
       position_attribute_ = attributes_.size();
     attributes_.push_back(std::move(attribute));

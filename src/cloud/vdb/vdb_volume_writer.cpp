@@ -93,6 +93,10 @@ void VdbVolumeWriter::addGrid(const RowChannel& channel, std::vector<std::size_t
       notes_.push_back(fmt::format("uint32 above 2^31 becomes 2^31 - 1: {}", name));
     }
   }
+  if (vdbName(name) != name) {
+    notes_.push_back(fmt::format("OpenVDB has letters, digits and _ in names: {} is written as {}",
+                                 quoteText(name), vdbName(name)));
+  }
   const char* type = is_whole ? "int32" : (components.size() == 3 ? "vec3s" : "float");
   grids_.push_back({channel, std::move(components), vdbName(name), type});
 }

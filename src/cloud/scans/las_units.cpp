@@ -1,0 +1,104 @@
+#include "cloud/scans/las_units.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <iterator>
+
+#include "cloud/row_layout.h"
+
+namespace surfeit {
+namespace {
+
+struct Known {
+  std::uint16_t code;
+  const char* name;
+  double metres;
+  const char* option;  // as `convert --units` calls it
+};
+constexpr Known kUnits[] = {
+    {9001, "metres", 1, "m"},
+    {9002, "feet", .3048, "ft"},
+    {9003, "US survey feet", 1200. / 3937, "us-ft"},
+    {9036, "kilometres", 1000, "km"},
+    {1033, "centimetres", .01, "cm"},
+    {1025, "millimetres", .001, "mm"},
+};
+
+bool isSame(double a, double b) { return std::abs(a - b) <= 1e-9 * std::abs(b); }
+bool isMetre(const LasUnit& unit) { return unit.name.empty() || isSame(unit.metres, 1); }
+
+// "ft", or a number of metres.
+std::string optionOf(const LasUnit& unit) {
+  const auto known = std::find_if(std::begin(kUnits), std::end(kUnits), [&](const Known& row) {
+    return isSame(row.metres, unit.metres);
+  });
+  return known != std::end(kUnits) ? known->option : fmt::format("{:.12g}", unit.metres);
+}
+
+}  // namespace
+
+LasUnit lasUnitOfCode(std::uint16_t code) {
+  constexpr std::uint16_t kUserDefined = 32767;
+  if (code == 0 || code == kUserDefined) return {};
+  for (const Known& row : kUnits) {
+    if (row.code == code) return {row.name, row.metres};
+  }
+  return {fmt::format("unit {} of EPSG", code), 0};
+}
+
+// [LENGTH]UNIT["name", metres, ...]
+LasUnits lasUnitsOfText(std::string_view text) {
+  LasUnits units;
+  constexpr std::string_view kWord = "UNIT[\"";
+  for (std::size_t at = text.find(kWord); at != text.npos; at = text.find(kWord, at + 1)) {
+    const std::size_t begin = at + kWord.size(), end = text.find('"', begin);
+    if (end == text.npos) break;
+    const std::size_t number = text.find_first_of("0123456789.", end);
+    double metres = 0;
+    if (number != text.npos && text.find_first_not_of(", ", end + 1) == number) {
+      std::from_chars(text.data() + number, text.data() + text.size(), metres);
+    }
+    const std::string name(text.substr(begin, end - begin));
+    const bool is_of_length = text.substr(0, at).ends_with("LENGTH");
+    const bool is_plain = at == 0 || text[at - 1] == ',' || text[at - 1] == ' ';
+    const bool is_angle = name.starts_with("deg") || name.starts_with("Deg") ||
+                          name.starts_with("rad") || name.starts_with("Rad") ||
+                          name.starts_with("grad") || name.starts_with("unity");
+    if ((!is_of_length && !is_plain) || is_angle) continue;
+    LasUnit& unit = units.horizontal.name.empty() ? units.horizontal : units.vertical;
+    unit = {name, metres};
+  }
+  return units;
+}
+
+std::string noteOfLasUnits(const LasUnits& units) {
+  const LasUnit &places = units.horizontal, &heights = units.vertical;
+  const bool are_alike = heights.name.empty() || places.name.empty()
+                             ? isMetre(heights)
+                             : heights.name == places.name || isSame(heights.metres, places.metres);
+  if (are_alike && isMetre(places)) return {};
+  if (are_alike) {
+    return fmt::format(
+        "positions are in {}, as the coordinate reference system says, and stay so{}",
+        quoteText(places.name),
+        places.metres > 0 ? fmt::format(": convert --units {}:m scales them", optionOf(places))
+                          : "");
+  }
+  const double metres = places.name.empty() ? 1 : places.metres;
+  const std::string advice =
+      heights.metres > 0 && metres > 0
+          ? fmt::format(": convert --set \"z *= {:.9g}\" makes {} of heights",
+                        heights.metres / metres,
+                        places.name.empty() ? "metres" : "the unit of x and y")
+          : std::string();
+  return fmt::format(
+      "heights are in {}, as the coordinate reference system says, x and y in {}, and all stay "
+      "so{}",
+      quoteText(heights.name.empty() ? "metres" : heights.name),
+      places.name.empty() ? "the unit of its code" : quoteText(places.name), advice);
+}
+
+}  // namespace surfeit

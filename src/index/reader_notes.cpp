@@ -1,0 +1,18 @@
+#include "index/reader_notes.h"
+
+#include <fmt/format.h>
+
+#include "surfels/no_data.h"
+
+namespace surfeit {
+
+void tellNotes(RowReader& reader, Progress& progress) {
+  for (const std::string& note : reader.notes()) {
+    progress.note(fmt::format("{}: {}", reader.path(), note));
+  }
+  // A failure will be that of whoever reads the rows
+  const Result<std::string> note = noteOfNoData(reader);
+  if (note.ok() && !note->empty()) progress.note(fmt::format("{}: {}", reader.path(), *note));
+}
+
+}  // namespace surfeit
