@@ -45,7 +45,7 @@ def _callback(progress: ProgressLike) -> Optional[ProgressCallback]:
     if progress is not True:
         return progress
     try:
-        from tqdm.auto import tqdm
+        from tqdm.auto import tqdm  # type: ignore[import]  # its types are a package of their own
     except ImportError:
         return None
     return _Bars(tqdm)
