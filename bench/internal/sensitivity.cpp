@@ -54,6 +54,7 @@ const std::vector<Number>& allNumbers() {
       {"nested", &F::nested, 0},
       {"own_order", &F::own_order, 0},
       {"least_filled", &F::least_filled, 0},
+      {"fewest_tiles", &F::fewest_tiles, 1},
       {"thin_volume", &F::thin_volume, 0},
       {"hull_widening", &F::hull_widening, 0},
       {"ribbon_part", &F::ribbon_part, 0},

@@ -269,7 +269,9 @@ inline V RimOfBoth(V cosine, V range) {
 // `half_area`: a quarter of its own area on the face; `spread_sq`: the determinant of its spread
 // there, where it is one unit away.
 inline V EvenPart(const Patch& patch, V half_area, V spread_sq, V inverse_sq) {
-  constexpr float kOfRectangle = 0.95f;  // pi / 3.3 of an ellipse with its covariance
+  // Of the ellipse with its covariance a rectangle fills this
+  constexpr float kOfRectangle = 3 / kPi;
+  constexpr float kLeast = 0.01f;  // lest what shows nothing is divided by 0
   // The ellipse is 4 pi times the root of the determinant of the covariance, which is the spread
   // times a sixth of the square of the radius
   const float scale = 4 / (kPi * patch.radius * patch.radius * 2 / 3);
@@ -277,7 +279,7 @@ inline V EvenPart(const Patch& patch, V half_area, V spread_sq, V inverse_sq) {
   const V fill = hn::Mul(hn::Mul(Splat(scale), half_area), ellipse_inverse);
   const float steepness = (kOfRectangle - kFidelity.least_filled) / kFidelity.least_filled;
   const V even = hn::Div(fill, hn::NegMulAdd(Splat(steepness), fill, Splat(kOfRectangle)));
-  return hn::IfThenElse(hn::Lt(fill, Splat(kFidelity.least_filled)), hn::Max(even, Splat(0.01f)),
+  return hn::IfThenElse(hn::Lt(fill, Splat(kFidelity.least_filled)), hn::Max(even, Splat(kLeast)),
                         Splat(1));
 }
 

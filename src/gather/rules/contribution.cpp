@@ -180,12 +180,16 @@ float reachOf(const Facet& facet, const glm::vec3& direction) {
   return layerReach(facet.radius, quadraticForm(facet.covariance, direction));
 }
 
-bool isSheet(const Node& node) {
+namespace {
+bool hasTwoSidedPieces(const Node& node) {
   constexpr std::uint8_t kAnyTwoSided = ((1u << kMostFacets) - 1) * kNodeTwoSided;
-  if ((node.flags & kAnyTwoSided) == 0) return false;
-  // Surfels of a piece: a few may be leaves
-  constexpr float kFewest = 3;
-  const float fewest = kFewest * node.area / float(node.surfel_count);
+  return (node.flags & kAnyTwoSided) != 0;
+}
+}  // namespace
+
+bool isSheet(const Node& node) {
+  if (!hasTwoSidedPieces(node)) return false;
+  const float fewest = kFidelity.fewest_tiles * node.area / float(node.surfel_count);
   if (node.isFlat()) return node.area >= fewest && isFilled(node, facetOf(node));
   float area = 0;
   for (std::size_t i = 0; i < node.facet_count; ++i) {
@@ -209,7 +213,8 @@ float volumePart(const SymmetricMatrix& covariance) {
 }  // namespace
 
 bool isThicket(const Node& node) {
-  return !isSheet(node) && volumePart(node.covariance) > kFidelity.thin_volume;
+  return hasTwoSidedPieces(node) && volumePart(node.covariance) > kFidelity.thin_volume &&
+         !isSheet(node);
 }
 
 float thicketPart(const Surfel& surfel) {
