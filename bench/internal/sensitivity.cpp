@@ -57,6 +57,7 @@ const std::vector<Number>& allNumbers() {
       {"fewest_tiles", &F::fewest_tiles, 1},
       {"thin_volume", &F::thin_volume, 0},
       {"hull_widening", &F::hull_widening, 0},
+      {"most_in_hull", &F::most_in_hull, 0},
       {"ribbon_part", &F::ribbon_part, 0},
       {"ribbon_elongation", &F::ribbon_elongation, kNever},
       {"ribbon_radius", &F::ribbon_radius, 0},

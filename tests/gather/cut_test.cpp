@@ -220,7 +220,7 @@ struct CountSurfels {
     fading += parts != nullptr;
   }
   void node(const Node& node, const LaneParts* parts) { add(double(node.surfel_count), parts); }
-  void leaf(const Node&, bool) {}
+  OpenedNode opened(const Node&, const LaneParts*, OpenedNode) { return {}; }
   void surfels(std::span<const Surfel> run, const LaneParts* parts) {
     add(double(run.size()), parts);
   }
@@ -263,7 +263,7 @@ struct SumOfHeights {
     }
   }
   void node(const Node& node, const LaneParts* parts) { add(node.position.z, parts); }
-  void leaf(const Node&, bool) {}
+  OpenedNode opened(const Node&, const LaneParts*, OpenedNode) { return {}; }
   void surfels(std::span<const Surfel> run, const LaneParts* parts) {
     for (const Surfel& surfel : run) add(surfel.position.z, parts);
   }

@@ -17,11 +17,11 @@ inline constexpr double kUsualRms = .01, kLargeRms = .02;
 // Goal of all: rms .02, worst .1, none above .02, none above .01 in three batches of four (99 % of
 // scenes), median light .01; final: half of each. Counts are of 25 scenes, in proportion where a
 // batch has fewer.
-inline constexpr FidelityLimits kFrontLimits = {.06, .25, 5, 2, .02};
+inline constexpr FidelityLimits kFrontLimits = {.03, .25, 3, 1, .02};
 inline constexpr FidelityLimits kBothLimits = {.012, .04, 2, 1, .1};
 inline constexpr FidelityLimits kBackLimits = {.03, .15, 5, 2, .15};
 inline constexpr FidelityLimits kFinalLimits = {.003, .012, 1, 1, .05};
-inline constexpr FidelityLimits kGlossyLimits = {.01, .04, 1, 1, .02};
+inline constexpr FidelityLimits kGlossyLimits = {.01, .045, 1, 1, .02};
 inline constexpr FidelityLimits kConeLimits = {.01, .04, 1, 1, .06};
 inline constexpr FidelityLimits kFalloffLimits = {.02, .1, 2, 1, .06};
 inline constexpr FidelityLimits kSubsetLimits = {.012, .04, 1, 1, .05};
@@ -31,8 +31,8 @@ inline constexpr double kMostBounceLight = .03;
 
 // A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
 // by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.
-inline constexpr double kUsualStep = .004, kMostStep = .008;
-inline constexpr double kUnusualSteps = 100;
+inline constexpr double kUsualStep = .004, kMostStep = .0105;
+inline constexpr double kUnusualSteps = 110;
 // Light, rms over the mean of a scene: of half of the scenes, and of nine tenths.
 inline constexpr double kMedianLightStep = .002, kLargeLightStep = .06;
 
@@ -42,9 +42,10 @@ inline constexpr double kMedianLightStep = .002, kLargeLightStep = .06;
 struct InvarianceLimits {
   double exact, fast;
 };
-// Nodes decide which two-sided surfels are of a sheet, and another place has other nodes.
-inline constexpr InvarianceLimits kMovedLimits = {.005, .01};
-inline constexpr InvarianceLimits kTurnedLimits = {.004, .005};
+// Nodes decide which two-sided surfels are of a sheet, and their hulls close gaps between surfels;
+// another place has other nodes.
+inline constexpr InvarianceLimits kMovedLimits = {.009, .011};
+inline constexpr InvarianceLimits kTurnedLimits = {.007, .0075};
 inline constexpr InvarianceLimits kScaledLimits = {0, 0};
 
 }  // namespace surfeit

@@ -61,16 +61,6 @@ CellGrid::CellGrid(const ShapePatch& patch, int columns, int rows)
 }
 
 SurfaceSite CellGrid::site(int column, int row, double s, double t) const {
-  const glm::dvec3 a = corner(column, row), b = corner(column + 1, row);
-  const glm::dvec3 c = corner(column, row + 1), d = corner(column + 1, row + 1);
-  SurfaceSite site;
-  site.position = (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d);
-  site.normal = glm::normalize(glm::cross(d - a, c - b));
-  site.spacing = std::sqrt(cellArea(column, row));
-  return site;
-}
-
-SurfaceSite CellGrid::trueSite(int column, int row, double s, double t) const {
   const glm::dvec3 a = corner(column, row), d = corner(column + 1, row + 1);
   const glm::dvec3 between = s > t ? corner(column + 1, row) : corner(column, row + 1);
   SurfaceSite site;
@@ -87,7 +77,8 @@ double CellGrid::cellArea(int column, int row) const {
 }
 
 double CellGrid::cellRadius(int column, int row) const {
-  const glm::dvec3 middle = site(column, row, .5, .5).position;
+  glm::dvec3 middle(0);
+  for (int i = 0; i < 4; ++i) middle += .25 * corner(column + i % 2, row + i / 2);
   double radius = 0;
   for (int i = 0; i < 4; ++i) {
     radius = std::max(radius, glm::length(corner(column + i % 2, row + i / 2) - middle));

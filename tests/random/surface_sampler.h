@@ -45,10 +45,8 @@ class CellGrid {
   glm::dvec3 corner(int column, int row) const {
     return corners_[std::size_t(row) * std::size_t(columns_ + 1) + std::size_t(column)];
   }
-  // Bilinear within the cell; s and t in 0..1.
+  // On the two triangles that the cell is, cut from its first corner to its last; s and t in 0..1.
   SurfaceSite site(int column, int row, double s, double t) const;
-  // On the two triangles that the cell is in truth, cut from its first corner to its last.
-  SurfaceSite trueSite(int column, int row, double s, double t) const;
   double cellArea(int column, int row) const;
   double cellRadius(int column, int row) const;  // of the circle around its middle
 

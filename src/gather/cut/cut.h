@@ -92,13 +92,20 @@ using SiblingClassifier = SiblingClasses (*)(std::span<const Node>, const Packet
                                              const CutRules&);
 SiblingClassifier fastestSiblingClassifier();
 
+// What a visitor knows of a node that it was told to look into.
+struct OpenedNode {
+  bool has_hull = false;  // its hull was drawn, or that of a node above it
+  bool is_sheet = false;  // isSheet()
+};
+
 // Calls visit.node(const Node&, const LaneParts*) for the nodes that some receiver sees as a whole,
-// visit.leaf(const Node&, bool) and visit.surfels(std::span<const Surfel>, const LaneParts*) for
-// leaves that some receiver looks into; the bool: isSheet(parent). The parts say how much they
-// count for each receiver; null: wholly for all. Surfels of groups that are not seen are left out.
-// `Reader` has the functions of PagedOctree::Reader. The order depends on octree and view alone.
-// A visitor with visit.instance(const Node&, const LaneParts*), which returns a Status, takes
-// leaves that some receiver may see by that alone (InstanceTree). One thread at a time.
+// visit.opened(const Node&, const LaneParts*, OpenedNode) for those that some receiver looks into,
+// and visit.surfels(std::span<const Surfel>, const LaneParts*) for the surfels of leaves among
+// them. The parts say how much they count for each receiver; null: wholly for all. opened() is
+// given what it answered of the parent. Surfels of groups that are not seen are left out. `Reader`
+// has the functions of PagedOctree::Reader. The order depends on octree and view alone. A visitor
+// with visit.instance(const Node&, const LaneParts*), which returns a Status, takes leaves that
+// some receiver may see by that alone (InstanceTree). One thread at a time.
 class CutWalk {
  public:
   explicit CutWalk(const GatherRules& rules)
@@ -121,8 +128,7 @@ class CutWalk {
               Visit&& visit, const LaneParts* all = nullptr) {
     nodes_visited_ = surfels_visited_ = 0;
     std::size_t stack_count = 0;
-    stack_[stack_count++] = {kRootRange, all != nullptr, false,
-                             all != nullptr ? *all : LaneParts{}};
+    stack_[stack_count++] = {kRootRange, all != nullptr, {}, all != nullptr ? *all : LaneParts{}};
     while (stack_count > 0) {
       const Siblings from = stack_[--stack_count];
       SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> siblings, octree.nodes(from.range));
@@ -153,9 +159,9 @@ class CutWalk {
           if (!division.has_below) continue;
           below = division.has_own ? &below_parts : whole;
         }
+        const OpenedNode opened = visit.opened(node, below, from.parent);
         if (node.isLeaf()) {
           if constexpr (!requires { visit.instance(node, whole); }) {
-            visit.leaf(node, from.are_of_sheet);
             SURFEIT_RETURN_IF_ERROR(octree.visitLeaf(node, [&](std::span<const Surfel> run) {
               surfels_visited_ += run.size();
               visitSeen(run, below, visit);
@@ -165,7 +171,7 @@ class CutWalk {
           Siblings& next = stack_[stack_count++];
           next.range = childrenOf(node);
           next.has_parts = below != nullptr;
-          next.are_of_sheet = isSheet(node);
+          next.parent = opened;
           if (below != nullptr) next.parts = *below;
         } else {
           return Status::corruption("octree: deeper than its curve has levels");
@@ -228,7 +234,7 @@ class CutWalk {
   struct Siblings {
     NodeRange range;
     bool has_parts;
-    bool are_of_sheet;  // isSheet(parent)
+    OpenedNode parent;
     LaneParts parts;
   };
   std::array<Siblings, kStackSize> stack_;
@@ -238,7 +244,7 @@ class CutWalk {
 // For walks that are made for the pages they touch.
 struct IgnoreCut {
   void node(const Node&, const LaneParts*) {}
-  void leaf(const Node&, bool) {}
+  OpenedNode opened(const Node&, const LaneParts*, OpenedNode) { return {}; }
   void surfels(std::span<const Surfel>, const LaneParts*) {}
 };
 

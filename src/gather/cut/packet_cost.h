@@ -34,7 +34,10 @@ class PacketCost {
   void node(const Node& node, const LaneParts*) {
     add(node, float(std::max<int>(1, node.facet_count)));
   }
-  void leaf(const Node& node, bool) { add(node, float(node.surfel_count)); }
+  OpenedNode opened(const Node& node, const LaneParts*, OpenedNode) {
+    if (node.isLeaf()) add(node, float(node.surfel_count));
+    return {};
+  }
   void surfels(std::span<const Surfel>, const LaneParts*) {}
 
   // What a packet of this radius around the receiver takes, in some unit of time. A node of s

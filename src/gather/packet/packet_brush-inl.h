@@ -86,7 +86,7 @@ class Brush {
     }
     if (!hn::AllFalse(D(), seen)) {
       SplatPatch(patch, sight, seen);
-      if (recorder_) Record(patch.kind, sight);
+      if (recorder_ && !patch.is_hull) Record(patch.kind, sight);
     }
   }
 
@@ -193,6 +193,10 @@ class Brush {
     const V distance_sq = hn::IfThenElse(seen, sight.distance_sq, Splat(1));
     const V distance = hn::Mul(distance_sq, InverseSqrt(distance_sq));
     seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kFidelity.least_axis), distance)));
+    if (patch.is_hull) {
+      const float least_sq = patch.disk_area / largestPatch(*canvas_.rules);
+      seen = hn::And(seen, hn::Ge(distance_sq, Splat(least_sq)));
+    }
     if (hn::AllFalse(D(), seen)) return;
 
     // The visible area, times the distance
@@ -209,7 +213,7 @@ class Brush {
     const Parallelogram shape =
         OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w, part);
     const Cover cover = MakeCover(patch, sight, distance, part);
-    CoverParallelogram(shape, seen, cover);
+    if (!patch.is_hull) CoverParallelogram(shape, seen, cover);
     if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
   }
 

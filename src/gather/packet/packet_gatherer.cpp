@@ -12,14 +12,18 @@ namespace {
 struct DrawCut {
   PacketRaster& raster;
   const PagedOctree::Reader& octree;
-  bool is_sheet = false;  // the last leaf
+  bool are_tiles = false;  // the two-sided surfels of the last leaf
   void setFrame(const InstanceFrame* frame) { raster.setFrame(frame); }
   void node(const Node& node, const LaneParts* parts) {
     raster.addNode(node, parts, octree.lobesOf(node));
   }
-  void leaf(const Node& node, bool is_of_sheet) { is_sheet = is_of_sheet || isSheet(node); }
+  OpenedNode opened(const Node& node, const LaneParts* parts, OpenedNode parent) {
+    const OpenedNode opened = {parent.has_hull || raster.addHull(node, parts), isSheet(node)};
+    are_tiles = parent.is_sheet || opened.is_sheet;
+    return opened;
+  }
   void surfels(std::span<const Surfel> run, const LaneParts* parts) {
-    raster.addSurfels(run, parts, octree.lobesOf(run), is_sheet);
+    raster.addSurfels(run, parts, octree.lobesOf(run), are_tiles);
   }
 };
 

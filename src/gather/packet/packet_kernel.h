@@ -55,6 +55,7 @@ struct alignas(64) Patch {
   bool is_solid = true;
   bool is_spread = false;  // a facet that may have gaps: it is spread evenly over its outline
   bool is_ribbon = false;  // a ray traced surfel is a rectangle, not a disk
+  bool is_hull = false;    // it covers nothing, but closes what others leave open
   // From where it is seen: before its front alone; from both sides of a two-sided disk or facet;
   // from both, though it sends light from its front alone; or as something else says
   enum class Seen : std::uint8_t { kFront, kBoth, kDarkBack, kAllAround };

@@ -220,7 +220,7 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
   gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
   if (node.isRough()) return addRoughNode(node, parts);
   if (node.isFlat()) {
-    return addFacet(node, facetOf(node), CubeKind::kFlatNode, parts, lobeOf(0));
+    return addFacet(node, facetOf(node), false, parts, lobeOf(0));
   }
   const bool is_thicket = isThicket(node);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
@@ -229,9 +229,40 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
       Facet facet = node.facet(i);
       facet.is_thicket = facet.is_thicket && is_thicket;
-      addFacet(node, facet, CubeKind::kFacet, parts, lobeOf(i));
+      addFacet(node, facet, false, parts, lobeOf(i));
     }
   }
+}
+
+// What rises from its planes by a pixel lies elsewhere.
+bool PacketRaster::mayLeaveHull(const Node& node) const {
+  if (node.isRough() || float(node.surfel_count) > kFidelity.most_in_hull) return false;
+  if (node.transparency != 0 || (node.groups & ~rules_.groups) != 0) return false;
+  const float nearest = glm::length(node.position - local_centre_) - local_radius_;
+  return node.off_plane * geometry_.pixelsPerSlope() <= nearest;
+}
+
+// False: some receiver is too close to see it as a parallelogram, or it has gaps.
+bool PacketRaster::addFacetHull(const Node& node, const Facet& facet, std::uint32_t parts) {
+  if (!isFilled(node, facet) || (facet.is_two_sided && !isSheet(node))) return false;
+  const float distance = glm::length(facet.position - local_centre_);
+  const float least = std::sqrt(facet.area / largestPatch(rules_));
+  if (distance + local_radius_ < least) return false;
+  addFacet(node, facet, true, parts, nullptr);
+  return distance - local_radius_ >= least;
+}
+
+bool PacketRaster::addHull(const Node& node, const LaneParts* lane_parts) {
+  if (!mayLeaveHull(node)) return false;
+  const std::uint32_t parts = keepParts(lane_parts);
+  if (node.isFlat()) return addFacetHull(node, facetOf(node), parts);
+  bool is_whole = true;
+  for (std::size_t i = 0; i < node.facet_count; ++i) {
+    Facet facet = node.facet(i);
+    facet.is_thicket = false;
+    is_whole = addFacetHull(node, facet, parts) && is_whole;
+  }
+  return is_whole;
 }
 
 // Whether no receiver sees any of a facet.
@@ -255,8 +286,8 @@ void PacketRaster::addLobe(const Lobe& lobe, const glm::vec3& normal) {
   kernel_.seeLobe(lanes_, receiver_count_, patch, light, lights_.emplace_back());
 }
 
-void PacketRaster::addFacet(const Node& node, const Facet& facet, CubeKind kind,
-                            std::uint32_t parts, const Lobe* lobe) {
+void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
+                            const Lobe* lobe) {
   if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(facet.position))) return;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - local_centre_;
@@ -288,7 +319,8 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, CubeKind kind,
                : shows_both       ? Patch::Seen::kDarkBack
                : patch.range > 0  ? Patch::Seen::kAllAround
                                   : Patch::Seen::kFront;
-  patch.kind = kind;
+  patch.is_hull = is_hull;
+  patch.kind = node.isFlat() ? CubeKind::kFlatNode : CubeKind::kFacet;
   patch.parts = parts;
   bringToWorld(patch);
   if (lobe != nullptr) addLobe(*lobe, facet.normal);
@@ -335,7 +367,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts,
-                              std::span<const Lobe> lobes, bool are_sheet) {
+                              std::span<const Lobe> lobes, bool are_tiles) {
   const std::uint32_t parts = keepParts(lane_parts);
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
@@ -370,7 +402,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.lets_through = surfel.transparency != 0;
     if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
     patch.thicket = thicketPart(surfel);
-    patch.is_solid = mayTile(surfel) || are_sheet;
+    patch.is_solid = mayTile(surfel) || are_tiles;
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float size = nearFieldSize(patch.radius, ribbon);
     const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;

@@ -68,10 +68,13 @@ class PacketRaster {
                const NodeLobes* lobes = nullptr);
   // Adds a patch as it is, in the frame of the receivers.
   void addPatch(const Patch& patch);
-  // Adds those of the surfels that some receiver may see. `lobes`: as many, or none. `are_sheet`:
-  // those of a leaf that isSheet().
+  // Adds the hull of a node that is looked into, for what is below it leaves gaps. False: it tells
+  // nothing, and those below it may.
+  bool addHull(const Node& node, const LaneParts* parts = nullptr);
+  // Adds those of the surfels that some receiver may see. `lobes`: as many, or none. `are_tiles`:
+  // they are of a node that isSheet().
   void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr,
-                  std::span<const Lobe> lobes = {}, bool are_sheet = false);
+                  std::span<const Lobe> lobes = {}, bool are_tiles = false);
 
   // Sorts what was added, and draws it.
   void sort();
@@ -97,9 +100,11 @@ class PacketRaster {
  private:
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   std::uint32_t keepParts(const LaneParts* parts);
-  // A facet of the node, or all of a flat one.
-  void addFacet(const Node& node, const Facet& facet, CubeKind kind, std::uint32_t parts,
+  // Adds a facet of the node, or all of a flat one, or the hull of that alone.
+  void addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
                 const Lobe* lobe);
+  bool mayLeaveHull(const Node& node) const;
+  bool addFacetHull(const Node& node, const Facet& facet, std::uint32_t parts);
   void addLobe(const Lobe& lobe, const glm::vec3& normal);
   void addRoughNode(const Node& node, std::uint32_t parts);
   std::uint32_t facesThatSee(const Patch& patch) const;

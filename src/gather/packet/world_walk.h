@@ -75,7 +75,7 @@ class WorldWalk {
       visit.setFrame(nullptr);
       visit.node(node, parts);
     }
-    void leaf(const Node&, bool) {}
+    OpenedNode opened(const Node&, const LaneParts*, OpenedNode) { return {}; }
     void surfels(std::span<const Surfel>, const LaneParts*) {}
     Status instance(const Node& leaf, const LaneParts* parts) {
       const PlacedScene& placed = world.instances()->instances()[leaf.page];

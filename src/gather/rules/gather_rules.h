@@ -110,14 +110,20 @@ inline float pixelsPerSlope(const GatherRules& rules) {
   return 0.5f * float(rules.quality.raster_resolution) / slope;
 }
 
+// The largest solid angle, as area over the square of the distance, that anything is drawn with as
+// one patch: the image of a larger one is no parallelogram.
+inline float largestPatch(const GatherRules& rules) {
+  const float pixel = 1 / pixelsPerSlope(rules);
+  return kFidelity.most_node_pixels * pixel * pixel;
+}
+
 // A raster that looks closer needs smaller clusters, and disks where others have patches. Shares of
 // the hemisphere keep their number of clusters.
 inline float maxSolidAngle(const GatherRules& rules) {
   const float share =
       std::min(1.f, kFidelity.cone_share * (1 - std::cos(rules.weights.cone_angle)));
-  const float pixel = 1 / pixelsPerSlope(rules);
   return std::min(rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1),
-                  kFidelity.most_node_pixels * pixel * pixel);
+                  largestPatch(rules));
 }
 // How many times as large what is low may look, where directions weigh by the cosine.
 inline float mostCoarser(const GatherRules& rules) {
