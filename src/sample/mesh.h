@@ -56,6 +56,7 @@ struct Mesh {
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<Mask> masks;
+  std::vector<std::string> comments;     // of the files
   std::vector<std::string> group_names;  // of the groups from 1, where they are asked for
   std::uint64_t degenerate_faces = 0;    // faces without area, skipped
 

@@ -163,7 +163,11 @@ bool ObjLines::readLine() {
     if (!readPhysicalLine()) return joined > 0 && status_.ok();
     const std::string_view text = trimmed(physical_);
     const bool is_comment = joined == 0 && text.starts_with('#');
-    if (is_comment && text.starts_with("#MRGB")) colors_.addZBrushLine();
+    if (is_comment) {
+      takeComment(text);
+    } else if (!text.empty()) {
+      has_statement_ = true;
+    }
     if (is_comment || !text.ends_with('\\')) {
       line_ += physical_;
       break;
@@ -181,6 +185,24 @@ bool ObjLines::readLine() {
   // Whoever counts lines comes to the same number
   line_.append(joined + 1, '\n');
   return status_.ok();
+}
+
+void ObjLines::takeComment(std::string_view text) {
+  constexpr std::size_t kMostComments = 64, kMostChars = 1024;
+  if (text.starts_with("#MRGB")) {
+    colors_.addZBrushLine();
+    return;
+  }
+  while (text.starts_with('#')) text.remove_prefix(1);
+  text = trimmed(text).substr(0, kMostChars);
+  if (text.empty()) return;
+  if (has_statement_ || comments_.size() == kMostComments) {
+    ++other_comments_;
+    return;
+  }
+  std::string& comment = comments_.emplace_back(text);
+  std::replace_if(
+      comment.begin(), comment.end(), [](char c) { return c < ' ' && c > '\0'; }, ' ');
 }
 
 void ObjLines::rewriteLine() {
@@ -204,6 +226,8 @@ void ObjLines::rewriteLine() {
     takeWord(rest);
     line_ = "d " + std::string(rest);
     checkNumbers(std::string_view(line_).substr(2));
+  } else if (isOneOf(word, kIndexStatements)) {
+    dropSlashes();
   } else if (isOneOf(word, kNumberStatements) && checkNumbers(rest)) {
     if (word == "v") keepPlace(rest);
     noteMaterial(word, rest);
@@ -251,7 +275,23 @@ void ObjLines::dropComment() {
   std::string_view rest = trimmed(line_);
   const std::string_view word = takeWord(rest);
   if (!isOneOf(word, kNumberStatements) && !isOneOf(word, kIndexStatements)) return;
-  line_.resize(std::min(line_.find('#'), line_.size()));
+  const std::size_t comment = line_.find('#');
+  if (comment == line_.npos) return;
+  ++other_comments_;
+  line_.resize(comment);
+}
+
+// Corners without the rest of their indices: 1/ and 1// are 1.
+void ObjLines::dropSlashes() {
+  if (line_.find('/') == line_.npos) return;
+  std::string line;
+  for (std::size_t i = 0; i < line_.size(); ++i) {
+    const std::size_t end = std::min(line_.find_first_not_of('/', i), line_.size());
+    const bool ends_word = end == line_.size() || kBlanks.find(line_[end]) != kBlanks.npos;
+    if (line_[i] == '/' && ends_word) continue;
+    line += line_[i];
+  }
+  line_ = std::move(line);
 }
 
 bool ObjLines::checkNumbers(std::string_view numbers) {

@@ -316,7 +316,8 @@ std::string describeTextRow(std::string_view line, std::span<const TextColumn> c
 
 bool isTextExtra(std::string_view line, TextExtras extras) {
   const std::string_view text = trimmedLine(line);
-  return text.empty() || (extras.has_comments && isTextComment(text)) ||
+  const bool is_empty = text.find_first_not_of(" \t,;|") == text.npos;  // ",,", too
+  return is_empty || (extras.has_comments && isTextComment(text)) ||
          (extras.has_counts && isTextCount(text));
 }
 
@@ -358,7 +359,8 @@ Status TextRowParser::checkEnd(LineSource& source) const {
     const std::string_view line = withoutEnd(lines, bytes);
     if (!isTextExtra(line, extras_)) {
       return Status::corruption(
-          fmt::format("{}: line {}: found {} after the last row, expected the end of the file",
+          fmt::format("{}: line {}: found {} after the last row, expected the end of the file: the "
+                      "header counts fewer rows",
                       source.input().path(), source.lineNumber(), quoteText(line)));
     }
     source.consume(bytes, 1);
