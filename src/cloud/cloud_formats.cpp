@@ -125,6 +125,8 @@ constexpr OtherFormat kOtherFormats[] = {
     {"version https://git-lfs"sv, "a pointer of Git LFS", "fetch the file itself: `git lfs pull`"},
     {"<!DOCTYPE"sv, "a web page", "download the file itself"},
     {"<html"sv, "a web page", "download the file itself"},
+    {"\x1F\x8B"sv, "gzip within gzip or zstd", "unpack it once"},
+    {"\x28\xB5\x2F\xFD"sv, "zstd within gzip or zstd", "unpack it once"},
     {"#ROSBAG"sv, "a ROS bag", "save the clouds in it as PCD: `rosrun pcl_ros bag_to_pcd`"},
     {"DSAA"sv, "a grid of heights (Surfer)", kGridAdvice},
     {"DSBB"sv, "a grid of heights (Surfer)", kGridAdvice},

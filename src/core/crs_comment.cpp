@@ -20,6 +20,7 @@ constexpr std::size_t kMostChars = 60;  // of well-known text: its name stands i
 // Well-known text of longitudes and latitudes, and of others; a system's parts follow its own name.
 constexpr std::string_view kGeographicText[] = {"GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS",
                                                 "GEODETICCRS"};
+constexpr std::string_view kGeocentricText[] = {"GEOCCS"};
 constexpr std::string_view kOtherText[] = {"PROJCS",   "PROJCRS",  "PROJECTEDCRS", "GEOCCS",
                                            "LOCAL_CS", "LOCALCRS", "ENGCRS",       "ENGINEERINGCRS",
                                            "VERT_CS",  "VERTCRS"};
@@ -84,6 +85,13 @@ std::string noteOfDegrees(std::string_view crs) {
                              : unit == 9105 || unit == 9106 ? "gons"
                                                             : "angles";
   return "x and y are " + angles + ", not lengths as z is: the coordinate reference system is " +
+         std::string(crs.substr(0, kMostChars)) + std::string(kReproject);
+}
+
+std::string noteOfGeocentric(std::string_view crs) {
+  if (!crs.starts_with(kGeocentricWord) && findFirst(crs, kGeocentricText) == crs.npos) return {};
+  return "x, y and z are counted from the centre of the Earth, so that none of them is up: the "
+         "coordinate reference system is " +
          std::string(crs.substr(0, kMostChars)) + std::string(kReproject);
 }
 

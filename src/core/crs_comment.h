@@ -49,8 +49,11 @@ std::uint16_t angularUnitOf(std::string_view crs);
 // What is to be told of such a system, with the way out; empty for others.
 std::string noteOfDegrees(std::string_view crs);
 
-// The same of a cloud that states no system, by the box of its places but for strays: within 180
-// and 90 of 0, and far higher than wide, though not above the highest mountains.
+// What is to be told of a system about the Earth's centre; empty for others.
+std::string noteOfGeocentric(std::string_view crs);
+
+// What is to be told of a cloud that states no system, by the box of its places but for strays:
+// within 180 and 90 of 0, and far higher than wide, though not above the highest mountains.
 std::string noteOfLikelyDegrees(const Bounds3d& bounds);
 
 // Whether two systems are one, as far as their texts tell: text and keys of one system differ.

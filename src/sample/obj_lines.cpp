@@ -64,9 +64,10 @@ constexpr std::string_view kIndexStatements[] = {"f", "l", "p"};
 constexpr std::string_view kNameStatements[] = {"usemtl", "newmtl", "mtllib"};
 constexpr std::string_view kColorStatements[] = {"Ka", "Kd", "Ks", "Ke", "Tf"};
 constexpr std::string_view kPictureStatements[] = {"map_Kd", "map_Ke", "map_d"};
-constexpr std::string_view kMtlStatements[] = {"Ka",     "Kd",     "Ks",     "Ke",     "Tf",
-                                               "Tr",     "Ni",     "map_Kd", "map_Ke", "map_d",
-                                               "newmtl", "usemtl", "mtllib", "illum"};
+// Statements whose case does not matter.
+constexpr std::string_view kSpelledStatements[] = {
+    "Ka",     "Kd",     "Ks",     "Ke",    "Tf", "Tr", "Ni", "map_Kd", "map_Ke", "map_d",
+    "newmtl", "usemtl", "mtllib", "illum", "v",  "vn", "vt", "f",      "l",      "Pm"};
 constexpr std::string_view kFreeFormStatements[] = {"surf", "curv", "curv2"};
 
 // An option of a picture, and the values that it may leave out.
@@ -212,7 +213,8 @@ void ObjLines::rewriteLine() {
   const std::string_view word = takeWord(rest);
   if (isOneOf(word, kFreeFormStatements)) ++free_form_;
   if (isOneOf(word, kNameStatements)) {
-    std::string name(rest);
+    const bool is_quoted = rest.size() > 2 && rest.starts_with('"') && rest.ends_with('"');
+    std::string name(is_quoted ? rest.substr(1, rest.size() - 2) : rest);
     for (char& c : name) {
       if (kBlanks.find(c) != std::string_view::npos) c = kNameBlank;
       if (c == '\\') c = '/';  // written on Windows
@@ -222,6 +224,9 @@ void ObjLines::rewriteLine() {
     if (is_material) noteMaterial("newmtl", name);
   } else if (isOneOf(word, kPictureStatements)) {
     line_ = std::string(word) + " " + withAllValues(rest);
+  } else if (word == "Pm") {
+    double metal = 0;
+    if (isNumber(takeWord(rest), metal) && metal > 0) ++metals_;
   } else if (word == "d" && rest.starts_with("-halo")) {
     takeWord(rest);
     line_ = "d " + std::string(rest);
@@ -229,6 +234,12 @@ void ObjLines::rewriteLine() {
   } else if (isOneOf(word, kIndexStatements)) {
     dropSlashes();
   } else if (isOneOf(word, kNumberStatements) && checkNumbers(rest)) {
+    if (word == "v" && values_.size() < 3) {
+      status_ = Status::corruption(
+          fmt::format("{}: line {}: found a vertex of {} numbers, expected three: flat ones have 0",
+                      input_.path(), number_, values_.size()));
+      return;
+    }
     if (word == "v") keepPlace(rest);
     noteMaterial(word, rest);
     completeColor(word, rest);
@@ -253,7 +264,7 @@ void ObjLines::completeColor(std::string_view word, std::string_view rest) {
 void ObjLines::spellStatement() {
   std::string_view rest = trimmed(line_);
   const std::string_view word = takeWord(rest);
-  for (const std::string_view known : kMtlStatements) {
+  for (const std::string_view known : kSpelledStatements) {
     if (word == known || !isSameInAnyCase(word, known)) continue;
     line_.replace(std::size_t(word.data() - line_.data()), word.size(), known);
     return;
@@ -288,7 +299,8 @@ void ObjLines::dropSlashes() {
   for (std::size_t i = 0; i < line_.size(); ++i) {
     const std::size_t end = std::min(line_.find_first_not_of('/', i), line_.size());
     const bool ends_word = end == line_.size() || kBlanks.find(line_[end]) != kBlanks.npos;
-    if (line_[i] == '/' && ends_word) continue;
+    const bool has_index = !line.empty() && kBlanks.find(line.back()) == kBlanks.npos;
+    if (line_[i] == '/' && ends_word && has_index) continue;
     line += line_[i];
   }
   line_ = std::move(line);

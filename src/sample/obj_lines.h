@@ -37,6 +37,8 @@ class ObjLines final : public std::streambuf {
   ObjVertexColors takeColors() { return std::move(colors_); }
   // Materials that the file defines, and whether they have a Kd; of several of one name the first.
   const std::map<std::string, bool>& materials() const { return materials_; }
+  // How many of them are metals (Pm).
+  std::uint64_t metals() const { return metals_; }
   // Names that several of its materials have.
   const std::set<std::string>& repeatedMaterials() const { return repeated_; }
 
@@ -63,7 +65,7 @@ class ObjLines final : public std::streambuf {
   std::size_t begin_ = 0;        // in the buffer: the next line
   std::string physical_, line_;  // as read; what the parser gets
   std::uint64_t number_ = 0;     // of the last line read, from 1
-  std::uint64_t free_form_ = 0, other_comments_ = 0;
+  std::uint64_t free_form_ = 0, other_comments_ = 0, metals_ = 0;
   std::vector<std::string> comments_;
   bool has_statement_ = false;
   ObjVertexColors colors_;

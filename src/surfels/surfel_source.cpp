@@ -55,6 +55,9 @@ class RowSurfelSource final : public SurfelSource {
     if (std::string note = noteOfDegrees(statedCrs(comments())); !note.empty()) {
       notes.push_back(std::move(note));
     }
+    if (std::string note = noteOfGeocentric(statedCrs(comments())); !note.empty()) {
+      notes.push_back(std::move(note));
+    }
     for (std::string& note : notesOfComments(comments())) notes.push_back(std::move(note));
     if (!row_notes_) row_notes_ = notesOfRows();
     notes.insert(notes.end(), row_notes_->begin(), row_notes_->end());

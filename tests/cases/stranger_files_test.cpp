@@ -141,6 +141,14 @@ TEST_F(StrangerFiles, TheLastCommentInFrontOfRowsCounts) {
   }
 }
 
+TEST_F(StrangerFiles, SystemsAboutTheCentreOfTheEarthHaveNoUp) {
+  for (const char* crs : {"geocentric EPSG:4978", "GEOCCS[\"WGS 84\",UNIT[\"metre\",1]]"}) {
+    EXPECT_THAT(told("a.ply", ply(fmt::format("comment crs {}\n", crs), "", 1, "1 2 3\n")),
+                ElementsAre(AllOf(HasSubstr("none of them is up"), HasSubstr("reproject"))))
+        << crs;
+  }
+}
+
 // --- Gaussian splats that are otherwise
 
 std::string splats(const std::string& colors, const std::string& row) {
@@ -272,6 +280,10 @@ TEST_F(StrangerFiles, TextThatIsNoTableIsRefusedWithTheWayOut) {
               ElementsAre(HasSubstr("a # in front makes a comment")));
   EXPECT_THAT(told("a.txt", "1.5\u00a02.5\u00a03.5\n"), ElementsAre(HasSubstr("not ASCII")));
   EXPECT_THAT(told("a.txt", "1.5 \u22122.5 3.5\n"), ElementsAre(HasSubstr("not ASCII")));
+  EXPECT_THAT(told("a.txt", "1.5 2.5\n2.5 3.5\n"), ElementsAre(HasSubstr("a place needs a third")));
+  EXPECT_THAT(told("a.txt", "1.5:2.5:3.5\n"), ElementsAre(HasSubstr("semicolons or bars part")));
+  EXPECT_THAT(told("a.xyz", std::string("1 2 3\n\0\0\0\0\n4 5 6\n", 17)),
+              ElementsAre(HasSubstr("was the file written whole?")));
   std::string wide;
   for (int i = 0; i < 300; ++i) wide += "1 ";
   EXPECT_THAT(told("a.xyz", wide + "\n"), ElementsAre(HasSubstr("`cut -d ' ' -f 1-256`")));
@@ -303,9 +315,18 @@ TEST_F(StrangerFiles, PtxMatricesOfZerosAreRefusedWithTheWayOut) {
 TEST_F(StrangerFiles, LinesOfSeparatorsAreEmpty) {
   for (const char* text :
        {",,\nx,y,z\n1,2,3\n2,3,4\n", "x,y,z\n,,\n1,2,3\n2,3,4\n", "x,y,z\n1,2,3\n\n,,\n2,3,4\n",
-        "x;y;z\n1;2;3\n;;\n2;3;4\n;;\n", "1\t2\t3\n\t\t\n2\t3\t4\n"}) {
+        "x;y;z\n1;2;3\n;;\n2;3;4\n;;\n", "1\t2\t3\n\t\t\n2\t3\t4\n", "1 2 3\n2 3 4\n\x1a",
+        "1 2 3\n2 3 4\n\x1a\n"}) {
     EXPECT_EQ(surfelsOf("a.csv", text).size(), 2u) << text;
     EXPECT_THAT(told("a.csv", text), IsEmpty()) << text;
+  }
+}
+
+TEST_F(StrangerFiles, CellsOfSpreadsheetsMayLackAValue) {
+  for (const char* cell : {"#N/A", "#n/a", "NULL", "", "-"}) {
+    EXPECT_THAT(told("a.csv", fmt::format("x,y,z,height\n1,2,3,5\n1,2,4,{}\n", cell)),
+                ElementsAre(HasSubstr("has no value in 1 of 2 rows")))
+        << cell;
   }
 }
 
@@ -342,6 +363,38 @@ TEST_F(StrangerFiles, FormatsThatAreNotReadAreNamed) {
 }
 
 // --- Meshes
+
+TEST_F(StrangerFiles, StatementsAndNamesMayBeWrittenOtherwise) {
+  EXPECT_NEAR(sampled("a.obj", "V 0 0 0\nV 2 0 0\nV 2 2 0\nF 1 2 3\n"), 2, 1e-6);
+  write("b.mtl", "newmtl a\nKd 0 1 0\n");
+  for (const char* name : {"b.mtl", "\"b.mtl\""}) {
+    sampled("a.obj",
+            fmt::format("mtllib {}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n", name));
+    EXPECT_THAT(notes_.notes, Not(Contains(HasSubstr("not found")))) << name;
+  }
+}
+
+TEST_F(StrangerFiles, MeshesOfTooFewNumbersAreRefused) {
+  const auto refusal = [&](const std::string& mesh) {
+    write("a.obj", mesh);
+    SampleOptions options;
+    return sampleMeshes({path("a.obj")}, path("b.ply"), options, notes_).status().message();
+  };
+  EXPECT_THAT(refusal("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n"), HasSubstr("flat ones have 0"));
+  EXPECT_THAT(refusal("v\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), HasSubstr("a vertex of 0 numbers"));
+  EXPECT_NE(refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 / 1 2 / 2 3 / 3\n"), "");
+}
+
+TEST_F(StrangerFiles, MetalsAreTold) {
+  for (const char* metal : {"Pm 1.0", "Pm .3", "pm 1"}) {
+    write("b.mtl", fmt::format("newmtl a\nKd .5 .5 .5\n{}\n", metal));
+    sampled("a.obj", "mtllib b.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+    EXPECT_THAT(notes_.notes, Contains(HasSubstr("1 materials are metals (Pm)"))) << metal;
+  }
+  write("b.mtl", "newmtl a\nKd .5 .5 .5\nPm 0\n");
+  sampled("a.obj", "mtllib b.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+  EXPECT_THAT(notes_.notes, Not(Contains(HasSubstr("metals"))));
+}
 
 TEST_F(StrangerFiles, CornersMayEndWithStrokes) {
   const std::string square = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\n";

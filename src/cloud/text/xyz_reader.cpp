@@ -110,13 +110,19 @@ class XyzReader final : public CountedRowReader {
              "signs for minus: replace them";
     }
     const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns);
+    if (words.size() < 3 && std::all_of(words.begin(), words.end(), isTextNumber)) {
+      return ": a place needs a third, 0 for flat clouds";
+    }
     // Three numbers, one after another
     std::size_t first = 1, count = 0;
     for (std::size_t i = 0; i < words.size() && count < 3; ++i) {
       count = isTextNumber(words[i]) ? count + 1 : 0;
       first = i + 2 - std::min<std::size_t>(count, i + 1);
     }
-    if (count < 3) return "; a # in front makes a comment of a line";
+    if (count < 3) {
+      return "; blanks, tabs, commas, semicolons or bars part numbers, and a # in front makes a "
+             "comment of a line";
+    }
     return fmt::format(
         ": say which are the position: --channels {}=x,{}=y,{}=z (numbers of "
         "columns; NUMBER=- leaves one out)",
@@ -435,7 +441,8 @@ bool recognisesXyz(std::string_view first_bytes) {
   const bool is_cut = first_bytes.size() >= kMagicBytes;
   if (first_bytes.starts_with(kByteOrderMark)) first_bytes.remove_prefix(kByteOrderMark.size());
   for (const char c : first_bytes) {
-    if ((c >= '\0' && c < ' ' && c != '\t' && c != '\r' && c != '\n') || c == '\x7f') return false;
+    const bool is_of_lines = c == '\t' || c == '\r' || c == '\n' || c == '\x1a';
+    if ((c >= '\0' && c < ' ' && !is_of_lines) || c == '\x7f') return false;
   }
   XyzHead head;
   bool has_any = false;

@@ -183,10 +183,13 @@ Result<XyzTable> scanXyz(LineSource& source, std::span<const TextColumn> columns
         table.has_comma_in_refused = line.find(',') != line.npos;
         const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns);
         const bool is_row = std::any_of(words.begin(), words.end(), isTextNumber);
-        table.refusal = Status::corruption(
-            fmt::format("{}: row {} at line {}: {}{}", source.input().path(), table.row_count,
-                        source.lineNumber() + line_count, describeTextRow(line, columns),
-                        is_row ? "" : ": a # in front makes a comment of a line that is no row"));
+        table.refusal = Status::corruption(fmt::format(
+            "{}: row {} at line {}: {}{}", source.input().path(), table.row_count,
+            source.lineNumber() + line_count, describeTextRow(line, columns),
+            line.find('\0') != line.npos ? ": bytes of 0 are no text: was the file written whole?"
+            : is_row                     ? ""
+                                         : ": a # in front makes a comment of a line that is no "
+                                           "row"));
         return table;
       }
       at = line_end + (found ? 1 : 0);
