@@ -333,10 +333,7 @@ Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo,
   noteLeftOut(path, parsed, curves.width > 0, progress);
   builder.mesh.comments.insert(builder.mesh.comments.end(), parsed.comments.begin(),
                                parsed.comments.end());
-  if (parsed.other_comments > 0) {
-    progress.inform(fmt::format("{}: {} comments behind the first statement are not kept", path,
-                                parsed.other_comments));
-  }
+  builder.mesh.other_comments += parsed.other_comments;
   ObjImporter importer(path, parsed, default_albedo, builder, progress);
   SURFEIT_RETURN_IF_ERROR(importer.importFaces());
   if (curves.width > 0) return importer.importLines(curves);

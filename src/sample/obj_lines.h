@@ -31,7 +31,7 @@ class ObjLines final : public std::streambuf {
 
   const Status& status() const { return status_; }
   std::uint64_t freeFormStatements() const { return free_form_; }
-  // In front of the first statement, so many as clouds keep; and how many others there are.
+  // In front of the first statement, at most 64; and how many others there are.
   const std::vector<std::string>& comments() const { return comments_; }
   std::uint64_t otherComments() const { return other_comments_; }
   ObjVertexColors takeColors() { return std::move(colors_); }

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "cloud/comment_notes.h"
+#include "core/crs_comment.h"
 #include "core/group_comment.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
@@ -121,9 +122,8 @@ Result<std::uint64_t> surfelCountFor(const SampleOptions& options, double area) 
 // near plane of pictures.
 constexpr double kNearFraction = 1e-5;
 
-// What the cloud says of itself, then what the meshes say; groups are those of the cloud.
+// What the cloud says of itself, and the system of the meshes.
 std::vector<std::string> commentsOf(const Mesh& mesh, UpAxis up, Progress& progress) {
-  constexpr std::size_t kMostComments = 64;
   std::vector<std::string> comments = {upComment(up)};
   for (std::size_t i = 0; i < mesh.group_names.size(); ++i) {
     comments.push_back(groupComment(i + 1, mesh.group_names[i]));
@@ -133,21 +133,17 @@ std::vector<std::string> commentsOf(const Mesh& mesh, UpAxis up, Progress& progr
                               upAxisName(*stated), upAxisName(up)));
   }
   for (const std::string& note : notesOfComments(mesh.comments)) progress.note(note);
-  std::size_t kept = 0, lost = 0;
+  // Places stay those of the system; all else is said of the mesh, not of the cloud made of it
+  std::uint64_t lost = mesh.other_comments;
   for (const std::string& comment : mesh.comments) {
-    if (statedUpAxis(std::span(&comment, 1)) || statedGroupName(comment)) continue;
-    if (std::find(comments.begin(), comments.end(), comment) != comments.end()) continue;
-    if (kept == kMostComments) {
+    const bool is_known = statedUpAxis(std::span(&comment, 1)) || statedGroupName(comment);
+    if (comment.starts_with(kCrsComment)) {
+      comments.push_back(comment);
+    } else if (!is_known) {
       ++lost;
-      continue;
     }
-    comments.push_back(comment);
-    ++kept;
   }
-  if (lost > 0) {
-    progress.note(fmt::format("{} comments of meshes are not kept, for there are more than {}",
-                              lost, kMostComments));
-  }
+  if (lost > 0) progress.inform(fmt::format("{} comments of the meshes are not kept", lost));
   return comments;
 }
 

@@ -145,9 +145,12 @@ class RowSurfelSource final : public SurfelSource {
                       dropsOf(element, "coverage")));
     }
     if (!is_used && element.find("opacity_r") != nullptr) {
-      notes.push_back(
-          "opacity_r opacity_g opacity_b are not used: a surfel has one opacity; convert --set "
-          "\"alpha = opacity_g\" makes one of the green one, then --channels alpha=opacity");
+      // Where a file has them as one channel, they cannot be named one by one
+      const bool is_channel = typedNames(element, "opacity_g").front() != "opacity_g";
+      notes.push_back(fmt::format(
+          "opacity_r opacity_g opacity_b are not used: a surfel has one opacity; {} the green one",
+          is_channel ? "convert --set \"alpha = opacity_g\", then --channels alpha=opacity, takes"
+                     : "--channels opacity_g=opacity takes"));
     }
   }
 

@@ -414,17 +414,20 @@ TEST_F(StrangerFiles, MeshesBeyondWhatSurfelsHoldAreRefused) {
   }
 }
 
-TEST_F(StrangerFiles, CommentsOfMeshesAreKept) {
+// They are said of the mesh; but places stay those of its system.
+TEST_F(StrangerFiles, CommentsOfMeshesAreCountedAndTheirSystemIsKept) {
   const std::string square = "v 0 0 0\nv 2 0 0\nv 2 2 0\nf 1 2 3\n";
-  sampled("a.obj", "# made by X\n#\n# as B\n" + square + "# end\n");
-  EXPECT_THAT(sampledComments(), ElementsAre("up y", "made by X", "as B"));
+  sampled("a.obj", "# made by X\n#\n# crs EPSG:25832\n" + square + "# end\n");
+  EXPECT_THAT(sampledComments(), ElementsAre("up y", "crs EPSG:25832"));
+  EXPECT_THAT(notes_.informed, Contains("2 comments of the meshes are not kept"));
   const std::string face =
       "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 "
       "0 1 2\n";
   const std::string head =
       "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n" + face;
   sampled("a.ply", "ply\nformat ascii 1.0\ncomment made by Y\ncomment up z\n" + head);
-  EXPECT_THAT(sampledComments(), ElementsAre("up y", "made by Y"));
+  EXPECT_THAT(sampledComments(), ElementsAre("up y"));
+  EXPECT_THAT(notes_.informed, Contains("1 comments of the meshes are not kept"));
   EXPECT_THAT(notes_.notes, Contains(HasSubstr("z is up, the cloud says y: --up z")));
   sampled("a.ply", "ply\nformat ascii 1.0\ncomment up y\n" + head);
   EXPECT_THAT(notes_.notes, Not(Contains(HasSubstr("is up"))));

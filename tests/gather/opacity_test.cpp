@@ -280,7 +280,7 @@ TEST_F(Opacity, WhatIsNotUsedIsTold) {
   for (auto& row : covered.rows) row[7] = .5;
   const std::string path = directory_.file("cloud.ply"), scene = directory_.file("scene.sft");
   for (const auto& [cloud, told, way_out] :
-       {std::tuple(tints, "opacity_r opacity_g opacity_b are not used", "alpha = opacity_g"),
+       {std::tuple(tints, "opacity_r opacity_g opacity_b are not used", "opacity_g=opacity"),
         std::tuple(covered, "opacity is not used beside coverage", "coverage=-")}) {
     writeTable(cloud, path);
     ToldNotes notes, silence;
