@@ -45,6 +45,7 @@ const LengthUnit* unitOf(std::span<const std::string> words) {
   const auto unit = std::find_if(words.begin(), words.end(),
                                  [&](const std::string& word) { return isOneOf(word, kUnits); });
   for (auto at = unit; at != words.end(); ++at) {
+    if (*at == "in" && at + 1 != words.end()) continue;  // units in mm
     if (const LengthUnit* const known = findLengthUnit(*at)) return known;
   }
   return nullptr;

@@ -87,7 +87,7 @@ std::string ply(const std::string& comments, const std::string& properties, std:
 
 TEST_F(StrangerFiles, CommentsNameUnitsThatAreNotMetres) {
   for (const char* comment : {"units mm", "Units: mm", "File units = millimeters", "unit=MM",
-                              "lengths have the unit mm"}) {
+                              "units in mm", "lengths have the unit mm"}) {
     EXPECT_THAT(told("a.ply", ply(fmt::format("comment {}\n", comment), "", 1, "1 2 3\n")),
                 ElementsAre(AllOf(HasSubstr("lengths are in millimetres"),
                                   HasSubstr("convert --units mm:m"))))
@@ -98,8 +98,9 @@ TEST_F(StrangerFiles, CommentsNameUnitsThatAreNotMetres) {
     sampled("a.obj", fmt::format("# {}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", comment));
     EXPECT_THAT(notes_.notes, Contains(HasSubstr("convert --units mm:m"))) << comment;
   }
-  for (const char* comment : {"units m", "unit of work", "unity", "made in a unit test by us",
-                              "up z", "group 1 units of mm"}) {
+  EXPECT_THAT(told("a.xyz", "# units: in\n1 2 3\n"), ElementsAre(HasSubstr("--units in:m")));
+  for (const char* comment : {"units m", "units in metres", "unit of work", "unity",
+                              "made in a unit test by us", "up z", "group 1 units of mm"}) {
     EXPECT_THAT(told("a.ply", ply(fmt::format("comment {}\n", comment), "", 1, "1 2 3\n")),
                 IsEmpty())
         << comment;
