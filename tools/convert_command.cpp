@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "surfeit/convert.h"
+#include "surfeit/length_unit.h"
 #include "surfeit/process.h"
 #include "tools/camera_options.h"
 #include "tools/channel_options.h"
@@ -32,18 +33,9 @@ struct ConvertArguments {
   DensityArguments cameras;  // of the options' density
 };
 
-struct Unit {
-  std::string_view name;
-  double metres;
-};
-constexpr Unit kUnits[] = {{"m", 1},       {"cm", 0.01},   {"mm", 0.001},           {"km", 1000},
-                           {"in", 0.0254}, {"ft", 0.3048}, {"us-ft", 1200.0 / 3937}};
-
 // Metres of a unit, by name or as a number; 0 for what is none.
 double metresOf(std::string_view text) {
-  for (const Unit& unit : kUnits) {
-    if (unit.name == text) return unit.metres;
-  }
+  if (const LengthUnit* const unit = findLengthUnit(text)) return unit->metres;
   double number = 0;
   const char* const text_end = text.data() + text.size();
   const auto [end, error] = std::from_chars(text.data(), text_end, number);

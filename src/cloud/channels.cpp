@@ -299,12 +299,37 @@ Status addChannel(std::string_view name, std::size_t components, ChannelKind kin
     }
     RowProperty property;
     property.name = std::move(property_name);
+    if (property.name != name) property.typed = name;
     property.type = type;
     property.offset = element.row_bytes;
     element.row_bytes += valueTypeBytes(type);
     element.properties.push_back(std::move(property));
   }
   return {};
+}
+
+std::vector<std::string> typedNames(const RowLayout& element, std::string_view name) {
+  std::vector<std::string> names = {std::string(name)};
+  const KnownChannel* const known = findKnown(name);
+  if (known != nullptr && known->components == 3) names = propertyNames(name, 3, known->kind, {});
+  std::vector<std::string> typed;
+  bool is_otherwise = false;
+  for (const std::string& each : names) {
+    const RowProperty* const property = element.find(each);
+    if (property == nullptr) continue;
+    is_otherwise = is_otherwise || !property->typed.empty();
+    const std::string& word = property->typed.empty() ? each : property->typed;
+    if (std::find(typed.begin(), typed.end(), word) == typed.end()) typed.push_back(word);
+  }
+  return is_otherwise ? typed : std::vector{std::string(name)};
+}
+
+std::string dropsOf(const RowLayout& element, std::string_view name) {
+  std::string drops;
+  for (const std::string& typed : typedNames(element, name)) {
+    drops += fmt::format("{}{}=-", drops.empty() ? "" : ",", typed);
+  }
+  return drops;
 }
 
 std::vector<RowChannel> channelsOf(const RowLayout& element) {

@@ -46,6 +46,13 @@ Status addChannel(std::string_view name, std::size_t components, ChannelKind kin
                   std::span<const ChannelRename> renames, const std::string& path,
                   RowLayout& element);
 
+// What FROM of `--channels FROM=TO` must be for a channel (normal) or a property (alpha) of rows:
+// their names, unless the file or the user calls them otherwise. Several where the properties of a
+// channel have names of their own.
+std::vector<std::string> typedNames(const RowLayout& element, std::string_view name);
+// The same as one that drops them: "normal=-", "NormalX=-,NormalY=-,NormalZ=-".
+std::string dropsOf(const RowLayout& element, std::string_view name);
+
 // Values of a row that belong together.
 struct RowChannel {
   std::string name;  // position, normal, radius, radiosity, color, velocity, anything_else

@@ -76,6 +76,8 @@ constexpr std::string_view kMeshAdvice =
 constexpr std::string_view kTableAdvice = "save the points as PLY or CSV";
 constexpr std::string_view kGridAdvice =
     "write the points of a map of heights as text: `gdal_translate -of XYZ IN OUT.xyz`";
+constexpr std::string_view kScannerAdvice =
+    "save the points as LAS or PLY with the program of the scanner, or with CloudCompare";
 constexpr OtherFormat kOtherFormats[] = {
     {kSceneMagic, "a Surfeit scene (.sft)",
      "give the cloud that it was indexed from, or make one: surfeit convert SCENE.sft -o "
@@ -123,6 +125,16 @@ constexpr OtherFormat kOtherFormats[] = {
     {"version https://git-lfs"sv, "a pointer of Git LFS", "fetch the file itself: `git lfs pull`"},
     {"<!DOCTYPE"sv, "a web page", "download the file itself"},
     {"<html"sv, "a web page", "download the file itself"},
+    {"\x1F\x8B"sv, "gzip within gzip or zstd", "unpack it once"},
+    {"\x28\xB5\x2F\xFD"sv, "zstd within gzip or zstd", "unpack it once"},
+    {"#ROSBAG"sv, "a ROS bag", "save the clouds in it as PCD: `rosrun pcl_ros bag_to_pcd`"},
+    {"DSAA"sv, "a grid of heights (Surfer)", kGridAdvice},
+    {"DSBB"sv, "a grid of heights (Surfer)", kGridAdvice},
+    {"DSRB"sv, "a grid of heights (Surfer)", kGridAdvice},
+    {"#VRML"sv, "VRML", kMeshAdvice},
+    {"BLENDER"sv, "a scene of Blender", kMeshAdvice},
+    {"\xD4\xC3\xB2\xA1"sv, "packets of a scanner (pcap)", kScannerAdvice},
+    {"\x0A\x0D\x0D\x0A"sv, "packets of a scanner (pcapng)", kScannerAdvice},
     {"BZh"sv, "bzip2", "unpack it first; gzip and zstd are read as they are"},
     {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},
 };
@@ -134,6 +146,15 @@ constexpr OtherFormat kOtherExtensions[] = {
     {".ksplat"sv, "Gaussian splats of a viewer (.ksplat)",
      "convert it to the PLY of Gaussian splats"},
     {".stl"sv, "STL", kMeshAdvice},
+    {".dxf"sv, "DXF", kTableAdvice},
+    {".fls"sv, "a scan of FARO (.fls)", kScannerAdvice},
+    {".rcp"sv, "a scan of ReCap (.rcp)", kScannerAdvice},
+    {".rcs"sv, "a scan of ReCap (.rcs)", kScannerAdvice},
+    {".zfs"sv, "a scan of Z+F (.zfs)", kScannerAdvice},
+    {".tar"sv, "an archive (tar)", "unpack it first"},
+    {".bin"sv, "numbers without a header (.bin)",
+     "the package surfeit for Python takes arrays (docs/python.md): "
+     "numpy.fromfile(NAME, 'f4').reshape(-1, 4)"},
 };
 
 // "PLY, PTC and PRT"
@@ -170,28 +191,60 @@ bool hasExtension(std::string_view path, std::string_view extensions) {
   return false;
 }
 
+// Whether every other byte is 0 and the rest is ASCII.
+bool isUtf16(std::string_view first_bytes) {
+  if (first_bytes.size() < 8) return false;
+  const std::size_t zero = first_bytes[0] == '\0' ? 0 : 1;
+  for (std::size_t i = 0; i < first_bytes.size(); ++i) {
+    const bool is_ascii = first_bytes[i] > '\0' && (first_bytes[i] & 0x80) == 0;
+    if (i % 2 == zero ? first_bytes[i] != '\0' : !is_ascii) return false;
+  }
+  return true;
+}
+
+// Whether a name says that the file is text, which content alone does not tell where rows begin
+// with words.
+bool isTextName(std::string_view path) {
+  return hasExtension(withoutCompression(path), ".xyz .txt .asc .csv .pts");
+}
+
 Status unknownFormat(const std::string& path, std::string_view first_bytes) {
   const auto notRead = [&path](const OtherFormat& other) {
     return Status::corruption(fmt::format("{}: found {}, which is not read as a cloud: {}", path,
                                           other.name, other.advice));
   };
+  if (hasEnding(path, ".xlsx")) {
+    return notRead({{}, "a spreadsheet (.xlsx)", "save it as CSV"});
+  }
   for (const OtherFormat& other : kOtherFormats) {
     if (first_bytes.starts_with(other.magic)) return notRead(other);
   }
+  if (isUtf16(first_bytes)) return notRead({{}, "text in UTF-16", "save it as UTF-8 or ASCII"});
   for (const OtherFormat& other : kOtherExtensions) {
     if (hasEnding(path, other.magic)) return notRead(other);
   }
   if (first_bytes.empty()) {
     return Status::corruption(path + ": the file is empty, expected a cloud");
   }
+  if (first_bytes.find_first_not_of('\0') == first_bytes.npos) {
+    return Status::corruption(
+        fmt::format("{}: the first {} bytes are all 0: was it copied or downloaded as a whole?",
+                    path, first_bytes.size()));
+  }
   // What the name says is text can tell the line that is none
-  if (hasExtension(withoutCompression(path), ".xyz .txt .asc .csv .pts")) {
+  if (isTextName(path)) {
     const Status text = openXyz(path, {}).status();
     if (!text.ok()) return text;
   }
   return Status::corruption(fmt::format(
       "{}: found {} at 0, expected a cloud ({}); `surfeit sample` makes one of a mesh (.obj)", path,
       quoteText(first_bytes.substr(0, 4)), namesOfRead()));
+}
+
+bool namesColumnsByNumber(std::span<const ChannelRename> renames) {
+  return std::any_of(renames.begin(), renames.end(), [](const ChannelRename& rename) {
+    return rename.from.find_first_not_of("0123456789") == rename.from.npos;
+  });
 }
 
 // Tells apart what a filter takes of files.
@@ -217,7 +270,9 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
                            input.readSome(0, std::as_writable_bytes(std::span(first_bytes))));
   first_bytes.resize(size);
   for (const CloudFormat& format : kFormats) {
-    if (format.open == nullptr || !format.recognises(first_bytes)) continue;
+    const bool is_named_text =
+        format.open == openXyz && isTextName(path) && namesColumnsByNumber(options.channels);
+    if (format.open == nullptr || !(format.recognises(first_bytes) || is_named_text)) continue;
     if (input.isCompressed() && format.has(CloudFormat::kReadInPlaces)) {
       return Status::corruption(
           fmt::format("{}: found {} compressed as a whole, expected it as it is: unpack it first "

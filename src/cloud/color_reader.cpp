@@ -274,10 +274,9 @@ class ColorPlan {
       property.type = is_byte ? ValueType::kInt8 : ValueType::kInt16;
     }
     notes_.push_back(fmt::format(
-        "normals are {} ({} {}): read as directions whose 0 is at {}; --channels normal=- drops "
-        "them",
+        "normals are {} ({} {}): read as directions whose 0 is at {}; --channels {} drops them",
         valueTypeName(sample.type), sampled_, sample.largest,
-        sample.type == ValueType::kUint8 ? 128 : 32768));
+        sample.type == ValueType::kUint8 ? 128 : 32768, dropsOf(element_, "normal")));
   }
 
   // Integers are parts of the largest that their type holds, unless that leaves all but nothing.
@@ -327,9 +326,9 @@ class ColorPlan {
       const RowProperty& property = element_.properties[sample.properties[0]];
       return Status::corruption(fmt::format(
           "{}: found {} to {} in property {} of type {}, expected colors of 0 to 255 or 65535 "
-          "(--channels {}=- reads no colors)",
+          "(--channels {} reads no colors)",
           reader_.path(), sample.least, sample.largest, property.name, valueTypeName(property.type),
-          sample.channel));
+          dropsOf(element_, sample.channel)));
     }
     return {};
   }
@@ -366,7 +365,8 @@ class ColorPlan {
     }
     std::vector<RowProperty> codes;
     for (std::size_t i = 0; i < names.size(); ++i) {
-      codes.push_back({names[i], ValueType::kUint8, false, ValueType::kUint8, packed.offset + i});
+      codes.push_back({names[i], ValueType::kUint8, false, ValueType::kUint8, packed.offset + i,
+                       WideInteger::kNone, packed.typed});
     }
     const auto at = element_.properties.begin() + static_cast<std::ptrdiff_t>(index);
     element_.properties.insert(element_.properties.erase(at), codes.begin(), codes.end());

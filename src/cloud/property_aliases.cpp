@@ -189,7 +189,7 @@ bool isWord(std::string_view name, std::size_t at, std::size_t size) {
 // The properties of an element that are called like each other but for one of three words.
 class LookalikeFinder {
  public:
-  explicit LookalikeFinder(const RowLayout& element) {
+  explicit LookalikeFinder(const RowLayout& element) : element_(element) {
     for (const RowChannel& channel : channelsOf(element)) {
       // What we know is something else
       if (isKnownChannel(channel.name)) continue;
@@ -247,7 +247,7 @@ class LookalikeFinder {
         if (entry == lower_.end()) continue;
         ++count;
         names += fmt::format("{}{}", names.empty() ? "" : " ", entry->second);
-        drops += fmt::format("{}{}=-", drops.empty() ? "" : ",", entry->second);
+        drops += fmt::format("{}{}", drops.empty() ? "" : ",", dropsOf(element_, entry->second));
       }
       if (count == 0 || count == 3) continue;
       notes.push_back(fmt::format(
@@ -262,11 +262,15 @@ class LookalikeFinder {
   std::string renaming(const std::array<std::string, 3>& names, const Triple& ours,
                        std::string_view channel) const {
     const auto entry = channel_of_.find(names[0]);
-    if (entry != channel_of_.end()) return fmt::format("{}={}", entry->second, channel);
-    return fmt::format("{}={},{}={},{}={}", names[0], ours[0], names[1], ours[1], names[2],
-                       ours[2]);
+    const std::string typed = typedNames(element_, names[0]).front();
+    if (entry != channel_of_.end()) {
+      return fmt::format("{}={}", typed == names[0] ? entry->second : typed, channel);
+    }
+    return fmt::format("{}={},{}={},{}={}", typed, ours[0], typedNames(element_, names[1]).front(),
+                       ours[1], typedNames(element_, names[2]).front(), ours[2]);
   }
 
+  const RowLayout& element_;
   std::map<std::string, std::string> lower_;  // names by lower case, in an order
   std::unordered_map<std::string, std::string> channel_of_;
   std::set<std::string> told_;
@@ -323,9 +327,9 @@ std::vector<std::string> notesOfLookalikes(const RowLayout& element,
   if (lacking.size) {
     for (const std::string& name : finder.singles(kSizes)) {
       notes.push_back(
-          fmt::format("property {0} looks like the width of surfels and is not read: "
-                      "--channels {0}=width",
-                      name));
+          fmt::format("property {} looks like the width of surfels and is not read: "
+                      "--channels {}=width",
+                      name, typedNames(element, name).front()));
     }
   }
   return notes;

@@ -76,6 +76,8 @@ struct RowProperty {
   // Where the value stands in a row of the reader: packed, host byte order; lists take no bytes.
   std::size_t offset = 0;
   WideInteger wide = WideInteger::kNone;  // in the file, where the type is float64
+  // What --channels must call it, where that is not the name: the file's, or the user's renaming.
+  std::string typed = {};
 };
 
 struct RowLayout {

@@ -2,9 +2,12 @@
 // well-known text.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
+
+#include "core/bounds.h"
 
 namespace surfeit {
 
@@ -38,8 +41,20 @@ inline std::string_view epsgCodeOf(std::string_view crs) {
 // Whether x and y are longitudes and latitudes in degrees, as far as the text tells.
 bool isGeographicCrs(std::string_view crs);
 
+// In front of the code of angles that are no degrees.
+inline constexpr std::string_view kAngularUnitWords = " angular unit ";
+// That code; 0: degrees, or not said.
+std::uint16_t angularUnitOf(std::string_view crs);
+
 // What is to be told of such a system, with the way out; empty for others.
 std::string noteOfDegrees(std::string_view crs);
+
+// What is to be told of a system about the Earth's centre; empty for others.
+std::string noteOfGeocentric(std::string_view crs);
+
+// What is to be told of a cloud that states no system, by the box of its places but for strays:
+// within 180 and 90 of 0, and far higher than wide, though not above the highest mountains.
+std::string noteOfLikelyDegrees(const Bounds3d& bounds);
 
 // Whether two systems are one, as far as their texts tell: text and keys of one system differ.
 inline bool isSameCrs(std::string_view a, std::string_view b) {

@@ -12,6 +12,7 @@
 #include "cloud/cloud_formats.h"
 #include "cloud/ply/ply_reader.h"
 #include "core/bounds.h"
+#include "core/crs_comment.h"
 #include "core/guard.h"
 #include "index/cloud_density.h"
 #include "index/stray_note.h"
@@ -102,6 +103,14 @@ Status addSurfels(const std::string& path, const RowReaderOptions& options, Clou
     const std::string strays =
         strayNote({places.begin(), places.end()}, scan.sample.bounds(), scan.origin);
     if (!strays.empty()) info.notes.push_back(strays);
+    if (statedCrs((*source)->comments()).empty() && !places.empty()) {
+      std::vector<glm::vec3> sample(places.begin(), places.end());
+      Bounds3d usual = usualBounds(sample);
+      usual.min += scan.origin;
+      usual.max += scan.origin;
+      std::string degrees = noteOfLikelyDegrees(usual);
+      if (!degrees.empty()) info.notes.push_back(std::move(degrees));
+    }
     SURFEIT_ASSIGN_OR_RETURN(surfels.density, measureDensity(**source, scan.sample, progress));
   }
   info.surfels = std::move(surfels);

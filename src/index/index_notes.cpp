@@ -6,9 +6,25 @@
 #include <utility>
 #include <vector>
 
+#include "core/bounds.h"
+#include "core/crs_comment.h"
 #include "index/stray_note.h"
 
 namespace surfeit {
+namespace {
+
+void noteLikelyDegrees(const CloudTotals& totals, const glm::dvec3& origin, Progress& progress) {
+  std::vector<glm::vec3> places;
+  for (const Surfel& surfel : totals.sample) places.push_back(surfel.position);
+  if (places.empty()) return;
+  Bounds3d bounds = usualBounds(places);
+  bounds.min += origin;
+  bounds.max += origin;
+  const std::string degrees = noteOfLikelyDegrees(bounds);
+  if (!degrees.empty()) progress.note(degrees);
+}
+
+}  // namespace
 
 void noteStrays(const CloudTotals& totals, const glm::dvec3& origin, bool is_origin_asked,
                 Progress& progress) {
@@ -40,7 +56,8 @@ void noteBrightness(const CloudTotals& totals, bool full_precision, Progress& pr
   if (totals.bright == 0) return;
   progress.note(fmt::format(
       "{} of {} surfels have an albedo above 1, up to {:.4g}, and so would reflect more light than "
-      "they get: {}. Where colors are light, --channels color=radiosity reads them as such alone; "
+      "they get: {}. Where colors are light, --channels color=radiosity reads them as such alone "
+      "(color as the file calls it: Cd, _albedo ...); "
       "else convert --set \"albedo = min(albedo, 1)\"",
       totals.bright, totals.surfels, totals.largest_albedo,
       full_precision ? "it is kept (--precision full)" : "it is 1 in the scene"));
@@ -49,6 +66,7 @@ void noteBrightness(const CloudTotals& totals, bool full_precision, Progress& pr
 void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
                     const IndexOptions& options, Progress& progress) {
   for (const std::string& note : reader.notesOfFloats(totals)) progress.note(note);
+  if (reader.crs().empty()) noteLikelyDegrees(totals, reader.origin(), progress);
   noteStrays(totals, reader.origin(), true, progress);
   noteSmallness(totals, progress);
   noteBrightness(totals, options.full_precision, progress);

@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
 #include "cloud/surfel_names.h"
 #include "core/curve_key.h"
@@ -152,7 +153,9 @@ class NormalsJob {
       indexing_.normals = options_.estimation;
       indexing_.up = options_.up;
       if (reader_->element().find("nx") != nullptr) {
-        indexing_.channels += indexing_.channels.empty() ? "nx=-,ny=-,nz=-" : ",nx=-,ny=-,nz=-";
+        // In front: of two that name the same the first counts
+        indexing_.channels = dropsOf(reader_->element(), "normal") +
+                             (indexing_.channels.empty() ? "" : "," + indexing_.channels);
       }
     }
     SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, indexPlaces(input_, output_, indexing_, progress_));

@@ -2,12 +2,16 @@
 
 #include <fmt/format.h>
 
+#include "cloud/comment_notes.h"
 #include "surfels/no_data.h"
 
 namespace surfeit {
 
 void tellNotes(RowReader& reader, Progress& progress) {
   for (const std::string& note : reader.notes()) {
+    progress.note(fmt::format("{}: {}", reader.path(), note));
+  }
+  for (const std::string& note : notesOfComments(reader.comments())) {
     progress.note(fmt::format("{}: {}", reader.path(), note));
   }
   // A failure will be that of whoever reads the rows

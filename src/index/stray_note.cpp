@@ -20,21 +20,6 @@ constexpr std::size_t kRare = 100;
 constexpr double kLoss = 0.02;
 constexpr std::size_t kLeastInCell = 8;
 
-Bounds3d usualBounds(std::vector<glm::vec3>& sample) {
-  Bounds3d bounds;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::size_t rare = sample.size() / kRare;
-    const auto low = sample.begin() + static_cast<std::ptrdiff_t>(rare);
-    const auto high = sample.end() - static_cast<std::ptrdiff_t>(rare) - 1;
-    const auto less = [axis](const glm::vec3& a, const glm::vec3& b) { return a[axis] < b[axis]; };
-    std::nth_element(sample.begin(), low, sample.end(), less);
-    bounds.min[axis] = double((*low)[axis]);
-    std::nth_element(sample.begin(), high, sample.end(), less);
-    bounds.max[axis] = double((*high)[axis]);
-  }
-  return bounds;
-}
-
 // The bounds of 98 % where the others are strays; else nothing.
 std::optional<Bounds3d> boundsBesideStrays(std::vector<glm::vec3>& sample, const Bounds3& bounds) {
   if (sample.size() < kRare) return std::nullopt;
@@ -85,6 +70,21 @@ double coveredArea(const std::vector<glm::vec3>& places, const Bounds3& bounds) 
 }
 
 }  // namespace
+
+Bounds3d usualBounds(std::vector<glm::vec3>& sample) {
+  Bounds3d bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t rare = sample.size() / kRare;
+    const auto low = sample.begin() + static_cast<std::ptrdiff_t>(rare);
+    const auto high = sample.end() - static_cast<std::ptrdiff_t>(rare) - 1;
+    const auto less = [axis](const glm::vec3& a, const glm::vec3& b) { return a[axis] < b[axis]; };
+    std::nth_element(sample.begin(), low, sample.end(), less);
+    bounds.min[axis] = double((*low)[axis]);
+    std::nth_element(sample.begin(), high, sample.end(), less);
+    bounds.max[axis] = double((*high)[axis]);
+  }
+  return bounds;
+}
 
 std::string strayNote(std::vector<glm::vec3> sample, const Bounds3& bounds,
                       const glm::dvec3& origin) {

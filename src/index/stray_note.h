@@ -11,6 +11,10 @@
 
 namespace surfeit {
 
+// The box that holds 98 % of the places along each axis; all of few. At least one place, whose
+// order changes.
+Bounds3d usualBounds(std::vector<glm::vec3>& sample);
+
 // A sentence with the command that leaves strays out, when 98 % of `sample`, positions from all
 // over a cloud with these bounds, lie in a box of a thousandth of the cloud's width; else nothing.
 // All are counted from `origin`.

@@ -56,6 +56,8 @@ struct Mesh {
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<Mask> masks;
+  std::vector<std::string> comments;     // of the files; of OBJ those in front
+  std::uint64_t other_comments = 0;      // how many more there are
   std::vector<std::string> group_names;  // of the groups from 1, where they are asked for
   std::uint64_t degenerate_faces = 0;    // faces without area, skipped
 

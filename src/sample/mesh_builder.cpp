@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <new>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "cloud/houdini/bgeo_json_cursor.h"
+#include "core/surfel_limits.h"
 #include "core/text_case.h"
 #include "sample/polygon.h"
 #include "storage/byte_output.h"
@@ -139,6 +141,14 @@ Status MeshBuilder::addFace(std::span<const std::uint64_t> corners, std::uint32_
                                             std::int64_t(position.size() - vertex_begin) - 1));
     }
     places_.push_back(position[corner]);
+    if (const glm::dvec3 size = glm::abs(places_.back());
+        std::max({size.x, size.y, size.z}) > double(kLargestLength) && isFinite(size)) {
+      return Status::corruption(
+          fmt::format("{}: face {}: vertex {} is at {:.3g} {:.3g} {:.3g}, expected at most {:g}: "
+                      "surfels have no larger places",
+                      path, face, corner - vertex_begin, places_.back().x, places_.back().y,
+                      places_.back().z, kLargestLength));
+    }
     if (!isFinite(places_.back())) {
       return Status::corruption(
           fmt::format("{}: face {}: vertex {} is not finite", path, face, corner - vertex_begin));

@@ -33,7 +33,8 @@ struct ParsedObj {
   std::map<std::string, MaterialSource> sources;
   std::string warnings;
   std::vector<std::string> notes;  // of material files
-  std::uint64_t free_form_statements = 0;
+  std::uint64_t free_form_statements = 0, other_comments = 0;
+  std::vector<std::string> comments;
 };
 
 Status parseObj(const std::string& path, ParsedObj& parsed) {
@@ -55,6 +56,8 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   SURFEIT_RETURN_IF_ERROR(lines.status());
   SURFEIT_RETURN_IF_ERROR(material_files.status());
   parsed.free_form_statements = lines.freeFormStatements();
+  parsed.comments = lines.comments();
+  parsed.other_comments = lines.otherComments();
   parsed.colors = lines.takeColors();
   parsed.sources = material_files.sources();
   parsed.notes = material_files.notes();
@@ -328,6 +331,9 @@ Status loadObjMesh(const std::string& path, const glm::vec3& default_albedo,
   for (const std::string& note : parsed.notes) progress.note(note);
   for (const std::string& note : parsed.colors.notes()) progress.note(path + ": " + note);
   noteLeftOut(path, parsed, curves.width > 0, progress);
+  builder.mesh.comments.insert(builder.mesh.comments.end(), parsed.comments.begin(),
+                               parsed.comments.end());
+  builder.mesh.other_comments += parsed.other_comments;
   ObjImporter importer(path, parsed, default_albedo, builder, progress);
   SURFEIT_RETURN_IF_ERROR(importer.importFaces());
   if (curves.width > 0) return importer.importLines(curves);

@@ -159,6 +159,7 @@ Status loadPlyMesh(const std::string& path, const glm::vec3& default_albedo, Mes
         has_strips ? "triangle strips are not read: write faces" : "clouds need no sampling"));
   }
   for (const std::string& comment : reader.header().comments) {
+    builder.mesh.comments.push_back(comment);
     if (!comment.starts_with("TextureFile")) continue;
     progress.note(
         fmt::format("{}: {}: textures of PLY are not read (those of OBJ are)", path, comment));

@@ -64,9 +64,10 @@ constexpr std::string_view kIndexStatements[] = {"f", "l", "p"};
 constexpr std::string_view kNameStatements[] = {"usemtl", "newmtl", "mtllib"};
 constexpr std::string_view kColorStatements[] = {"Ka", "Kd", "Ks", "Ke", "Tf"};
 constexpr std::string_view kPictureStatements[] = {"map_Kd", "map_Ke", "map_d"};
-constexpr std::string_view kMtlStatements[] = {"Ka",     "Kd",     "Ks",     "Ke",     "Tf",
-                                               "Tr",     "Ni",     "map_Kd", "map_Ke", "map_d",
-                                               "newmtl", "usemtl", "mtllib", "illum"};
+// Statements whose case does not matter.
+constexpr std::string_view kSpelledStatements[] = {
+    "Ka",     "Kd",     "Ks",     "Ke",    "Tf", "Tr", "Ni", "map_Kd", "map_Ke", "map_d",
+    "newmtl", "usemtl", "mtllib", "illum", "v",  "vn", "vt", "f",      "l",      "Pm"};
 constexpr std::string_view kFreeFormStatements[] = {"surf", "curv", "curv2"};
 
 // An option of a picture, and the values that it may leave out.
@@ -163,7 +164,11 @@ bool ObjLines::readLine() {
     if (!readPhysicalLine()) return joined > 0 && status_.ok();
     const std::string_view text = trimmed(physical_);
     const bool is_comment = joined == 0 && text.starts_with('#');
-    if (is_comment && text.starts_with("#MRGB")) colors_.addZBrushLine();
+    if (is_comment) {
+      takeComment(text);
+    } else if (!text.empty()) {
+      has_statement_ = true;
+    }
     if (is_comment || !text.ends_with('\\')) {
       line_ += physical_;
       break;
@@ -183,6 +188,24 @@ bool ObjLines::readLine() {
   return status_.ok();
 }
 
+void ObjLines::takeComment(std::string_view text) {
+  constexpr std::size_t kMostComments = 64, kMostChars = 1024;
+  if (text.starts_with("#MRGB")) {
+    colors_.addZBrushLine();
+    return;
+  }
+  while (text.starts_with('#')) text.remove_prefix(1);
+  text = trimmed(text).substr(0, kMostChars);
+  if (text.empty()) return;
+  if (has_statement_ || comments_.size() == kMostComments) {
+    ++other_comments_;
+    return;
+  }
+  std::string& comment = comments_.emplace_back(text);
+  std::replace_if(
+      comment.begin(), comment.end(), [](char c) { return c < ' ' && c > '\0'; }, ' ');
+}
+
 void ObjLines::rewriteLine() {
   spellStatement();
   dropComment();
@@ -190,7 +213,8 @@ void ObjLines::rewriteLine() {
   const std::string_view word = takeWord(rest);
   if (isOneOf(word, kFreeFormStatements)) ++free_form_;
   if (isOneOf(word, kNameStatements)) {
-    std::string name(rest);
+    const bool is_quoted = rest.size() > 2 && rest.starts_with('"') && rest.ends_with('"');
+    std::string name(is_quoted ? rest.substr(1, rest.size() - 2) : rest);
     for (char& c : name) {
       if (kBlanks.find(c) != std::string_view::npos) c = kNameBlank;
       if (c == '\\') c = '/';  // written on Windows
@@ -200,11 +224,22 @@ void ObjLines::rewriteLine() {
     if (is_material) noteMaterial("newmtl", name);
   } else if (isOneOf(word, kPictureStatements)) {
     line_ = std::string(word) + " " + withAllValues(rest);
+  } else if (word == "Pm") {
+    double metal = 0;
+    if (isNumber(takeWord(rest), metal) && metal > 0) ++metals_;
   } else if (word == "d" && rest.starts_with("-halo")) {
     takeWord(rest);
     line_ = "d " + std::string(rest);
     checkNumbers(std::string_view(line_).substr(2));
+  } else if (isOneOf(word, kIndexStatements)) {
+    dropSlashes();
   } else if (isOneOf(word, kNumberStatements) && checkNumbers(rest)) {
+    if (word == "v" && values_.size() < 3) {
+      status_ = Status::corruption(
+          fmt::format("{}: line {}: found a vertex of {} numbers, expected three: flat ones have 0",
+                      input_.path(), number_, values_.size()));
+      return;
+    }
     if (word == "v") keepPlace(rest);
     noteMaterial(word, rest);
     completeColor(word, rest);
@@ -229,7 +264,7 @@ void ObjLines::completeColor(std::string_view word, std::string_view rest) {
 void ObjLines::spellStatement() {
   std::string_view rest = trimmed(line_);
   const std::string_view word = takeWord(rest);
-  for (const std::string_view known : kMtlStatements) {
+  for (const std::string_view known : kSpelledStatements) {
     if (word == known || !isSameInAnyCase(word, known)) continue;
     line_.replace(std::size_t(word.data() - line_.data()), word.size(), known);
     return;
@@ -251,7 +286,24 @@ void ObjLines::dropComment() {
   std::string_view rest = trimmed(line_);
   const std::string_view word = takeWord(rest);
   if (!isOneOf(word, kNumberStatements) && !isOneOf(word, kIndexStatements)) return;
-  line_.resize(std::min(line_.find('#'), line_.size()));
+  const std::size_t comment = line_.find('#');
+  if (comment == line_.npos) return;
+  ++other_comments_;
+  line_.resize(comment);
+}
+
+// Corners without the rest of their indices: 1/ and 1// are 1.
+void ObjLines::dropSlashes() {
+  if (line_.find('/') == line_.npos) return;
+  std::string line;
+  for (std::size_t i = 0; i < line_.size(); ++i) {
+    const std::size_t end = std::min(line_.find_first_not_of('/', i), line_.size());
+    const bool ends_word = end == line_.size() || kBlanks.find(line_[end]) != kBlanks.npos;
+    const bool has_index = !line.empty() && kBlanks.find(line.back()) == kBlanks.npos;
+    if (line_[i] == '/' && ends_word && has_index) continue;
+    line += line_[i];
+  }
+  line_ = std::move(line);
 }
 
 bool ObjLines::checkNumbers(std::string_view numbers) {

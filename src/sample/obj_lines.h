@@ -31,9 +31,14 @@ class ObjLines final : public std::streambuf {
 
   const Status& status() const { return status_; }
   std::uint64_t freeFormStatements() const { return free_form_; }
+  // In front of the first statement, at most 64; and how many others there are.
+  const std::vector<std::string>& comments() const { return comments_; }
+  std::uint64_t otherComments() const { return other_comments_; }
   ObjVertexColors takeColors() { return std::move(colors_); }
   // Materials that the file defines, and whether they have a Kd; of several of one name the first.
   const std::map<std::string, bool>& materials() const { return materials_; }
+  // How many of them are metals (Pm).
+  std::uint64_t metals() const { return metals_; }
   // Names that several of its materials have.
   const std::set<std::string>& repeatedMaterials() const { return repeated_; }
 
@@ -44,10 +49,12 @@ class ObjLines final : public std::streambuf {
   bool readPhysicalLine();
   bool readLine();
   void rewriteLine();
+  void takeComment(std::string_view text);
   void spellStatement();
   void keepPlace(std::string_view rest);
   void completeColor(std::string_view word, std::string_view rest);
   void dropComment();
+  void dropSlashes();
   void noteMaterial(std::string_view word, std::string_view rest);
   bool checkNumbers(std::string_view numbers);
 
@@ -58,7 +65,9 @@ class ObjLines final : public std::streambuf {
   std::size_t begin_ = 0;        // in the buffer: the next line
   std::string physical_, line_;  // as read; what the parser gets
   std::uint64_t number_ = 0;     // of the last line read, from 1
-  std::uint64_t free_form_ = 0;
+  std::uint64_t free_form_ = 0, other_comments_ = 0, metals_ = 0;
+  std::vector<std::string> comments_;
+  bool has_statement_ = false;
   ObjVertexColors colors_;
   std::vector<double> values_;  // of the numbers that checkNumbers() saw
   std::map<std::string, bool> materials_;

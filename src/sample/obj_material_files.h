@@ -136,6 +136,12 @@ class MaterialFiles final : public tinyobj::MaterialReader {
     *warnings += warned;
     *errors += failed;
     if (!lines.status().ok()) status_ = lines.status();
+    if (lines.metals() > 0) {
+      notes_.push_back(
+          path + ": " + std::to_string(lines.metals()) +
+          " materials are metals (Pm), which reflect no diffuse light, and are read as "
+          "if they did: make their Kd darker");
+    }
     std::set<std::string> repeated = lines.repeatedMaterials();
     for (const auto& [name, has_kd] : lines.materials()) {
       const MaterialSource source{directoryOf(path), has_kd};

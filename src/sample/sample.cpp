@@ -15,7 +15,12 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
+#include "cloud/comment_notes.h"
+#include "core/crs_comment.h"
 #include "core/group_comment.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
@@ -117,6 +122,31 @@ Result<std::uint64_t> surfelCountFor(const SampleOptions& options, double area) 
 // near plane of pictures.
 constexpr double kNearFraction = 1e-5;
 
+// What the cloud says of itself, and the system of the meshes.
+std::vector<std::string> commentsOf(const Mesh& mesh, UpAxis up, Progress& progress) {
+  std::vector<std::string> comments = {upComment(up)};
+  for (std::size_t i = 0; i < mesh.group_names.size(); ++i) {
+    comments.push_back(groupComment(i + 1, mesh.group_names[i]));
+  }
+  if (const auto stated = statedUpAxis(mesh.comments); stated && *stated != up) {
+    progress.note(fmt::format("the mesh says that {0} is up, the cloud says {1}: --up {0} says so",
+                              upAxisName(*stated), upAxisName(up)));
+  }
+  for (const std::string& note : notesOfComments(mesh.comments)) progress.note(note);
+  // Places stay those of the system; all else is said of the mesh, not of the cloud made of it
+  std::uint64_t lost = mesh.other_comments;
+  for (const std::string& comment : mesh.comments) {
+    const bool is_known = statedUpAxis(std::span(&comment, 1)) || statedGroupName(comment);
+    if (comment.starts_with(kCrsComment)) {
+      comments.push_back(comment);
+    } else if (!is_known) {
+      ++lost;
+    }
+  }
+  if (lost > 0) progress.inform(fmt::format("{} comments of the meshes are not kept", lost));
+  return comments;
+}
+
 // The ways to cut the mesh that options may ask for.
 class Cutting {
  public:
@@ -193,15 +223,13 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.two_sided = channels.long_side = options.is_two_sided || mesh.hasTwoSides();
     channels.opacity = mesh.isTranslucent();
     channels.group = options.groups != SampleGroups::kNone;
-    std::vector<std::string> comments = {upComment(options.surroundings.ground.up)};
-    for (std::size_t i = 0; i < mesh.group_names.size(); ++i) {
-      comments.push_back(groupComment(i + 1, mesh.group_names[i]));
-    }
     SURFEIT_ASSIGN_OR_RETURN(
         SurfelWriter writer,
-        SurfelWriter::create(output, channels,
-                             {.comments = std::move(comments), .progress = &progress},
-                             mesh.origin));
+        SurfelWriter::create(
+            output, channels,
+            {.comments = commentsOf(mesh, options.surroundings.ground.up, progress),
+             .progress = &progress},
+            mesh.origin));
     const SurfelMaker maker(mesh, light.hasLight() ? &light : nullptr, options.is_two_sided);
     const std::unique_ptr<SurfelTasks> tasks = cutting->tasks(maker);
     SURFEIT_RETURN_IF_ERROR(writeSurfels(*tasks, stats.threads, writer, progress, stats));

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <vector>
 
+#include "cloud/channels.h"
 #include "cloud/color_sample.h"
 #include "cloud/surfel_names.h"
 
@@ -33,10 +34,11 @@ Result<std::string> noteOfDarkColors(RowReader& reader) {
   if (seen.hasLight() && !is_flag) return std::string();
   if (seen.largest != 0 && !is_flag) return std::string();  // not a number
   return fmt::format(
-      "colors are {}{}: surfels are {}black{}; --channels color=- leaves the colors out",
+      "colors are {}{}: surfels are {}black{}; --channels {} leaves the colors out",
       is_flag ? "0 or 1 in uchar, of 255" : "all 0", is_whole ? "" : " in a sample",
       is_flag ? "all but " : "",
-      is_flag ? ", and `convert --set \"red = red * 255\"` (green, blue) makes 1 white" : "");
+      is_flag ? ", and `convert --set \"red = red * 255\"` (green, blue) makes 1 white" : "",
+      dropsOf(element, "color"));
 }
 
 }  // namespace surfeit

@@ -23,8 +23,8 @@ constexpr std::size_t kMostProperties = 64, kMostTold = 4;
 // Smaller numbers are values.
 constexpr double kLeastSize = 999;
 // What programs write where there is no value.
-constexpr double kNoData[] = {-999,  -9999, -99999, -999999, -32767, -32768, -2147483648.,
-                              -1e20, 1e20,  -1e30,  1e30,    -1e32,  1e32};
+constexpr double kNoData[] = {-999, -9999, -99999, -999999, -32767, -32768, -2147483648., -1e10,
+                              1e10, -1e20, 1e20,   -1e30,   1e30,   -1e32,  1e32};
 // Floats and doubles near the largest: written with few digits they differ.
 constexpr double kHugeFloat = 3.4e38, kHugeDouble = 1.79e308;
 
@@ -188,11 +188,10 @@ Result<std::uint64_t> look(RowReader& reader, std::vector<Column>& columns, Orig
   const std::size_t most_rows = std::max<std::size_t>(1, kPassBytes / row_bytes);
   std::uint64_t seen = 0;
   AlignedBuffer buffer;
-  for (std::uint64_t place = 0; seen < kPlaces * kRowsOfPlace; ++place) {
-    if (takes_places && (place == kPlaces || !reader.seekRow(place * step).ok())) break;
-    const std::size_t at_once =
-        takes_places ? std::min(std::size_t{kRowsOfPlace}, most_rows)
-                     : std::min<std::size_t>(most_rows, kPlaces * kRowsOfPlace - seen);
+  const std::size_t at_once =
+      takes_places ? std::min(std::size_t{kRowsOfPlace}, most_rows) : most_rows;
+  for (std::uint64_t place = 0; !takes_places || place < kPlaces; ++place) {
+    if (takes_places && !reader.seekRow(place * step).ok()) break;
     const Result<Bytes> rows = reader.readRows(at_once, buffer);
     if (!rows.ok() || rows->empty()) break;
     for (Column& column : columns) column.add(*rows);

@@ -30,9 +30,9 @@ constexpr KindName kKindNames[] = {
     {&SurfelDefects::bad_opacity, "an opacity that is not above 0 and at most 1"},
 };
 
-// The channel that --channels drops, so that records are read without it; empty: none, for a surfel
-// has a place.
-std::string_view channelOf(std::string_view property) {
+}  // namespace
+
+std::string_view channelToDrop(std::string_view property) {
   const auto is_in = [property](const auto& names) {
     return std::find(std::begin(names), std::end(names), property) != std::end(names);
   };
@@ -45,13 +45,13 @@ std::string_view channelOf(std::string_view property) {
   return property;
 }
 
-}  // namespace
-
-void SurfelDefects::Kind::add(std::uint64_t record, const char* bad_property, double bad_value) {
+void SurfelDefects::Kind::add(std::uint64_t record, const char* bad_property, double bad_value,
+                              const std::string& drops_of_property) {
   if (count == 0 || record < first_record) {
     first_record = record;
     property = bad_property;
     value = bad_value;
+    drops = drops_of_property;
   }
   ++count;
 }
@@ -108,12 +108,10 @@ std::string SurfelDefects::wayOut() const {
   bool lacks_place = false;
   for (const KindName& row : kKindNames) {
     const Kind& kind = this->*row.kind;
-    const std::string_view channel = channelOf(kind.property);
     const bool has_property = kind.count > 0 && kind.property[0] != '\0';
-    lacks_place = lacks_place || (has_property && channel.empty());
-    const std::string drop = fmt::format("{}=-", channel);
-    const bool is_known = std::find(drops.begin(), drops.end(), drop) != drops.end();
-    if (!channel.empty() && !is_known) drops.push_back(drop);
+    lacks_place = lacks_place || (has_property && kind.drops.empty());
+    const bool is_known = std::find(drops.begin(), drops.end(), kind.drops) != drops.end();
+    if (!kind.drops.empty() && !is_known) drops.push_back(kind.drops);
   }
   if (drops.empty()) {
     return lacks_place ? "; a record without a place is no surfel: --filter leaves such records out"

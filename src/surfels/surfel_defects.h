@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace surfeit {
 
@@ -14,9 +15,11 @@ struct SurfelDefects {
     // Of the first record: the property that is bad, a name that lasts, and its value
     const char* property = "";
     double value = 0;
+    std::string drops = {};  // what --channels takes to drop it; empty: a surfel has it
 
     // Counts a record.
-    void add(std::uint64_t record, const char* bad_property = "", double bad_value = 0);
+    void add(std::uint64_t record, const char* bad_property = "", double bad_value = 0,
+             const std::string& drops_of_property = {});
     // "3 records with a non-finite value (first: record 17, whose y is nan)"
     std::string describe(const char* what) const;
   };
@@ -43,5 +46,9 @@ struct SurfelDefects {
   // Both.
   std::string describe() const { return describeKinds() + wayOut(); }
 };
+
+// The channel that --channels drops, so that records are read without a property that is bad;
+// empty: none, for a surfel has a place.
+std::string_view channelToDrop(std::string_view property);
 
 }  // namespace surfeit

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "cloud/channels.h"
 #include "cloud/srgb_curve.h"
 #include "cloud/surfel_names.h"
 #include "core/assert.h"
@@ -62,7 +63,8 @@ Result<bool> SurfelMapping::findTriple(const RowLayout& element, const char* con
   for (int i = 0; i < 3; ++i) {
     SURFEIT_ASSIGN_OR_RETURN(fields[i], findField(element, names[i], path));
     (fields[i].isPresent() ? found : missing) = names[i];
-    if (fields[i].isPresent()) drops += fmt::format("{}{}=-", drops.empty() ? "" : ",", names[i]);
+    if (!fields[i].isPresent()) continue;
+    drops += fmt::format("{}{}", drops.empty() ? "" : ",", dropsOf(element, names[i]));
   }
   if (found != nullptr && missing != nullptr) {
     const std::string advice = std::string_view(names[0]) == kPositionNames[0]
@@ -145,9 +147,21 @@ Result<SurfelMapping> SurfelMapping::create(const RowLayout& element, const std:
     channels.group = mapping.group_.isPresent();
     if (channels.group) break;
   }
+  mapping.findDrops(element);
   mapping.row_bytes_ = element.row_bytes;
   mapping.fast_decoder_ = mapping.makeFastDecoder();
   return mapping;
+}
+
+// What a user types, so that records are read without their bad values.
+void SurfelMapping::findDrops(const RowLayout& element) {
+  for (const RowProperty& property : element.properties) {
+    const std::string channel(channelToDrop(property.name));
+    if (channel.empty() || !isSurfelProperty(property.name)) continue;
+    drops_.try_emplace(channel, dropsOf(element, channel));
+  }
+  // A value of either, whichever a color stands in for
+  if (!drops_.contains("color")) drops_["color"] = "color=-";
 }
 
 void SurfelMapping::setOrigin(const glm::dvec3& origin) {
@@ -320,7 +334,10 @@ bool SurfelMapping::decode(const std::byte* row, std::uint64_t record, Surfel& s
                            SurfelDefects& defects) const {
   const Defect defect = decodeRow(row, surfel);
   if (defect.kind == nullptr) return true;
-  (defects.*defect.kind).add(record, defect.property, defect.value);
+  const auto drops = drops_.find(channelToDrop(defect.property));
+  (defects.*defect.kind)
+      .add(record, defect.property, defect.value,
+           drops == drops_.end() ? std::string() : drops->second);
   return false;
 }
 

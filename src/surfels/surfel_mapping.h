@@ -4,7 +4,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -100,6 +102,7 @@ class SurfelMapping {
                                  const std::string& path, Field (&fields)[3]);
   Defect decodeRow(const std::byte* row, Surfel& surfel) const;
   std::optional<FloatRowDecoder> makeFastDecoder() const;
+  void findDrops(const RowLayout& element);
 
   CloudChannels channels_;
   std::size_t row_bytes_ = 0;
@@ -107,6 +110,7 @@ class SurfelMapping {
   Field long_side_[3], coverage_, opacity_;
   double opacity_scale_ = 1;
   double radius_scale_ = 1;
+  std::map<std::string, std::string, std::less<>> drops_;  // of --channels, by channel
   glm::dvec3 origin_{0};
   std::optional<FloatRowDecoder> fast_decoder_;  // when the types of the properties allow it
 };

@@ -7,7 +7,9 @@
 #include <string_view>
 #include <utility>
 
+#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
+#include "cloud/comment_notes.h"
 #include "cloud/property_aliases.h"
 #include "cloud/row_reader.h"
 #include "core/crs_comment.h"
@@ -53,6 +55,10 @@ class RowSurfelSource final : public SurfelSource {
     if (std::string note = noteOfDegrees(statedCrs(comments())); !note.empty()) {
       notes.push_back(std::move(note));
     }
+    if (std::string note = noteOfGeocentric(statedCrs(comments())); !note.empty()) {
+      notes.push_back(std::move(note));
+    }
+    for (std::string& note : notesOfComments(comments())) notes.push_back(std::move(note));
     if (!row_notes_) row_notes_ = notesOfRows();
     notes.insert(notes.end(), row_notes_->begin(), row_notes_->end());
     return notes;
@@ -134,12 +140,17 @@ class RowSurfelSource final : public SurfelSource {
     const RowLayout& element = reader_->element();
     const bool is_used = mapping_.channels().opacity;
     if (!is_used && element.find("opacity") != nullptr && element.find("f_dc_0") == nullptr) {
-      notes.push_back("opacity is not used beside coverage: --channels coverage=- leaves that out");
+      notes.push_back(
+          fmt::format("opacity is not used beside coverage: --channels {} leaves that out",
+                      dropsOf(element, "coverage")));
     }
     if (!is_used && element.find("opacity_r") != nullptr) {
-      notes.push_back(
-          "opacity_r opacity_g opacity_b are not used: a surfel has one opacity; --channels "
-          "opacity_g=opacity takes the green one");
+      // Where a file has them as one channel, they cannot be named one by one
+      const bool is_channel = typedNames(element, "opacity_g").front() != "opacity_g";
+      notes.push_back(fmt::format(
+          "opacity_r opacity_g opacity_b are not used: a surfel has one opacity; {} the green one",
+          is_channel ? "convert --set \"alpha = opacity_g\", then --channels alpha=opacity, takes"
+                     : "--channels opacity_g=opacity takes"));
     }
   }
 
@@ -148,14 +159,16 @@ class RowSurfelSource final : public SurfelSource {
     if (mapping_.hasCoverage() || reader_->element().find("coverage") == nullptr) return;
     const CloudChannels& has = mapping_.channels();
     if (has.area) {
-      notes.push_back(
+      notes.push_back(fmt::format(
           "coverage is not used beside area: convert --set \"area *= coverage\" multiplies both, "
-          "--channels coverage=- leaves it out");
+          "--channels {} leaves it out",
+          dropsOf(reader_->element(), "coverage")));
       return;
     }
-    notes.push_back(
-        "coverage is not used without a radius: --channels coverage=opacity takes it for how "
-        "opaque surfels are, --channels coverage=- leaves it out");
+    notes.push_back(fmt::format(
+        "coverage is not used without a radius: --channels {0}=opacity takes it for how opaque "
+        "surfels are, --channels {0}=- leaves it out",
+        typedNames(reader_->element(), "coverage").front()));
   }
 
   std::unique_ptr<RowReader> reader_;

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <type_traits>
 
+#include "cloud/channels.h"
+
 namespace surfeit {
 namespace {
 
@@ -90,12 +92,15 @@ Result<std::string> noteOfUnusedAlpha(RowReader& reader, bool has_opacity) {
   const std::string what =
       fmt::format("the alpha of {} of {} records looked at is below {} and not used", below,
                   counts.rows, is_unit ? 1 : largestCode(alpha->type));
-  if (has_opacity) return what + " beside the opacity: --channels alpha=- leaves it out";
+  const std::string typed = typedNames(reader.element(), "alpha").front();
+  if (has_opacity) {
+    return fmt::format("{} beside the opacity: --channels {}=- leaves it out", what, typed);
+  }
   // An opacity of these types is of 1 or of 65535
   const bool is_scaled = !is_unit && valueTypeBytes(alpha->type) > 2;
   return fmt::format(
-      "{}: {}--channels alpha=opacity takes it for how opaque surfels are, alpha=- leaves it out",
-      what, is_scaled ? "write it as uchar, then " : "");
+      "{0}: {1}--channels {2}=opacity takes it for how opaque surfels are, {2}=- leaves it out",
+      what, is_scaled ? "write it as uchar, then " : "", typed);
 }
 
 }  // namespace surfeit

@@ -15,7 +15,8 @@ namespace surfeit {
 class Notes : public Progress {
  public:
   void note(const std::string& message) override { notes.push_back(message); }
-  std::vector<std::string> notes;
+  void inform(const std::string& message) override { informed.push_back(message); }
+  std::vector<std::string> notes, informed;
 };
 
 // Where the case lies, if it is there.

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -68,6 +69,50 @@ TEST_F(CloudDoubtsTest, NumbersThatStandForNoValueAreTold) {
               ElementsAre(HasSubstr("red green blue are -9999 in 1 of 2")));
   EXPECT_THAT(notesOf({"short height"}, {"1 2 3 -32768", "2 3 4 70", "2 3 4 80"}),
               ElementsAre(HasSubstr("height is -32768 in 1 of 3")));
+}
+
+// A stream is looked at as a whole, a file that can be sought in from all over.
+TEST_F(CloudDoubtsTest, NumbersThatStandForNoValueAreFoundBehindTheBegin) {
+  std::string text;
+  for (int i = 0; i < 70000; ++i) text += std::to_string(i % 300) + " 2 3.5\n";
+  const std::string bad = "1 2 -9999\n";
+  EXPECT_THAT(textNotes(text + bad), ElementsAre(HasSubstr("z is -9999 in 1 of 70001 records")));
+  EXPECT_THAT(textNotes(text + bad + text, "x < 250"), Contains(HasSubstr("z is -9999 in 1 of ")));
+  std::vector<std::string> rows(70000, "1 2 3.5");
+  for (std::size_t i = 69000; i < rows.size(); ++i) rows[i] = "1 2 -9999";
+  EXPECT_THAT(notesOf({}, rows), Contains(HasSubstr("z is -9999 in ")));
+}
+
+// --- Longitudes and latitudes
+
+TEST_F(CloudDoubtsTest, CloudsThatLookLikeDegreesAreTold) {
+  const auto notesOfIndex = [&](double x, double y, double step, double height) {
+    std::string text;
+    for (int i = 0; i < 100; ++i) {
+      text += std::to_string(x + i % 10 * step) + " " + std::to_string(y + i / 10 * step) + " " +
+              std::to_string(100 + i % 7 * height / 7) + "\n";
+    }
+    write("a.txt", text);
+    KeepNotes notes;
+    EXPECT_TRUE(indexClouds({path("a.txt")}, path("a.sft"), {}, notes).ok());
+    const auto info = readCloudInfo(path("a.txt"), {}, notes);
+    EXPECT_TRUE(info.ok());
+    const bool is_told_by_info =
+        info.ok() && std::any_of(info->notes.begin(), info->notes.end(), [](const auto& note) {
+          return note.find("look like longitudes") != std::string::npos;
+        });
+    const auto told = std::find_if(notes.notes.begin(), notes.notes.end(), [](const auto& note) {
+      return note.find("look like longitudes") != std::string::npos;
+    });
+    EXPECT_EQ(is_told_by_info, told != notes.notes.end());
+    return told == notes.notes.end() ? std::string() : *told;
+  };
+  EXPECT_THAT(notesOfIndex(7.1, 50.2, 1e-5, 20), HasSubstr("filters.reprojection"));
+  EXPECT_THAT(notesOfIndex(-122.4, 37.7, 1e-3, 50), HasSubstr("degrees"));
+  EXPECT_THAT(notesOfIndex(5, 45, .2, 3000), HasSubstr("degrees"));
+  EXPECT_EQ(notesOfIndex(500000, 5400000, 1e-2, 20), "");
+  EXPECT_EQ(notesOfIndex(7.1, 50.2, 1, 20), "");  // as wide as high
+  EXPECT_EQ(notesOfIndex(0, 0, .1, 30), "");      // a pole near 0
 }
 
 TEST_F(CloudDoubtsTest, PlacesAtZeroFarFromAllOthersAreTold) {

@@ -58,7 +58,13 @@ TEST(ExrLayout, OtherNamesComeFromTheUser) {
   const Status status = layOut(names).status();
   EXPECT_EQ(status.code(), StatusCode::kCorruption);
   EXPECT_THAT(status.message(), AllOf(HasSubstr("a.exr: found the channels"), HasSubstr("WorldPos"),
-                                      HasSubstr("expected world positions")));
+                                      HasSubstr("expected world positions"),
+                                      HasSubstr("--channels WorldPos=position names")));
+  // The only layer of three values, and a depth
+  EXPECT_THAT(layOut({"Where.X", "Where.Y", "Where.Z"}).status().message(),
+              HasSubstr("--channels Where=position"));
+  EXPECT_THAT(layOut({"R", "G", "B", "Z"}).status().message(),
+              AllOf(HasSubstr("--channels RGB=position"), HasSubstr("a depth alone is none")));
   EXPECT_THAT(properties(names, "WorldPos=position,nrm=normal"),
               ElementsAre("x", "y", "z", "nx", "ny", "nz", "pixel_x", "pixel_y", "id"));
   EXPECT_THAT(properties(names, "WorldPos=position,V.nrm=-,id=-"),

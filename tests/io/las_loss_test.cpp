@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cloud/comment_notes.h"
 #include "cloud/scans/las_reader.h"
 #include "core/crs_comment.h"
 #include "io/convert_tables.h"
@@ -127,7 +128,10 @@ TEST_F(LasLossTest, UnitsThatAreNotMetresAreTold) {
     write("a.las", withRecords(makeLas(4, 6, 3), {lasRecord("LASF_Projection", number, data)}));
     const auto reader = openLas(path("a.las"), {});
     EXPECT_TRUE(reader.ok());
-    return reader.ok() ? (*reader)->notes() : std::vector<std::string>();
+    if (!reader.ok()) return std::vector<std::string>();
+    std::vector<std::string> notes = (*reader)->notes();
+    for (std::string& note : notesOfComments((*reader)->comments())) notes.push_back(note);
+    return notes;
   };
   const auto ofKeys = [&](std::uint16_t unit, std::uint16_t vertical_unit) {
     std::vector<std::uint16_t> words = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 2992};
@@ -155,6 +159,59 @@ TEST_F(LasLossTest, UnitsThatAreNotMetresAreTold) {
   EXPECT_THAT(notesOf(2112, "COMPD_CS[\"c\"," + degrees +
                                 "UNIT[\"metre\",1]],VERT_CS[\"v\",UNIT[\"foot\",0.3048]]]"),
               ElementsAre(HasSubstr("heights are in 'foot'")));
+}
+
+TEST_F(LasLossTest, UnitsOfHeightsFollowFromTheirSystem) {
+  const auto notesOf = [&](std::uint16_t vertical, std::uint16_t unit) {
+    const std::vector<std::uint16_t> words = {1,    1, 0, 4,        1024, 0, 1, 1,
+                                              3072, 0, 1, 2,        3076, 0, 1, 9001,
+                                              4096, 0, 1, vertical, 4099, 0, 1, unit};
+    write(
+        "a.las",
+        withRecords(makeLas(4, 6, 3),
+                    {lasRecord("LASF_Projection", 34735,
+                               {reinterpret_cast<const char*>(words.data()), 2 * words.size()})}));
+    const auto reader = openLas(path("a.las"), {});
+    EXPECT_TRUE(reader.ok());
+    return reader.ok() ? (*reader)->notes() : std::vector<std::string>();
+  };
+  EXPECT_THAT(notesOf(6360, 0), ElementsAre(HasSubstr("heights are in 'US survey feet'")));
+  EXPECT_THAT(notesOf(8228, 0), ElementsAre(HasSubstr("heights are in 'feet'")));
+  EXPECT_THAT(notesOf(5703, 0), testing::IsEmpty());
+  EXPECT_THAT(notesOf(6360, 9001), testing::IsEmpty());  // what is stated goes before
+}
+
+// Keys say what the angles are, from LAS to PLY and back.
+TEST_F(LasLossTest, UnitsOfAnglesAreToldAndKept) {
+  const auto crsOf = [&](const std::vector<std::uint16_t>& keys, const std::string& file) {
+    std::vector<std::uint16_t> words = {1, 1, 0, std::uint16_t(keys.size() / 2)};
+    for (std::size_t i = 0; i < keys.size(); i += 2) {
+      words.insert(words.end(), {keys[i], 0, 1, keys[i + 1]});
+    }
+    write(
+        "a.las",
+        withRecords(makeLas(2, 3, 3),
+                    {lasRecord("LASF_Projection", 34735,
+                               {reinterpret_cast<const char*>(words.data()), 2 * words.size()})}));
+    if (file != "a.las") convertOk({"a.las"}, "b.ply");
+    if (file == "c.las") convertOk({"b.ply"}, "c.las");
+    const auto reader = openRowReader(path(file));
+    EXPECT_TRUE(reader.ok());
+    return reader.ok() ? std::string(statedCrs((*reader)->comments())) : std::string();
+  };
+  for (const char* file : {"a.las", "b.ply", "c.las"}) {
+    EXPECT_EQ(crsOf({1024, 2, 2048, 4807, 2054, 9105}, file),
+              "geographic EPSG:4807 angular unit 9105")
+        << file;
+    EXPECT_EQ(crsOf({1024, 2, 2048, 4326, 2054, 9102}, file), "geographic EPSG:4326") << file;
+  }
+  EXPECT_THAT(noteOfDegrees("geographic EPSG:4807 angular unit 9105"),
+              HasSubstr("x and y are gons"));
+  EXPECT_THAT(noteOfDegrees("geographic EPSG:4326 angular unit 9101"),
+              HasSubstr("x and y are radians"));
+  // Angles without a code are angles; those beside a projection are of its datum
+  EXPECT_EQ(crsOf({2054, 9102}, "a.las"), "geographic by GeoTIFF keys without a code");
+  EXPECT_EQ(crsOf({2054, 9102, 3072, 32632}, "a.las"), "EPSG:32632");
 }
 
 // Whole degrees of old point formats are no multiples of .006.

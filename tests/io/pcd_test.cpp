@@ -288,7 +288,10 @@ TEST_F(PcdTest, CountComesFromPointsOrWidthAndHeight) {
   EXPECT_THAT(refusalOf(head.text()), HasSubstr("expected POINTS, or WIDTH and HEIGHT"));
   head.size = "WIDTH 3\nHEIGHT 3\n";
   head.points = "POINTS 2\n";
-  EXPECT_THAT(refusalOf(head.text()), HasSubstr("width times height points before it: 9, found 2"));
+  const auto reader = openGood(head.text() + "1 2 3\n4 5 6\n");
+  EXPECT_EQ(reader->element().count, 2u);
+  EXPECT_THAT(reader->notes(),
+              testing::Contains(HasSubstr("WIDTH times HEIGHT are 9 points, POINTS 2")));
   head.size = "WIDTH 18446744073709551615\nHEIGHT 2\n";
   EXPECT_THAT(refusalOf(head.text()), HasSubstr("below 2^64"));
 }

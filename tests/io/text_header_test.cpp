@@ -138,6 +138,53 @@ TEST_F(TextHeaderTest, CommentsBehindValuesAreTold) {
   EXPECT_EQ(openText("x y z tag\n1 2 3 #1\n", "tag=-")->element().properties.size(), 3u);
 }
 
+TEST_F(TextHeaderTest, CommentsBehindNamesAndInFrontAreKept) {
+  for (const char* text : {"x y z # from here\n1 2 3\n", "# from here\nx y z\n1 2 3\n",
+                           "x,y,z // from here\n1,2,3\n", "# x y z # from here\n1 2 3\n"}) {
+    const auto reader = openText(text);
+    EXPECT_THAT(reader->comments(), ElementsAre("from here")) << text;
+    EXPECT_THAT(reader->notes(), IsEmpty()) << text;
+  }
+  // Well-known text is long
+  const std::string crs = "crs PROJCS[\"" + std::string(3000, 'a') + "\"]";
+  EXPECT_THAT(openText("# " + crs + "\nx y z\n1 2 3\n")->comments(), ElementsAre(crs));
+}
+
+TEST_F(TextHeaderTest, CommentsThatAreNotKeptAreCounted) {
+  EXPECT_THAT(notesOf("x y z\n1 2 3\n# b\n4 5 6\n\n# c\n"),
+              ElementsAre(HasSubstr("2 lines of comments among the rows are not kept")));
+  EXPECT_THAT(notesOf("1 2 3\n// b\n4 5 6\n"), ElementsAre(HasSubstr("1 lines of comments")));
+  std::string many;
+  for (int i = 0; i < 70; ++i) many += "# line\n";
+  EXPECT_THAT(notesOf(many + "1 2 3\n"),
+              ElementsAre(HasSubstr("6 comments in front of the rows are not kept")));
+}
+
+// --- Units below names
+
+TEST_F(TextHeaderTest, ALineBelowNamesMayHoldUnits) {
+  for (const char* text : {"x y z\nft ft ft\n1 2 3\n", "X,Y,Z\n[ft],[ft],[ft]\n1,2,3\n",
+                           "x;y;z\n(ft);(ft);(ft)\n1;2;3\n",
+                           "Easting\tNorthing\tHeight\n\"ft\"\t\"ft\"\t\"ft\"\n1\t2\t3\n",
+                           "# x y z\nfeet feet feet\n1 2 3\n"}) {
+    EXPECT_EQ(valueIn(text, 0, "z"), 3) << text;
+    EXPECT_THAT(notesOf(text), ElementsAre(HasSubstr("convert --units ft:m"))) << text;
+  }
+  EXPECT_THAT(notesOf("x y z\nm m m\n1 2 3\n"), IsEmpty());
+  EXPECT_THAT(notesOf("x,y,z,radius\nm,m,m,mm\n1,2,3,4\n"),
+              ElementsAre(HasSubstr("--set \"radius *= 0.001\"")));
+  EXPECT_THAT(notesOf("x,y,z,I\nm,m,m,\n1,2,3,4\n"), IsEmpty());
+  EXPECT_THAT(refusal(openRowReader, "x,y,z\ndeg,deg,m\n1,2,3\n"), HasSubstr("are angles"));
+  EXPECT_THAT(refusal(openRowReader, "x [deg],y [deg],z [m]\n1,2,3\n"), HasSubstr("are angles"));
+  // What is none of units is refused with a way out
+  for (const char* text : {"x y z\nfloat float float\n1 2 3\n", "x,y,z\nm,m\n1,2,3\n"}) {
+    write("b.txt", text);
+    EXPECT_THAT(openRowReader(path("b.txt")).status().message(),
+                HasSubstr("a # in front makes a comment"))
+        << text;
+  }
+}
+
 // --- Whole numbers that no double holds
 
 TEST_F(TextHeaderTest, WholeNumbersThatDoublesRoundAreTold) {

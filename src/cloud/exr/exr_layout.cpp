@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <string>
 #include <string_view>
 #include <unordered_map>
 #include <utility>
@@ -145,10 +147,11 @@ class LayoutBuilder {
   LayoutBuilder(std::span<const ExrSource> sources, ExrLayout& layout)
       : sources_(sources), layout_(layout) {}
 
-  void addProperty(const std::string& name, ValueType type) {
+  void addProperty(const std::string& name, ValueType type, const std::string& group = {}) {
     RowLayout& element = layout_.element;
     RowProperty property;
     property.name = name;
+    if (name != group) property.typed = group;
     property.type = type;
     property.offset = element.row_bytes;
     element.row_bytes += valueTypeBytes(type);
@@ -163,7 +166,8 @@ class LayoutBuilder {
       ExrColumn column = {group.sources[i], is_integer, std::nullopt};
       if (!group.properties.empty()) {
         column.property = layout_.element.properties.size();
-        addProperty(group.properties[i], is_integer ? ValueType::kUint32 : ValueType::kFloat32);
+        addProperty(group.properties[i], is_integer ? ValueType::kUint32 : ValueType::kFloat32,
+                    group.name);
       }
       layout_.columns.push_back(column);
     }
@@ -186,6 +190,21 @@ class LayoutBuilder {
   ExrLayout& layout_;
 };
 
+// The layer of three values that may be a position, by its name or as the only one.
+std::string likeliestPosition(std::span<const ExrSource> sources) {
+  std::vector<std::string> layers;
+  for (const Group& group : groupSources(sources)) {
+    if (group.sources.size() != 3) continue;
+    std::string lower = group.name;
+    std::transform(lower.begin(), lower.end(), lower.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const std::string_view last = splitAtLastDot(lower).second;
+    if (lower.find("pos") != lower.npos || last.starts_with('p')) return group.name;
+    layers.push_back(group.name);
+  }
+  return layers.size() == 1 && layers[0] != "N" ? layers[0] : "NAME";
+}
+
 Status noPosition(std::span<const ExrSource> sources, const std::string& path) {
   constexpr std::size_t kMaxListed = 200;
   std::string found;
@@ -195,8 +214,9 @@ Status noPosition(std::span<const ExrSource> sources, const std::string& path) {
   }
   return Status::corruption(fmt::format(
       "{}: found the channels {}, expected world positions: P.X P.Y P.Z, or others that "
-      "--channels NAME=position names",
-      path, found.empty() ? "none" : quoteText(found)));
+      "--channels {}=position names{}",
+      path, found.empty() ? "none" : quoteText(found), likeliestPosition(sources),
+      found == "Z" || found.ends_with(" Z") ? "; a depth alone is none" : ""));
 }
 
 }  // namespace

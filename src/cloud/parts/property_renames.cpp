@@ -17,7 +17,7 @@ constexpr std::size_t kTwinNameChars = 48;  // what tells twins apart is kept
 
 }  // namespace
 
-std::vector<std::string> renamedProperties(const RowLayout& element,
+std::vector<RowProperty> renamedProperties(const RowLayout& element,
                                            std::span<const ChannelRename> renames) {
   const auto is_renamed = [renames](std::string_view name) {
     return std::any_of(renames.begin(), renames.end(),
@@ -34,11 +34,16 @@ std::vector<std::string> renamedProperties(const RowLayout& element,
   for (std::size_t i = 0; i < known_names.size(); ++i) known.properties[i].name = known_names[i];
 
   // Whole channels, by our name or the file's, then single properties
-  std::vector<std::string> names(element.properties.size());
-  const auto rename = [&](const RowChannel& channel, std::string_view from) {
+  std::vector<RowProperty> renamed = element.properties;
+  for (RowProperty& property : renamed) property.name.clear();
+  const auto rename = [&](const RowChannel& channel, const std::string& from) {
     const std::vector<std::string> given =
         propertyNames(from, channel.properties.size(), channel.kind, renames);
-    for (std::size_t i = 0; i < given.size(); ++i) names[channel.properties[i]] = given[i];
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      RowProperty& property = renamed[channel.properties[i]];
+      property.name = given[i];
+      property.typed = from;
+    }
   };
   std::vector<bool> is_done(element.properties.size(), false);
   for (const RowLayout& names_of : {std::cref(element), std::cref(std::as_const(known))}) {
@@ -53,31 +58,32 @@ std::vector<std::string> renamedProperties(const RowLayout& element,
       for (const std::size_t i : channel.properties) is_done[i] = true;
     }
   }
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  for (std::size_t i = 0; i < renamed.size(); ++i) {
     if (is_done[i] || element.properties[i].is_list) continue;
-    names[i] = known.properties[i].name;
-    if (!is_renamed(names[i])) continue;
-    const std::vector<std::string> given = propertyNames(names[i], 1, ChannelKind::kFloat, renames);
-    names[i] = given.empty() ? "" : given.front();
+    const std::string& from = known.properties[i].name;
+    renamed[i].name = from;
+    if (!is_renamed(from)) continue;
+    const std::vector<std::string> given = propertyNames(from, 1, ChannelKind::kFloat, renames);
+    renamed[i].name = given.empty() ? "" : given.front();
+    renamed[i].typed = from;
   }
-  return names;
+  return renamed;
 }
 
 Result<RowLayout> renamedElement(const RowLayout& original, std::span<const ChannelRename> renames,
                                  const std::string& path) {
-  const std::vector<std::string> names = renamedProperties(original, renames);
+  std::vector<RowProperty> renamed = renamedProperties(original, renames);
   RowLayout element = original;
   element.properties.clear();
   std::set<std::string> taken;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (names[i].empty()) continue;
-    if (!taken.insert(names[i]).second) {
+  for (std::size_t i = 0; i < renamed.size(); ++i) {
+    if (renamed[i].name.empty()) continue;
+    if (!taken.insert(renamed[i].name).second) {
       return Status::corruption(
           fmt::format("{}: element {}: property {} would be a second {}, expected another name",
-                      path, original.name, original.properties[i].name, names[i]));
+                      path, original.name, original.properties[i].name, renamed[i].name));
     }
-    element.properties.push_back(original.properties[i]);
-    element.properties.back().name = names[i];
+    element.properties.push_back(std::move(renamed[i]));
   }
   return element;
 }

@@ -15,10 +15,10 @@
 
 namespace surfeit {
 
-// The name of every property of `element` after renames of whole channels (color=albedo) and of
-// single properties (curvature=weight); empty for lists and what is dropped. Names may come out
-// twice.
-std::vector<std::string> renamedProperties(const RowLayout& element,
+// The scalar properties of `element` after renames of whole channels (color=albedo) and of single
+// properties (curvature=weight), with what the user typed; without names where they are lists or
+// dropped. Names may come out twice.
+std::vector<RowProperty> renamedProperties(const RowLayout& element,
                                            std::span<const ChannelRename> renames);
 
 // The element with these names, without lists and what is dropped; places in a row stay the same.

@@ -93,12 +93,14 @@ struct PlyReader::State {
     SURFEIT_RETURN_IF_ERROR(cursor.failure());
     const std::string expected = fmt::format("{} of type {}", property.name, valueTypeName(type));
     if (!token.empty()) {
-      const bool has_comma = token.find(',') != token.npos;
-      return damaged(fmt::format("found {}, expected {}{}", quoteText(token), expected,
-                                 has_comma
-                                     ? ": PLY has points before decimals and no commas; write "
-                                       "it with points"
-                                     : ""));
+      std::byte value[8];
+      std::string_view advice;
+      if (token.find(',') != token.npos) {
+        advice = ": PLY has points before decimals and no commas; write it with points";
+      } else if (parsePlyNumber(token, ValueType::kFloat64, value)) {
+        advice = ", which does not hold it: make it float in the header";
+      }
+      return damaged(fmt::format("found {}, expected {}{}", quoteText(token), expected, advice));
     }
     if (cursor.isAtEnd()) return endsEarly(expected);
     return damaged(fmt::format("line ends early, expected {}", expected));
@@ -240,7 +242,8 @@ struct PlyReader::State {
 
   Status notTheEnd(std::string_view found, std::uint64_t offset) const {
     return Status::corruption(
-        fmt::format("{}: {} at {} after the last element, expected the end of the file",
+        fmt::format("{}: {} at {} after the last element, expected the end of the file: the header "
+                    "counts fewer rows",
                     file().path(), found, offset));
   }
 

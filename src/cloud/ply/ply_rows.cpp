@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "cloud/channels.h"
 #include "cloud/parts/property_renames.h"
 #include "cloud/ply/packed_splat_reader.h"
 #include "cloud/ply/ply_reader.h"
@@ -67,8 +68,8 @@ class PlyRowReader final : public RowReader {
     if (!missing.empty()) {
       notes.push_back(fmt::format(
           "these are Gaussian splats without {}: read as points, with opacity and scales as they "
-          "are; --channels opacity=- leaves opacity out",
-          fmt::join(missing, " ")));
+          "are; --channels {} leaves opacity out",
+          fmt::join(missing, " "), dropsOf(element_, "opacity")));
     }
     for (std::size_t i = 0; i < elements.size(); ++i) {
       if (i != index_) notes.push_back(fmt::format("element {} is not kept", elements[i].name));

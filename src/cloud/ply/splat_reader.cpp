@@ -6,12 +6,14 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <string_view>
 #include <utility>
 
 #include "cloud/srgb_curve.h"
+#include "cloud/surfel_names.h"
 
 namespace surfeit {
 namespace {
@@ -23,6 +25,7 @@ constexpr const char* kNeeded[] = {"x",      "y",       "z",       "f_dc_0",  "f
                                    "f_dc_2", "opacity", "scale_0", "scale_1", "rot_0",
                                    "rot_1",  "rot_2",   "rot_3"};
 constexpr const char* kThirdScale = "scale_2";
+constexpr std::size_t kFirstColor = 3;  // of kNeeded
 
 // What disks have instead; files bring normals that mean nothing.
 constexpr const char* kFloats[] = {"nx",    "ny",   "nz",      "radius",  "red",
@@ -36,6 +39,19 @@ bool isReplaced(std::string_view name) {
   };
   return has(std::span(kNeeded).subspan(3)) || has(kFloats) || name == kThirdScale ||
          name == kTwoSided || name.starts_with("f_rest_");
+}
+
+bool hasScalar(const RowLayout& element, const char* name) {
+  const RowProperty* const property = element.find(name);
+  return property != nullptr && !property->is_list;
+}
+
+// Whether colors are codes of 8 bits in place of harmonics, as nerfstudio writes them (rgb).
+bool hasCodes(const RowLayout& element) {
+  return !hasScalar(element, kNeeded[kFirstColor]) &&
+         std::all_of(std::begin(kColorNames), std::end(kColorNames), [&](const char* name) {
+           return hasScalar(element, name) && element.find(name)->type == ValueType::kUint8;
+         });
 }
 
 // A value of a splat, in its row.
@@ -53,7 +69,8 @@ struct Field {
 
 class SplatReader final : public RowReader {
  public:
-  explicit SplatReader(std::unique_ptr<RowReader> splats) : splats_(std::move(splats)) {
+  SplatReader(std::unique_ptr<RowReader> splats, bool are_lengths)
+      : splats_(std::move(splats)), are_lengths_(are_lengths) {
     const RowLayout& from = splats_->element();
     element_.name = from.name;
     element_.count = from.count;
@@ -68,7 +85,11 @@ class SplatReader final : public RowReader {
     for (const char* name : kFloats) element_.properties.push_back({name, ValueType::kFloat32});
     element_.properties.push_back({kTwoSided, ValueType::kUint8});
     packRow(element_);
-    for (std::size_t i = 0; i < std::size(kNeeded); ++i) fields_[i] = fieldOf(kNeeded[i]);
+    has_codes_ = hasCodes(from);
+    for (std::size_t i = 0; i < std::size(kNeeded); ++i) {
+      const bool is_color = i >= kFirstColor && i < kFirstColor + 3;
+      fields_[i] = fieldOf(is_color && has_codes_ ? kColorNames[i - kFirstColor] : kNeeded[i]);
+    }
     has_third_scale_ = from.find(kThirdScale) != nullptr;
     if (has_third_scale_) third_scale_ = fieldOf(kThirdScale);
   }
@@ -83,6 +104,12 @@ class SplatReader final : public RowReader {
     notes.push_back("Gaussian splats are read as disks of radius sqrt(2 s1 s2), two-sided");
     notes.push_back("their opacity becomes the part of its area that a disk covers");
     notes.push_back("splats of an opacity below 1/255 keep their rows");
+    if (are_lengths_) {
+      notes.push_back(
+          "scales are all above 0 and opacities from 0 to 1: they look like lengths and parts, and "
+          "are read as logarithms and logits, as splats have them: write ln(scale) and ln(opacity "
+          "/ (1 - opacity))");
+    }
     if (rest_count_ > 0) {
       notes.push_back(
           fmt::format("colors by direction, f_rest_0 to f_rest_{}, are not kept", rest_count_ - 1));
@@ -140,8 +167,9 @@ class SplatReader final : public RowReader {
     std::array<float, std::size(kFloats)> values;
     decodeShape(splat, values.data());
     for (std::size_t c = 0; c < 3; ++c) {
-      const double code = std::max(0.0, 0.5 + kSplatColorFactor * valueOf(splat, 3 + c));
-      values[4 + c] = static_cast<float>(linearFromSrgbCode(code));
+      const double value = valueOf(splat, kFirstColor + c);
+      const double code = has_codes_ ? value / 255 : 0.5 + kSplatColorFactor * value;
+      values[4 + c] = static_cast<float>(linearFromSrgbCode(code < 0 ? 0 : code));
     }
     const double opacity = 1 / (1 + std::exp(-valueOf(splat, 6)));
     values[7] = static_cast<float>(opacity);
@@ -172,27 +200,58 @@ class SplatReader final : public RowReader {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       values[axis] = static_cast<float>(columns[smallest][axis]);
     }
-    values[3] = static_cast<float>(std::numbers::sqrt2 * std::exp(log_product / 2));
+    const bool is_number = std::none_of(scales, scales + 3, [](double s) { return std::isnan(s); });
+    values[3] = static_cast<float>(is_number ? std::numbers::sqrt2 * std::exp(log_product / 2)
+                                             : std::numeric_limits<double>::quiet_NaN());
   }
 
   std::unique_ptr<RowReader> splats_;
+  bool are_lengths_;
   RowLayout element_;
   std::vector<std::size_t> copies_;  // where the first properties of element_ stand in a splat
   std::array<Field, std::size(kNeeded)> fields_;
   Field third_scale_;
-  bool has_third_scale_ = false;
+  bool has_third_scale_ = false, has_codes_ = false;
   std::size_t rest_count_ = 0;
   std::uint64_t next_row_ = 0;
   AlignedBuffer splat_rows_;
 };
 
+// Whether all scales are above 0 and all opacities from 0 to 1, in rows from all over the file: the
+// first of real splats is not so.
+Result<bool> haveLengths(RowReader& splats) {
+  constexpr std::uint64_t kPlaces = 64;
+  constexpr std::size_t kRowsOfPlace = 64;
+  const RowLayout& element = splats.element();
+  const RowProperty &opacity = *element.find("opacity"), &scale = *element.find("scale_0"),
+                    &other = *element.find("scale_1");
+  const bool takes_places = splats.isSeekable() && element.count > kPlaces * kRowsOfPlace;
+  bool have_lengths = element.count > 0;
+  AlignedBuffer buffer;
+  for (std::uint64_t place = 0; have_lengths && (!takes_places || place < kPlaces); ++place) {
+    if (takes_places && !splats.seekRow(element.count / kPlaces * place).ok()) break;
+    const Result<Bytes> rows = splats.readRows(kRowsOfPlace, buffer);
+    if (!rows.ok() || rows->empty()) break;
+    for (std::size_t at = 0; at < rows->size(); at += element.row_bytes) {
+      const auto value = [&](const RowProperty& property) {
+        return rowValue(&(*rows)[at + property.offset], property.type);
+      };
+      const double part = value(opacity);
+      have_lengths = have_lengths && value(scale) > 0 && value(other) > 0 && part >= 0 && part <= 1;
+    }
+  }
+  SURFEIT_RETURN_IF_ERROR(splats.rewind());
+  return have_lengths;
+}
+
 }  // namespace
 
 bool areSplats(const RowLayout& element) {
-  return std::all_of(std::begin(kNeeded), std::end(kNeeded), [&](const char* name) {
-    const RowProperty* property = element.find(name);
-    return property != nullptr && !property->is_list;
-  });
+  for (std::size_t i = 0; i < std::size(kNeeded); ++i) {
+    const bool is_color = i >= kFirstColor && i < kFirstColor + 3;
+    if (!hasScalar(element, kNeeded[i]) && !(is_color && hasCodes(element))) return false;
+  }
+  return true;
 }
 
 std::vector<std::string> missingOfSplats(const RowLayout& element) {
@@ -202,12 +261,13 @@ std::vector<std::string> missingOfSplats(const RowLayout& element) {
     if (element.find(name) == nullptr) missing.emplace_back(name);
   }
   const bool has_place = element.find("x") != nullptr && element.find("opacity") != nullptr;
-  if (!has_place || missing.size() >= kMost) missing.clear();
+  if (!has_place || missing.size() >= kMost || areSplats(element)) missing.clear();
   return missing;
 }
 
-std::unique_ptr<RowReader> readSplatsAsDisks(std::unique_ptr<RowReader> splats) {
-  return std::make_unique<SplatReader>(std::move(splats));
+Result<std::unique_ptr<RowReader>> readSplatsAsDisks(std::unique_ptr<RowReader> splats) {
+  SURFEIT_ASSIGN_OR_RETURN(const bool are_lengths, haveLengths(*splats));
+  return std::unique_ptr<RowReader>(std::make_unique<SplatReader>(std::move(splats), are_lengths));
 }
 
 }  // namespace surfeit

@@ -7,7 +7,7 @@
 // - radius: sqrt(2 s1 s2) with the two largest scales. The Gaussian exp(-r^2 / 2) with the scales
 //   s1 and s2 integrates to 2 pi s1 s2: the disk covers as much as the splat at full opacity.
 // - red green blue: 0.5 + f_dc / (2 sqrt(pi)), not below 0. Splats are fitted to pictures that are
-//   coded as sRGB, so this is decoded to scene-linear light.
+//   coded as sRGB, so this is decoded to scene-linear light. Without f_dc, red green blue in uchar.
 // - opacity: 1 / (1 + exp(-opacity)). Splats below 1/255, which viewers leave out, keep their rows.
 // - coverage: the opacity, at least 1e-6, for a surfel has an area. Splats overlap as their
 // training
@@ -31,14 +31,15 @@ namespace surfeit {
 // harmonic.
 inline constexpr double kSplatColorFactor = 0.28209479177387814;
 
-// Whether the vertices of a PLY file are splats: f_dc_0 to f_dc_2, opacity, scale_0 and scale_1,
-// rot_0 to rot_3.
+// Whether the vertices of a PLY file are splats: f_dc_0 to f_dc_2 (or red green blue in uchar),
+// opacity, scale_0 and scale_1, rot_0 to rot_3.
 bool areSplats(const RowLayout& element);
 
 // What is missing where most of the properties of splats are there; empty elsewhere.
 std::vector<std::string> missingOfSplats(const RowLayout& element);
 
-// The rows of `splats`, of which areSplats() holds, as disks.
-std::unique_ptr<RowReader> readSplatsAsDisks(std::unique_ptr<RowReader> splats);
+// The rows of `splats`, of which areSplats() holds, as disks. Looks at rows, and goes back to the
+// first.
+Result<std::unique_ptr<RowReader>> readSplatsAsDisks(std::unique_ptr<RowReader> splats);
 
 }  // namespace surfeit

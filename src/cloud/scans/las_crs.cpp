@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "cloud/crs_units.h"
 #include "cloud/scans/las_format.h"
-#include "cloud/scans/las_units.h"
 #include "core/crs_comment.h"
 #include "storage/byte_coding.h"
 
@@ -18,12 +18,13 @@ namespace {
 
 // Keys of GeoTIFF, and what a code says that has none
 constexpr std::uint16_t kModelType = 1024, kCitation = 1026, kGeographic = 2048,
-                        kGeographicCitation = 2049, kProjected = 3072, kProjectedCitation = 3073,
-                        kProjectedUnit = 3076, kVertical = 4096, kVerticalUnit = 4099,
-                        kUserDefined = 32767;
+                        kGeographicCitation = 2049, kAngularUnit = 2054, kProjected = 3072,
+                        kProjectedCitation = 3073, kProjectedUnit = 3076, kVertical = 4096,
+                        kVerticalUnit = 4099, kUserDefined = 32767;
 constexpr std::uint16_t kProjectedModel = 1, kGeographicModel = 2, kGeocentricModel = 3;
 constexpr std::string_view kEpsg = "EPSG:", kUnitWords = " vertical unit ";
-constexpr std::size_t kMostData = 65535;  // of a record before the points
+constexpr std::uint16_t kDegrees = 9102, kDegreesToo = 9122;  // angles
+constexpr std::size_t kMostData = 65535;                      // of a record before the points
 
 // One line of printable text.
 std::string lineOf(std::string_view text) {
@@ -54,7 +55,8 @@ std::string_view wordOf(std::uint16_t model) {
 
 // What the keys of a system say that have one number each; 0: not said.
 struct Keys {
-  std::uint16_t model = 0, projected = 0, geographic = 0, vertical = 0, vertical_unit = 0, unit = 0;
+  std::uint16_t model = 0, projected = 0, geographic = 0, angular_unit = 0, vertical = 0,
+                vertical_unit = 0, unit = 0;
 
   std::uint16_t* find(std::uint16_t key) {
     switch (key) {
@@ -64,6 +66,8 @@ struct Keys {
         return &projected;
       case kGeographic:
         return &geographic;
+      case kAngularUnit:
+        return &angular_unit;
       case kVertical:
         return &vertical;
       case kVerticalUnit:
@@ -81,7 +85,8 @@ struct Keys {
     if (says_kind && model != kGeographicModel) return model;
     if (geographic == kGeocentricCode) return kGeocentricModel;
     if (says_kind) return model;
-    return projected == 0 && geographic != 0 ? kGeographicModel : kProjectedModel;
+    const bool says_angles = geographic != 0 || angular_unit != 0;
+    return projected == 0 && unit == 0 && says_angles ? kGeographicModel : kProjectedModel;
   }
   std::uint16_t code() const {
     const std::uint16_t stated =
@@ -89,6 +94,12 @@ struct Keys {
     return stated == kUserDefined ? std::uint16_t{0} : stated;
   }
 };
+
+// Whether x and y are angles other than degrees.
+bool isOtherAngle(const Keys& keys) {
+  return keys.kind() == kGeographicModel && keys.angular_unit != 0 &&
+         keys.angular_unit != kDegrees && keys.angular_unit != kDegreesToo;
+}
 
 // The number behind `words`, where these end what stands before the first blank of `text`; else 0.
 std::uint16_t numberBehind(std::string_view text, std::string_view words) {
@@ -116,6 +127,7 @@ std::vector<std::uint16_t> keysOf(std::string_view text) {
                   : is_geographic ? kGeographicModel
                                   : kProjectedModel);
   put(is_geocentric || is_geographic ? kGeographic : kProjected, code);
+  put(kAngularUnit, is_geographic ? angularUnitOf(text) : std::uint16_t{0});
   put(kVertical, numberBehind(text, "+"));
   put(kVerticalUnit, numberBehind(text, kUnitWords));
   return words;
@@ -143,13 +155,15 @@ std::vector<std::string> LasCrs::comments() const {
 }
 
 std::string LasCrs::unitNote() const {
-  if (!text_.empty()) return noteOfLasUnits(lasUnitsOfText(text_));
+  if (!text_.empty()) return {};
   Keys said;
   for (std::size_t at = 4; at + 4 <= keys_.size(); at += 4) {
     std::uint16_t* const number = said.find(keys_[at]);
     if (number != nullptr && keys_[at + 1] == 0) *number = keys_[at + 3];
   }
-  return noteOfLasUnits({lasUnitOfCode(said.unit), lasUnitOfCode(said.vertical_unit)});
+  const CrsUnit vertical =
+      said.vertical_unit != 0 ? crsUnitOfCode(said.vertical_unit) : crsUnitOfHeights(said.vertical);
+  return noteOfCrsUnits({crsUnitOfCode(said.unit), vertical});
 }
 
 std::string LasCrs::keysComment() const {
@@ -177,9 +191,11 @@ std::string LasCrs::keysComment() const {
       text += fmt::format("+{}", said.vertical);
     }
     if (said.vertical_unit != 0) text += fmt::format("{}{}", kUnitWords, said.vertical_unit);
+    if (isOtherAngle(said)) text += fmt::format("{}{}", kAngularUnitWords, said.angular_unit);
     if (!citation.empty()) text += " " + citation;
   } else {
     text += citation.empty() ? "by GeoTIFF keys without a code" : citation;
+    if (isOtherAngle(said)) text += fmt::format("{}{}", kAngularUnitWords, said.angular_unit);
   }
   return text;
 }

@@ -43,6 +43,12 @@ inline constexpr std::size_t kLasDescriptorBytes = 192;
 // What extra bytes are called that have no name.
 inline constexpr std::string_view kLasExtraBytes = "extra_bytes";
 
+// Text that a zero ends, unless it fills its place.
+inline std::string lasTextOf(Bytes bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return std::string(text.substr(0, text.find('\0')));
+}
+
 // A header that was read, and what is needed to write one like it.
 struct LasHeader {
   std::string path;

@@ -99,6 +99,7 @@ class LasReader : public FixedRecordReader {
         notes_.push_back(fmt::format("extra bytes {} are called {}, since there is a {}",
                                      quoteText(field.name), property.name, names[i]));
       }
+      if (property.name != field.name) property.typed = field.name;
       property.type = field.type;
       property.offset = element_.row_bytes;
       element_.row_bytes += valueTypeBytes(field.type);

@@ -188,10 +188,10 @@ class HeaderParser {
       }
       const std::uint64_t count = *width_ * *height_;
       if (points_ && *points_ != count) {
-        return unexpected(
-            fmt::format("width times height points before it: {}, found {}", count, *points_));
+        header_.grid_count = count;
+      } else {
+        points_ = count;
       }
-      points_ = count;
     }
     if (!points_) return unexpected("POINTS, or WIDTH and HEIGHT, before it");
     header_.count = *points_;
@@ -219,7 +219,9 @@ bool PcdField::isPackedColor() const {
 bool recognisesPcd(std::string_view first_bytes) {
   if (first_bytes.starts_with("# .PCD")) return true;
   const bool begins_so = first_bytes.starts_with('#') || first_bytes.starts_with("VERSION ");
-  return begins_so && first_bytes.find("\nFIELDS ") != first_bytes.npos &&
+  return begins_so &&
+         (first_bytes.find("\nFIELDS ") != first_bytes.npos ||
+          first_bytes.find("\nCOLUMNS ") != first_bytes.npos) &&
          first_bytes.find("\nSIZE ") != first_bytes.npos;
 }
 

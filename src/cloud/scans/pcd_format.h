@@ -32,7 +32,8 @@ struct PcdHeader {
   std::string version;
   std::vector<PcdField> fields;
   std::uint64_t count = 0;
-  bool has_view_point = false;  // other than the origin
+  std::optional<std::uint64_t> grid_count;  // width times height, where count is another
+  bool has_view_point = false;              // other than the origin
   bool is_text = false;
   bool is_compressed = false;                    // by LZF, field by field; then no text
   std::uint64_t data_offset = 0, data_line = 1;  // of the first point

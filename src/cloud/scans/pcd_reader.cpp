@@ -37,21 +37,20 @@ class PcdLayout {
     for (const PcdField& field : header.fields) layout.addField(field, header.is_text);
 
     // Names after renames, then places in a row
-    const std::vector<std::string> names = renamedProperties(layout.all_, renames);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (names[i].empty()) continue;
-      if (element.find(names[i]) != nullptr) {
+    const std::vector<RowProperty> renamed = renamedProperties(layout.all_, renames);
+    for (std::size_t i = 0; i < renamed.size(); ++i) {
+      if (renamed[i].name.empty()) continue;
+      if (element.find(renamed[i].name) != nullptr) {
         return Status::corruption(
             fmt::format("{}: field {} would be a second {}, expected another name", path,
-                        layout.all_.properties[i].name, names[i]));
+                        layout.all_.properties[i].name, renamed[i].name));
       }
       layout.addMove(layout.values_[i], element.row_bytes);
       for (PackedReal& packed : layout.packed_) {
         const std::size_t at = layout.values_[i].offset;
         if (at >= packed.offset && at < packed.offset + 4) packed.to.push_back(element.row_bytes);
       }
-      element.properties.push_back(layout.all_.properties[i]);
-      element.properties.back().name = names[i];
+      element.properties.push_back(renamed[i]);
       element.properties.back().offset = element.row_bytes;
       element.row_bytes += valueTypeBytes(element.properties.back().type);
     }
@@ -227,7 +226,15 @@ std::string nameOfFormat(const PcdHeader& header) {
 std::vector<std::string> notesOf(const PcdHeader& header) {
   std::vector<std::string> notes;
   if (header.has_view_point) {
-    notes.emplace_back("the view point is not kept: positions are as the file has them");
+    notes.emplace_back(
+        "the view point is not kept: positions are as the file has them; convert --transform moves "
+        "them, where they are relative to it");
+  }
+  if (header.grid_count) {
+    notes.push_back(
+        fmt::format("WIDTH times HEIGHT are {} points, POINTS {}: the latter are read, in the "
+                    "order of the file",
+                    *header.grid_count, header.count));
   }
   std::map<std::string, int> times;
   for (const PcdField& field : header.fields) times[field.name] += field.isPadding() ? 0 : 1;
@@ -262,7 +269,13 @@ class PcdBinaryReader final : public FixedRecordReader {
     std::vector<std::string> notes = notesOf(header_);
     if (!note_.empty()) notes.push_back(note_);
     if (trailingBytes() > 0) {
-      notes.push_back(fmt::format("{} bytes after the last point are not read", trailingBytes()));
+      const std::uint64_t points = trailingBytes() / layout_.recordBytes();
+      notes.push_back(fmt::format(
+          "{} bytes after the last point are not read{}", trailingBytes(),
+          points == 0 ? ""
+                      : fmt::format(": they may be {} points that the header does not count, which "
+                                    "right numbers in WIDTH and POINTS add",
+                                    points)));
     }
     return notes;
   }
@@ -423,16 +436,22 @@ class PcdCompressedReader final : public CountedRowReader {
   AlignedBuffer values_;
 };
 
-// How many colors are nan, of up to so many points at the begin; empty where there are none.
+// How many colors are nan, of points from all over the file, or of all where it cannot be sought
+// in; empty where there are none.
 template <typename Reader>
 Result<std::string> noteOfLostColors(Reader& reader) {
-  constexpr std::size_t kMostPoints = 65536;
+  constexpr std::uint64_t kPlaces = 64, kPointsOfPlace = 1024;
   if (!reader.layout().hasPackedReals()) return std::string();
-  const std::size_t at_once = std::max<std::size_t>(
+  const std::uint64_t count = reader.element().count;
+  const bool takes_places = reader.isSeekable() && count > kPlaces * kPointsOfPlace;
+  const std::size_t most = std::max<std::size_t>(
       1, kPassBytes / std::max<std::size_t>(1, reader.layout().recordBytes()));
+  const std::size_t at_once = takes_places ? std::min<std::size_t>(most, kPointsOfPlace) : most;
   std::uint64_t seen = 0;
   AlignedBuffer buffer;
-  while (seen < kMostPoints) {
+  for (std::uint64_t place = 0; !takes_places || place < kPlaces; ++place) {
+    if (takes_places && !reader.seekRow((count - kPointsOfPlace) / (kPlaces - 1) * place).ok())
+      break;
     // Whoever reads the points is told of what is wrong with them
     const Result<Bytes> rows = reader.readRows(at_once, buffer);
     if (!rows.ok() || rows->empty()) break;

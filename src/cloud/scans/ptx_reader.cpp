@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <utility>
 #include <vector>
@@ -155,7 +156,19 @@ class PtxCursor {
                         matrix_[i][3], i + 1, i == 3 ? 1 : 0));
       }
     }
-    return {};
+    return checkMatrix();
+  }
+
+  // One of zeros would put all points to one place.
+  Status checkMatrix() const {
+    const auto& m = matrix_;
+    const double volume = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                          m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                          m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+    if (std::isfinite(volume) && volume != 0) return {};
+    return damaged(
+        "found a matrix that leaves no volume, expected a rotation: where the points are in the "
+        "world already, rows 1 0 0 0, 0 1 0 0, 0 0 1 0 and 0 0 0 1");
   }
 
   Status checkValues(const Numbers& numbers) {
@@ -228,19 +241,18 @@ class PtxReader final : public CountedRowReader {
     if (cursor_.hasColor()) {
       for (const char* const name : {"red", "green", "blue"}) add(name, ValueType::kUint8);
     }
-    const std::vector<std::string> names = renamedProperties(all, renames);
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (names[i].empty()) {
+    const std::vector<RowProperty> renamed = renamedProperties(all, renames);
+    for (std::size_t i = 0; i < renamed.size(); ++i) {
+      if (renamed[i].name.empty()) {
         offsets_.push_back(kDropped);
         continue;
       }
-      if (element_.find(names[i]) != nullptr) {
+      if (element_.find(renamed[i].name) != nullptr) {
         return Status::corruption(fmt::format("{}: {} would be a second {}, expected another name",
-                                              path_, all.properties[i].name, names[i]));
+                                              path_, all.properties[i].name, renamed[i].name));
       }
       offsets_.push_back(element_.row_bytes);
-      element_.properties.push_back(all.properties[i]);
-      element_.properties.back().name = names[i];
+      element_.properties.push_back(renamed[i]);
       packRow(element_);
     }
     return checkChannelsLeft(element_, path_);

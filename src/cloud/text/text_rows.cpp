@@ -158,7 +158,7 @@ bool isTextNumber(std::string_view word) {
 }
 
 bool isMissingText(std::string_view word) {
-  constexpr std::string_view kMissing[] = {"", "-", "na", "n/a", "null", "none"};
+  constexpr std::string_view kMissing[] = {"", "-", "na", "n/a", "null", "none", "#n/a"};
   std::string lower(word.substr(0, 5));
   for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return std::find(std::begin(kMissing), std::end(kMissing), lower) != std::end(kMissing);
@@ -316,7 +316,9 @@ std::string describeTextRow(std::string_view line, std::span<const TextColumn> c
 
 bool isTextExtra(std::string_view line, TextExtras extras) {
   const std::string_view text = trimmedLine(line);
-  return text.empty() || (extras.has_comments && isTextComment(text)) ||
+  // ",,", too, and the mark of old programs at the end
+  const bool is_empty = text == "\x1a" || text.find_first_not_of(" \t,;|") == text.npos;
+  return is_empty || (extras.has_comments && isTextComment(text)) ||
          (extras.has_counts && isTextCount(text));
 }
 
@@ -358,7 +360,8 @@ Status TextRowParser::checkEnd(LineSource& source) const {
     const std::string_view line = withoutEnd(lines, bytes);
     if (!isTextExtra(line, extras_)) {
       return Status::corruption(
-          fmt::format("{}: line {}: found {} after the last row, expected the end of the file",
+          fmt::format("{}: line {}: found {} after the last row, expected the end of the file: the "
+                      "header counts fewer rows",
                       source.input().path(), source.lineNumber(), quoteText(line)));
     }
     source.consume(bytes, 1);

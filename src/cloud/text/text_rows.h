@@ -31,8 +31,8 @@ std::vector<std::string_view> wordsOf(std::string_view line, std::size_t most);
 
 // Whether a word is a number, by the rules of ascii PLY.
 bool isTextNumber(std::string_view word);
-// Whether a cell of a table says that it has no value: nothing between commas, NA, N/A, null, none,
-// or a dash.
+// Whether a cell of a table says that it has no value: nothing between commas, NA, N/A, #N/A, null,
+// none, or a dash.
 bool isMissingText(std::string_view word);
 // Whether a word is digits only, 18 at most: a count.
 bool isTextCount(std::string_view word);

@@ -11,7 +11,9 @@
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kMaxComments = 64, kMaxCommentChars = 1024;
+constexpr std::size_t kMaxComments = 64;
+// Well-known text of coordinate reference systems is long.
+constexpr std::size_t kMaxCommentChars = 65535;
 
 bool beginsWithNumbers(std::span<const std::string_view> words) {
   return words.size() >= 3 && std::all_of(words.begin(), words.begin() + 3, isTextNumber);
@@ -58,8 +60,9 @@ bool XyzHead::isData(std::string_view line) const {
 
 bool XyzHead::isDataOf(std::span<const std::string_view> words) const {
   if (beginsWithNumbers(words)) return true;
+  const auto numbers = std::count_if(words.begin(), words.end(), isTextNumber);
+  if (takes_words_ && numbers >= 3) return true;
   if (!hasNames()) {
-    const auto numbers = std::count_if(words.begin(), words.end(), isTextNumber);
     return !other_names_.empty() && words.size() == other_names_.size() && numbers >= 3;
   }
   if (words.size() != header_.names.size()) return false;
@@ -72,7 +75,8 @@ bool XyzHead::isDataOf(std::span<const std::string_view> words) const {
 
 XyzHead::Line XyzHead::take(std::string_view line) {
   line = trimmedLine(line);
-  if (line.empty() || (isSeparatorLine(line) && !hasNames())) return Line::kHead;
+  const bool is_empty = line.find_first_not_of(" \t,;|") == line.npos;
+  if (is_empty || (isSeparatorLine(line) && !hasNames())) return Line::kHead;
   if (isTextComment(line)) {
     endNames();
     named_in_comment_ = true;
@@ -82,6 +86,10 @@ XyzHead::Line XyzHead::take(std::string_view line) {
     return Line::kHead;
   }
   if (isData(line) && !namesNumbers(line)) return Line::kData;
+  if (hasNames() && !has_units_ && addUnits(line, header_)) {
+    has_units_ = true;
+    return Line::kHead;
+  }
   if (isTextCount(line) && !has_count_) {
     has_count_ = true;
     for (const char c : line) count_ = count_ * 10 + static_cast<std::uint64_t>(c - '0');
@@ -98,6 +106,7 @@ XyzHead::Line XyzHead::take(std::string_view line) {
     other_names_.assign(words.begin(), words.end());
     return Line::kHead;
   }
+  if (hasNames() && !named_in_comment_) return Line::kUnknown;  // names of another table
   endNames();
   named_in_comment_ = false;
   header_line_ = std::string(line.substr(0, kMaxCommentChars));
@@ -106,12 +115,16 @@ XyzHead::Line XyzHead::take(std::string_view line) {
 }
 
 void XyzHead::end(std::size_t column_count) {
+  if (header_.file_names.empty()) endNames();
   if (column_count == 0 || header_.file_names.empty()) return;
   if (header_.file_names.size() != column_count) {
     XyzHeader other = parseXyzHeader(header_line_, column_count);
     if (other.file_names.size() == column_count) header_ = std::move(other);
   }
-  if (!named_in_comment_ || header_.file_names.size() == column_count) return;
+  if (!named_in_comment_ || header_.file_names.size() == column_count) {
+    keepComment(textOfComment(trimmedLine(header_.comment)));
+    return;
+  }
   if (hasNames()) {
     note_ = fmt::format("the comment {} names {} columns, lines have {} values: it names none",
                         quoteText(last_comment_), header_.names.size(), column_count);
@@ -122,10 +135,17 @@ void XyzHead::end(std::size_t column_count) {
 // The last comment turned out to be one.
 void XyzHead::endNames() {
   header_ = {};
-  if (!last_comment_.empty() && comments_.size() < kMaxComments) {
-    comments_.push_back(std::move(last_comment_));
-  }
+  keepComment(std::move(last_comment_));
   last_comment_.clear();
+}
+
+void XyzHead::keepComment(std::string comment) {
+  if (comment.empty()) return;
+  if (comments_.size() < kMaxComments) {
+    comments_.push_back(std::move(comment));
+  } else {
+    ++lost_comments_;
+  }
 }
 
 }  // namespace surfeit

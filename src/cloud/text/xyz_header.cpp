@@ -52,6 +52,13 @@ constexpr Alias kAliases[] = {
     {"xcoord", "x"},
     {"ycoord", "y"},
     {"zcoord", "z"},
+    {"point_x", "x"},
+    {"point_y", "y"},
+    {"point_z", "z"},
+    {"utm_x", "x"},
+    {"utm_y", "y"},
+    {"rechtswert", "x"},
+    {"hochwert", "y"},
     {"easting", "x"},
     {"northing", "y"},
     {"eastings", "x"},
@@ -66,6 +73,9 @@ constexpr Alias kAliases[] = {
     {"altitude", "z"},
     {"alt", "z"},
     {"h", "z"},
+    {"hoehe", "z"},
+    {"h\xC3\xB6he", "z"},
+    {"h\xF6he", "z"},
     {"red", "red"},
     {"green", "green"},
     {"blue", "blue"},
@@ -128,6 +138,8 @@ constexpr std::string_view kFellows[] = {"r g b", "e n"};
 constexpr std::string_view kLatitudes[] = {"lat", "latitude", "lat_deg", "phi"};
 constexpr std::string_view kLongitudes[] = {"lon", "long", "lng", "longitude", "lon_deg", "lambda"};
 
+constexpr std::string_view kAroundUnits = " []()\"'";
+
 using Words = std::vector<std::string>;
 
 bool contains(const Words& words, std::string_view word) {
@@ -138,6 +150,21 @@ template <std::size_t kCount>
 bool containsAny(const Words& words, const std::string_view (&names)[kCount]) {
   return std::any_of(std::begin(names), std::end(names),
                      [&](std::string_view name) { return contains(words, name); });
+}
+
+bool isPlace(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
+
+constexpr std::string_view kAngles =
+    ", which are angles, expected lengths: project the points first, to UTM for example";
+
+// Why x and y cannot be used that have units of angles; empty where they have none.
+std::string refusalOfAngles(const Words& names, const Words& file_names) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string_view unit = splitUnit(file_names[i]).unit;
+    if (!isPlace(names[i]) || !isAngularUnit(unit)) continue;
+    return fmt::format("found {} in {}{}", names[i], quoteText(unit), kAngles);
+  }
+  return {};
 }
 
 // The words between separators outside quotes; a blank stands for any number of blanks with at most
@@ -288,9 +315,7 @@ XyzHeader headerOf(Words words) {
     if (contains(names, place)) continue;
     // Without x or y: angles, if they are named
     if (containsAny(plain, kLatitudes) && containsAny(plain, kLongitudes)) {
-      header.refusal =
-          "found latitude and longitude, which are angles, expected lengths: project the points "
-          "first, to UTM for example";
+      header.refusal = "found latitude and longitude" + std::string(kAngles);
       header.file_names = std::move(words);
     }
     return header;
@@ -304,6 +329,7 @@ XyzHeader headerOf(Words words) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i].empty()) names[i] = distinct.add(fitName(words[i]));
   }
+  header.refusal = refusalOfAngles(names, words);
   header.unit_note = noteOfUnits(names, words);
   header.repeat_note = noteOfRepeats(words, names);
   header.names = std::move(names);
@@ -335,9 +361,29 @@ XyzHeader parseXyzHeader(std::string_view line, std::size_t column_count) {
   const bool fits = best.file_names.size() == column_count;
   if (column_count > 0 && !fits && names.size() < line.size()) {
     XyzHeader header = parseXyzHeader(names, column_count);
-    if (header.file_names.size() == column_count) return header;
+    if (header.file_names.size() == column_count) {
+      header.comment = line.substr(names.size());
+      return header;
+    }
   }
   return best;
+}
+
+bool addUnits(std::string_view line, XyzHeader& header) {
+  std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns + 1);
+  if (!line.empty() && isTextComma(line.back())) words.emplace_back();
+  if (words.size() != header.names.size()) return false;
+  Words with_units = header.file_names;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    std::string_view unit = words[i];
+    while (!unit.empty() && kAroundUnits.find(unit.front()) != unit.npos) unit.remove_prefix(1);
+    while (!unit.empty() && kAroundUnits.find(unit.back()) != unit.npos) unit.remove_suffix(1);
+    if (isPlace(header.names[i]) && !isKnownUnit(unit)) return false;
+    if (!unit.empty()) with_units[i] = fmt::format("{} [{}]", with_units[i], unit);
+  }
+  header.refusal = refusalOfAngles(header.names, with_units);
+  header.unit_note = noteOfUnits(header.names, with_units);
+  return true;
 }
 
 }  // namespace surfeit

@@ -19,6 +19,7 @@ struct XyzHeader {
   // What is to be told of units behind names, and of names that stand over several columns; empty
   // where there are none.
   std::string unit_note, repeat_note;
+  std::string comment;  // behind the names
   // Why a line that names columns cannot be used; empty when it can.
   std::string refusal;
 };
@@ -32,5 +33,9 @@ struct XyzHeader {
 // gets a number.
 // Latitude and longitude are refused: they are angles.
 XyzHeader parseXyzHeader(std::string_view line, std::size_t column_count = 0);
+
+// Takes a line below the names that has a unit for each of them: "m m m", "[ft],[ft],[ft],-".
+// Nothing happens, and false is returned, unless all of x, y and z have units that we know there.
+bool addUnits(std::string_view line, XyzHeader& header);
 
 }  // namespace surfeit

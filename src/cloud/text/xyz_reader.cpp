@@ -43,6 +43,7 @@ class XyzReader final : public CountedRowReader {
 
   Status open(const RowReaderOptions& options) {
     renames_ = options.channels;
+    if (hasNumbers()) head_.takeWords();
     SURFEIT_RETURN_IF_ERROR(readHead());
     SURFEIT_RETURN_IF_ERROR(chooseDecimals());
     SURFEIT_RETURN_IF_ERROR(readFirstRow());
@@ -61,6 +62,7 @@ class XyzReader final : public CountedRowReader {
     noteScans(table);
     noteMissing(table);
     noteRounded(table);
+    noteComments(table);
     element_.count = table.row_count;
     SURFEIT_RETURN_IF_ERROR(setColumns(names_, typeXyzColumns(table, names_)));
     return moveTo(0);
@@ -87,10 +89,9 @@ class XyzReader final : public CountedRowReader {
         return Status::corruption(fmt::format("{}: found no line of numbers", path_));
       }
       if (kind == XyzHead::Line::kUnknown) {
-        return Status::corruption(
-            fmt::format("{}: line {}: found {}, expected three numbers or names of columns with x, "
-                        "y and z",
-                        path_, source_.lineNumber(), quoteText(line)));
+        return Status::corruption(fmt::format(
+            "{}: line {}: found {}, expected three numbers or names of columns with x, y and z{}",
+            path_, source_.lineNumber(), quoteText(line), adviceFor(line)));
       }
       if (kind == XyzHead::Line::kData) {
         data_offset_ = source_.offset();
@@ -100,6 +101,32 @@ class XyzReader final : public CountedRowReader {
       }
       source_.consume(line.size() + (end < lines.size() ? 1 : 0), 1);
     }
+  }
+
+  // How a line that is neither of the head nor a row can be read after all.
+  static std::string adviceFor(std::string_view line) {
+    if (std::any_of(line.begin(), line.end(), [](char c) { return (c & 0x80) != 0; })) {
+      return ": it has characters that are not ASCII, such as blanks that do not break or other "
+             "signs for minus: replace them";
+    }
+    const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns);
+    if (words.size() < 3 && std::all_of(words.begin(), words.end(), isTextNumber)) {
+      return ": a place needs a third, 0 for flat clouds";
+    }
+    // Three numbers, one after another
+    std::size_t first = 1, count = 0;
+    for (std::size_t i = 0; i < words.size() && count < 3; ++i) {
+      count = isTextNumber(words[i]) ? count + 1 : 0;
+      first = i + 2 - std::min<std::size_t>(count, i + 1);
+    }
+    if (count < 3) {
+      return "; blanks, tabs, commas, semicolons or bars part numbers, and a # in front makes a "
+             "comment of a line";
+    }
+    return fmt::format(
+        ": say which are the position: --channels {}=x,{}=y,{}=z (numbers of "
+        "columns; NUMBER=- leaves one out)",
+        first, first + 1, first + 2);
   }
 
   // What --text says, else what the lines tell.
@@ -157,8 +184,10 @@ class XyzReader final : public CountedRowReader {
                                  head_.header().file_names.size() == words.size() + 1;
     if (ends_with_empty) words.emplace_back();
     if (words.size() > kMaxXyzColumns) {
-      return Status::corruption(fmt::format("{}: line {}: more than {} values, expected fewer",
-                                            path_, data_line_, kMaxXyzColumns));
+      return Status::corruption(fmt::format(
+          "{}: line {}: more than {} values, expected fewer: `cut -d ' ' -f 1-{}` keeps "
+          "the first",
+          path_, data_line_, kMaxXyzColumns, kMaxXyzColumns));
     }
     if (decimals_ == TextDecimals::kComma && !words.empty() && words.size() < 3) {
       return Status::corruption(fmt::format(
@@ -180,6 +209,7 @@ class XyzReader final : public CountedRowReader {
                                : fmt::format("column {}", i + 1));
       }
     }
+    typed_.resize(names_.size());
     for (std::size_t i = 0; i < names_.size(); ++i) {
       const bool is_text = i < words.size() && !isTextNumber(words[i]) && !isMissingText(words[i]);
       first_row_.push_back({names_[i], ValueType::kFloat32, 0, !is_text && !isDropped(i),
@@ -234,7 +264,9 @@ class XyzReader final : public CountedRowReader {
       const XyzHeader& header = head_.header();
       for (ChannelRename& rename : renames_) {
         for (std::size_t i = 0; i < header.names.size(); ++i) {
-          if (rename.from == header.file_names[i]) rename.from = header.names[i];
+          if (rename.from != header.file_names[i]) continue;
+          typed_[i] = rename.from;
+          rename.from = header.names[i];
         }
       }
       return nameNumbered();
@@ -277,6 +309,7 @@ class XyzReader final : public CountedRowReader {
           rename.from = names_[i];
         } else {
           names_[i] = rename.to;
+          typed_[i] = rename.from;
         }
         break;
       }
@@ -317,9 +350,24 @@ class XyzReader final : public CountedRowReader {
           "shorten them in the file, or leave the column out by --channels {}=-",
           i + 1, names_[i], table.columns[i].rounded, table.row_count, i + 1));
     }
-    if (table.commented_rows == 0) return;
-    notes_.push_back(fmt::format("comments behind the values of {} of {} rows are not kept",
-                                 table.commented_rows, table.row_count));
+  }
+
+  // Those in front of the rows are kept.
+  void noteComments(const XyzTable& table) {
+    if (table.commented_rows > 0) {
+      notes_.push_back(fmt::format("comments behind the values of {} of {} rows are not kept",
+                                   table.commented_rows, table.row_count));
+    }
+    if (table.comment_lines > 0) {
+      notes_.push_back(
+          fmt::format("{} lines of comments among the rows are not kept", table.comment_lines));
+    }
+    if (head_.lostComments() > 0) {
+      notes_.push_back(
+          fmt::format("{} comments in front of the rows are not kept, for there are "
+                      "more than {}",
+                      head_.lostComments(), comments_.size()));
+    }
   }
 
   void noteMissing(const XyzTable& table) {
@@ -343,18 +391,19 @@ class XyzReader final : public CountedRowReader {
     }
 
     // As they are called
-    const std::vector<std::string> called = renamedProperties(all, renames_);
+    const std::vector<RowProperty> called = renamedProperties(all, renames_);
     std::vector<TextColumn> columns;
     for (std::size_t i = 0; i < names.size(); ++i) {
-      if (!called[i].empty() && element_.find(called[i]) != nullptr) {
+      const std::string& name = called[i].name;
+      if (!name.empty() && element_.find(name) != nullptr) {
         return Status::corruption(fmt::format(
-            "{}: column {} would be a second {}, expected another name", path_, i + 1, called[i]));
+            "{}: column {} would be a second {}, expected another name", path_, i + 1, name));
       }
-      columns.push_back({names[i], types[i], element_.row_bytes, !called[i].empty(),
-                         isFloatType(types[i]) && !isPlaceColumn(called[i])});
-      if (called[i].empty()) continue;
-      element_.properties.push_back(all.properties[i]);
-      element_.properties.back().name = called[i];
+      columns.push_back({names[i], types[i], element_.row_bytes, !name.empty(),
+                         isFloatType(types[i]) && !isPlaceColumn(name)});
+      if (name.empty()) continue;
+      element_.properties.push_back(called[i]);
+      if (!typed_[i].empty()) element_.properties.back().typed = typed_[i];
       packRow(element_);
     }
     SURFEIT_RETURN_IF_ERROR(checkChannelsLeft(element_, path_));
@@ -379,6 +428,7 @@ class XyzReader final : public CountedRowReader {
   TextDecimals decimals_ = TextDecimals::kUnknown;
   TextExtras extras_{true, false};
   std::vector<std::string> names_;
+  std::vector<std::string> typed_;  // what --channels calls a column, where it names it
   std::vector<TextColumn> first_row_;
   std::uint64_t data_offset_ = 0, data_line_ = 1;
   std::optional<TextRowParser> parser_;
@@ -387,10 +437,12 @@ class XyzReader final : public CountedRowReader {
 }  // namespace
 
 bool recognisesXyz(std::string_view first_bytes) {
+  if (first_bytes.starts_with('{') || first_bytes.starts_with('<')) return false;  // JSON, XML
   const bool is_cut = first_bytes.size() >= kMagicBytes;
   if (first_bytes.starts_with(kByteOrderMark)) first_bytes.remove_prefix(kByteOrderMark.size());
   for (const char c : first_bytes) {
-    if ((c >= '\0' && c < ' ' && c != '\t' && c != '\r' && c != '\n') || c == '\x7f') return false;
+    const bool is_of_lines = c == '\t' || c == '\r' || c == '\n' || c == '\x1a';
+    if ((c >= '\0' && c < ' ' && !is_of_lines) || c == '\x7f') return false;
   }
   XyzHead head;
   bool has_any = false;

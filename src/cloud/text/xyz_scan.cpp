@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "cloud/ply/ply_number.h"
+#include "cloud/text/xyz_header.h"
 #include "cloud/text/xyz_layout.h"
 
 namespace surfeit {
@@ -173,12 +174,22 @@ Result<XyzTable> scanXyz(LineSource& source, std::span<const TextColumn> columns
       const bool is_count = extras.has_counts && isTextCount(trimmedLine(line));
       if (is_count) {
         scanner.takeCount(countOf(line));
-      } else if (!scanner.takeRow(line) && !isTextExtra(line, extras)) {
+      } else if (scanner.takeRow(line)) {
+        // Most lines are rows
+      } else if (isTextExtra(line, extras)) {
+        scanner.table().comment_lines += isTextComment(trimmedLine(line)) ? 1 : 0;
+      } else {
         XyzTable table = scanner.finish();
         table.has_comma_in_refused = line.find(',') != line.npos;
-        table.refusal = Status::corruption(
-            fmt::format("{}: row {} at line {}: {}", source.input().path(), table.row_count,
-                        source.lineNumber() + line_count, describeTextRow(line, columns)));
+        const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns);
+        const bool is_row = std::any_of(words.begin(), words.end(), isTextNumber);
+        table.refusal = Status::corruption(fmt::format(
+            "{}: row {} at line {}: {}{}", source.input().path(), table.row_count,
+            source.lineNumber() + line_count, describeTextRow(line, columns),
+            line.find('\0') != line.npos ? ": bytes of 0 are no text: was the file written whole?"
+            : is_row                     ? ""
+                                         : ": a # in front makes a comment of a line that is no "
+                                           "row"));
         return table;
       }
       at = line_end + (found ? 1 : 0);

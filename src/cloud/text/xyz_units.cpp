@@ -4,37 +4,15 @@
 
 #include <algorithm>
 #include <cctype>
-#include <iterator>
 #include <vector>
 
 #include "cloud/row_layout.h"
 #include "cloud/text/text_rows.h"
+#include "surfeit/length_unit.h"
 
 namespace surfeit {
 namespace {
 
-struct Unit {
-  std::string_view name;
-  double metres;
-};
-constexpr Unit kUnits[] = {
-    {"m", 1},
-    {"metre", 1},
-    {"metres", 1},
-    {"meter", 1},
-    {"meters", 1},
-    {"cm", .01},
-    {"mm", .001},
-    {"km", 1000},
-    {"in", .0254},
-    {"inch", .0254},
-    {"ft", .3048},
-    {"foot", .3048},
-    {"feet", .3048},
-    {"us-ft", 1200. / 3937},
-    {"usft", 1200. / 3937},
-    {"ftus", 1200. / 3937},
-};
 constexpr std::string_view kPlaces[] = {"x", "y", "z"};
 constexpr std::string_view kLengths[] = {"radius", "pscale", "width"};
 
@@ -47,10 +25,8 @@ std::string lowerOf(std::string_view text) {
 
 // Metres; 0 where the unit is none that we know.
 double metresOf(std::string_view unit) {
-  const std::string lower = lowerOf(unit);
-  const auto found = std::find_if(std::begin(kUnits), std::end(kUnits),
-                                  [&](const Unit& known) { return known.name == lower; });
-  return found == std::end(kUnits) ? 0 : found->metres;
+  const LengthUnit* const known = findLengthUnit(unit);
+  return known == nullptr ? 0 : known->metres;
 }
 
 // Of an area: m2, mm^2, "sq ft".
@@ -96,6 +72,14 @@ std::vector<Length> lengthsOf(std::span<const std::string> names,
 
 }  // namespace
 
+bool isKnownUnit(std::string_view unit) { return metresOf(unit) > 0 || isAngularUnit(unit); }
+
+bool isAngularUnit(std::string_view unit) {
+  constexpr std::string_view kAngles[] = {"deg", "degree", "degrees", "\xC2\xB0",
+                                          "rad", "radian", "radians", "dd"};
+  return isIn(kAngles, lowerOf(unit));
+}
+
 NameWithUnit splitUnit(std::string_view word) {
   word = trimmedLine(word);
   const std::size_t bracket = word.find_first_of("([");
@@ -137,9 +121,11 @@ std::string noteOfUnits(std::span<const std::string> names,
                        : fmt::format("convert{} makes one unit of them", scales));
   }
   if (unit == 1) return {};
+  const LengthUnit* const known = findLengthUnit(lengths[0].unit);
   return fmt::format(
-      "places are in {}, as the names of columns say, and stay so: convert --units scales them",
-      quoteText(lowerOf(lengths[0].unit)));
+      "places are in {}, as the names of columns say, and stay so: convert --units{} scales them",
+      quoteText(lowerOf(lengths[0].unit)),
+      known == nullptr ? "" : fmt::format(" {}:m", known->option));
 }
 
 }  // namespace surfeit

@@ -14,6 +14,10 @@ struct NameWithUnit {
 };
 NameWithUnit splitUnit(std::string_view word);
 
+// Whether it is a unit of length or angle that we know.
+bool isKnownUnit(std::string_view unit);
+bool isAngularUnit(std::string_view unit);
+
 // What the units of lengths mean, one sentence: numbers stay as the file has them. Empty where all
 // are metres or nothing is said. `names` are ours, `file_names` those of the file, column by
 // column.

@@ -1,4 +1,4 @@
-#include "cloud/scans/las_units.h"
+#include "cloud/crs_units.h"
 
 #include <fmt/format.h>
 
@@ -8,50 +8,44 @@
 #include <iterator>
 
 #include "cloud/row_layout.h"
+#include "surfeit/length_unit.h"
 
 namespace surfeit {
 namespace {
 
-struct Known {
-  std::uint16_t code;
-  const char* name;
-  double metres;
-  const char* option;  // as `convert --units` calls it
-};
-constexpr Known kUnits[] = {
-    {9001, "metres", 1, "m"},
-    {9002, "feet", .3048, "ft"},
-    {9003, "US survey feet", 1200. / 3937, "us-ft"},
-    {9036, "kilometres", 1000, "km"},
-    {1033, "centimetres", .01, "cm"},
-    {1025, "millimetres", .001, "mm"},
-};
-
 bool isSame(double a, double b) { return std::abs(a - b) <= 1e-9 * std::abs(b); }
-bool isMetre(const LasUnit& unit) { return unit.name.empty() || isSame(unit.metres, 1); }
+bool isMetre(const CrsUnit& unit) { return unit.name.empty() || isSame(unit.metres, 1); }
 
 // "ft", or a number of metres.
-std::string optionOf(const LasUnit& unit) {
-  const auto known = std::find_if(std::begin(kUnits), std::end(kUnits), [&](const Known& row) {
-    return isSame(row.metres, unit.metres);
-  });
-  return known != std::end(kUnits) ? known->option : fmt::format("{:.12g}", unit.metres);
+std::string optionOf(const CrsUnit& unit) {
+  const LengthUnit* const known = lengthUnitOfMetres(unit.metres);
+  return known != nullptr ? std::string(known->option) : fmt::format("{:.12g}", unit.metres);
 }
 
 }  // namespace
 
-LasUnit lasUnitOfCode(std::uint16_t code) {
+CrsUnit crsUnitOfCode(std::uint16_t code) {
   constexpr std::uint16_t kUserDefined = 32767;
   if (code == 0 || code == kUserDefined) return {};
-  for (const Known& row : kUnits) {
-    if (row.code == code) return {row.name, row.metres};
+  if (const LengthUnit* const known = lengthUnitOfEpsg(code)) {
+    return {std::string(known->plural), known->metres};
   }
   return {fmt::format("unit {} of EPSG", code), 0};
 }
 
+CrsUnit crsUnitOfHeights(std::uint16_t code) {
+  // NAVD88 and NGVD29 in feet
+  constexpr std::uint16_t kFeet[] = {8228, 7968}, kSurveyFeet[] = {6360, 6358, 5702};
+  const auto has = [code](const auto& codes) {
+    return std::find(std::begin(codes), std::end(codes), code) != std::end(codes);
+  };
+  if (has(kFeet)) return crsUnitOfCode(9002);
+  return has(kSurveyFeet) ? crsUnitOfCode(9003) : CrsUnit();
+}
+
 // [LENGTH]UNIT["name", metres, ...]
-LasUnits lasUnitsOfText(std::string_view text) {
-  LasUnits units;
+CrsUnits crsUnitsOfText(std::string_view text) {
+  CrsUnits units;
   constexpr std::string_view kWord = "UNIT[\"";
   for (std::size_t at = text.find(kWord); at != text.npos; at = text.find(kWord, at + 1)) {
     const std::size_t begin = at + kWord.size(), end = text.find('"', begin);
@@ -68,14 +62,14 @@ LasUnits lasUnitsOfText(std::string_view text) {
                           name.starts_with("rad") || name.starts_with("Rad") ||
                           name.starts_with("grad") || name.starts_with("unity");
     if ((!is_of_length && !is_plain) || is_angle) continue;
-    LasUnit& unit = units.horizontal.name.empty() ? units.horizontal : units.vertical;
+    CrsUnit& unit = units.horizontal.name.empty() ? units.horizontal : units.vertical;
     unit = {name, metres};
   }
   return units;
 }
 
-std::string noteOfLasUnits(const LasUnits& units) {
-  const LasUnit &places = units.horizontal, &heights = units.vertical;
+std::string noteOfCrsUnits(const CrsUnits& units) {
+  const CrsUnit &places = units.horizontal, &heights = units.vertical;
   const bool are_alike = heights.name.empty() || places.name.empty()
                              ? isMetre(heights)
                              : heights.name == places.name || isSame(heights.metres, places.metres);
