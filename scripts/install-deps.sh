@@ -8,7 +8,7 @@ packages=(
   g++ cmake ninja-build ccache pkg-config
   # Library
   libglm-dev libfmt-dev libtbb-dev libzstd-dev zlib1g-dev libblosc-dev libxxhash-dev libhwy-dev nlohmann-json3-dev
-  libopenexr-dev libeigen3-dev libnanoflann-dev
+  libopenexr-dev
   # Program: rays and meshes of `surfeit sample`, pictures of `surfeit view`
   libcli11-dev libembree-dev libtinyobjloader-dev libstb-dev libpng-dev
   # Python package, its tests and examples, and pictures of docs/gallery.md

@@ -245,6 +245,9 @@ class NormalsJob {
   Status findNormals() {
     progress_.beginPhase("normals", places_in_order_->count(), "points");
     found_rows_.emplace(sorting(sizeof(FoundRow)));
+    // Neighbours have agreed on the normals of the octree
+    const SurfaceNeeds needs{
+        .size = options_.with_sizes, .plane = true, .normal = !rule_->needsSides()};
     std::vector<SurfaceSearch> searches;
     for (int i = 0; i < threads_; ++i) searches.emplace_back(*octree_);
     std::vector<OrderedPlace> batch;
@@ -262,7 +265,7 @@ class NormalsJob {
       }
       found.resize(batch.size());
       SURFEIT_RETURN_IF_ERROR(findOnThreads(
-          searches, surfels, [](std::size_t) { return true; },
+          searches, surfels, [&](std::size_t) { return needs; },
           [&](std::size_t i, const SurfaceAt& surface) { found[i] = foundAt(batch[i], surface); },
           progress_));
       for (const FoundRow& row : found) {
@@ -280,7 +283,8 @@ class NormalsJob {
                                                        : rule_->at(at.place, surface);
     FoundRow row;
     row.row = at.row;
-    row.normal = rule_->needsSides() && !found.is_thin ? surface.own_normal : found.normal;
+    row.normal = found.normal;
+    if (rule_->needsSides() && found.normal != glm::vec3(0)) row.normal = surface.own_normal;
     row.confidence = surface.confidence;
     row.radius = std::sqrt(IndexOptions().disk_overlap) * surface.radius;
     row.area = surface.area;

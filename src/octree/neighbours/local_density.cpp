@@ -6,15 +6,17 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "octree/page/page_limits.h"
+
 namespace surfeit {
 namespace {
 
 // Strays: radii off surfaces are limited to this many times the cloud's median; and those of what
 // is sparse beside dense, for densities that change by 1:1600.
 constexpr float kStrayLimit = 8, kSparseLimit = 40;
-constexpr std::size_t kSamplePages = 64;
-// Pages whose surfels are sized at once.
-constexpr std::uint32_t kBatchPages = 32;
+constexpr std::size_t kSamplePages = 64, kSampleStep = 16;
+// Pages whose surfels are sized at once, for each thread: what a PlaceIndex serves best.
+constexpr std::uint32_t kThreadPages = 16;
 
 bool needsSize(const Surfel& surfel) { return (surfel.flags & kSurfelNeedsSize) != 0; }
 
@@ -30,7 +32,10 @@ SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap,
 SizedSurfelStream::~SizedSurfelStream() = default;
 
 std::size_t SizedSurfelStream::searcherBytes(int threads) {
-  return std::size_t(threads) * SurfaceSearch::memoryBytes();
+  // Surfels are read, then copied into a batch with their tickets
+  constexpr std::size_t kBatchBytes =
+      kThreadPages * kDefaultSurfelGroup * (2 * sizeof(Surfel) + sizeof(Ticket));
+  return std::size_t(threads) * (SurfaceSearch::memoryBytes() + kBatchBytes);
 }
 
 Status SizedSurfelStream::prepare() {
@@ -43,11 +48,13 @@ Status SizedSurfelStream::prepare() {
     SceneFile::Scratch scratch;
     SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count,
                              file.decodeSurfels(page, scratch, surfels_));
-    for (std::uint32_t i = 0; i < count; i += 16) {
-      if (progress_.isCancelled()) return Status::interrupted();
-      SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, searchers_[0].at(surfels_[i]));
-      if (surface.area > 0) radii.push_back(surface.radius);
-    }
+    SURFEIT_RETURN_IF_ERROR(searchers_[0].find(
+        std::span(surfels_).first(count),
+        [](std::size_t i) { return SurfaceNeeds{.size = i % kSampleStep == 0}; },
+        [&](std::size_t, const SurfaceAt& surface) {
+          if (surface.area > 0) radii.push_back(surface.radius);
+        },
+        progress_));
   }
   // One position for all: any size will do, so take a thousandth of the scene
   const float fallback = float(file.header().cube.size) * 1e-3f;
@@ -122,12 +129,15 @@ void SizedSurfelStream::applyNormal(Surfel& surfel, const SurfaceAt& surface) {
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const SceneFile& file = octree_.file();
   if (next_page_ == file.surfelPageCount()) return std::shared_ptr<const SortedBatch>();
+  const std::uint32_t pages = kThreadPages * std::uint32_t(searchers_.size());
   SURFEIT_RETURN_IF_ERROR(
-      readPages(std::min<std::uint32_t>(next_page_ + kBatchPages, file.surfelPageCount())));
+      readPages(next_page_ + std::min(pages, file.surfelPageCount() - next_page_)));
 
   SURFEIT_RETURN_IF_ERROR(findOnThreads(
       searchers_, surfels_,
-      [&](std::size_t i) { return needsSize(surfels_[i]) || needsNormal(surfels_[i]); },
+      [&](std::size_t i) {
+        return SurfaceNeeds{.size = needsSize(surfels_[i]), .normal = needsNormal(surfels_[i])};
+      },
       [&](std::size_t i, const SurfaceAt& surface) {
         Surfel& surfel = surfels_[i];
         if (needsSize(surfel)) applySize(surfel, surface);

@@ -1,18 +1,20 @@
 #include "octree/neighbours/orientation.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numeric>
 #include <unordered_map>
 #include <utility>
 
 #include "core/worker_threads.h"
 #include "octree/build/scene_writer.h"
 #include "octree/neighbours/local_density.h"
-#include "octree/neighbours/places.h"
+#include "octree/neighbours/place_index.h"
 #include "octree/neighbours/side_forest.h"
 #include "storage/external_sorter.h"
 
@@ -45,12 +47,28 @@ struct Edge {
   std::uint64_t to = 0;    // the same, or the id of a surfel elsewhere
 };
 
-bool isSurer(const Edge& a, const Edge& b) {
-  if (std::abs(a.agreement) != std::abs(b.agreement)) {
-    return std::abs(a.agreement) > std::abs(b.agreement);
+// Sorts edges by how sure they are, in steps of a two thousandth: the surest first, and of a step
+// in their order. Agreements say no more about surfaces than that, and one pass does it.
+class EdgeSorter {
+ public:
+  void sort(std::vector<Edge>& edges) {
+    std::array<std::uint32_t, kSteps + 1> ends{};
+    for (const Edge& edge : edges) ++ends[stepOf(edge) + 1];
+    std::partial_sum(ends.begin(), ends.end(), ends.begin());
+    sorted_.resize(edges.size());
+    for (const Edge& edge : edges) sorted_[ends[stepOf(edge)]++] = edge;
+    edges.swap(sorted_);
   }
-  return a.from != b.from ? a.from < b.from : a.to < b.to;
-}
+
+ private:
+  static constexpr std::size_t kSteps = 2048;
+  static std::size_t stepOf(const Edge& edge) {
+    const float doubt = 1 - std::abs(edge.agreement);
+    return doubt < 1 ? std::size_t(std::max(doubt, 0.f) * float(kSteps)) : kSteps - 1;
+  }
+
+  std::vector<Edge> sorted_;
+};
 
 // Sums over a piece: A, A n, A x, A (n x).
 struct PieceSums {
@@ -132,16 +150,18 @@ class Chunk {
 
   Status findEdges() {
     inner_.clear(), outer_.clear();
-    return index_.serve(sides_, reader_, [&](std::size_t i) -> Status {
-      const std::uint32_t from = places_[i];
-      if (!needsSide(from)) return {};
-      const Surfel& surfel = surfels_[from];
-      if (!index_.find(surfel.position, kNeighbours, found_)) {
-        SURFEIT_RETURN_IF_ERROR(findPlaces(surfel.position, kNeighbours, reader_, found_));
-      }
-      for (const Neighbour& neighbour : found_.neighbours) addEdge(from, surfel, neighbour);
-      return {};
-    });
+    const auto wants = [&](std::size_t i) { return needsSide(places_[i]); };
+    return index_.serve(
+        sides_, wants, kNeighbours, reader_,
+        [&](std::span<const std::size_t> group, std::span<NearestPlaces> found) -> Status {
+          for (std::size_t i = 0; i < group.size(); ++i) {
+            const std::uint32_t from = places_[group[i]];
+            for (const Neighbour& neighbour : found[i].neighbours) {
+              addEdge(from, surfels_[from], neighbour);
+            }
+          }
+          return {};
+        });
   }
 
   void addEdge(std::uint32_t from, const Surfel& surfel, const Neighbour& neighbour) {
@@ -156,7 +176,7 @@ class Chunk {
   }
 
   void joinSurfels() {
-    std::sort(inner_.begin(), inner_.end(), isSurer);
+    sorter_.sort(inner_);
     forest_.reset(surfels_.size());
     for (const Edge& edge : inner_) {
       const std::uint32_t to = std::uint32_t(edge.to);
@@ -190,12 +210,12 @@ class Chunk {
   PagedOctree& octree_;
   PagedOctree::Reader reader_;
   PlaceIndex index_;
-  NearestPlaces found_;
   SceneFile::Scratch scratch_;
   std::uint64_t first_id_ = 0;
   std::vector<Surfel> surfels_, sides_;
   std::vector<std::uint32_t> places_;  // where in surfels_ those of sides_ are
   std::vector<Edge> inner_, outer_;
+  EdgeSorter sorter_;
   SideForest forest_;
   std::vector<std::uint32_t> labels_, numbers_;
   std::vector<PieceSums> pieces_;
@@ -361,9 +381,9 @@ Result<Sides> Sides::find(PagedOctree& octree, const OrientationOptions& options
 }
 
 std::uint64_t Sides::searcherBytes(int threads) {
-  // Surfels twice, edges in vectors that grow by doubling, labels
+  // Surfels twice, edges in vectors that grow by doubling and sorted, labels
   constexpr std::uint64_t kChunkBytes = kChunkPages * kDefaultSurfelGroup *
-                                        (2 * sizeof(Surfel) + 2 * kNeighbours * sizeof(Edge) + 32);
+                                        (2 * sizeof(Surfel) + 3 * kNeighbours * sizeof(Edge) + 32);
   return std::uint64_t(threads) * (PlaceIndex::memoryBytes() + kChunkBytes);
 }
 

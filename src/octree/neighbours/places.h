@@ -1,17 +1,15 @@
-// The different places of surfels, and which of them are nearest to one: through the octree for any
-// place, or from a copy of what lies around many.
+// The different places of surfels, and which of them are nearest to one, through the octree
+// (place_index.h: from a copy of what lies around many).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "core/bounds.h"
 #include "octree/neighbours/surface_cell.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/status.h"
@@ -32,37 +30,14 @@ inline std::uint64_t surfelId(const SceneFile& file, std::uint32_t page, std::ui
   return std::uint64_t{page} * file.header().surfel_group_capacity + index;
 }
 
-// A box of places, with a k-d tree (nanoflann). One thread at a time.
-class PlaceIndex {
- public:
-  PlaceIndex();
-  PlaceIndex(PlaceIndex&&) noexcept;
-  PlaceIndex& operator=(PlaceIndex&&) noexcept;
-  ~PlaceIndex();
+// Sorted by distance, then by offset.
+bool isBefore(const Neighbour& a, const Neighbour& b);
 
-  // Takes a copy of what lies in `box`. False, and then empty, when that is more than `most`.
-  Result<bool> read(const Bounds3& box, std::size_t most, PagedOctree::Reader& reader);
+// Drops the farthest of those in order, since others as far away may not be among them: what is
+// found must not depend on how it was. Where all are as far, all stay.
+void dropFarthest(NearestPlaces& found);
 
-  // The nearest places, `count` or fewer. False when some may lie outside of the box.
-  bool find(const glm::vec3& position, std::size_t count, NearestPlaces& found);
-
-  // Calls visit(i) for all places, with a box around them read each time that serves as many as it
-  // can. Those that follow each other are close to each other, or it takes long.
-  using Visit = std::function<Status(std::size_t)>;
-  Status serve(std::span<const Surfel> places, PagedOctree::Reader& reader, const Visit& visit);
-
-  // While it serves.
-  static std::size_t memoryBytes();
-
- private:
-  Status serveFrom(std::span<const Surfel> places, std::size_t first, PagedOctree::Reader& reader,
-                   const Visit& visit);
-
-  struct State;
-  std::unique_ptr<State> state_;
-};
-
-// The same of all places, through the octree.
+// The nearest places, `count` or fewer, through the octree.
 Status findPlaces(const glm::vec3& position, std::size_t count, PagedOctree::Reader& reader,
                   NearestPlaces& found);
 

@@ -1,6 +1,5 @@
 #include "octree/neighbours/surface_cell.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,17 +7,16 @@
 #include <glm/vec2.hpp>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <vector>
 
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
+#include "octree/neighbours/cell_polygon.h"
+#include "octree/neighbours/surface_fits.h"
 
 namespace surfeit {
 namespace {
 
-// Places on a line have this part of their variance, at most, across it.
-constexpr float kLineFlatness = 1e-4f;
 // Sheets are told apart by a gap between them: of half a spacing, or of a fifth where it is four
 // times as wide as the own sheet is thick (two scans of one surface lie closer than that).
 constexpr float kWideGap = 0.5f, kNarrowGap = 0.2f, kGapOverThickness = 4;
@@ -27,142 +25,22 @@ constexpr float kSharing = 0.05f;
 // What lies so close beside a place, in spacings, shares its cell.
 constexpr float kCoincident = 1e-3f;
 
-// A plane is fitted again where what lies off it is more than this part of the spacing.
-constexpr float kThick = 0.1f;
-constexpr int kSheetPasses = 6;
 // Of a slope from the place to a neighbour that is another sheet's, not its own.
 constexpr float kSteep = 0.7f;
-// Places that lie this far off their surface, in spacings, are noisy.
-constexpr float kNoisy = 0.1f;
 // At the edge of a surface cells are closed by other places of the edge, far outside: they reach
 // farther than this, in distances of the places that cut them.
 constexpr float kSpike = 2;
 // What cuts from farther away lies flatter than this, root mean square, or all of it are strays.
 constexpr float kLooseSlope = 0.3f;
-// How far an open cell reaches, in units of the farthest neighbour.
-constexpr float kOpen = 2;
+constexpr float kOpen = SurfaceFitLanes::kOpen;
 
-struct Plane {
-  glm::vec3 normal{0};
-  float thickness = 0;  // root mean square of what lies off it
-  float confidence = 0;
-  bool is_line = false;  // the places lie on one: the plane is any through it
-};
-
-// Offsets of the neighbours in units of the farthest, as the vectorizer likes them, with weights.
-struct Columns {
-  std::vector<float> x, y, z, weight;
-
-  void fill(std::span<const Neighbour> neighbours, float unit) {
-    const std::size_t count = neighbours.size();
-    for (std::vector<float>* column : {&x, &y, &z, &weight}) column->resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const glm::vec3 offset = neighbours[i].offset / unit;
-      x[i] = offset.x, y[i] = offset.y, z[i] = offset.z, weight[i] = 1;
-    }
-  }
-
-  // Cauchy's: what lies off the plane counts the less, the farther it does.
-  void weigh(const glm::vec3& normal, float width) {
-    const glm::vec3 across = normal / width;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const float above = x[i] * across.x + y[i] * across.y + z[i] * across.z;
-      weight[i] = 1 / (1 + above * above);
-    }
-  }
-};
-
-// The plane through the neighbours and the place itself, each with its weight.
-Plane fitPlane(const Columns& at) {
-  float sum = 1, x = 0, y = 0, z = 0, xx = 0, yy = 0, zz = 0, xy = 0, yz = 0, zx = 0;
-  for (std::size_t i = 0; i < at.x.size(); ++i) {
-    const float wx = at.weight[i] * at.x[i], wy = at.weight[i] * at.y[i],
-                wz = at.weight[i] * at.z[i];
-    sum += at.weight[i], x += wx, y += wy, z += wz;
-    xx += wx * at.x[i], yy += wy * at.y[i], zz += wz * at.z[i];
-    xy += wx * at.y[i], yz += wy * at.z[i], zx += wz * at.x[i];
-  }
-  Eigen::Matrix3f covariance;
-  covariance << xx - x * x / sum, xy - x * y / sum, zx - z * x / sum,  //
-      xy - x * y / sum, yy - y * y / sum, yz - y * z / sum,            //
-      zx - z * x / sum, yz - y * z / sum, zz - z * z / sum;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  solver.computeDirect(covariance);
-  const Eigen::Vector3f normal = solver.eigenvectors().col(0);
-  Plane plane;
-  plane.normal = {normal.x(), normal.y(), normal.z()};
-  const float length = glm::length(plane.normal);
-  plane.normal = length > 0.5f ? plane.normal / length : glm::vec3(0, 0, 1);
-  plane.thickness = std::sqrt(std::max(solver.eigenvalues()(0), 0.f) / sum);
-  const float all = solver.eigenvalues().sum();
-  plane.confidence = all > 0 ? std::clamp(1 - 3 * solver.eigenvalues()(0) / all, 0.f, 1.f) : 0;
-  plane.is_line = !(solver.eigenvalues()(1) > kLineFlatness * solver.eigenvalues()(2));
-  return plane;
-}
-
-// The plane of the place's own sheet, where several lie close to each other: what lies off it
-// counts the less, again and again. `spacing` and thickness are in units of the farthest.
-Plane fitSheet(Columns& at, float spacing) {
-  Plane plane = fitPlane(at);
-  for (int pass = 0; pass < kSheetPasses && plane.thickness > kThick * spacing; ++pass) {
-    at.weigh(plane.normal, kNarrowGap * spacing);
-    const Plane again = fitPlane(at);
-    plane.normal = again.normal;
-    plane.is_line = again.is_line;
-  }
-  return plane;
-}
-
-// The quadric over a plane that fits the neighbours and the place best (jets of order 2: Cazals and
-// Pouget 2005): places on one side alone do not turn it as they turn a plane.
-struct Quadric {
-  float slope_u = 0, slope_v = 0;  // at the place
-  float noise = 0;                 // what lies off it, root mean square
-
-  // Neighbours count by their weight and, with `is_narrow`, the less, the farther they are.
-  static Quadric fit(const Columns& at, const glm::vec3& normal, const TangentFrame& frame,
-                     bool is_narrow) {
-    constexpr int kTerms = 6;
-    float sums[kTerms][kTerms] = {}, heights[kTerms] = {}, squares = 0;
-    sums[0][0] = 1;  // the place itself
-    for (std::size_t i = 0; i < at.x.size(); ++i) {
-      const glm::vec3 p(at.x[i], at.y[i], at.z[i]);
-      const float u = glm::dot(p, frame.tangent), v = glm::dot(p, frame.bitangent);
-      const float h = glm::dot(p, normal), near = std::max(1 - glm::dot(p, p), 0.f);
-      const float weight = at.weight[i] * (is_narrow ? near * near * near * near : 1.f);
-      const float terms[kTerms] = {1, u, v, u * u, u * v, v * v};
-      for (int r = 0; r < kTerms; ++r) {
-        const float weighted = weight * terms[r];
-        for (int c = 0; c < kTerms; ++c) sums[r][c] += weighted * terms[c];
-        heights[r] += weighted * h;
-      }
-      squares += weight * h * h;
-    }
-    using Column = Eigen::Matrix<float, kTerms, 1>;
-    Eigen::Matrix<float, kTerms, kTerms> matrix =
-        Eigen::Map<const Eigen::Matrix<float, kTerms, kTerms>>(&sums[0][0]);
-    matrix.diagonal().array() += 1e-6f * matrix.trace();
-    const Eigen::Map<const Column> right(heights);
-    const Column fit = matrix.ldlt().solve(right);
-    return {fit[1], fit[2], std::sqrt(std::max(squares - fit.dot(right), 0.f) / sums[0][0])};
-  }
-};
-
-// Of the surface at the place. Where there is no noise the nearest tell it best.
-glm::vec3 normalAt(const Columns& at, const glm::vec3& normal, float spacing) {
-  const TangentFrame frame(normal);
-  Quadric quadric = Quadric::fit(at, normal, frame, false);
-  if (quadric.noise < kNoisy * spacing) quadric = Quadric::fit(at, normal, frame, true);
-  const glm::vec3 turned =
-      normal - quadric.slope_u * frame.tangent - quadric.slope_v * frame.bitangent;
-  const float length = glm::length(turned);
-  return length > 0 && std::isfinite(length) ? turned / length : normal;
-}
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // A neighbour in the plane: beside the place, and above it.
 struct Flat {
   glm::vec2 beside;
   float above;
+  std::uint32_t index = 0;  // of the neighbour
 };
 
 // Drops what lies above (`side` 1) or below (-1) the first gap on that side. What lies only far
@@ -197,11 +75,25 @@ void dropSheet(float side, float spacing, float thickness, std::vector<Flat>& fl
   }
 }
 
-// Whether anything lies so high that there may be a gap below it.
-bool mayBeSheets(const std::vector<Flat>& flat, float spacing) {
-  return std::any_of(flat.begin(), flat.end(),
-                     [&](const Flat& n) { return std::abs(n.above) > kNarrowGap * spacing; });
+struct SideGaps {
+  bool above = false, below = false;
+};
+
+// On which sides a gap may lie that is wider than `narrow`: one leaves a free slot of half of that.
+SideGaps gapsIn(const std::vector<Flat>& flat, float narrow) {
+  constexpr float kLastSlot = 62;
+  std::uint64_t above = 1, below = 1;  // the plane takes the first
+  for (const Flat& n : flat) {
+    const float slot = std::min(std::abs(n.above) * (2 / narrow), kLastSlot);
+    const std::uint64_t bit = std::uint64_t{1} << int(slot);
+    (n.above > 0 ? above : below) |= bit;
+  }
+  const auto hasFree = [](std::uint64_t slots) { return (slots & (slots + 1)) != 0; };
+  return {hasFree(above), hasFree(below)};
 }
+
+// Of so many neighbours, in units of the farthest.
+float spacingOf(float count) { return std::sqrt(kPi / (count + 1)); }
 
 // How thick the own sheet is: a quarter of the neighbours lie nearer to the plane.
 float thicknessOf(const std::vector<Flat>& flat, std::vector<float>& heights) {
@@ -212,146 +104,86 @@ float thicknessOf(const std::vector<Flat>& flat, std::vector<float>& heights) {
   return heights.empty() ? 0 : *middle;
 }
 
-// The median of how far each neighbour is from the third of the others, since scans come in pairs.
-float spacingAmong(std::span<const Neighbour> neighbours, std::vector<float>& nearest) {
-  nearest.clear();
-  for (const Neighbour& a : neighbours) {
-    float least[3];
-    std::fill(std::begin(least), std::end(least), std::numeric_limits<float>::infinity());
-    for (const Neighbour& b : neighbours) {
-      const float distance = glm::length(a.offset - b.offset);
-      if (&a == &b || distance >= least[2]) continue;
-      least[2] = distance;
-      if (least[2] < least[1]) std::swap(least[1], least[2]);
-      if (least[1] < least[0]) std::swap(least[0], least[1]);
-    }
-    nearest.push_back(least[2]);
-  }
-  const auto middle = nearest.begin() + std::ptrdiff_t(nearest.size() / 2);
-  std::nth_element(nearest.begin(), middle, nearest.end());
-  return *middle;
-}
-
-// A convex polygon around the place, cut by the lines halfway to its neighbours.
-class Cell {
+// How far each of some places is from the third of the others, since scans come in pairs.
+class ThirdNearest {
  public:
-  explicit Cell(float reach) : reach_sq_(2 * reach * reach) {
-    count_ = 4;
-    corners_ = {{{-reach, -reach}, {reach, -reach}, {reach, reach}, {-reach, reach}}};
-  }
-
-  // Keeps what is nearer to the place than to `other`.
-  bool cut(const glm::vec2& other) {
-    const float limit = 0.5f * glm::dot(other, other);
-    if (limit * 0.5f >= reach_sq_) return false;  // (|other| / 2)^2
-    std::array<glm::vec2, kMostCorners> kept;
-    std::size_t kept_count = 0;
-    bool is_cut = false;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const glm::vec2 &from = corners_[i], &to = corners_[i + 1 == count_ ? 0 : i + 1];
-      const float before = glm::dot(from, other) - limit, after = glm::dot(to, other) - limit;
-      if (before <= 0) {
-        kept[kept_count++] = from;
-      } else {
-        is_cut = true;
-      }
-      if ((before <= 0) != (after <= 0) && kept_count < kMostCorners) {
-        kept[kept_count++] = from + before / (before - after) * (to - from);
-      }
-      if (kept_count + 1 >= kMostCorners) break;
+  // The median; lengths in `unit`.
+  float median(std::span<const Neighbour> places, float unit) {
+    const std::size_t count = places.size();
+    for (std::vector<float>* column : {&x_, &y_, &z_, &squares_}) column->resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const glm::vec3 offset = places[i].offset / unit;
+      x_[i] = offset.x, y_[i] = offset.y, z_[i] = offset.z;
     }
-    if (!is_cut || kept_count < 3) return false;
-    corners_ = kept;
-    count_ = kept_count;
-    reach_sq_ = 0;
-    for (std::size_t i = 0; i < count_; ++i) {
-      reach_sq_ = std::max(reach_sq_, glm::dot(corners_[i], corners_[i]));
-    }
-    return true;
-  }
-
-  float reach() const { return std::sqrt(reach_sq_); }
-  // Whether what is nearer to a corner than the place is lies within `radius` of there: only that
-  // cuts the cell.
-  bool mayCut(const glm::vec2& there, float radius) const {
-    for (std::size_t i = 0; i < count_; ++i) {
-      if (glm::length(there - corners_[i]) < glm::length(corners_[i]) + radius) return true;
-    }
-    return false;
-  }
-  bool wouldCut(const glm::vec2& there) const { return mayCut(there, -kTouching); }
-  // Whether any side of the first square is left, which had corners at (+-size, +-size).
-  bool touches(float size) const {
-    for (std::size_t i = 0; i < count_; ++i) {
-      const glm::vec2& corner = corners_[i];
-      if (std::max(std::abs(corner.x), std::abs(corner.y)) > size * (1 - kTouching)) return true;
-    }
-    return false;
-  }
-  float area() const {
-    float twice = 0;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
-      twice += a.x * b.y - a.y * b.x;
-    }
-    return 0.5f * twice;
-  }
-  // The mean squared distance from the place.
-  float meanSquare() const {
-    float sum = 0;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
-      sum += (a.x * b.y - a.y * b.x) * (glm::dot(a, a) + glm::dot(a, b) + glm::dot(b, b));
-    }
-    return sum / (12 * area());
-  }
-  // Its width along a direction of unit length.
-  float width(const glm::vec2& direction) const {
-    float low = 0, high = 0;
-    for (std::size_t i = 0; i < count_; ++i) {
-      const float at = glm::dot(corners_[i], direction);
-      low = std::min(low, at), high = std::max(high, at);
-    }
-    return high - low;
+    thirds_.clear();
+    for (std::size_t i = 0; i < count; ++i) thirds_.push_back(thirdSquare(i));
+    const auto middle = thirds_.begin() + std::ptrdiff_t(count / 2);
+    std::nth_element(thirds_.begin(), middle, thirds_.end());
+    return std::sqrt(*middle) * unit;
   }
 
  private:
-  static constexpr float kTouching = 1e-4f;
-  static constexpr std::size_t kMostCorners = 64;
-  std::array<glm::vec2, kMostCorners> corners_;
-  std::size_t count_;
-  float reach_sq_;  // of the farthest corner
+  float thirdSquare(std::size_t i) {
+    const std::size_t count = x_.size();
+    const float x = x_[i], y = y_[i], z = z_[i];
+    for (std::size_t j = 0; j < count; ++j) {
+      const float dx = x_[j] - x, dy = y_[j] - y, dz = z_[j] - z;
+      squares_[j] = dx * dx + dy * dy + dz * dz;
+    }
+    squares_[i] = kInfinity;
+    float least[3] = {kInfinity, kInfinity, kInfinity};
+    for (const float square : squares_) {
+      if (square >= least[2]) continue;
+      least[2] = square;
+      if (least[2] < least[1]) std::swap(least[1], least[2]);
+      if (least[1] < least[0]) std::swap(least[0], least[1]);
+    }
+    return least[2];
+  }
+
+  std::vector<float> x_, y_, z_, squares_, thirds_;
 };
 
 }  // namespace
 
 struct SurfaceCells::Scratch {
+  SurfaceFitLanes fits;
+  std::array<CellPlace, SurfaceFitLanes::kLanes> places;
   std::vector<Flat> flat;
-  Columns columns;
   std::vector<float> heights;
   std::vector<glm::vec2> cutters;
   std::vector<float> slopes_sq;  // of those from farther away
+  ThirdNearest third_nearest;
 
-  // Of the cell in the making. Lengths are in units of the farthest neighbour: fourth powers of
-  // them must stay finite.
+  // Of the cell in the making. Lengths are in units of the farthest neighbour.
+  std::size_t lane = 0;
   float unit = 1, spacing = 1, sharers = 1;
-  Plane plane;
-  glm::vec3 own_normal{0}, normal{0}, surface_normal{0};
-  std::optional<TangentFrame> frame;
-  Cell polygon{kOpen};
+  glm::vec3 own_normal{0}, normal{0};
+  TangentFrame frame{glm::vec3(0, 0, 1)};  // of cells that are cut one by one
+  CellPolygon polygon;
+
+  bool has_measures = false;
 
   Flat flatten(const glm::vec3& place) const {
     const glm::vec3 offset = place / unit;
-    return {{glm::dot(offset, frame->tangent), glm::dot(offset, frame->bitangent)},
-            glm::dot(offset, normal)};
+    return {{glm::dot(offset, frame.tangent), glm::dot(offset, frame.bitangent)},
+            glm::dot(offset, normal),
+            0};
   }
   // Not on the other side of something thin.
   bool mayShareSheet(const Neighbour& n) const { return glm::dot(n.normal, own_normal) >= 0; }
+  bool isLine() const { return fits.is_line[lane] > 0; }
 
-  void begin(std::span<const Neighbour> neighbours, const glm::vec3& given_normal);
+  void begin(std::size_t of_lane);
   void flattenAll(std::span<const Neighbour> neighbours);
   float usualCutter();
   SurfaceCell cell() const;
+  void dropOthers();
+  bool isSettled(float reach_sq) const {
+    const float reach = places[lane].reach / unit;  // beyond which places are not known
+    // Where all are, what is open reaches farther than any of them
+    return 2 * std::sqrt(reach_sq) <= std::min(reach, kOpen);
+  }
 };
 
 SurfaceCells::SurfaceCells() : scratch_(std::make_unique<Scratch>()) {}
@@ -359,17 +191,49 @@ SurfaceCells::SurfaceCells(SurfaceCells&&) noexcept = default;
 SurfaceCells& SurfaceCells::operator=(SurfaceCells&&) noexcept = default;
 SurfaceCells::~SurfaceCells() = default;
 
-void SurfaceCells::Scratch::begin(std::span<const Neighbour> neighbours,
-                                  const glm::vec3& given_normal) {
-  unit = glm::length(neighbours.back().offset);
-  spacing = std::sqrt(kPi / float(neighbours.size() + 1));
-  columns.fill(neighbours, unit);
-  plane = fitSheet(columns, spacing);
-  own_normal = given_normal;
-  normal = own_normal != glm::vec3(0) ? own_normal : plane.normal;
-  surface_normal = plane.is_line ? plane.normal : normalAt(columns, plane.normal, spacing);
-  frame.emplace(normal);
-  polygon = Cell(kOpen);
+void SurfaceCells::fit(std::span<const CellPlace> places, bool with_normals) {
+  SurfaceFitLanes& fits = scratch_->fits;
+  fits.most_neighbours = 0;
+  fits.with_quadrics = with_normals;
+  scratch_->has_measures = false;
+  for (std::size_t lane = 0; lane < SurfaceFitLanes::kLanes; ++lane) {
+    const CellPlace place = lane < places.size() ? places[lane] : CellPlace();
+    const std::size_t count = std::min(place.neighbours.size(), SurfaceFitLanes::kMostNeighbours);
+    scratch_->places[lane] = place;
+    fits.most_neighbours = std::max(fits.most_neighbours, count);
+    fits.count[lane] = float(count);
+    fits.unit[lane] = count > 0 ? glm::length(place.neighbours.back().offset) : 1;
+    fits.own_x[lane] = place.normal.x;
+    fits.own_y[lane] = place.normal.y;
+    fits.own_z[lane] = place.normal.z;
+    for (std::size_t i = 0; i < count; ++i) {
+      const glm::vec3& offset = place.neighbours[i].offset;
+      fits.x[i][lane] = offset.x, fits.y[i][lane] = offset.y, fits.z[i][lane] = offset.z;
+    }
+  }
+  fastestSurfaceFitKernel().fit(fits);
+}
+
+SurfacePlane SurfaceCells::planeOf(std::size_t lane) const {
+  const SurfaceFitLanes& fits = scratch_->fits;
+  if (fits.count[lane] == 0) return {};
+  SurfacePlane plane;
+  plane.normal = {fits.surface_x[lane], fits.surface_y[lane], fits.surface_z[lane]};
+  plane.confidence = fits.confidence[lane];
+  plane.is_line = fits.is_line[lane] > 0;
+  plane.thickness = fits.thickness[lane] / spacingOf(fits.count[lane]);
+  return plane;
+}
+
+void SurfaceCells::Scratch::begin(std::size_t of_lane) {
+  lane = of_lane;
+  unit = fits.unit[lane];
+  spacing = spacingOf(fits.count[lane]);
+  own_normal = places[lane].normal;
+  normal = own_normal != glm::vec3(0)
+               ? own_normal
+               : glm::vec3(fits.normal_x[lane], fits.normal_y[lane], fits.normal_z[lane]);
+  polygon.begin(kOpen);
   sharers = 1;
   cutters.clear();
   slopes_sq.clear();
@@ -377,34 +241,74 @@ void SurfaceCells::Scratch::begin(std::span<const Neighbour> neighbours,
 
 // Of the place's own sheet.
 void SurfaceCells::Scratch::flattenAll(std::span<const Neighbour> neighbours) {
-  flat.clear();
-  for (const Neighbour& n : neighbours) {
-    if (mayShareSheet(n)) flat.push_back(flatten(n.offset));
+  const bool has_normal = own_normal != glm::vec3(0);
+  flat.resize(neighbours.size());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    if (has_normal && !mayShareSheet(neighbours[i])) continue;
+    flat[count++] = {
+        {fits.beside_u[i][lane], fits.beside_v[i][lane]}, fits.above[i][lane], std::uint32_t(i)};
   }
-  if (!mayBeSheets(flat, spacing)) return;
+  flat.resize(count);
+  if (fits.highest[lane] <= kNarrowGap * spacing) return;  // there is no gap below anything
+  const SideGaps gaps = gapsIn(flat, kNarrowGap * spacing);
+  if (!gaps.above && !gaps.below) return;
   const float thickness = thicknessOf(flat, heights);
-  dropSheet(1, spacing, thickness, flat, heights);
-  dropSheet(-1, spacing, thickness, flat, heights);
+  if (gaps.above) dropSheet(1, spacing, thickness, flat, heights);
+  if (gaps.below) dropSheet(-1, spacing, thickness, flat, heights);
 }
 
-SurfaceCell SurfaceCells::cellOf(std::span<const Neighbour> neighbours, float reach,
-                                 const glm::vec3& normal) {
+// Neighbours on other sheets are infinitely far.
+void SurfaceCells::Scratch::dropOthers() {
+  const bool may_have_sheets = fits.highest[lane] > kNarrowGap * spacing;
+  if (own_normal == glm::vec3(0) && !may_have_sheets) return;
+  const std::size_t count = places[lane].neighbours.size();
+  flattenAll(places[lane].neighbours);
+  if (flat.size() == count) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    fits.half_sq[i][lane] = kInfinity;
+  }
+  for (const Flat& n : flat) fits.half_sq[n.index][lane] = 0.5f * glm::dot(n.beside, n.beside);
+}
+
+void SurfaceCells::measure() {
   Scratch& at = *scratch_;
-  at.cutters.clear();
-  if (neighbours.empty()) return {};
-  at.begin(neighbours, normal);
-  at.flattenAll(neighbours);
+  for (std::size_t lane = 0; lane < SurfaceFitLanes::kLanes; ++lane) {
+    at.begin(lane);
+    at.fits.coincident_half_sq[lane] =
+        0.5f * (kCoincident * at.spacing) * (kCoincident * at.spacing);
+    at.dropOthers();
+  }
+  fastestSurfaceFitKernel().measure(at.fits);
+  at.has_measures = true;
+}
+
+SurfaceCell SurfaceCells::cellOf(std::size_t lane) {
+  Scratch& at = *scratch_;
+  at.begin(lane);
+  const CellPlace& place = at.places[lane];
+  if (place.neighbours.empty()) return {};
+  if (at.has_measures && at.fits.cell_is_cut[lane] > 0 &&
+      at.isSettled(at.fits.cell_reach_sq[lane])) {
+    const SurfaceFitLanes& fits = at.fits;
+    SurfaceCell cell;
+    cell.area = fits.cell_area[lane] / fits.cell_sharers[lane] * at.unit * at.unit;
+    cell.radius = std::sqrt(2 * fits.cell_mean_square[lane]) * at.unit;
+    cell.is_settled = true;
+    return cell;
+  }
+  at.frame = TangentFrame(at.normal);
+  at.flattenAll(place.neighbours);
+  const float coincident_sq = (kCoincident * at.spacing) * (kCoincident * at.spacing);
   for (const Flat& n : at.flat) {
-    if (glm::length(n.beside) < kCoincident * at.spacing) {
+    if (glm::dot(n.beside, n.beside) < coincident_sq) {
       ++at.sharers;
     } else if (at.polygon.cut(n.beside)) {
       at.cutters.push_back(n.beside);
     }
   }
   SurfaceCell cell = at.cell();
-  // Where all places are known, what is open reaches farther than any of them
-  cell.is_settled =
-      !at.cutters.empty() && 2 * at.polygon.reach() <= std::min(reach / at.unit, kOpen);
+  cell.is_settled = !at.cutters.empty() && at.isSettled(at.polygon.reachSq());
   return cell;
 }
 
@@ -412,7 +316,7 @@ float SurfaceCells::reach() const { return 2 * scratch_->polygon.reach() * scrat
 
 bool SurfaceCells::isOpen() const {
   const Scratch& at = *scratch_;
-  const bool has_plane = !at.plane.is_line || at.own_normal != glm::vec3(0);
+  const bool has_plane = !at.isLine() || at.own_normal != glm::vec3(0);
   return !at.cutters.empty() && has_plane;
 }
 
@@ -437,7 +341,7 @@ bool SurfaceCells::cut(const Neighbour& place) {
   return true;
 }
 
-SurfaceCell SurfaceCells::closed(std::span<const Neighbour> neighbours) {
+SurfaceCell SurfaceCells::closed() {
   Scratch& at = *scratch_;
   const float slopes_sq = std::accumulate(at.slopes_sq.begin(), at.slopes_sq.end(), 0.f);
   const bool is_loose = slopes_sq > kLooseSlope * kLooseSlope * float(at.slopes_sq.size());
@@ -451,7 +355,8 @@ SurfaceCell SurfaceCells::closed(std::span<const Neighbour> neighbours) {
   }
   SurfaceCell cell = at.cell();
   cell.is_settled = !is_open;
-  if (is_open) cell.neighbour_spacing = spacingAmong(neighbours, at.heights);
+  if (is_open)
+    cell.neighbour_spacing = at.third_nearest.median(at.places[at.lane].neighbours, at.unit);
   return cell;
 }
 
@@ -465,13 +370,9 @@ float SurfaceCells::Scratch::usualCutter() {
 
 SurfaceCell SurfaceCells::Scratch::cell() const {
   SurfaceCell cell;
-  cell.normal = surface_normal;
-  cell.confidence = plane.confidence;
-  cell.is_line = plane.is_line;
-  cell.thickness = plane.thickness / spacing;
   if (cutters.empty()) return cell;
   // Of a line all that is known is a width: the piece is a square of it
-  const bool is_strip = plane.is_line && polygon.touches(kOpen);
+  const bool is_strip = isLine() && polygon.touches(kOpen);
   const float width = is_strip ? polygon.width(glm::normalize(cutters[0])) : 0;
   const float area = is_strip ? width * width : polygon.area();
   cell.area = area / sharers * unit * unit;

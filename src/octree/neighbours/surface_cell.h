@@ -3,6 +3,7 @@
 // given (docs/format.md, "Rules for what is missing").
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -17,17 +18,27 @@ struct Neighbour {
   std::uint64_t id = 0;  // of the surfel, or the first one there (places.h)
 };
 
-struct SurfaceCell {
-  float area = 0;        // 0: the neighbours do not tell
-  float radius = 0;      // of the disk around the place that is spread out as far: the same second
-                         // moment over its area
-  glm::vec3 normal{0};   // of the plane through them, either way
-  float confidence = 0;  // 1 - 3 l0 / (l0 + l1 + l2), with the variances along its axes
+struct CellPlace {
+  // All that are nearer than `reach`, ascending; none at the place itself.
+  std::span<const Neighbour> neighbours;
+  float reach = 0;
+  glm::vec3 normal{0};  // of the place; zero: that of the plane through all
+};
+
+struct SurfacePlane {
+  glm::vec3 normal{0};   // of the surface through the neighbours at the place, either way
+  float confidence = 0;  // 1 - 3 l0 / (l0 + l1 + l2), with the variances along the plane's axes
   bool is_line = false;  // the neighbours lie on one: any plane through it will do
-  // Whether places beyond the last neighbour would not change it.
-  bool is_settled = false;
   // How far they lie off that plane, root mean square, over the spacing: about 1 all around.
   float thickness = 0;
+};
+
+struct SurfaceCell {
+  float area = 0;    // 0: the neighbours do not tell
+  float radius = 0;  // of the disk around the place that is spread out as far: the same second
+                     // moment over its area
+  // Whether places beyond the last neighbour would not change it.
+  bool is_settled = false;
   // Of cells that stay open: how far the neighbours are from each other.
   float neighbour_spacing = 0;
 };
@@ -40,10 +51,15 @@ class SurfaceCells {
   SurfaceCells& operator=(SurfaceCells&&) noexcept;
   ~SurfaceCells();
 
-  // `neighbours`: all that are nearer than `reach`, ascending; none at the place itself. `normal`:
-  // of the place; zero: that of the plane through all. Neighbours on another sheet (turned away, or
-  // above or below with nothing between) do not count.
-  SurfaceCell cellOf(std::span<const Neighbour> neighbours, float reach, const glm::vec3& normal);
+  // Up to SurfaceFitLanes::kLanes places, the lanes of the other functions; their neighbours must
+  // stay. Without `with_normals` a plane's normal is that of the plane, not of the surface.
+  void fit(std::span<const CellPlace> places, bool with_normals);
+  SurfacePlane planeOf(std::size_t lane) const;
+  // Finds the cells of all of them at once, of those that nothing farther away can cut. Of many
+  // neighbours, or for one place, they are found faster one by one.
+  void measure();
+  // Neighbours on another sheet (turned away, or above or below with nothing between) do not count.
+  SurfaceCell cellOf(std::size_t lane);
 
   // A cell that is not settled may be cut by places farther away. Whether any could, which would be
   // nearer than reach(): a place, or one within a sphere.
@@ -55,8 +71,8 @@ class SurfaceCells {
   bool cut(const Neighbour& place);
 
   // The cell when nothing else cuts it: where it is still open, at the edge of a surface, it is
-  // closed by the mirror images of the places that cut it. `neighbours` as before.
-  SurfaceCell closed(std::span<const Neighbour> neighbours);
+  // closed by the mirror images of the places that cut it.
+  SurfaceCell closed();
 
  private:
   struct Scratch;

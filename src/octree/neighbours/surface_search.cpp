@@ -6,16 +6,18 @@
 #include <glm/geometric.hpp>
 #include <iterator>
 #include <optional>
+#include <vector>
 
 #include "core/spherical_harmonics.h"
 #include "core/worker_threads.h"
+#include "octree/neighbours/surface_fits.h"
 
 namespace surfeit {
 namespace {
 
 // Neighbours looked at first, and while cells are open: of random places all but one of a thousand
 // cells are settled by 24; scan lines twenty times as far apart as their points take 96.
-constexpr std::size_t kNeighbours[] = {24, 48, 96};
+constexpr std::size_t kNeighbours = 24, kMoreNeighbours[] = {48, 96};
 // Farther places that cut a cell: each is the nearest that does, so few suffice.
 constexpr int kMostFarther = 32;
 // Strays: radii of open cells are limited to this many times the distance of the neighbours from
@@ -26,7 +28,7 @@ constexpr float kOpenLimit = 4;
 constexpr float kLooseThickness = 0.4f;
 
 glm::vec3 normalOf(const Surfel& surfel) {
-  return (surfel.flags & kSurfelSphere) != 0 ? glm::vec3(0) : surfel.normal;
+  return surfel.isSphere() ? glm::vec3(0) : surfel.normal;
 }
 
 }  // namespace
@@ -34,67 +36,154 @@ glm::vec3 normalOf(const Surfel& surfel) {
 SurfaceSearch::SurfaceSearch(PagedOctree& octree)
     : reader_(std::make_unique<PagedOctree::Reader>(octree)) {}
 
-std::size_t SurfaceSearch::memoryBytes() { return PlaceIndex::memoryBytes(); }
+std::size_t SurfaceSearch::memoryBytes() {
+  return PlaceIndex::memoryBytes() + 2 * sizeof(SurfaceFitLanes);
+}
 
 Status SurfaceSearch::find(std::span<const Surfel> places, const Wants& wants, const Take& take,
                            const Progress& progress) {
-  return index_.serve(places, *reader_, [&](std::size_t i) -> Status {
-    if (progress.isCancelled()) return Status::interrupted();
-    if (!wants(i)) return {};
-    SURFEIT_ASSIGN_OR_RETURN(const SurfaceAt surface, at(places[i]));
-    take(i, surface);
-    return {};
-  });
+  // Surfels at one position follow each other, and a search among a million of them should happen
+  // once. Noted now, for take() may change places
+  std::vector<bool> is_like_last(places.size());
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    const Surfel &place = places[i], &last = places[i - 1];
+    is_like_last[i] = place.position == last.position && place.isSphere() == last.isSphere() &&
+                      wants(i) == wants(i - 1);
+  }
+  const auto takeAlike = [&](std::size_t i, const SurfaceAt& surface) {
+    do take(i, surface);
+    while (++i < places.size() && is_like_last[i]);
+  };
+  open_.clear();
+  const Status status = index_.serve(
+      places, [&](std::size_t i) { return wants(i) != SurfaceNeeds() && !is_like_last[i]; },
+      kNeighbours, *reader_,
+      [&](std::span<const std::size_t> group, std::span<NearestPlaces> found) -> Status {
+        if (progress.isCancelled()) return Status::interrupted();
+        fit(group, found, places, wants);
+        for (std::size_t lane = 0; lane < group.size(); ++lane) {
+          const std::size_t i = group[lane];
+          SURFEIT_RETURN_IF_ERROR(
+              findAt({i, places[i].position, wants(i)}, lane, found[lane], takeAlike));
+        }
+        return {};
+      });
+  return status.ok() ? findOpen(takeAlike) : status;
 }
 
-Result<SurfaceAt> SurfaceSearch::at(const Surfel& place) {
-  const glm::vec3& position = place.position;
-  if (has_last_ && position == last_position_) return last_;
-  SurfaceCell cell, first;
-  for (const std::size_t count : kNeighbours) {
-    if (!index_.find(position, count, found_)) {
-      SURFEIT_RETURN_IF_ERROR(findPlaces(position, count, *reader_, found_));
-    }
-    cell = cells_.cellOf(found_.neighbours, found_.reach, normalOf(place));
-    if (count == kNeighbours[0]) first = cell;
-    if (cell.is_settled || std::isinf(found_.reach)) break;
+void SurfaceSearch::fit(std::span<const std::size_t> group, std::span<const NearestPlaces> found,
+                        std::span<const Surfel> places, const Wants& wants) {
+  SurfaceNeeds any;
+  for (std::size_t lane = 0; lane < group.size(); ++lane) {
+    const Surfel& place = places[group[lane]];
+    const NearestPlaces& nearest = found[lane];
+    // The first of those at one position tells for all
+    const bool is_first_known = !place.isSphere() && nearest.own_normal != glm::vec3(0);
+    group_[lane] = {nearest.neighbours, nearest.reach,
+                    is_first_known ? nearest.own_normal : normalOf(place)};
+    const SurfaceNeeds needs = wants(group[lane]);
+    any.size |= needs.size, any.normal |= needs.normal;
   }
+  cells_.fit(std::span(group_).first(group.size()), any.normal);
+  if (any.size) cells_.measure();
+}
+
+// At a place of the group, with its nearest. A cell that more neighbours may cut waits for others.
+Status SurfaceSearch::findAt(const Spot& spot, std::size_t lane, const NearestPlaces& nearest,
+                             const Take& take) {
+  const SurfacePlane plane = cells_.planeOf(lane);
+  SurfaceAt surface;
+  surface.normal = plane.normal;
+  surface.confidence = plane.confidence;
+  surface.thickness = plane.thickness;
+  surface.own_normal = nearest.own_normal;
+  if (!spot.needs.size && !plane.is_line) {
+    take(spot.index, surface);
+    return {};
+  }
+  const OpenPlace place{spot, group_[lane].normal, surface, plane.is_line, nearest.coincident};
+  const SurfaceCell cell = cells_.cellOf(lane);
+  if (cell.is_settled || std::isinf(nearest.reach)) {
+    return finish(place, cell, nearest.reach, cells_, take);
+  }
+  open_.push_back(place);
+  return open_.size() == PlaceIndex::kGroup ? findOpen(take) : Status();
+}
+
+// With more neighbours, and still more, at the places with open cells.
+Status SurfaceSearch::findOpen(const Take& take) {
+  for (const std::size_t count : kMoreNeighbours) {
+    bool with_normals = false;
+    for (std::size_t lane = 0; lane < open_.size(); ++lane) {
+      const OpenPlace& place = open_[lane];
+      NearestPlaces& found = wider_[lane];
+      SURFEIT_RETURN_IF_ERROR(index_.find(place.spot.position, count, *reader_, found));
+      wider_group_[lane] = {found.neighbours, found.reach, place.normal};
+      with_normals |= place.is_line && place.spot.needs.normal;
+    }
+    wider_cells_.fit(std::span(wider_group_).first(open_.size()), with_normals);
+    std::size_t left = 0;
+    for (std::size_t lane = 0; lane < open_.size(); ++lane) {
+      OpenPlace place = open_[lane];
+      const SurfaceCell cell = wider_cells_.cellOf(lane);
+      const float reach = wider_[lane].reach;
+      if (!cell.is_settled && !std::isinf(reach) && count != *std::rbegin(kMoreNeighbours)) {
+        open_[left++] = place;
+        continue;
+      }
+      // The plane is that of the nearest, unless they lie on a line
+      if (place.is_line) {
+        const SurfacePlane plane = wider_cells_.planeOf(lane);
+        place.surface.normal = plane.normal;
+        place.surface.confidence = plane.confidence;
+        place.surface.thickness = plane.thickness;
+      }
+      SURFEIT_RETURN_IF_ERROR(finish(place, cell, reach, wider_cells_, take));
+    }
+    open_.resize(left);
+  }
+  return {};
+}
+
+// Closes the cell that was made last, if it is open, and hands on what was found.
+Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float reach,
+                             SurfaceCells& cells, const Take& take) {
   const bool is_sparse = !cell.is_settled;
   if (is_sparse) {
-    SURFEIT_RETURN_IF_ERROR(cutByFarther(position));
-    cell = cells_.closed(found_.neighbours);
+    SURFEIT_RETURN_IF_ERROR(cutByFarther(place.spot.position, reach, cells));
+    cell = cells.closed();
   }
-  // The plane is that of the nearest, unless they lie on a line
-  const SurfaceCell& plane = first.is_line ? cell : first;
-  float area = cell.area, radius = cell.radius;
-  const auto limit = [&](float largest_radius) {
-    radius = std::min(radius, largest_radius);
-    area = std::min(area, kPi * largest_radius * largest_radius);
-  };
-  // What is open may be a stray, far from neighbours that are close to each other; and strays may
-  // lie all around each other
-  if (!cell.is_settled) limit(kOpenLimit * cell.neighbour_spacing);
-  if (is_sparse) limit(largest_sparse_radius_);
-  if (plane.thickness > kLooseThickness) limit(largest_loose_radius_);
-  area /= float(std::max<std::uint64_t>(found_.coincident, 1));
-  last_ = {area, radius, plane.normal, plane.confidence, plane.thickness, found_.own_normal};
-  last_position_ = position;
-  has_last_ = true;
-  return last_;
+  SurfaceAt surface = place.surface;
+  limit(cell, is_sparse, surface.thickness);
+  surface.area = cell.area / float(std::max<std::uint64_t>(place.coincident, 1));
+  surface.radius = cell.radius;
+  take(place.spot.index, surface);
+  return {};
+}
+
+// What is open may be a stray, far from neighbours that are close to each other; and strays may lie
+// all around each other.
+void SurfaceSearch::limit(SurfaceCell& cell, bool is_sparse, float thickness) const {
+  float largest = std::numeric_limits<float>::infinity();
+  if (!cell.is_settled) largest = kOpenLimit * cell.neighbour_spacing;
+  if (is_sparse) largest = std::min(largest, largest_sparse_radius_);
+  if (thickness > kLooseThickness) largest = std::min(largest, largest_loose_radius_);
+  cell.radius = std::min(cell.radius, largest);
+  cell.area = std::min(cell.area, kPi * largest * largest);
 }
 
 // Cuts the open cell by what lies beyond its neighbours: the other rows of a scan, what is sparse
 // beside something dense.
-Status SurfaceSearch::cutByFarther(const glm::vec3& position) {
-  if (std::isinf(found_.reach)) return {};  // there is nothing
-  for (int i = 0; i < kMostFarther && cells_.isOpen(); ++i) {
+Status SurfaceSearch::cutByFarther(const glm::vec3& position, float reach, SurfaceCells& cells) {
+  if (std::isinf(reach)) return {};  // there is nothing
+  for (int i = 0; i < kMostFarther && cells.isOpen(); ++i) {
     SURFEIT_ASSIGN_OR_RETURN(
         const std::optional<Neighbour> place,
         findPlace(
-            position, cells_.reach(), *reader_,
-            [&](const glm::vec3& centre, float radius) { return cells_.mayCut(centre, radius); },
-            [&](const Neighbour& other) { return cells_.wouldCut(other); }));
-    if (!place || !cells_.cut(*place)) break;
+            position, cells.reach(), *reader_,
+            [&](const glm::vec3& centre, float radius) { return cells.mayCut(centre, radius); },
+            [&](const Neighbour& other) { return cells.wouldCut(other); }));
+    if (!place || !cells.cut(*place)) break;
   }
   return {};
 }

@@ -2,14 +2,17 @@
 // (docs/surfels.md, "Sizes from the neighbourhood").
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <memory>
 #include <span>
+#include <vector>
 
-#include "octree/neighbours/places.h"
+#include "octree/neighbours/place_index.h"
 #include "octree/neighbours/surface_cell.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/progress.h"
@@ -27,6 +30,13 @@ struct SurfaceAt {
   glm::vec3 own_normal{0};  // of a surfel at the place itself; zero: none
 };
 
+// What of it is asked for: area and radius; confidence and thickness; these and the normal.
+struct SurfaceNeeds {
+  bool size = false, plane = false, normal = false;
+
+  bool operator==(const SurfaceNeeds&) const = default;
+};
+
 // One thread at a time; several search one octree.
 class SurfaceSearch {
  public:
@@ -35,38 +45,53 @@ class SurfaceSearch {
   // Besides the octree's reader.
   static std::size_t memoryBytes();
 
-  // Calls take(i, surface) for all places i that wants(i). Those that follow each other are close
-  // to each other, or it takes long. They need not be in the octree.
-  using Wants = std::function<bool(std::size_t)>;
+  // Calls take(i, surface) for all places i, in any order, with what wants(i). Those that follow
+  // each other are close to each other, or it takes long. They need not be in the octree.
+  using Wants = std::function<SurfaceNeeds(std::size_t)>;
   using Take = std::function<void(std::size_t, const SurfaceAt&)>;
   // kInterrupted as soon as `progress` is cancelled.
   Status find(std::span<const Surfel> places, const Wants& wants, const Take& take,
               const Progress& progress);
-  // The same at one place.
-  Result<SurfaceAt> at(const Surfel& place);
 
   // Of places off a surface, and of those that only places farther away tell the size of (sparse
   // beside dense): no radius becomes larger.
   void limitRadii(float largest_loose, float largest_sparse) {
     largest_loose_radius_ = largest_loose;
     largest_sparse_radius_ = largest_sparse;
-    has_last_ = false;
   }
 
  private:
-  Status cutByFarther(const glm::vec3& position);
+  struct Spot {
+    std::size_t index = 0;
+    glm::vec3 position{0};
+    SurfaceNeeds needs;
+  };
+  // With what is known so far.
+  struct OpenPlace {
+    Spot spot;
+    glm::vec3 normal{0};  // its own; zero: none
+    SurfaceAt surface;
+    bool is_line = false;  // the nearest lie on one
+    std::uint64_t coincident = 0;
+  };
+
+  void fit(std::span<const std::size_t> group, std::span<const NearestPlaces> found,
+           std::span<const Surfel> places, const Wants& wants);
+  Status findAt(const Spot& spot, std::size_t lane, const NearestPlaces& nearest, const Take& take);
+  Status findOpen(const Take& take);
+  Status finish(const OpenPlace& place, SurfaceCell cell, float reach, SurfaceCells& cells,
+                const Take& take);
+  Status cutByFarther(const glm::vec3& position, float reach, SurfaceCells& cells);
+  void limit(SurfaceCell& cell, bool is_sparse, float thickness) const;
 
   std::unique_ptr<PagedOctree::Reader> reader_;
   PlaceIndex index_;
-  SurfaceCells cells_;
-  NearestPlaces found_;
+  std::array<CellPlace, PlaceIndex::kGroup> group_, wider_group_;
+  SurfaceCells cells_, wider_cells_;  // of a group; with more neighbours
+  std::vector<OpenPlace> open_;       // up to a group
+  std::array<NearestPlaces, PlaceIndex::kGroup> wider_;
   float largest_loose_radius_ = std::numeric_limits<float>::infinity();
   float largest_sparse_radius_ = std::numeric_limits<float>::infinity();
-  // Surfels at one position follow each other, and a search among a million of them should happen
-  // once.
-  bool has_last_ = false;
-  glm::vec3 last_position_{0};
-  SurfaceAt last_;
 };
 
 // The same by a thread for each search, in slices of the places; wants and take are called by all

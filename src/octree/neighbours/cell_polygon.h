@@ -1,0 +1,117 @@
+// A convex polygon around a place: its cell among its neighbours in a plane.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+
+namespace surfeit {
+
+// Around the origin, cut by the lines halfway to neighbours.
+class CellPolygon {
+ public:
+  // A square with corners at (+-size, +-size).
+  void begin(float size) {
+    count_ = 4;
+    reach_sq_ = 2 * size * size;
+    corners_[0] = {-size, -size}, corners_[1] = {size, -size};
+    corners_[2] = {size, size}, corners_[3] = {-size, size};
+  }
+
+  // Keeps what is nearer to the place than to `other`.
+  bool cut(const glm::vec2& other) {
+    const float limit = 0.5f * glm::dot(other, other);
+    if (limit * 0.5f >= reach_sq_) return false;  // (|other| / 2)^2
+    float beyond[kMostCorners];
+    float farthest = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      beyond[i] = glm::dot(corners_[i], other) - limit;
+      farthest = std::max(farthest, beyond[i]);
+    }
+    if (farthest <= 0 || count_ + 1 >= kMostCorners) return false;
+    return keepWithin(beyond);
+  }
+
+  float reach() const { return std::sqrt(reach_sq_); }
+  float reachSq() const { return reach_sq_; }
+  // Whether what is nearer to a corner than the place is lies within `radius` of there: only that
+  // cuts the cell.
+  bool mayCut(const glm::vec2& there, float radius) const {
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (glm::length(there - corners_[i]) < glm::length(corners_[i]) + radius) return true;
+    }
+    return false;
+  }
+  bool wouldCut(const glm::vec2& there) const { return mayCut(there, -kTouching); }
+  // Whether any side of the first square is left, which had corners at (+-size, +-size).
+  bool touches(float size) const {
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec2& corner = corners_[i];
+      if (std::max(std::abs(corner.x), std::abs(corner.y)) > size * (1 - kTouching)) return true;
+    }
+    return false;
+  }
+  float area() const {
+    float twice = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
+      twice += a.x * b.y - a.y * b.x;
+    }
+    return 0.5f * twice;
+  }
+  // The mean squared distance from the place.
+  float meanSquare() const {
+    float sum = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
+      sum += (a.x * b.y - a.y * b.x) * (glm::dot(a, a) + glm::dot(a, b) + glm::dot(b, b));
+    }
+    return sum / (12 * area());
+  }
+  // Its width along a direction of unit length.
+  float width(const glm::vec2& direction) const {
+    float low = 0, high = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const float at = glm::dot(corners_[i], direction);
+      low = std::min(low, at), high = std::max(high, at);
+    }
+    return high - low;
+  }
+
+ private:
+  static constexpr float kTouching = 1e-4f;
+  static constexpr std::size_t kMostCorners = 64;
+
+  // Keeps the part with corners that are not beyond.
+  bool keepWithin(const float* beyond) {
+    std::array<glm::vec2, kMostCorners> kept;
+    std::size_t kept_count = 0;
+    float reach_sq = 0;
+    const auto keep = [&](const glm::vec2& corner) {
+      kept[kept_count++] = corner;
+      reach_sq = std::max(reach_sq, glm::dot(corner, corner));
+    };
+    for (std::size_t i = 0; i < count_; ++i) {
+      const std::size_t next = i + 1 == count_ ? 0 : i + 1;
+      if (beyond[i] <= 0) keep(corners_[i]);
+      if ((beyond[i] <= 0) != (beyond[next] <= 0) && kept_count < kMostCorners) {
+        const float part = beyond[i] / (beyond[i] - beyond[next]);
+        keep(corners_[i] + part * (corners_[next] - corners_[i]));
+      }
+    }
+    if (kept_count < 3) return false;
+    std::copy_n(kept.begin(), kept_count, corners_.begin());
+    count_ = kept_count;
+    reach_sq_ = reach_sq;
+    return true;
+  }
+
+  std::array<glm::vec2, kMostCorners> corners_;
+  std::size_t count_ = 0;
+  float reach_sq_ = 0;  // of the farthest corner
+};
+
+}  // namespace surfeit

@@ -1,0 +1,66 @@
+// Planes, and low quadrics over them, through the neighbours of many places at once: a place in
+// each lane, so that every place gets the same sums whatever the instruction set, and whatever
+// places are beside it.
+#pragma once
+
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+
+#include "octree/neighbours/places.h"
+
+namespace surfeit {
+
+// By lane; lengths are in units of the farthest neighbour: fourth powers of them must stay finite.
+struct SurfaceFitLanes {
+  static constexpr std::size_t kLanes = 16, kMostNeighbours = 112;
+  // How far an open cell reaches.
+  static constexpr float kOpen = 2;
+  using Lanes = float[kLanes];
+
+  // Given
+  std::size_t most_neighbours = 0;  // of any lane
+  alignas(64) Lanes count;          // of neighbours
+  Lanes unit;                       // distance of the farthest neighbour
+  Lanes own_x, own_y, own_z;        // the place's own normal; zero: that of the plane counts
+  bool with_quadrics = false;       // whether quadrics are fitted
+
+  // Found
+  alignas(64) Lanes normal_x;  // of the plane
+  Lanes normal_y, normal_z;
+  Lanes thickness;   // root mean square of what lies off the plane
+  Lanes confidence;  // 1 - 3 l0 / (l0 + l1 + l2), with the variances along its axes
+  Lanes is_line;     // 1: the neighbours lie on one, and the plane is any through it
+  Lanes surface_x, surface_y, surface_z;  // the normal of the quadric at the place
+  Lanes highest;                          // the most that a neighbour lies off the own plane
+
+  // By neighbour: offsets, given, in any unit; then in the own plane's frame, and above it
+  alignas(64) Lanes x[kMostNeighbours];
+  Lanes y[kMostNeighbours], z[kMostNeighbours];
+  Lanes beside_u[kMostNeighbours], beside_v[kMostNeighbours], above[kMostNeighbours];
+  Lanes weight[kMostNeighbours];  // scratch
+
+  // Cells: half the squared distance beside the place, of neighbours that count (others: infinity),
+  // below which they share the cell
+  Lanes half_sq[kMostNeighbours];
+  Lanes coincident_half_sq;
+  // Found
+  Lanes cell_area, cell_mean_square;  // of the distance from the place
+  Lanes cell_reach_sq;                // of the farthest corner
+  Lanes cell_sharers;                 // the place, and neighbours that share the cell
+  Lanes cell_is_cut;                  // 1: by any neighbour
+};
+
+struct SurfaceFitKernel {
+  // Planes and quadrics, and the neighbours in the own planes' frames.
+  void (*fit)(SurfaceFitLanes& lanes);
+  // Then the cells of neighbours that count.
+  void (*measure)(SurfaceFitLanes& lanes);
+};
+
+const SurfaceFitKernel& fastestSurfaceFitKernel();
+// Of all instruction sets that this machine has.
+std::span<const SurfaceFitKernel> surfaceFitKernels();
+
+}  // namespace surfeit
