@@ -56,6 +56,7 @@ const std::vector<Number>& allNumbers() {
       {"least_filled", &F::least_filled, 0},
       {"fewest_tiles", &F::fewest_tiles, 1},
       {"thin_volume", &F::thin_volume, 0},
+      {"fill_doubt", &F::fill_doubt, 0},
       {"hull_widening", &F::hull_widening, 0},
       {"most_in_hull", &F::most_in_hull, 0},
       {"ribbon_part", &F::ribbon_part, 0},

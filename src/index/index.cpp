@@ -203,7 +203,7 @@ Status Indexer::openInputs() {
   const double packed_bytes = packedBytesPerSurfel(sample_);
   SURFEIT_ASSIGN_OR_RETURN(
       plan_, planIndex({options_.memory_bytes, threads_, records, packed_bytes, form,
-                        options_.normals ? leastNeighbourBytes(*options_.normals, threads_) : 0,
+                        mayNeedNeighbours() ? leastNeighbourBytes(options_.normals, threads_) : 0,
                         options_.repeats == Repeats::kThin ? RepeatFilter::kBytesPerSurfel : 0}));
   stats_.input_bytes = reader_->fileBytes();
   SURFEIT_RETURN_IF_ERROR(checkFreeSpace(sample_.empty() ? kLeastPackedBytes : packed_bytes));

@@ -64,11 +64,12 @@ Status buildOriented(SceneFile scene, const NeighbourBuild& how, IndexStats& sta
 
 }  // namespace
 
-std::uint64_t leastNeighbourBytes(const NormalEstimation& estimation, int threads) {
+std::uint64_t leastNeighbourBytes(const std::optional<NormalEstimation>& normals, int threads) {
   constexpr std::uint64_t kCacheBytes = std::uint64_t{1} << 20;  // of a thread, for a few pages
   const std::uint64_t caches = std::uint64_t(threads) * kCacheBytes;
   const std::uint64_t sides = ExternalSorter::kLeastMemory + Sides::searcherBytes(threads);
-  const bool needs_sides = estimation.orientation.toward == NormalOrientation::Toward::kConsistent;
+  const bool needs_sides =
+      normals && normals->orientation.toward == NormalOrientation::Toward::kConsistent;
   return caches + (needs_sides ? sides : SizedSurfelStream::searcherBytes(threads));
 }
 

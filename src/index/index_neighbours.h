@@ -30,7 +30,7 @@ struct NeighbourBuild {
 };
 
 // The least memory_bytes for so many threads, but for what grows with the scene.
-std::uint64_t leastNeighbourBytes(const NormalEstimation& estimation, int threads);
+std::uint64_t leastNeighbourBytes(const std::optional<NormalEstimation>& normals, int threads);
 
 Status buildFromNeighbours(SceneFile places, const NeighbourBuild& how, IndexStats& stats,
                            PhaseClock& clock, Progress& progress);

@@ -47,7 +47,7 @@ class TemporaryFaultTest : public testing::TestWithParam<Job> {
     for (const char* name : {"x", "y", "z"}) bare.addProperty(name);
     for (const std::vector<double>& row : cloud.rows) bare.rows.push_back({row[0], row[1], row[2]});
     writeTable(bare, file("bare.ply"));
-    writeTable(receiversOf(60000), file("receivers.ply"));
+    writeTable(receiversOf(90000), file("receivers.ply"));
     Progress quiet;
     IndexOptions options;
     options.leaf_capacity = 4;

@@ -31,8 +31,8 @@ inline constexpr double kMostBounceLight = .03;
 
 // A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
 // by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.
-inline constexpr double kUsualStep = .004, kMostStep = .0105;
-inline constexpr double kUnusualSteps = 110;
+inline constexpr double kUsualStep = .004, kMostStep = .007;
+inline constexpr double kUnusualSteps = 80;
 // Light, rms over the mean of a scene: of half of the scenes, and of nine tenths.
 inline constexpr double kMedianLightStep = .002, kLargeLightStep = .06;
 

@@ -94,8 +94,8 @@ SiblingClassifier fastestSiblingClassifier();
 
 // What a visitor knows of a node that it was told to look into.
 struct OpenedNode {
-  bool has_hull = false;  // its hull was drawn, or that of a node above it
-  bool is_sheet = false;  // isSheet()
+  std::uint32_t hull_lanes = 0;  // receivers that see its hull, or that of a node above it, as bits
+  bool is_sheet = false;         // isSheet()
 };
 
 // Calls visit.node(const Node&, const LaneParts*) for the nodes that some receiver sees as a whole,

@@ -193,10 +193,6 @@ class Brush {
     const V distance_sq = hn::IfThenElse(seen, sight.distance_sq, Splat(1));
     const V distance = hn::Mul(distance_sq, InverseSqrt(distance_sq));
     seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kFidelity.least_axis), distance)));
-    if (patch.is_hull) {
-      const float least_sq = patch.disk_area / largestPatch(*canvas_.rules);
-      seen = hn::And(seen, hn::Ge(distance_sq, Splat(least_sq)));
-    }
     if (hn::AllFalse(D(), seen)) return;
 
     // The visible area, times the distance

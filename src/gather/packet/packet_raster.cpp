@@ -234,35 +234,50 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
   }
 }
 
-// What rises from its planes by a pixel lies elsewhere.
 bool PacketRaster::mayLeaveHull(const Node& node) const {
-  if (node.isRough() || float(node.surfel_count) > kFidelity.most_in_hull) return false;
-  if (node.transparency != 0 || (node.groups & ~rules_.groups) != 0) return false;
-  const float nearest = glm::length(node.position - local_centre_) - local_radius_;
-  return node.off_plane * geometry_.pixelsPerSlope() <= nearest;
+  return !node.isRough() && float(node.surfel_count) <= kFidelity.most_in_hull &&
+         node.transparency == 0 && (node.groups & ~rules_.groups) == 0;
 }
 
-// False: some receiver is too close to see it as a parallelogram, or it has gaps.
-bool PacketRaster::addFacetHull(const Node& node, const Facet& facet, std::uint32_t parts) {
-  if (!isFilled(node, facet) || (facet.is_two_sided && !isSheet(node))) return false;
-  const float distance = glm::length(facet.position - local_centre_);
-  const float least = std::sqrt(facet.area / largestPatch(rules_));
-  if (distance + local_radius_ < least) return false;
-  addFacet(node, facet, true, parts, nullptr);
-  return distance - local_radius_ >= least;
+// Receivers that are at least so far from a place, in the frame of what is added.
+std::uint32_t PacketRaster::lanesBeyond(const glm::vec3& position, float distance) const {
+  const glm::vec3 place = toWorld(position);
+  const float least = frame_ != nullptr ? frame_->scale * distance : distance;
+  std::uint32_t lanes = 0;
+  for (std::size_t i = 0; i < kPacketReceivers; ++i) {
+    const glm::vec3 offset = place - glm::vec3(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
+    lanes |= (glm::dot(offset, offset) >= least * least ? 1u : 0u) << i;
+  }
+  return lanes;
 }
 
-bool PacketRaster::addHull(const Node& node, const LaneParts* lane_parts) {
-  if (!mayLeaveHull(node)) return false;
-  const std::uint32_t parts = keepParts(lane_parts);
-  if (node.isFlat()) return addFacetHull(node, facetOf(node), parts);
-  bool is_whole = true;
+// The image of what looks larger is no parallelogram, and what rises from the node's planes by a
+// pixel lies elsewhere.
+std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
+                                         const LaneParts* parts, std::uint32_t lanes) {
+  if (!isFilled(node, facet) || (facet.is_two_sided && !isSheet(node))) return 0;
+  lanes &= lanesBeyond(facet.position, std::max(std::sqrt(facet.area / largestPatch(rules_)),
+                                                node.off_plane * geometry_.pixelsPerSlope()));
+  if (lanes == 0) return 0;
+  LaneParts seen;
+  for (std::size_t i = 0; i < kPacketReceivers; ++i) {
+    seen[i] = (lanes >> i & 1) == 0 ? 0 : parts != nullptr ? (*parts)[i] : 1;
+  }
+  addFacet(node, facet, true, keepParts(&seen), nullptr);
+  return lanes;
+}
+
+std::uint32_t PacketRaster::addHull(const Node& node, const LaneParts* parts, std::uint32_t have) {
+  constexpr std::uint32_t kAll = (1u << kPacketReceivers) - 1;
+  if (have == kAll || !mayLeaveHull(node)) return have;
+  std::uint32_t see_all = kAll & ~have;
+  if (node.isFlat()) see_all = addFacetHull(node, facetOf(node), parts, see_all);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     Facet facet = node.facet(i);
     facet.is_thicket = false;
-    is_whole = addFacetHull(node, facet, parts) && is_whole;
+    see_all &= addFacetHull(node, facet, parts, kAll & ~have);
   }
-  return is_whole;
+  return have | see_all;
 }
 
 // Whether no receiver sees any of a facet.

@@ -158,15 +158,18 @@ float facetLayers(const Facet& facet) {
 }
 
 bool isFilled(const Node& node, const Facet& facet) {
+  const float surfels = float(node.surfel_count) * facet.area / node.area;
+  const float doubt = kFidelity.fill_doubt / std::sqrt(std::max(1.f, surfels));
+  const float least = kFidelity.least_filled * std::max(0.f, 1 - doubt);
   const float layers = facetLayers(facet);
-  if (layers >= kFidelity.least_filled) return true;
+  if (layers >= least) return true;
   const glm::vec3 direction = glm::normalize(facet.normal);
   float shown = 0;
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const float cosine = glm::dot(direction, node.facets[i].meanNormal());
     if (node.isTwoSided(i) || cosine > 0) shown += float(node.facets[i].area) * std::abs(cosine);
   }
-  return layers * node.area * (1.f / 65535) * shown >= kFidelity.least_filled * facet.area;
+  return layers * node.area * (1.f / 65535) * shown >= least * facet.area;
 }
 
 float facetOpacity(const Facet& facet) {

@@ -91,6 +91,12 @@ struct Fidelity {
   // with gaps as wide as they are .48.)
   float least_filled = 0.7f;
 
+  // Standard deviations. Of n random samples of a surface, what a node fills scatters by 1 / sqrt(n)
+  // of it. One that falls short of `least_filled` by less than so many of them may be a surface.
+  // (0, 1, 1.5: a plane of random samples with noise of .2 spacings covers .045, .029, .020 less than
+  // it should. Fences cover the same with all three, from 2 on .02 more.)
+  float fill_doubt = 1.5f;
+
   // Part of half its side by which a patch is widened in the hull. (AO RMSE with .7, .75, .8, .9:
   // bunny, scattered .0054, .0046, .0042, .0037; city .0049, .0052, .0053, .0057.)
   float hull_widening = 0.75f;
