@@ -159,13 +159,17 @@ M IsOutsideCones(const PacketView& view, const Nodes& nodes, const Places& place
 //
 // of which the first factor is at most -depth, the second at most aside: below zero for all b up
 // to the angle of the cone if depth cos > aside sin there.
-M TurnsAway(const PacketView& view, const Nodes& nodes, const Places& places, float facing) {
-  const V along = hn::Mul(Splat(facing), Dot(places.offset, nodes.normal));
+//
+// Rays begin before the receiver by the bias, at most in radii of the node: what they see the front
+// of is not dropped.
+M TurnsAway(const PacketView& view, const Nodes& nodes, const Places& places,
+            const CutRules& rules) {
+  const V along = hn::Mul(Splat(rules.facing), Dot(places.offset, nodes.normal));
   const V slack = hn::Mul(Splat(kRoundingSlack), places.distance);
-  const V size = hn::Add(hn::Add(Splat(view.radius), nodes.thickness), slack);
+  const V before = hn::MulAdd(Splat(rules.bias), nodes.radius, Splat(view.radius));
+  const V size = hn::Add(hn::Add(before, nodes.thickness), slack);
   const V depth = hn::Max(hn::Zero(D()), hn::Sub(along, size));
-  const V aside =
-      hn::Add(Other(places.distance_sq, along), hn::Add(nodes.radius, Splat(view.radius)));
+  const V aside = hn::Add(Other(places.distance_sq, along), hn::Add(nodes.radius, before));
   return hn::Gt(hn::Mul(depth, nodes.normal_cosine),
                 hn::Mul(aside, Other(Splat(1), nodes.normal_cosine)));
 }
@@ -222,7 +226,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     }
     if (view.has_cone) seen = hn::AndNot(IsOutsideCones(view, nodes, places), seen);
     if (rules.facing != 0 && rules.approximates()) {
-      seen = hn::AndNot(TurnsAway(view, nodes, places, rules.facing), seen);
+      seen = hn::AndNot(TurnsAway(view, nodes, places, rules), seen);
     }
     M is_far = hn::Lt(hn::Zero(d), hn::Zero(d)), is_open = hn::Not(is_far);
     if (rules.approximates()) {

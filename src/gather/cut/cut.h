@@ -51,6 +51,7 @@ struct CutRules {
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
   float most_coarser = 1;             // what is low may look so many times as large
   float pixel = 0;                    // slope of a pixel of the raster
+  float bias = 0;                     // of rays, in radii of surfels
   SendingGains gains{};
 
   bool approximates() const { return max_solid_angle > 0; }
@@ -115,6 +116,7 @@ class CutWalk {
                rules.groups,
                mostCoarser(rules),
                1 / pixelsPerSlope(rules),
+               rules.quality.bias,
                rules.hasLight() ? rules.gains : SendingGains()},
         classify_(fastestSiblingClassifier()) {}
 
