@@ -17,17 +17,17 @@ inline constexpr double kUsualRms = .01, kLargeRms = .02;
 // Goal of all: rms .02, worst .1, none above .02, none above .01 in three batches of four (99 % of
 // scenes), median light .01; final: half of each. Counts are of 25 scenes, in proportion where a
 // batch has fewer.
-inline constexpr FidelityLimits kFrontLimits = {.03, .25, 3, 1, .02};
-inline constexpr FidelityLimits kBothLimits = {.012, .04, 2, 1, .1};
-inline constexpr FidelityLimits kBackLimits = {.03, .15, 5, 2, .15};
-inline constexpr FidelityLimits kFinalLimits = {.003, .012, 1, 1, .05};
-inline constexpr FidelityLimits kGlossyLimits = {.01, .045, 1, 1, .02};
-inline constexpr FidelityLimits kConeLimits = {.01, .04, 1, 1, .06};
-inline constexpr FidelityLimits kFalloffLimits = {.02, .1, 2, 1, .06};
-inline constexpr FidelityLimits kSubsetLimits = {.012, .04, 1, 1, .05};
+inline constexpr FidelityLimits kFrontLimits = {.012, .035, 1, 0, .008};
+inline constexpr FidelityLimits kBothLimits = {.012, .035, 1, 0, .018};
+inline constexpr FidelityLimits kBackLimits = {.006, .027, 0, 0, .15};
+inline constexpr FidelityLimits kFinalLimits = {.0016, .006, 0, 0, .001};
+inline constexpr FidelityLimits kGlossyLimits = {.0075, .045, 0, 0, .006};
+inline constexpr FidelityLimits kConeLimits = {.0035, .016, 0, 0, .006};
+inline constexpr FidelityLimits kFalloffLimits = {.0035, .018, 0, 0, .012};
+inline constexpr FidelityLimits kSubsetLimits = {.0045, .025, 0, 0, .013};
 
 // One bounce, by default against exactly: RMS of irradiance over its mean. Goal: .02.
-inline constexpr double kMostBounceLight = .03;
+inline constexpr double kMostBounceLight = .0015;
 
 // A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
 // by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.
@@ -44,8 +44,8 @@ struct InvarianceLimits {
 };
 // Nodes decide which two-sided surfels are of a sheet, and their hulls close gaps between surfels;
 // another place has other nodes.
-inline constexpr InvarianceLimits kMovedLimits = {.009, .011};
-inline constexpr InvarianceLimits kTurnedLimits = {.007, .0075};
+inline constexpr InvarianceLimits kMovedLimits = {.009, .0105};
+inline constexpr InvarianceLimits kTurnedLimits = {.007, .007};
 inline constexpr InvarianceLimits kScaledLimits = {0, 0};
 
 }  // namespace surfeit
