@@ -31,6 +31,8 @@ constexpr float kDiagonal = 1.415f;
 // sphere; with .02 by .0001 and .0006, for 3 % of the time.)
 constexpr float kLargeExtent = 0.02f;
 
+constexpr std::uint32_t kAllLanes = (1u << kPacketReceivers) - 1;
+
 // Thickets fill their outlines however long these are.
 float leastHalf(const Patch& patch) {
   return patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius : 0;
@@ -259,6 +261,10 @@ std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
   lanes &= lanesBeyond(facet.position, std::max(std::sqrt(facet.area / largestPatch(rules_)),
                                                 node.off_plane * geometry_.pixelsPerSlope()));
   if (lanes == 0) return 0;
+  if (lanes == kAllLanes) {
+    addFacet(node, facet, true, keepParts(parts), nullptr);
+    return lanes;
+  }
   LaneParts seen;
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
     seen[i] = (lanes >> i & 1) == 0 ? 0 : parts != nullptr ? (*parts)[i] : 1;
@@ -268,14 +274,14 @@ std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
 }
 
 std::uint32_t PacketRaster::addHull(const Node& node, const LaneParts* parts, std::uint32_t have) {
-  constexpr std::uint32_t kAll = (1u << kPacketReceivers) - 1;
-  if (have == kAll || !mayLeaveHull(node)) return have;
-  std::uint32_t see_all = kAll & ~have;
-  if (node.isFlat()) see_all = addFacetHull(node, facetOf(node), parts, see_all);
+  if (have == kAllLanes || !mayLeaveHull(node)) return have;
+  const std::uint32_t others = kAllLanes & ~have;
+  if (node.isFlat()) return have | addFacetHull(node, facetOf(node), parts, others);
+  std::uint32_t see_all = others;
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     Facet facet = node.facet(i);
     facet.is_thicket = false;
-    see_all &= addFacetHull(node, facet, parts, kAll & ~have);
+    see_all &= addFacetHull(node, facet, parts, others);
   }
   return have | see_all;
 }
