@@ -87,7 +87,7 @@ TEST(Scattered, SquaresCoverHoweverFinelyTheyAreDrawn) {
                       is_two_sided ? "two-sided" : "one-sided", double(distance), off.standard,
                       off.exact, off.between);
           // The goal is .01. Without hulls of nodes .083
-          EXPECT_LE(off.between, .045) << count << ' ' << distance;
+          EXPECT_LE(off.between, .055) << count << ' ' << distance;
           // Fewer are no square: what they cover is short of it by holes and by ragged outlines
           if (count < 4000) continue;
           EXPECT_NEAR(off.standard, 0, .03) << count << ' ' << distance;
