@@ -20,10 +20,10 @@ inline constexpr double kUsualRms = .01, kLargeRms = .02;
 inline constexpr FidelityLimits kFrontLimits = {.012, .035, 1, 0, .008};
 inline constexpr FidelityLimits kBothLimits = {.012, .035, 1, 0, .018};
 inline constexpr FidelityLimits kBackLimits = {.006, .027, 0, 0, .15};
-inline constexpr FidelityLimits kFinalLimits = {.0016, .006, 0, 0, .001};
+inline constexpr FidelityLimits kFinalLimits = {.002, .008, 0, 0, .0012};
 inline constexpr FidelityLimits kGlossyLimits = {.0075, .045, 0, 0, .007};
-inline constexpr FidelityLimits kConeLimits = {.0035, .016, 0, 0, .006};
-inline constexpr FidelityLimits kFalloffLimits = {.0035, .018, 0, 0, .012};
+inline constexpr FidelityLimits kConeLimits = {.0045, .02, 0, 0, .007};
+inline constexpr FidelityLimits kFalloffLimits = {.006, .025, 0, 0, .015};
 inline constexpr FidelityLimits kSubsetLimits = {.0045, .025, 0, 0, .013};
 
 // One bounce, by default against exactly: RMS of irradiance over its mean. Goal: .02.

@@ -18,7 +18,7 @@ struct DrawCut {
     raster.addNode(node, parts, octree.lobesOf(node));
   }
   OpenedNode opened(const Node& node, const LaneParts* parts, OpenedNode parent) {
-    const OpenedNode opened = {raster.addHull(node, parts, parent.hull_lanes), isSheet(node)};
+    const OpenedNode opened = raster.addHull(node, parts, parent);
     are_tiles = parent.is_sheet || opened.is_sheet;
     return opened;
   }

@@ -30,22 +30,12 @@ PacketKernel Kernel() {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-#include <vector>
+#include "core/every_target.h"
 
 namespace surfeit {
 namespace {
 
 HWY_EXPORT(Kernel);
-
-std::vector<PacketKernel> allKernels() {
-  std::vector<PacketKernel> kernels;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(Kernel)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  return kernels;
-}
 
 }  // namespace
 
@@ -55,7 +45,7 @@ const PacketKernel& fastestPacketKernel() {
 }
 
 std::span<const PacketKernel> packetKernels() {
-  static const std::vector<PacketKernel> kernels = allKernels();
+  static const auto kernels = forEveryTarget([] { return HWY_DYNAMIC_DISPATCH(Kernel)(); });
   return kernels;
 }
 

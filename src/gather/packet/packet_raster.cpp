@@ -257,7 +257,8 @@ std::uint32_t PacketRaster::lanesBeyond(const glm::vec3& position, float distanc
 // pixel lies elsewhere.
 std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
                                          const LaneParts* parts, std::uint32_t lanes) {
-  if (!isFilled(node, facet) || (facet.is_two_sided && !isSheet(node))) return 0;
+  if (!facet.is_two_sided && turnsAway(facet.position, facet.normal)) return lanes;
+  if (!isFilled(node, facet)) return 0;
   lanes &= lanesBeyond(facet.position, std::max(std::sqrt(facet.area / largestPatch(rules_)),
                                                 node.off_plane * geometry_.pixelsPerSlope()));
   if (lanes == 0) return 0;
@@ -273,17 +274,21 @@ std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
   return lanes;
 }
 
-std::uint32_t PacketRaster::addHull(const Node& node, const LaneParts* parts, std::uint32_t have) {
-  if (have == kAllLanes || !mayLeaveHull(node)) return have;
-  const std::uint32_t others = kAllLanes & ~have;
-  if (node.isFlat()) return have | addFacetHull(node, facetOf(node), parts, others);
-  std::uint32_t see_all = others;
-  for (std::size_t i = 0; i < node.facet_count; ++i) {
-    Facet facet = node.facet(i);
+OpenedNode PacketRaster::addHull(const Node& node, const LaneParts* parts,
+                                 const OpenedNode& parent) {
+  OpenedNode opened = {parent.hull_lanes, isSheet(node)};
+  const std::uint32_t others = kAllLanes & ~parent.hull_lanes;
+  if (others == 0 || !mayLeaveHull(node)) return opened;
+  const auto addPiece = [&](Facet facet) {
+    if (facet.is_two_sided && !opened.is_sheet) return 0u;
     facet.is_thicket = false;
-    see_all &= addFacetHull(node, facet, parts, others);
-  }
-  return have | see_all;
+    return addFacetHull(node, facet, parts, others);
+  };
+  std::uint32_t see_all = others;
+  if (node.isFlat()) see_all = addPiece(facetOf(node));
+  for (std::size_t i = 0; i < node.facet_count; ++i) see_all &= addPiece(node.facet(i));
+  opened.hull_lanes |= see_all;
+  return opened;
 }
 
 // Whether no receiver sees any of a facet.
@@ -325,7 +330,7 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
   patch.lets_through = facet.opacity < 1;
   if (patch.lets_through) patch.opacity = facetOpacity(facet);
-  patch.is_solid = isFilled(node, facet);
+  patch.is_solid = is_hull || isFilled(node, facet);
   patch.lets_through = patch.lets_through || !patch.is_solid;
   patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);

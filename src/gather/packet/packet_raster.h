@@ -68,9 +68,10 @@ class PacketRaster {
                const NodeLobes* lobes = nullptr);
   // Adds a patch as it is, in the frame of the receivers.
   void addPatch(const Patch& patch);
-  // Adds the hull of a node that is looked into, for what is below it leaves gaps. `have`: the
-  // receivers, as bits, that see the hull of a node above it. With those that see all of its own.
-  std::uint32_t addHull(const Node& node, const LaneParts* parts = nullptr, std::uint32_t have = 0);
+  // Adds the hull of a node that is looked into, for what is below it leaves gaps, for receivers
+  // that see no hull of a node above it.
+  OpenedNode addHull(const Node& node, const LaneParts* parts = nullptr,
+                     const OpenedNode& parent = {});
   // Adds those of the surfels that some receiver may see. `lobes`: as many, or none. `are_tiles`:
   // they are of a node that isSheet().
   void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr,
@@ -105,7 +106,7 @@ class PacketRaster {
                 const Lobe* lobe);
   bool mayLeaveHull(const Node& node) const;
   std::uint32_t lanesBeyond(const glm::vec3& position, float distance) const;
-  // Adds a hull for those of these lanes that see it, and says which do.
+  // Adds a hull for those of these lanes that see it, and says which need no other.
   std::uint32_t addFacetHull(const Node& node, const Facet& facet, const LaneParts* parts,
                              std::uint32_t lanes);
   void addLobe(const Lobe& lobe, const glm::vec3& normal);

@@ -157,25 +157,20 @@ float facetLayers(const Facet& facet) {
   return ellipse > 0 ? facet.area / ellipse : 1;
 }
 
-namespace {
-// The part of the outline that is asked for.
-bool fills(const Node& node, const Facet& facet, float part) {
+bool isFilled(const Node& node, const Facet& facet) {
+  const float surfels = float(node.surfel_count) * facet.area / node.area;
+  const float doubt =
+      facet.is_two_sided ? 0 : kFidelity.fill_doubt / std::sqrt(std::max(1.f, surfels));
+  const float least = kFidelity.least_filled * std::max(0.f, 1 - doubt);
   const float layers = facetLayers(facet);
-  if (layers >= part) return true;
+  if (layers >= least) return true;
   const glm::vec3 direction = glm::normalize(facet.normal);
   float shown = 0;
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const float cosine = glm::dot(direction, node.facets[i].meanNormal());
     if (node.isTwoSided(i) || cosine > 0) shown += float(node.facets[i].area) * std::abs(cosine);
   }
-  return layers * node.area * (1.f / 65535) * shown >= part * facet.area;
-}
-}  // namespace
-
-bool isFilled(const Node& node, const Facet& facet) {
-  const float surfels = float(node.surfel_count) * facet.area / node.area;
-  const float doubt = kFidelity.fill_doubt / std::sqrt(std::max(1.f, surfels));
-  return fills(node, facet, kFidelity.least_filled * std::max(0.f, 1 - doubt));
+  return layers * node.area * (1.f / 65535) * shown >= least * facet.area;
 }
 
 float facetOpacity(const Facet& facet) {
@@ -200,7 +195,7 @@ bool isSheet(const Node& node) {
   if (!hasTwoSidedPieces(node)) return false;
   const float fewest = kFidelity.fewest_tiles * node.area / float(node.surfel_count);
   const auto isTiled = [&](const Facet& facet) {
-    return facet.area >= fewest && fills(node, facet, kFidelity.least_filled);
+    return facet.area >= fewest && isFilled(node, facet);
   };
   if (node.isFlat()) return isTiled(facetOf(node));
   float area = 0;

@@ -93,6 +93,7 @@ struct Fidelity {
 
   // Standard deviations. Of n random samples of a surface, what a node fills scatters by 1 / sqrt(n)
   // of it. One that falls short of `least_filled` by less than so many of them may be a surface.
+  // Two-sided samples may be leaves as well, and have no such benefit.
   // (0, 1, 1.5: a plane of random samples with noise of .2 spacings covers .045, .029, .020 less than
   // it should. Fences cover the same with all three, from 2 on .02 more.)
   float fill_doubt = 1.5f;

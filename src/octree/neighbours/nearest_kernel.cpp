@@ -117,20 +117,12 @@ NearestKernel NearestKernelHere() {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include "core/every_target.h"
+
 namespace surfeit {
 namespace {
 
 HWY_EXPORT(NearestKernelHere);
-
-std::vector<NearestKernel> allKernels() {
-  std::vector<NearestKernel> kernels;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(NearestKernelHere)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  return kernels;
-}
 
 }  // namespace
 
@@ -140,7 +132,8 @@ const NearestKernel& fastestNearestKernel() {
 }
 
 std::span<const NearestKernel> nearestKernels() {
-  static const std::vector<NearestKernel> kernels = allKernels();
+  static const auto kernels =
+      forEveryTarget([] { return HWY_DYNAMIC_DISPATCH(NearestKernelHere)(); });
   return kernels;
 }
 

@@ -22,22 +22,12 @@ SurfaceFitKernel SurfaceFitKernelHere() { return {.fit = FitSurfaces, .measure =
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-#include <vector>
+#include "core/every_target.h"
 
 namespace surfeit {
 namespace {
 
 HWY_EXPORT(SurfaceFitKernelHere);
-
-std::vector<SurfaceFitKernel> allKernels() {
-  std::vector<SurfaceFitKernel> kernels;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    hwy::SetSupportedTargetsForTest(target);
-    kernels.push_back(HWY_DYNAMIC_DISPATCH(SurfaceFitKernelHere)());
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  return kernels;
-}
 
 }  // namespace
 
@@ -47,7 +37,8 @@ const SurfaceFitKernel& fastestSurfaceFitKernel() {
 }
 
 std::span<const SurfaceFitKernel> surfaceFitKernels() {
-  static const std::vector<SurfaceFitKernel> kernels = allKernels();
+  static const auto kernels =
+      forEveryTarget([] { return HWY_DYNAMIC_DISPATCH(SurfaceFitKernelHere)(); });
   return kernels;
 }
 
