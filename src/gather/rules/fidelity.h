@@ -91,11 +91,11 @@ struct Fidelity {
   // with gaps as wide as they are .48.)
   float least_filled = 0.7f;
 
-  // Standard deviations. Of n random samples of a surface, what a node fills scatters by 1 / sqrt(n)
-  // of it. One that falls short of `least_filled` by less than so many of them may be a surface.
-  // Two-sided samples may be leaves as well, and have no such benefit.
-  // (0, 1, 1.5: a plane of random samples with noise of .2 spacings covers .045, .029, .020 less than
-  // it should. Fences cover the same with all three, from 2 on .02 more.)
+  // Standard deviations. Of n random samples of a surface, what a node fills scatters by 1 /
+  // sqrt(n) of it. One that falls short of `least_filled` by less than so many of them may be a
+  // surface. Two-sided samples may be leaves as well, and have no such benefit. (0, 1, 1.5: a plane
+  // of random samples with noise of .2 spacings covers .045, .029, .020 less than it should. Fences
+  // cover the same with all three, from 2 on .02 more.)
   float fill_doubt = 1.5f;
 
   // Part of half its side by which a patch is widened in the hull. (AO RMSE with .7, .75, .8, .9:
@@ -103,10 +103,9 @@ struct Fidelity {
   float hull_widening = 0.75f;
 
   // Surfels. Hulls of nodes with more are left out, for what many show has an outline that the
-  // hulls of its parts follow better. (Without hulls of nodes, scenes of random_scenes 0..399 are
-  // off by .0306 rms at worst, 11 by more than .01; with 16 .0276 and 3; with 64 .0276 and 2; with
-  // any number .0276 and 1, but 2 % of the light behind a ball of 50,000 disks leaks at draft
-  // quality.)
+  // hulls of its parts follow better. (Of random_scenes 0..399, 11 are off by more than .01 without
+  // hulls of nodes, the worst by .0352; none with 64, nor with any number, the worst by .0095. With
+  // any number, 2 % of the light behind a ball of 50,000 disks leaks at draft quality.)
   float most_in_hull = 64;
 
   // --- Leaves, hair and grass ("Thickets", "Ribbons") ---
