@@ -10,6 +10,10 @@ namespace surfeit {
 enum SurfelFlags : std::uint32_t {
   kSurfelSphere = 1u << 0,    // no normal: a sphere that looks the same from everywhere
   kSurfelTwoSided = 1u << 1,  // both sides send and block light (leaves, cloth, hair)
+  // Set by the indexer: another sheet that faces alike lies close before it, where its normal
+  // points to; and of a two-sided one, on the other side. It is not seen from there.
+  kSurfelHiddenFront = 1u << 2,
+  kSurfelHiddenBack = 1u << 3,
 };
 
 // Number of object groups. A surfel belongs to one object group; a gather may see some of them

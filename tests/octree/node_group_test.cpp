@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/curve_key.h"
+#include "octree/node/hidden_layers.h"
 #include "octree/node/node_sums.h"
 #include "octree/page/node_bounds.h"
 #include "octree/test_scenes.h"
@@ -224,6 +225,30 @@ TEST_F(NodeGroupTest, DecodeRejectsFacetsOfNoSuchNode) {
     const Status status = storeAndRead(nodes, kFull).status();
     EXPECT_EQ(status.code(), StatusCode::kCorruption);
     EXPECT_NE(status.message().find("field facets"), std::string::npos) << status.message();
+  }
+}
+
+TEST_F(NodeGroupTest, HiddenSidesAreKeptAndThoseOfNoSuchPieceRejected) {
+  for (const PageForm& form : kForms) {
+    std::vector<LevelNode> nodes = someNodes(20);
+    ASSERT_TRUE(nodes[0].node.isFlat() && nodes[3].node.hasFacets());
+    nodes[0].node.hidden = kHiddenFront;
+    nodes[3].node.facets[1].hidden = kHiddenFront;
+    const Status status = storeAndRead(nodes, form).status();
+    ASSERT_TRUE(status.ok()) << status.message();
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      EXPECT_EQ(found_[i].hidden, i == 0 ? kHiddenFront : 0);
+      for (std::size_t k = 0; k < found_[i].facet_count; ++k) {
+        EXPECT_EQ(found_[i].facets[k].hidden, i == 3 && k == 1 ? kHiddenFront : 0);
+      }
+    }
+    // A one-sided piece has no back
+    for (const int wrong : {int(kHiddenBack), int(kHiddenSides), 4}) {
+      nodes[0].node.hidden = std::uint8_t(wrong);
+      const Status rejected = storeAndRead(nodes, form).status();
+      EXPECT_EQ(rejected.code(), StatusCode::kCorruption);
+      EXPECT_NE(rejected.message().find("field facets"), std::string::npos) << rejected.message();
+    }
   }
 }
 

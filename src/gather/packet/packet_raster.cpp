@@ -12,8 +12,10 @@
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
 #include "gather/rules/coverage_rules.h"
+#include "gather/rules/layers.h"
 #include "gather/rules/lobe_light.h"
 #include "gather/rules/ribbon.h"
+#include "octree/node/hidden_layers.h"
 
 namespace surfeit {
 namespace {
@@ -30,8 +32,6 @@ constexpr float kDiagonal = 1.415f;
 // on every face: with .2 occlusion is off by up to .0016 at .11 sr and by .019 at .4, in a hollow
 // sphere; with .02 by .0001 and .0006, for 3 % of the time.)
 constexpr float kLargeExtent = 0.02f;
-
-constexpr std::uint32_t kAllLanes = (1u << kPacketReceivers) - 1;
 
 // Thickets fill their outlines however long these are.
 float leastHalf(const Patch& patch) {
@@ -221,9 +221,16 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
   const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
   gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
   if (node.isRough()) return addRoughNode(node, parts);
-  if (node.isFlat()) {
-    return addFacet(node, facetOf(node), false, parts, lobeOf(0));
-  }
+  const bool has_hidden = rules_.groups == kAllGroups && hasHiddenPieces(node);
+  const auto add = [&](std::size_t i, const Facet& facet) {
+    std::uint32_t seen = parts;
+    if (has_hidden) {
+      const auto seen_of = [&](const glm::vec3& eye) { return seenOfPiece(node, i, eye); };
+      if (!keepSeenParts(seen_of, lane_parts, seen)) return;
+    }
+    addFacet(node, facet, false, seen, lobeOf(i));
+  };
+  if (node.isFlat()) return add(0, facetOf(node));
   const bool is_thicket = isThicket(node);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
@@ -231,64 +238,28 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
       Facet facet = node.facet(i);
       facet.is_thicket = facet.is_thicket && is_thicket;
-      addFacet(node, facet, false, parts, lobeOf(i));
+      add(i, facet);
     }
   }
 }
 
-bool PacketRaster::mayLeaveHull(const Node& node) const {
-  return !node.isRough() && float(node.surfel_count) <= kFidelity.most_in_hull &&
-         node.transparency == 0 && (node.groups & ~rules_.groups) == 0;
-}
-
-// Receivers that are at least so far from a place, in the frame of what is added.
-std::uint32_t PacketRaster::lanesBeyond(const glm::vec3& position, float distance) const {
-  const glm::vec3 place = toWorld(position);
-  const float least = frame_ != nullptr ? frame_->scale * distance : distance;
-  std::uint32_t lanes = 0;
-  for (std::size_t i = 0; i < kPacketReceivers; ++i) {
-    const glm::vec3 offset = place - glm::vec3(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
-    lanes |= (glm::dot(offset, offset) >= least * least ? 1u : 0u) << i;
-  }
-  return lanes;
-}
-
-// The image of what looks larger is no parallelogram, and what rises from the node's planes by a
-// pixel lies elsewhere.
-std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
-                                         const LaneParts* parts, std::uint32_t lanes) {
-  if (!facet.is_two_sided && turnsAway(facet.position, facet.normal)) return lanes;
-  if (!isFilled(node, facet)) return 0;
-  lanes &= lanesBeyond(facet.position, std::max(std::sqrt(facet.area / largestPatch(rules_)),
-                                                node.off_plane * geometry_.pixelsPerSlope()));
-  if (lanes == 0) return 0;
-  if (lanes == kAllLanes) {
-    addFacet(node, facet, true, keepParts(parts), nullptr);
-    return lanes;
-  }
+// Of what lies behind other layers: how much counts for each receiver, in the frame of what is
+// added. `place`, that of `parts` among those of the patches, becomes another one unless all is
+// seen. False: nobody sees any.
+template <typename SeenOf>
+bool PacketRaster::keepSeenParts(const SeenOf& seenOf, const LaneParts* parts,
+                                 std::uint32_t& place) {
   LaneParts seen;
+  bool is_all = true, is_none = true;
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
-    seen[i] = (lanes >> i & 1) == 0 ? 0 : parts != nullptr ? (*parts)[i] : 1;
+    const glm::vec3 eye(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
+    const float part = seenOf(frame_ != nullptr ? frame_->toLocal(eye) : eye);
+    is_all = is_all && part == 1;
+    is_none = is_none && part == 0;
+    seen[i] = part * (parts != nullptr ? (*parts)[i] : 1);
   }
-  addFacet(node, facet, true, keepParts(&seen), nullptr);
-  return lanes;
-}
-
-OpenedNode PacketRaster::addHull(const Node& node, const LaneParts* parts,
-                                 const OpenedNode& parent) {
-  OpenedNode opened = {parent.hull_lanes, isSheet(node)};
-  const std::uint32_t others = kAllLanes & ~parent.hull_lanes;
-  if (others == 0 || !mayLeaveHull(node)) return opened;
-  const auto addPiece = [&](Facet facet) {
-    if (facet.is_two_sided && !opened.is_sheet) return 0u;
-    facet.is_thicket = false;
-    return addFacetHull(node, facet, parts, others);
-  };
-  std::uint32_t see_all = others;
-  if (node.isFlat()) see_all = addPiece(facetOf(node));
-  for (std::size_t i = 0; i < node.facet_count; ++i) see_all &= addPiece(node.facet(i));
-  opened.hull_lanes |= see_all;
-  return opened;
+  if (!is_all) place = keepParts(&seen);
+  return !is_none;
 }
 
 // Whether no receiver sees any of a facet.
@@ -394,9 +365,14 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts,
                               std::span<const Lobe> lobes, bool are_tiles) {
-  const std::uint32_t parts = keepParts(lane_parts);
+  const std::uint32_t all_parts = keepParts(lane_parts);
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
+    std::uint32_t parts = all_parts;
+    if (hiddenSidesOf(stored) != 0 && rules_.groups == kAllGroups) {
+      const auto seen_of = [&](const glm::vec3& eye) { return seenOf(stored, eye); };
+      if (!keepSeenParts(seen_of, lane_parts, parts)) continue;
+    }
     const Surfel surfel = withSides(stored, rules_.quality.sides);
     Patch& patch = patches_.emplace_back();
     patch.position = surfel.position;

@@ -99,8 +99,12 @@ class PacketRaster {
   static std::size_t memoryBytes(const GatherRules& rules);
 
  private:
+  static constexpr std::uint32_t kAllLanes = (1u << kPacketReceivers) - 1;
+
   bool turnsAway(const glm::vec3& position, const glm::vec3& normal) const;
   std::uint32_t keepParts(const LaneParts* parts);
+  template <typename SeenOf>
+  bool keepSeenParts(const SeenOf& seenOf, const LaneParts* parts, std::uint32_t& place);
   // Adds a facet of the node, or all of a flat one, or the hull of that alone.
   void addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
                 const Lobe* lobe);

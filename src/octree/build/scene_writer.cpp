@@ -24,6 +24,7 @@ GroupPlace SceneWriter::addSiblings(int level, std::span<const LevelNode> siblin
   const GroupPlace place{at.full_pages, static_cast<std::uint16_t>(at.open.size())};
   at.open.insert(at.open.end(), siblings.begin(), siblings.end());
   header_.node_count += siblings.size();
+  for (const LevelNode& node : siblings) header_.has_layers |= node.has_layers;
   return place;
 }
 

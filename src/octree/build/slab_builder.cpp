@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "core/thread_scratch.h"
+#include "octree/build/hidden_surfels.h"
+#include "octree/node/hidden_layers.h"
 #include "octree/page/node_bounds.h"
 #include "octree/page/surfel_group.h"
 #include "storage/page_codec.h"
@@ -52,7 +54,9 @@ class SlabBuilder {
  private:
   void fetchSurfels();
   void buildBrick(std::size_t begin, const Brick& brick);
-  std::size_t leafSize(std::size_t begin, std::size_t end, int boundary_level) const;
+  void markLayers(std::size_t first, const Brick& brick);
+  std::size_t cellSize(std::size_t begin, std::size_t end, int boundary_level,
+                       std::size_t capacity) const;
   void makeLeaf(std::size_t begin, std::size_t end, FinishedNode& leaf);
   GroupPlace placeSurfels(std::size_t begin, std::size_t end);
   Status encodePages();
@@ -96,11 +100,13 @@ void SlabBuilder::fetchSurfels() {
 }
 
 void SlabBuilder::buildBrick(std::size_t begin, const Brick& brick) {
+  if (!slab_.giant) markLayers(begin, brick);
   FinishedNode node;
   int boundary_level = brick.level;
   while (begin < brick.end) {
     std::size_t end = brick.end;
-    if (!slab_.giant) end = begin + leafSize(begin, brick.end, boundary_level);
+    if (!slab_.giant)
+      end = begin + cellSize(begin, brick.end, boundary_level, header_.leaf_capacity);
     makeLeaf(begin, end, node);
     boundary_level =
         end < brick.end ? firstDifferentLevel(keys_[end - 1], keys_[end]) : brick.level;
@@ -110,12 +116,26 @@ void SlabBuilder::buildBrick(std::size_t begin, const Brick& brick) {
   built_.roots.push_back({node, brick.boundary_level, built_.siblings.size()});
 }
 
-// Surfels of the leaf that begins here. Its cell is the largest that begins here and holds no more
-// than a leaf may: its level is at least the boundary's, and deep enough to leave out the surfel
-// after the last one that fits. More surfels than that in one cell of the finest level are one
-// leaf.
-std::size_t SlabBuilder::leafSize(std::size_t begin, std::size_t end, int boundary_level) const {
-  const std::size_t capacity = header_.leaf_capacity;
+void SlabBuilder::markLayers(std::size_t first, const Brick& brick) {
+  for (std::size_t i = first; i < brick.end; ++i) {
+    surfels_[i].flags &= static_cast<std::uint16_t>(~(kSurfelHiddenFront | kSurfelHiddenBack));
+  }
+  for (const std::size_t most : kLayerCells) {
+    int boundary_level = brick.level;
+    for (std::size_t begin = first; begin < brick.end;) {
+      const std::size_t size = cellSize(begin, brick.end, boundary_level, most);
+      if (size <= most) markHidden(std::span(surfels_).subspan(begin, size));
+      begin += size;
+      if (begin < brick.end) boundary_level = firstDifferentLevel(keys_[begin - 1], keys_[begin]);
+    }
+  }
+}
+
+// Surfels of the cell that begins here, the largest with no more than `capacity`: its level is at
+// least the boundary's, and deep enough to leave out the surfel after the last one that fits. More
+// surfels than that in one cell of the finest level are one.
+std::size_t SlabBuilder::cellSize(std::size_t begin, std::size_t end, int boundary_level,
+                                  std::size_t capacity) const {
   int level = boundary_level;
   std::size_t limit = std::min(end - begin, capacity);
   if (end - begin > capacity) {
@@ -143,6 +163,9 @@ void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& lea
   node = leaf.sums.toNode(header_.flatness_limit, radius);
   boundSurfels(surfels, leaf.node);
   leaf.node.child_level = 0;
+  leaf.node.has_layers = std::any_of(surfels.begin(), surfels.end(), [](const Surfel& surfel) {
+    return hiddenSidesOf(surfel) != 0;
+  });
   const GroupPlace place = placeSurfels(begin, end);
   node.page = place.page;
   node.first = place.first;

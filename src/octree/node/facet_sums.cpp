@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "octree/node/hidden_layers.h"
+
 namespace surfeit {
 namespace {
 
@@ -29,10 +31,15 @@ double facingDot(const FacetGroup& a, const FacetGroup& b) {
   return areTurned(a, b) ? -dot : dot;
 }
 
-// Within 10 degrees.
+bool areLayers(const FacetGroup& a, const FacetGroup& b) {
+  if ((a.hidden | b.hidden) == 0 || a.is_two_sided != b.is_two_sided) return false;
+  return a.hidden != (areTurned(a, b) ? turnedSides(b.hidden) : b.hidden);
+}
+
+// Within 10 degrees, and hidden alike.
 bool faceAlike(const FacetGroup& a, const FacetGroup& b) {
   constexpr double kCosineSq = 0.97;
-  if (a.is_two_sided != b.is_two_sided) return false;
+  if (a.is_two_sided != b.is_two_sided || areLayers(a, b)) return false;
   const double dot = facingDot(a, b);
   return dot > 0 && dot * dot > kCosineSq * dotOfNormals(a, a) * dotOfNormals(b, b);
 }
@@ -40,15 +47,18 @@ bool faceAlike(const FacetGroup& a, const FacetGroup& b) {
 }  // namespace
 
 FacetGroup::FacetGroup(const AreaSums& sums, const Surfel& surfel)
-    : AreaSums(sums), is_two_sided(surfel.isTwoSided()) {
+    : AreaSums(sums), is_two_sided(surfel.isTwoSided()), hidden(hiddenSidesOf(surfel)) {
   for (int axis = 0; axis < 3; ++axis) normal[axis] = sums.area * double(surfel.normal[axis]);
 }
 
 void FacetGroup::add(const FacetGroup& other) {
-  if (!areTurned(*this, other)) return AreaSums::add(other);
-  AreaSums turned = other;
-  for (double& n : turned.normal) n = -n;
-  AreaSums::add(turned);
+  const bool is_turned = areTurned(*this, other);
+  hidden &= is_turned ? turnedSides(other.hidden) : other.hidden;
+  AreaSums sums = other;
+  if (is_turned) {
+    for (double& n : sums.normal) n = -n;
+  }
+  AreaSums::add(sums);
 }
 
 void FacetSums::add(const FacetGroup& facet) {
@@ -83,7 +93,8 @@ std::optional<FacetSums::Pair> FacetSums::closest() const {
       if (groups_[i].is_two_sided != groups_[j].is_two_sided) continue;
       const double both_sq =
           lengths[i] * lengths[i] + lengths[j] * lengths[j] + 2 * facingDot(groups_[i], groups_[j]);
-      const double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
+      double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
+      if (areLayers(groups_[i], groups_[j])) loss += std::min(groups_[i].area, groups_[j].area);
       if (!closest || loss < least) {
         least = loss;
         closest = Pair{i, j};
@@ -99,6 +110,21 @@ void FacetSums::merge(const Pair& pair) {
   groups_[pair.second] = groups_[count_];
 }
 
+bool FacetSums::hasLayers() const {
+  for (std::size_t i = 0; i < count_; ++i) {
+    for (std::size_t j = i + 1; j < count_; ++j) {
+      if (areLayers(groups_[i], groups_[j])) return true;
+    }
+  }
+  return false;
+}
+
+std::uint8_t FacetSums::hiddenSides() const {
+  std::uint8_t all = count_ > 0 ? kHiddenSides : 0;
+  for (const FacetGroup& group : groups()) all &= group.hidden;
+  return all;
+}
+
 FacetSums FacetSums::fewest(float flatness) const {
   FacetSums fewest;
   FacetSums fewer = *this;
@@ -112,6 +138,7 @@ FacetSums FacetSums::fewest(float flatness) const {
     fewest = fewer;
     const std::optional<Pair> closest = fewer.closest();
     if (!closest) break;
+    if (areLayers(fewer.groups_[closest->first], fewer.groups_[closest->second])) break;
     fewer.merge(*closest);
   }
   return fewest;

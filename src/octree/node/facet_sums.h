@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 
@@ -14,6 +15,7 @@ namespace surfeit {
 // Surfels that face about one way; two-sided ones of a plane may face the other way as well.
 struct FacetGroup : AreaSums {
   bool is_two_sided = false;  // `normal` is the sum of those turned to one side, within a plane
+  std::uint8_t hidden = 0;    // HiddenSides of all of them, by that normal
 
   FacetGroup() = default;
   // One surfel; it has a normal. `sums` are its own.
@@ -23,8 +25,9 @@ struct FacetGroup : AreaSums {
 
 // Groups of surfels that face about one way. What is added joins the group that it resembles, and
 // when there are too many, the two groups become one that lose least by it: the loss is the area
-// that faces one way less, |N_a| + |N_b| - |N_a + N_b| with N = sum A n. The order of adding
-// decides what is grouped with what. One-sided and two-sided surfels stay apart. Plain data.
+// that faces one way less, |N_a| + |N_b| - |N_a + N_b| with N = sum A n, or all of the smaller one
+// where one has hidden sides that the other has not. The order of adding decides what is grouped
+// with what. One-sided and two-sided surfels stay apart. Plain data.
 class FacetSums {
  public:
   void add(const FacetGroup& facet);
@@ -33,9 +36,13 @@ class FacetSums {
   // There are no facets and will be none: some surfels have no normal.
   void giveUp();
 
-  // As few groups as hold together more than `flatness` of the area, as sum |N| over sum A; none
-  // when all do not.
+  // As few groups as hold together more than `flatness` of the area, as sum |N| over sum A, and are
+  // hidden alike; none when all do not.
   FacetSums fewest(float flatness) const;
+  // Some of one kind are hidden otherwise than others.
+  bool hasLayers() const;
+  // Sides that are hidden of all.
+  std::uint8_t hiddenSides() const;
   std::span<const FacetGroup> groups() const { return std::span(groups_).first(count_); }
 
  private:

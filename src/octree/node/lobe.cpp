@@ -6,22 +6,25 @@
 #include <iterator>
 
 #include "core/luminance.h"
+#include "octree/node/hidden_layers.h"
 #include "octree/node/moment_codes.h"
 
 namespace surfeit {
 namespace {
 
-// The piece of a node that faces most as this normal does, of those of its kind; 0 where there is
-// none.
-std::size_t pieceThatFaces(const Node& node, const glm::vec3& normal, bool is_two_sided) {
+// The piece of a node that faces most as this normal does, of those of its kind and hidden alike,
+// if there are some; 0 where there is none.
+std::size_t pieceThatFaces(const Node& node, const glm::vec3& normal, bool is_two_sided,
+                           std::uint8_t hidden) {
   std::size_t nearest = 0;
-  float most = -2;
+  float most = -4;
   for (std::size_t k = 0; k < node.facet_count; ++k) {
     if (node.isTwoSided(k) != is_two_sided) continue;
     const glm::vec3 facing = node.facets[k].meanNormal();
     const float length = glm::length(facing);
     float cosine = length > 0 ? glm::dot(facing, normal) / length : 0;
     if (is_two_sided) cosine = std::abs(cosine);
+    if (node.facets[k].hidden != hidden) cosine -= 2;
     if (cosine > most) {
       most = cosine;
       nearest = k;
@@ -81,7 +84,7 @@ void addToPiece(const Node& node, const Surfel& surfel, const Lobe& lobe, PieceS
   // One direction stands for all colors
   one.weight = luminance(glm::dvec3(one.lobe[0], one.lobe[1], one.lobe[2]));
   for (int c = 0; c < 3; ++c) one.mean[c] = one.weight * double(direction[c]);
-  sums[pieceThatFaces(node, surfel.normal, is_two_sided)].add(one);
+  sums[pieceThatFaces(node, surfel.normal, is_two_sided, hiddenSidesOf(surfel))].add(one);
 }
 
 void addToPieces(const Node& node, const Node& child, const PieceSums& of_child, PieceSums& sums) {
@@ -95,7 +98,8 @@ void addToPieces(const Node& node, const Node& child, const PieceSums& of_child,
       std::copy(std::begin(all.power), std::end(all.power), std::begin(one.power));
     }
     const bool is_two_sided = pieceCount(child) > 0 && child.isTwoSided(piece);
-    sums[pieceThatFaces(node, normalOfPiece(child, piece), is_two_sided)].add(one);
+    const std::uint8_t hidden = pieceCount(child) > 0 ? child.hiddenSides(piece) : std::uint8_t{0};
+    sums[pieceThatFaces(node, normalOfPiece(child, piece), is_two_sided, hidden)].add(one);
   }
 }
 

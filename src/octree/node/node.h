@@ -77,6 +77,7 @@ struct Node {
   // how the area spreads. Trace above 0 and at most about radius^2.
   SymmetricMatrix covariance;
   std::uint8_t facet_count;    // 0: it is flat or rough
+  std::uint8_t hidden;         // HiddenSides of a flat node, by its normal
   std::uint16_t transparency;  // of the area-weighted mean of opacities, as in Surfel
   // How far surfels lie off the planes that a flat node or one of facets is drawn on, at most or by
   // their moments; 0 in a rough node. Not stored.
@@ -102,6 +103,7 @@ struct Node {
   bool hasFacets() const { return facet_count > 0; }
   bool isRough() const { return !isFlat() && !hasFacets(); }
   // Of facet i, or of a flat node.
+  std::uint8_t hiddenSides(std::size_t i) const { return isFlat() ? hidden : facets[i].hidden; }
   bool isTwoSided(std::size_t i = 0) const { return (flags & (kNodeTwoSided << i)) != 0; }
   Facet facet(std::size_t i) const {
     Facet facet = facets[i].decode(position, radius, area);

@@ -38,6 +38,7 @@ struct NodeFacet {
   std::uint16_t area;                  // in 1/65535 of the node's
   std::array<std::uint8_t, 3> offset;  // from the node's position, a signed fraction of its radius
   CovarianceCodes covariance;          // within its radius
+  std::uint8_t hidden;                 // HiddenSides, by its normal
   std::uint16_t transparency;          // as in Surfel
 
   static NodeFacet encode(const Facet& facet, const glm::vec3& position, float radius, float area);

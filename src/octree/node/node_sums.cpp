@@ -140,8 +140,10 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   node.transparency = transparencyOf(covered / area);
   node.covariance = all.covariance;
   setNormal(*this, node);
-  if (node.flatness > flatness_limit) {
+  const bool is_flat = node.flatness > flatness_limit;
+  if (is_flat && !facets.hasLayers()) {
     node.flags = kNodeFlat;
+    node.hidden = facets.hiddenSides();
     return node;
   }
   const FacetSums fewest = facets.fewest(flatness_limit);
@@ -152,13 +154,15 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   if (fewest.groups().size() == 1 && fewest.groups().front().is_two_sided) {
     setNormal(fewest.groups().front(), node);
     node.flags = kNodeFlat | kNodeTwoSided;
+    node.hidden = fewest.groups().front().hidden;
     return node;
   }
   node.facets = {};
   for (const FacetGroup& group : fewest.groups()) {
     if (group.is_two_sided) node.flags |= std::uint8_t(kNodeTwoSided << node.facet_count);
-    node.facets[node.facet_count++] =
-        NodeFacet::encode(toFacet(group), node.position, node.radius, node.area);
+    NodeFacet& facet = node.facets[node.facet_count++];
+    facet = NodeFacet::encode(toFacet(group), node.position, node.radius, node.area);
+    facet.hidden = group.hidden;
   }
   return node;
 }

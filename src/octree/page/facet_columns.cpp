@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "core/thread_scratch.h"
+#include "octree/node/hidden_layers.h"
 #include "octree/page/column_codec.h"
 
 namespace surfeit {
@@ -63,23 +64,54 @@ MutableAxes colorColumns(std::size_t count) {
   return {all.first(count), all.subspan(count, count), all.subspan(2 * count)};
 }
 
+// Numbers of facets have this bit where hidden sides follow for the pieces of the node.
+constexpr std::uint8_t kHasHidden = 0x80;
+
+std::size_t pieceCount(const Node& node) { return node.isFlat() ? 1 : node.facet_count; }
+
 std::size_t countFacets(std::span<const Node> nodes) {
   std::size_t count = 0;
   for (const Node& node : nodes) count += node.facet_count;
   return count;
 }
 
+// Of the nodes whose counts say so; only two-sided pieces have another side.
+bool getHidden(PayloadReader& reader, std::span<const std::uint8_t> counts,
+               std::size_t hidden_count, std::span<Node> nodes) {
+  std::vector<std::uint8_t>& hidden = threadScratch<std::vector<std::uint8_t>>([] {});
+  hidden.resize(hidden_count);
+  if (!getBytes8(reader, hidden)) return false;
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if ((counts[i] & kHasHidden) == 0) continue;
+    Node& node = nodes[i];
+    for (std::size_t k = 0; k < pieceCount(node); ++k, ++next) {
+      const int most = node.isTwoSided(k) ? kHiddenSides : kHiddenFront;
+      if (hidden[next] > most) return false;
+      (node.isFlat() ? node.hidden : node.facets[k].hidden) = hidden[next];
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 FacetColumns::FacetColumns()
     : counts_(threadScratch<std::vector<std::uint8_t>>([] {})),
-      facets_(threadScratch<std::vector<NodeFacet>>([] {})) {
+      facets_(threadScratch<std::vector<NodeFacet>>([] {})),
+      hidden_(threadScratch<std::vector<std::uint8_t>>([] {})) {
   counts_.clear();
   facets_.clear();
+  hidden_.clear();
 }
 
 void FacetColumns::add(const Node& node) {
-  counts_.push_back(node.facet_count);
+  std::uint8_t any = 0;
+  for (std::size_t k = 0; k < pieceCount(node); ++k) any |= node.hiddenSides(k);
+  counts_.push_back(node.facet_count | (any != 0 ? kHasHidden : std::uint8_t{0}));
+  for (std::size_t k = 0; any != 0 && k < pieceCount(node); ++k) {
+    hidden_.push_back(node.hiddenSides(k));
+  }
   facets_.insert(facets_.end(), node.facets.begin(), node.facets.begin() + node.facet_count);
 }
 
@@ -89,6 +121,7 @@ void FacetColumns::put(PayloadWriter& writer, bool has_opacity) const {
   for (std::size_t i = 0; i < facets_.size(); ++i) codes.set(i, facets_[i]);
   putSmallIntegers(writer, codes.wide);
   putBytes8(writer, codes.bytes);
+  if (!hidden_.empty()) putBytes8(writer, hidden_);
 }
 
 void FacetColumns::putRadiosity(PayloadWriter& writer, bool full_precision) const {
@@ -100,16 +133,19 @@ void FacetColumns::putRadiosity(PayloadWriter& writer, bool full_precision) cons
 }
 
 bool FacetColumns::pass(PayloadReader& reader, bool has_opacity) const {
-  return getBytes8(reader, counts_) && Codes(facets_.size(), has_opacity).get(reader);
+  return getBytes8(reader, counts_) && Codes(facets_.size(), has_opacity).get(reader) &&
+         (hidden_.empty() || getBytes8(reader, hidden_));
 }
 
 bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, bool has_opacity) {
   std::vector<std::uint8_t>& counts = threadScratch<std::vector<std::uint8_t>>([] {});
   counts.resize(nodes.size());
+  std::size_t hidden_count = 0;
   if (!getBytes8(reader, counts)) return false;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (counts[i] > (nodes[i].isFlat() ? 0 : kMostFacets)) return false;
-    nodes[i].facet_count = counts[i];
+    nodes[i].facet_count = counts[i] & ~kHasHidden;
+    if (nodes[i].facet_count > (nodes[i].isFlat() ? 0 : kMostFacets)) return false;
+    if ((counts[i] & kHasHidden) != 0) hidden_count += pieceCount(nodes[i]);
   }
   Codes codes(countFacets(nodes), has_opacity);
   if (!codes.get(reader)) return false;
@@ -122,7 +158,7 @@ bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, bool has_op
       if (node.facets[k].transparency > kMostTransparency) return false;
     }
   }
-  return true;
+  return hidden_count == 0 || getHidden(reader, counts, hidden_count, nodes);
 }
 
 bool FacetColumns::getRadiosity(PayloadReader& reader, std::span<Node> nodes) {

@@ -31,6 +31,7 @@ class FacetColumns {
  private:
   std::vector<std::uint8_t>& counts_;
   std::vector<NodeFacet>& facets_;
+  std::vector<std::uint8_t>& hidden_;  // of the pieces of nodes of which some is
 };
 
 }  // namespace surfeit

@@ -26,7 +26,12 @@ enum ChannelBits : std::uint32_t {
 };
 
 // Bits of the feature field. A reader refuses bits that it does not know.
-enum FeatureBits : std::uint32_t { kFullPrecision = 1, kHasLobes = 2, kAllFeatures = 3 };
+enum FeatureBits : std::uint32_t {
+  kFullPrecision = 1,
+  kHasLobes = 2,
+  kHasLayers = 4,
+  kAllFeatures = 7
+};
 
 // Largest groups that a reader accepts: they bound what a page can make it allocate.
 constexpr std::uint32_t kMaxNodeGroup = 4096;
@@ -130,7 +135,8 @@ std::uint32_t codeOf(UpAxis up) {
 std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
   std::vector<std::byte> bytes;
   ByteWriter writer(bytes);
-  writer.put((header.full_precision ? kFullPrecision : 0u) | (header.has_lobes ? kHasLobes : 0u));
+  writer.put((header.full_precision ? kFullPrecision : 0u) | (header.has_lobes ? kHasLobes : 0u) |
+             (header.has_layers ? kHasLayers : 0u));
   writer.put(channelBits(header.channels));
   writer.put(header.surfel_count);
   writer.put(header.node_count);
@@ -160,6 +166,7 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
   }
   header.full_precision = (features & kFullPrecision) != 0;
   header.has_lobes = (features & kHasLobes) != 0;
+  header.has_layers = (features & kHasLayers) != 0;
   const std::uint32_t channels = reader.get<std::uint32_t>();
   if ((channels & ~kAllChannels) != 0) {
     return wrongField("channel bits", fmt::format("{:#x}", channels), "known channels");

@@ -43,6 +43,7 @@ struct SceneHeader {
   CloudChannels channels;       // what the input had, as opposed to filled in by rules
   bool full_precision = false;  // pages hold floats instead of quantized values
   bool has_lobes = false;       // surfels and nodes have lobes (octree/node/lobe.h)
+  bool has_layers = false;      // some have hidden sides (octree/node/hidden_layers.h)
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 

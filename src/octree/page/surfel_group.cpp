@@ -17,8 +17,8 @@ namespace surfeit {
 namespace {
 
 // Flags that a page may hold; the last two only in the indexer's own temporary files.
-constexpr std::uint8_t kStoredFlags =
-    kSurfelSphere | kSurfelTwoSided | kSurfelNeedsSize | kSurfelNeedsSide;
+constexpr std::uint8_t kStoredFlags = kSurfelSphere | kSurfelTwoSided | kSurfelHiddenFront |
+                                      kSurfelHiddenBack | kSurfelNeedsSize | kSurfelNeedsSide;
 
 Status damaged(const char* field) {
   return Status::corruption(fmt::format("surfel group: damaged field {}", field));

@@ -138,7 +138,10 @@ void NodeCheck::checkNormal() {
            sums_.normal[axis] / sums_.area, most);
   }
   const double limit = double(tolerance_.flatness_limit);
-  if (wrong_.empty() && (node_.isFlat() ? found < limit - most : found > limit + most)) {
+  // Layers that face alike are no flat node, but facets
+  const bool is_wrong =
+      node_.isFlat() ? found < limit - most : node_.facet_count < 2 && found > limit + most;
+  if (wrong_.empty() && is_wrong) {
     wrong_ = fmt::format(
         "{}, expected otherwise: the flatness of what lies below is {:.7g}, the "
         "limit {:.7g}",
