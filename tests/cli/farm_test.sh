@@ -29,6 +29,8 @@ plansAreGolden() {
       --overlap thin --remove-shards "--$kind"
     isGolden "plan_index_frames_$kind.$extension" --index crowd.####.ply -o crowd.####.sft \
       --shards 7 --frames 1-7x3,-2 --memory 512M --time 90s --threads 1 "--$kind"
+    isGolden "plan_index_neighbours_$kind.$extension" --index scan.####.las -o scan.####.sft \
+      --shards 3 --frames 1-2 --memory 1G --time 45m --threads 2 --normals estimate "--$kind"
   done
 }
 
