@@ -91,10 +91,9 @@ void addIndexPlan(CLI::App& command, CommandContext& context) {
   addPlanOptions(command, *arguments, context);
   command.add_flag("--remove-shards", arguments->plan.removes_shards,
                    "The merge removes the files of the shards when the scene is complete");
-  command.add_flag(
-      "--neighbours", arguments->plan.has_neighbours,
-      "The job has the passes for sizes from neighbours although the clouds have radii "
-      "or areas, or are not there yet");
+  command.add_flag("--neighbours", arguments->plan.has_neighbours,
+                   "The job has the passes for sizes from neighbours (default: as options and "
+                   "clouds say, which may not be there yet)");
   context.addCommonOptions(command, {.stats = false});
   command.footer(
       "The job counts, distributes, builds and merges (docs/farm.md, \"An index in shards\"); "

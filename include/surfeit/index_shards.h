@@ -88,8 +88,7 @@ SURFEIT_API Result<IndexShardForecast> forecastIndexShards(const std::vector<std
 
 // Whether the passes `places` and `sizes` may have something to do, by the channels of the clouds
 // and the options: a cloud without radii and areas, or with coverages, or normals that are asked
-// for. Single surfels without a size in a cloud that has sizes do not show. Opens all inputs, and
-// reads no surfel.
+// for. Opens all inputs, and reads no surfel.
 SURFEIT_API Result<bool> mayNeedNeighbours(const std::vector<std::string>& inputs,
                                            const IndexOptions& options);
 

@@ -154,6 +154,17 @@ def test_indexes_with_groups_cubes_and_shards(room, tmp_path, run_program):
                   remove_shards=True, **inputs)
     assert same_bytes(tmp_path / "s.sft", tmp_path / "p.sft")
     assert not list(tmp_path.glob("s.sft.*"))
+
+    # Sizes and normals from neighbours
+    surfeit.convert(room / "room.ply", tmp_path / "bare.ply", keep=["position"])
+    surfeit.index(tmp_path / "bare.ply", tmp_path / "one.sft", normals="estimate")
+    for pass_ in ("count", "distribute", "build", "places", "sizes"):
+        for shard in (1, 2):
+            surfeit.index(tmp_path / "bare.ply", tmp_path / "s.sft", pass_=pass_, shard=(shard, 2),
+                          normals="estimate")
+    surfeit.index(tmp_path / "bare.ply", tmp_path / "s.sft", pass_="merge", shards=2,
+                  remove_shards=True, normals="estimate")
+    assert same_bytes(tmp_path / "s.sft", tmp_path / "one.sft")
     for wrong, message in [({"pass_": "sort"}, "count, distribute"), ({"shard": "1/2"}, "pass_"),
                            ({"pass_": "merge"}, "shards"), ({"pass_": "build"}, "shard"),
                            ({"pass_": "build", "shard": "3/2"}, "I/N")]:

@@ -299,6 +299,8 @@ documentedCommandsWork() {
     generate "crowd.$n.ply" --surfels 200 --seed "$frame"
     cp street.ply "street.$n.ply"
   done
+  generate scan.las --surfels 3k
+  "$surfeit" convert -q scan.las -o scan.ply --keep position
   export TMPDIR=$PWD/scratch
   mkdir scratch
   bash -euxo pipefail -c "$commands" || fail "a command of $docs"
@@ -307,6 +309,8 @@ documentedCommandsWork() {
   for frame in 1 2 3; do exists "lit.000$frame.ply"; done
   "$surfeit" index -q crowd.0001.ply crowd.0002.ply -o one.sft --memory 64M
   sameBytes one.sft two.sft
+  "$surfeit" index -q scan.ply -o one.sft --normals estimate --memory 80M
+  sameBytes one.sft scan.sft
 }
 
 runCase
