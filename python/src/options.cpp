@@ -166,8 +166,6 @@ void takeGather(Options& options, GatherOptions& gather) {
   options.into("cache_split", gather.cache_split);
   options.into("direct_io", gather.direct_io);
   options.into("prefetch", gather.prefetch);
-  options.into("stage", gather.stage_directory);
-  options.into("stage_limit", gather.stage_limit_bytes);
 }
 
 namespace {

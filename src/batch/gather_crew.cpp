@@ -15,7 +15,7 @@ namespace surfeit {
 namespace {
 
 // Null unless pages are kept on this node, too.
-PageStage* stageOf(const PagedOctree& octree) { return octree.file().pages().stage(); }
+PageStage* stageOf(const PagedOctree& octree) { return octree.file().pages().stage().get(); }
 
 }  // namespace
 
@@ -102,8 +102,8 @@ SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, bool is_warm,
                            GatherStats& stats, Progress& progress,
                            const LoadedEnvironment* environment)
     : octree_(std::move(octree)),
-      staged_read_(stageOf(*octree_) ? stageOf(*octree_)->bytesRead() : 0),
-      staged_kept_(stageOf(*octree_) ? stageOf(*octree_)->bytesKept() : 0),
+      staged_read_(is_warm && stageOf(*octree_) ? stageOf(*octree_)->bytesRead() : 0),
+      staged_kept_(is_warm && stageOf(*octree_) ? stageOf(*octree_)->bytesKept() : 0),
       prefetch_threads_(memory.prefetch_threads),
       rules_(gatherRules(options, environment)),
       look_(options.look),

@@ -42,7 +42,7 @@ Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOpt
                                                                  UpAxis scene_up,
                                                                  Progress& progress);
 
-// Opens a scene as the options say its pages are read, also a second time.
+// Opens a scene as the options say its pages are read.
 Result<SceneFile> openSceneAsAsked(const std::string& scene_path, const GatherOptions& options);
 
 // How the pages of the scene are read.

@@ -100,7 +100,9 @@ class ShardGather {
     const bool takes_all = shards_.first == 1 && shards_.last == shards_.count;
     std::optional<ExternalSorter::Mark> begin;
     if (takes_all) begin = sorter->mark();
-    SURFEIT_ASSIGN_OR_RETURN(SceneFile again, openSceneAsAsked(scene.path(), job_.options()));
+    SURFEIT_ASSIGN_OR_RETURN(SceneFile again,
+                             SceneFile::open(scene.path(), sceneAccess(job_.options())));
+    again.stageAs(scene);
     SURFEIT_ASSIGN_OR_RETURN(ShardPlan plan,
                              planShards(std::move(again), job_, *sorter, shards_.count, progress_));
     plan.job = identity_;

@@ -255,14 +255,12 @@ Status PageFile::checkTiling() const {
 // The bytes of a page, checked: from the stage where they are there, else from the file.
 Result<Bytes> PageFile::readStored(std::uint32_t page, AlignedBuffer& stored) const {
   const PageEntry& at = entry(page);
-  bool had_other = false;
+  const auto isPage = [&](Bytes bytes) {
+    return hash(bytes, pageSeed(identity_, at.offset)) == at.checksum;
+  };
   if (stage_ != nullptr) {
-    const Bytes staged = stage_->read(at.offset, at.stored_bytes, stored);
-    if (!staged.empty() && hash(staged, pageSeed(identity_, at.offset)) == at.checksum) {
-      stage_->countRead(staged.size());
-      return staged;
-    }
-    had_other = !staged.empty();
+    const Bytes staged = stage_->find(file_, at.offset, at.stored_bytes, isPage, stored);
+    if (!staged.empty()) return staged;
   }
   const Result<Bytes> read = file_.readView(at.offset, at.stored_bytes, stored);
   if (!read.ok()) return readError(page, read.status());
@@ -275,7 +273,6 @@ Result<Bytes> PageFile::readStored(std::uint32_t page, AlignedBuffer& stored) co
       found != at.checksum) {
     return pageError(page, checksumMismatch(found, at.checksum));
   }
-  if (stage_ != nullptr) stage_->keep(at.offset, bytes, had_other);
   return bytes;
 }
 

@@ -85,7 +85,7 @@ class PageFile {
   // threads read.
   void setStage(std::shared_ptr<PageStage> stage) { stage_ = std::move(stage); }
   // Null unless there is one.
-  PageStage* stage() const { return stage_.get(); }
+  const std::shared_ptr<PageStage>& stage() const { return stage_; }
   // Whether the pages fill the space between header and provenance without gap or overlap: that
   // they do in sum, open has checked. Takes memory of 16 bytes per page.
   Status checkTiling() const;

@@ -48,8 +48,9 @@ const std::string& SceneFile::provenance() const { return pages_.provenance(); }
 const PageFile& SceneFile::pages() const { return pages_; }
 void SceneFile::stage(const PageStage::Options& options) {
   if (options.directory.empty()) return;
-  pages_.setStage(
-      std::make_shared<PageStage>(options, pages_.identity(), pages_.directoryChecksum()));
+  pages_.setStage(std::make_shared<PageStage>(
+      options,
+      PageStage::Scene{pages_.identity(), pages_.directoryChecksum(), pages_.fileBytes()}));
 }
 std::uint32_t SceneFile::nodePageCount() const { return pages_.nodePageCount(); }
 std::uint32_t SceneFile::surfelPageCount() const {
