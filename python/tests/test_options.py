@@ -81,6 +81,12 @@ def test_shards_resume_and_merge(room, tmp_path, run_program):
     assert surfeit.merge(scene, receivers, out, remove_shards=True)["shards"] == 3
     assert same_bytes(out, tmp_path / "one.ply")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.ply", "out.ply"]
+    # Pages of the scene are kept, and read again
+    for count, read in (("staged_bytes_kept", 0), ("staged_bytes_read", 1)):
+        stats = surfeit.gather(scene, receivers, out, quality="draft", stage=tmp_path, stage_limit="1G")
+        assert stats[count] > 0 and stats["staged_bytes_read"] >= read
+        assert same_bytes(out, tmp_path / "one.ply")
+    assert len(list(tmp_path.glob("surfeit-stage-*"))) == 1
 
     surfeit.gather(scene, receivers, tmp_path / "r.ply", resume=True, resume_parts=4,
                    quality="draft")

@@ -18,6 +18,7 @@ commands=(
   "gather scene.sft receivers.ply -o out.ply --quality draft --max-variation 0.02"
   "gather scene.sft receivers.ply -o out.ply --quality draft --mode glossy --camera 0.5,0.5,2"
   "gather scene.sft receivers.ply -o out.vdb --quality draft"
+  "gather scene.sft receivers.ply -o out.ply --quality draft --stage ."
   "tune scene.sft receivers.ply --quality draft"
   "relight scene.sft -o out.sft --light-directional 0,-1,0,1,1,1"
   "bounce scene.sft -o out.sft --bounces 2 --surfels-per-receiver 64 --spare-last"
