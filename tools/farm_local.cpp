@@ -42,7 +42,7 @@ rm -f "$farm"/*.stop
 # them
 for _ in 1 2 3; do
   for pass in "${passes[@]}"; do
-    seq "$tasks" | parallel --quote --joblog "$farm/joblog-$pass-$shards" --resume-failed \
+    tasksOf "$pass" | parallel --quote --joblog "$farm/joblog-$pass-$shards" --resume-failed \
       --retries 3 --jobs "$jobs" --workdir "$PWD" bash "$script" task "$pass" {}
   done
   status=0
@@ -73,6 +73,9 @@ esac
 
 // Targets of the tasks of a frame, from 0 on, in a pass.
 std::string frameTasks(const FarmPlan& plan, const std::string& pass, std::size_t frame) {
+  if (FarmPlan::isSingle(pass)) {
+    return fmt::format("{}-{}", pass, frame * std::size_t(plan.shards) + 1);
+  }
   return fmt::format("$(addprefix {}-,$(shell seq {} {}))", pass,
                      frame * std::size_t(plan.shards) + 1, (frame + 1) * std::size_t(plan.shards));
 }
@@ -100,7 +103,8 @@ std::string frameRules(const FarmPlan& plan, std::size_t frame) {
 
 std::string parallelScript(const FarmPlan& plan) {
   return "#!/bin/bash\n" + planComment(plan) + std::string(kParallelHow) + planFunctions(plan) +
-         std::string(runTaskFunction()) + std::string(kParallelScript);
+         std::string(tasksFunction()) + std::string(runTaskFunction()) +
+         std::string(kParallelScript);
 }
 
 std::string makefileOf(const FarmPlan& plan) {
@@ -113,10 +117,10 @@ std::string makefileOf(const FarmPlan& plan) {
   std::string tasks, frames;
   for (const std::string& pass : plan.passes()) {
     tasks += fmt::format(
-        "{0}_tasks := $(addprefix {0}-,$(shell seq {1}))\n"
+        "{0}_tasks := $(addprefix {0}-,$(shell seq 1 {2} {1}))\n"
         ".PHONY: $({0}_tasks)\n$({0}_tasks): {0}-%:\n"
         "\t@bash -c \"$$surfeit_plan\" surfeit-plan {0} $*\n\n",
-        pass, plan.taskCount());
+        pass, plan.taskCount(), FarmPlan::isSingle(pass) ? plan.shards : 1);
   }
   for (std::size_t i = 0; i < plan.frameCount(); ++i) frames += frameRules(plan, i);
   return planComment(plan) + std::string(kMakeHow) +

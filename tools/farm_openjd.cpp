@@ -104,6 +104,14 @@ std::string stepsOf(const FarmPlan& plan) {
   };
   for (const std::string& pass : plan.passes()) {
     begin(stepName(pass));
+    if (FarmPlan::isSingle(pass)) {
+      text +=
+          spaceOf(plan, false) +
+          scriptOf(plan.merge_minutes, frame,
+                   head + std::string(runTaskFunction()) + "\ncd \"$1\" || exit\n" +
+                       fmt::format("runTask {} \"$(({} * shards + 1))\" 3\n", pass, frame_index));
+      continue;
+    }
     text += spaceOf(plan, true) +
             scriptOf(plan.minutes, frame + ", \"{{Task.Param.Shard}}\"",
                      head + std::string(runTaskFunction()) + "\ncd \"$1\" || exit\n" +

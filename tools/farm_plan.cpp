@@ -44,6 +44,15 @@ merge() {
 }
 )";
 
+constexpr std::string_view kTasksOf = R"(
+# tasksOf PASS: the numbers of its tasks. The pass `places` has one for each frame.
+tasksOf() {
+  local step=1
+  [[ $1 != places ]] || step=$shards
+  seq 1 "$step" "$tasks"
+}
+)";
+
 constexpr std::string_view kRunTask = R"(
 # runTask PASS TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
 runTask() {
@@ -91,15 +100,20 @@ std::string shellWord(std::string_view text) {
 std::string planComment(const FarmPlan& plan) {
   const std::string frames =
       plan.frames.empty() ? "" : fmt::format(" for each of {} frames", plan.frames.size());
+  const std::string passes =
+      !plan.is_index ? "" : fmt::format("{} passes of ", plan.passes().size());
   return fmt::format(
       "# {} in {} shards{}: {}{} tasks of {} MiB and {} threads (surfeit {}, docs/farm.md).\n"
       "# Exit statuses of a task: 0 done, also where its shard was finished before; 33 too little\n"
       "# memory: again with twice as much; 74, 137 and 143 (files, killed, told to stop): again; "
       "any\n"
       "# other, such as 2 and 3 (command line, data): not again, it would end the same way.\n{}",
-      plan.is_index ? "An index" : "A gather", plan.shards, frames,
-      plan.is_index ? "3 passes of " : "", plan.taskCount(), plan.memory_mib, plan.threads,
-      kVersion, plan.is_index ? "# 75: the pass before is not complete; again behind it.\n" : "");
+      plan.is_index ? "An index" : "A gather", plan.shards, frames, passes, plan.taskCount(),
+      plan.memory_mib, plan.threads, kVersion,
+      (plan.is_index ? "# 75: the pass before is not complete; again behind it.\n" : "") +
+          std::string(plan.has_neighbours
+                          ? "# The pass `places` has one task for each frame, and no other.\n"
+                          : ""));
 }
 
 std::string planFunctions(const FarmPlan& plan) {
@@ -135,6 +149,8 @@ std::string planFunctions(const FarmPlan& plan) {
                                    : "remove=\n") +
          std::string(plan.is_index ? kIndexFunctions : kGatherFunctions);
 }
+
+std::string_view tasksFunction() { return kTasksOf; }
 
 std::string_view runTaskFunction() { return kRunTask; }
 

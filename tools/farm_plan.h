@@ -1,7 +1,8 @@
 // The jobs that `surfeit plan` prints: a gather or an index in shards, for the schedulers of farms.
 //
 // A task is one shard of one frame in one pass; the tasks of a pass are one flat array. A gather is
-// one pass, an index three, each behind the one before. Every script has the same rules for the
+// one pass, an index three, and five where sizes or normals follow from neighbours, each behind the
+// one before. Every script has the same rules for the
 // exit status of a task: 33 again with twice the memory; 74, 137 and 143 again; others not.
 #pragma once
 
@@ -19,6 +20,7 @@ struct FarmPlan {
   std::string result;
   std::vector<std::string> options;  // of the command, "--name=value"
   bool removes_shards = false;       // when an index is complete
+  bool has_neighbours = false;       // an index takes sizes or normals from these
   std::vector<int> frames;           // empty: no sequence
   int shards = 1;
   std::uint64_t memory_mib = 0;  // of a task, at first
@@ -29,9 +31,12 @@ struct FarmPlan {
   // Of each pass.
   std::size_t taskCount() const { return frameCount() * std::size_t(shards); }
   std::vector<std::string> passes() const {
-    if (is_index) return {"count", "distribute", "build"};
-    return {"gather"};
+    if (!is_index) return {"gather"};
+    if (!has_neighbours) return {"count", "distribute", "build"};
+    return {"count", "distribute", "build", "places", "sizes"};
   }
+  // A pass of one task for each frame, that of its first shard; it takes as long as a merge.
+  static bool isSingle(std::string_view pass) { return pass == "places"; }
 };
 
 // A bash script: `bash FILE` submits an array, and a job behind it that merges, and submits again
@@ -50,6 +55,8 @@ std::string shellWord(std::string_view text);
 std::string planComment(const FarmPlan& plan);
 // Variables of the job, and the functions `task` and `merge`.
 std::string planFunctions(const FarmPlan& plan);
+// The function `tasksOf`, for scripts that count tasks.
+std::string_view tasksFunction();
 // The function `runTask`, for schedulers that leave trying again to the task.
 std::string_view runTaskFunction();
 

@@ -33,9 +33,10 @@ submit() {
 
 # submitTasks PASS MEMORY TASK...: behind the jobs `before`; adds the jobs to `jobs`.
 submitTasks() {
-  local pass=$1 memory=$2 task most offset job
+  local pass=$1 memory=$2 limit=$minutes task most offset job
   local -A lists=()
   shift 2
+  [[ $pass != places ]] || limit=$merge_minutes
   # The numbers of an array are below MaxArraySize, so many tasks are several arrays
   most=$(scontrol show config | sed -n -E 's/^MaxArraySize *= *([0-9]+).*/\1/p')
   most=$((${most:-1001} - 1))
@@ -47,7 +48,7 @@ submitTasks() {
   done
   for offset in "${!lists[@]}"; do
     # Beside its budget, a task has the shell that runs it
-    job=$(submit --job-name="surfeit-$pass" --array="${lists[$offset]#,}" --time="$minutes" \
+    job=$(submit --job-name="surfeit-$pass" --array="${lists[$offset]#,}" --time="$limit" \
       --mem="$((memory + 64))M" ${before:+"--dependency=afterany$before"} \
       "$script" task "$pass" "$memory" "$offset") || return
     jobs+=:$job
@@ -67,7 +68,7 @@ submitAll() {
   for pass in "${passes[@]}"; do
     jobs=
     # shellcheck disable=SC2046
-    submitTasks "$pass" "$memory" $(seq "$tasks") || return
+    submitTasks "$pass" "$memory" $(tasksOf "$pass") || return
     before=$jobs
   done
   submitMerge 1 "$memory"
@@ -90,16 +91,17 @@ shardFile() {
 # Where shards are missing although none of their files is (the merge says so, or a task of the next
 # pass, by 75), one of them is none of this job, and all tasks look.
 missingTasks() {
-  local place pass shard task status memory looks=1 fails
+  local place pass shard last task status memory looks=1 fails
   local -a absent
   local -A own mine=()
   for ((place = ${#passes[@]} - 1; place >= 0; --place)); do
-    pass=${passes[place]} absent=() fails=0
-    for ((shard = 1; shard <= shards; ++shard)); do
+    pass=${passes[place]} absent=() fails=0 last=$shards
+    [[ $pass != places ]] || last=1
+    for ((shard = 1; shard <= last; ++shard)); do
       [[ -e $(shardFile "$1" "$place" "$shard") ]] || absent+=("$shard")
     done
     # shellcheck disable=SC2207
-    if ((looks && ${#absent[@]} == 0)); then absent=($(seq "$shards")); fi
+    if ((looks && ${#absent[@]} == 0)); then absent=($(seq "$last")); fi
     looks=0 own=()
     for shard in "${absent[@]}"; do
       task=$(($1 * shards + shard))
@@ -195,10 +197,13 @@ std::string slurmScript(const FarmPlan& plan) {
   for (const int frame : plan.frames) {
     results += (results.empty() ? "" : " ") + shellWord(frameName(plan.result, frame));
   }
+  const char* const files = !plan.is_index        ? "shard"
+                            : plan.has_neighbours ? "count ranges slabs places sized"
+                                                  : "count ranges slabs";
   return "#!/bin/bash\n" + planComment(plan) + std::string(kHow) + planFunctions(plan) +
          fmt::format("\nminutes={}\nmerge_minutes={}\nfiles=({})\nresults=({})", plan.minutes,
-                     plan.merge_minutes, plan.is_index ? "count ranges slabs" : "shard", results) +
-         std::string(kSubmit) + std::string(kMerge);
+                     plan.merge_minutes, files, results) +
+         std::string(tasksFunction()) + std::string(kSubmit) + std::string(kMerge);
 }
 
 }  // namespace surfeit

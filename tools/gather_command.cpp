@@ -119,6 +119,7 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
   options.threads = context.threads();
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
+  SURFEIT_RETURN_IF_ERROR(expandStage(options));
   if (arguments.is_dry_run) return sayForecast(arguments, context);
   SURFEIT_ASSIGN_OR_RETURN(const ShardStats stats, gatherAsAsked(arguments, context));
   const double rate = double(stats.receivers) / std::max(stats.gather_seconds, 1e-9);
@@ -131,6 +132,10 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
       formatBytes(stats.temporary_bytes), stats.receivers > 0 ? cacheTable(stats) : std::string()));
   if (options.quality.max_variation > 0) {
     context.say(fmt::format("{} of them interpolated", formatCount(stats.interpolated_receivers)));
+  }
+  if (!options.stage_directory.empty()) {
+    context.say(fmt::format("stage: {} read there, {} kept", formatBytes(stats.staged_bytes_read),
+                            formatBytes(stats.staged_bytes_kept)));
   }
   if (!arguments.series.empty()) {
     SURFEIT_RETURN_IF_ERROR(writeCacheSeries(arguments.series, stats.windows));
@@ -151,6 +156,8 @@ Status runGather(GatherArguments& arguments, CommandContext& context) {
                              {"receivers_per_second", rate},
                              {"gather_seconds", stats.gather_seconds},
                              {"temporary_bytes", stats.temporary_bytes},
+                             {"staged_bytes_read", stats.staged_bytes_read},
+                             {"staged_bytes_kept", stats.staged_bytes_kept},
                              {"node_cache", cacheJson(stats.node_cache)},
                              {"surfel_cache", cacheJson(stats.surfel_cache)},
                              {"windows", windowsJson(stats.windows)}});
@@ -194,6 +201,7 @@ void addGatherCommand(CLI::App& app, CommandContext& context) {
       ->required();
   addCloudOutputOption(*command, arguments->result, "Result cloud", true);
   addGatherOptions(*command, arguments->options);
+  addStageOptions(*command, arguments->options);
   addLightOptions(*command, arguments->options);
   addSubsetOption(*command, arguments->options.groups, arguments->scene);
   addGainOption(*command, arguments->options.gains, arguments->scene);

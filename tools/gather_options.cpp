@@ -169,6 +169,47 @@ void addPagingOptions(CLI::App& command, GatherOptions& options) {
 
 }  // namespace
 
+void addStageOptions(CLI::App& command, GatherOptions& options) {
+  command
+      .add_option(
+          "--stage", options.stage_directory,
+          "Keep the pages of the scene that are read in this directory of the node, and read "
+          "them there when they are read again, by any task; \"$NAME/...\" begins with a "
+          "variable of the environment")
+      ->type_name("DIR")
+      ->group(kPagingGroup);
+  const auto parse = [&options](const std::string& text) {
+    const Result<std::uint64_t> bytes = parseMemory(text);
+    if (!bytes.ok() || text.ends_with('%')) {
+      throw CLI::ValidationError("--stage-limit",
+                                 "found \"" + text + "\", expected a size such as 20G");
+    }
+    options.stage_limit_bytes = *bytes;
+  };
+  command
+      .add_option_function<std::string>(
+          "--stage-limit", parse,
+          "Most bytes of all such copies in that directory (default: nine tenths of the disk)")
+      ->type_name("SIZE")
+      ->group(kPagingGroup);
+}
+
+Status expandStage(GatherOptions& options) {
+  std::string& directory = options.stage_directory;
+  if (directory.empty() && options.stage_limit_bytes > 0) {
+    return Status::invalidArgument("--stage-limit is of --stage, expected both");
+  }
+  if (!directory.starts_with('$')) return {};
+  const std::size_t end = std::min(directory.find('/'), directory.size());
+  const char* const value = std::getenv(directory.substr(1, end - 1).c_str());
+  if (value == nullptr || *value == '\0') {
+    return Status::invalidArgument(fmt::format(
+        "--stage: found \"{}\", expected a variable of the environment that is set", directory));
+  }
+  directory = value + directory.substr(end);
+  return {};
+}
+
 void addModeOption(CLI::App& command, GatherMode& mode) {
   addChoice<GatherMode>(command, "--mode", mode, "What is gathered",
                         {{"occlusion", GatherMode::kOcclusion},

@@ -40,6 +40,11 @@ void addGatherOptions(CLI::App& command, GatherOptions& options);
 // caches.
 void addModeOption(CLI::App& command, GatherMode& mode);
 void addQualityOptions(CLI::App& command, GatherQuality& quality);
+// --stage and --stage-limit. A directory "$NAME/..." begins with a variable of the environment of
+// the process that gathers: jobs of a plan find the node's own.
+void addStageOptions(CLI::App& command, GatherOptions& options);
+// Puts the variable in. Errors: kInvalidArgument where it is not set.
+Status expandStage(GatherOptions& options);
 void addCacheOptions(CLI::App& command, double& cache_split, bool& direct_io);
 
 // --subset, the groups of surfels that are seen, by numbers or by their names in `scene`: an

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "surfeit/index.h"
@@ -50,6 +51,20 @@ Status sayForecast(const IndexArguments& arguments, CommandContext& context) {
                              {"seconds", forecast.seconds}});
 }
 
+// Those of shards; "merge" is of all.
+constexpr std::pair<const char*, IndexPass> kPasses[] = {{"count", IndexPass::kCount},
+                                                         {"distribute", IndexPass::kDistribute},
+                                                         {"build", IndexPass::kBuild},
+                                                         {"places", IndexPass::kPlaces},
+                                                         {"sizes", IndexPass::kSizes}};
+
+IndexPass passOf(const std::string& name) {
+  for (const auto& [word, pass] : kPasses) {
+    if (name == word) return pass;
+  }
+  return IndexPass::kCount;
+}
+
 // --pass: what goes with which.
 Status checkPass(const IndexArguments& arguments) {
   const bool is_merge = arguments.pass == "merge";
@@ -57,7 +72,7 @@ Status checkPass(const IndexArguments& arguments) {
     if (!arguments.shard && arguments.shards == 0 && !arguments.removes_shards) return {};
     return Status::invalidArgument(
         "--shard, --shards and --remove-shards are of one pass of an index in shards, expected "
-        "--pass count|distribute|build|merge");
+        "--pass count|distribute|build|places|sizes|merge");
   }
   if (arguments.is_dry_run) {
     return Status::invalidArgument("--dry-run estimates a whole index, expected no --pass");
@@ -75,15 +90,15 @@ Status checkPass(const IndexArguments& arguments) {
 
 // One shard of --pass.
 Status runPass(const IndexArguments& arguments, CommandContext& context) {
-  const IndexPass pass = arguments.pass == "count"        ? IndexPass::kCount
-                         : arguments.pass == "distribute" ? IndexPass::kDistribute
-                                                          : IndexPass::kBuild;
+  const IndexPass pass = passOf(arguments.pass);
   SURFEIT_ASSIGN_OR_RETURN(const IndexShardStats stats,
                            indexShards(arguments.inputs, arguments.output, arguments.options, pass,
                                        *arguments.shard, context.progress()));
   const std::string shard = fmt::format("{}: shard {} of {}", arguments.output,
                                         arguments.shard->first, arguments.shard->count);
-  if (stats.finished_shards > 0) {
+  if (pass == IndexPass::kPlaces && arguments.shard->first > 1) {
+    context.say(fmt::format("{}: nothing to do, places is of shard 1", shard));
+  } else if (stats.finished_shards > 0) {
     context.say(fmt::format("{}: {} was done before", shard, arguments.pass));
   } else {
     context.say(
@@ -150,15 +165,17 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
 void addPassOptions(CLI::App& command, IndexArguments& arguments) {
   constexpr const char* kGroup = "Many machines";
   command
-      .add_option("--pass", arguments.pass,
-                  "Do one pass of an index in shards alone (docs/farm.md): count, distribute and "
-                  "build of every shard, then merge")
-      ->check(CLI::IsMember({"count", "distribute", "build", "merge"}))
+      .add_option(
+          "--pass", arguments.pass,
+          "Do one pass of an index in shards alone (docs/farm.md): count, distribute and "
+          "build of every shard, then merge; where sizes or normals follow from neighbours, "
+          "places of shard 1 and sizes of every shard before it")
+      ->check(CLI::IsMember({"count", "distribute", "build", "places", "sizes", "merge"}))
       ->group(kGroup);
   command
       .add_option_function<std::string>(
           "--shard", [&](const std::string& text) { arguments.shard = parseShard(text); },
-          "The I-th of N shards of --pass count, distribute or build, into a file beside the scene")
+          "The I-th of N shards of --pass, into a file beside the scene")
       ->type_name("I/N")
       ->group(kGroup);
   command

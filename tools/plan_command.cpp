@@ -59,6 +59,7 @@ void addGatherPlan(CLI::App& command, CommandContext& context) {
       ->type_name("CLOUD");
   addPlanOptions(command, *arguments, context);
   addGatherOptions(command, arguments->options);
+  addStageOptions(command, arguments->options);
   addLightOptions(command, arguments->options);
   addSubsetOption(command, arguments->options.groups, arguments->scene);
   addGainOption(command, arguments->options.gains, arguments->scene);

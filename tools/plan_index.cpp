@@ -30,6 +30,7 @@ Status forecastIndexPlan(IndexPlanArguments& arguments, CommandContext& context)
   SURFEIT_ASSIGN_OR_RETURN(const IndexShardForecast forecast,
                            forecastIndexShards(clouds, firstName(plan, plan.result),
                                                settings.options, plan.shards, context.progress()));
+  plan.has_neighbours = plan.has_neighbours || forecast.may_need_neighbours;
   takeForecast(forecast.memory_bytes, forecast.task_seconds, forecast.merge_seconds, plan);
   context.say(fmt::format(
       "plan: {} surfels in {}, by a sample of {}: {} MiB, about {:.0f} s for a task and {:.0f} s "
@@ -44,13 +45,28 @@ Status forecastIndexPlan(IndexPlanArguments& arguments, CommandContext& context)
 
 Status checkIndexPlan(const IndexPlanArguments& arguments) {
   const IndexSettings& settings = arguments.settings;
-  if (settings.inputs.empty() && settings.options.named.empty()) {
-    return Status::invalidArgument("plan --index: no input cloud");
+  if (!settings.inputs.empty() || !settings.options.named.empty()) return {};
+  return Status::invalidArgument("plan --index: no input cloud");
+}
+
+// Without a forecast: by the channels of the first frame, where its clouds are there already.
+Status lookForSizes(IndexPlanArguments& arguments, CommandContext& context) {
+  FarmPlan& plan = arguments.plan;
+  if (plan.has_neighbours) return {};
+  IndexOptions options = arguments.settings.options;
+  for (NamedInput& named : options.named) named.path = firstName(plan, named.path);
+  std::vector<std::string> clouds;
+  for (const std::string& cloud : plan.inputs) clouds.push_back(firstName(plan, cloud));
+  const Result<bool> needs = mayNeedNeighbours(clouds, options);
+  if (needs.ok()) {
+    plan.has_neighbours = *needs;
+  } else if (needs.status().code() == StatusCode::kIoError) {
+    context.say(fmt::format("{}: planned as if every surfel had a size (--neighbours)",
+                            needs.status().message()));
+  } else {
+    return needs.status();
   }
-  if (settings.normals == "none") return {};
-  return Status::invalidArgument(
-      "shards of an index cannot find normals: neighbours lie in other shards; find them first "
-      "(surfeit normals CLOUD -o OUT.ply), or index on one machine");
+  return {};
 }
 
 Status runIndexPlan(IndexPlanArguments& arguments, const CLI::App& command,
@@ -59,7 +75,9 @@ Status runIndexPlan(IndexPlanArguments& arguments, const CLI::App& command,
   arguments.plan.result = arguments.settings.output;
   SURFEIT_RETURN_IF_ERROR(checkIndexPlan(arguments));
   SURFEIT_RETURN_IF_ERROR(beginPlan(arguments, command, context));
-  if (needsForecast(arguments)) SURFEIT_RETURN_IF_ERROR(forecastIndexPlan(arguments, context));
+  arguments.plan.has_neighbours |= arguments.settings.normals != "none";
+  SURFEIT_RETURN_IF_ERROR(needsForecast(arguments) ? forecastIndexPlan(arguments, context)
+                                                   : lookForSizes(arguments, context));
   context.answer(jobText(arguments));
   return {};
 }
@@ -73,6 +91,9 @@ void addIndexPlan(CLI::App& command, CommandContext& context) {
   addPlanOptions(command, *arguments, context);
   command.add_flag("--remove-shards", arguments->plan.removes_shards,
                    "The merge removes the files of the shards when the scene is complete");
+  command.add_flag("--neighbours", arguments->plan.has_neighbours,
+                   "The job has the passes for sizes from neighbours (default: as options and "
+                   "clouds say, which may not be there yet)");
   context.addCommonOptions(command, {.stats = false});
   command.footer(
       "The job counts, distributes, builds and merges (docs/farm.md, \"An index in shards\"); "

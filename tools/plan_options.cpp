@@ -21,8 +21,8 @@ constexpr std::size_t kMostTasks = 1'000'000;
 
 // Options that are the plan's own; all others are those of the gather or the index.
 constexpr const char* kOwnOptions[] = {
-    "output",   "shards", "frames", "time",     "memory", "threads", "index",        "slurm",
-    "parallel", "make",   "openjd", "progress", "quiet",  "verbose", "remove-shards"};
+    "output",   "shards", "frames", "time",     "memory", "threads", "index",         "slurm",
+    "parallel", "make",   "openjd", "progress", "quiet",  "verbose", "remove-shards", "neighbours"};
 
 bool isOwn(const CLI::Option& option) {
   return std::any_of(std::begin(kOwnOptions), std::end(kOwnOptions),

@@ -46,6 +46,12 @@ struct GatherOptions : GatherSettings, JobOptions, ReadOptions {
   double cache_split = -1;
   bool direct_io = false;  // read the scene past the page cache of the system
   bool prefetch = true;    // read ahead along the order of the receivers when reading is slow
+  // A directory of this machine for pages of the scene, as they are read: gathers that come later,
+  // and others at the same time, read them there (docs/farm.md, "Scratch on the node"). Copies
+  // stay until someone removes them. Empty: none. Limit in bytes of all copies there, about; 0: a
+  // tenth of the disk stays free.
+  std::string stage_directory{};
+  std::uint64_t stage_limit_bytes = 0;
 };
 
 struct GatherStats {
@@ -56,7 +62,8 @@ struct GatherStats {
   double gather_seconds = 0;  // wall time inside the gather proper, without reading and writing
   int threads = 0;
   std::uint64_t memory_bytes = 0;
-  std::uint64_t temporary_bytes = 0;  // written to temporary files
+  std::uint64_t temporary_bytes = 0;                           // written to temporary files
+  std::uint64_t staged_bytes_read = 0, staged_bytes_kept = 0;  // of pages, in the stage
   GatherCacheStats node_cache, surfel_cache;
   std::vector<GatherWindow> windows;  // in order; at most some hundreds, for any running time
 };

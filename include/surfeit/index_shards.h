@@ -1,15 +1,18 @@
 // One scene indexed by many processes, on one machine or many, byte for byte as indexClouds does
 // it.
 //
-// The shards of a job share the work of four passes. Each pass reads what the one before wrote, and
+// The shards of a job share the work of some passes. Each pass reads what the one before wrote, and
 // every shard writes one file beside the scene ("out.sft.count-03-of-16"):
 //
 //   count        shard I reads the I-th part of the records: bounds, counts, a sample of places
 //   distribute   reads the part again; sends its surfels to ranges of the curve, as many as shards
 //   build        sorts the I-th range, and builds the pages and octrees of its slabs
+//   places       (*) shard 1 writes a scene of the places alone, "out.sft.places"
+//   sizes        (*) finds sizes and normals of the I-th range in it, and builds its slabs again
 //   merge        one process writes the pages, and the top of the octree above them
 //
-// docs/farm.md, "An index in shards", has the sizes of the files and the memory of each pass.
+// (*) where sizes or normals follow from neighbours; else both have nothing to do, and may be left
+// out. docs/farm.md, "An index in shards", has the sizes of the files and the memory of each pass.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +27,7 @@
 
 namespace surfeit {
 
-enum class IndexPass { kCount, kDistribute, kBuild };
+enum class IndexPass { kCount, kDistribute, kBuild, kPlaces, kSizes };
 
 // The file of a shard.
 SURFEIT_API std::string indexShardPath(const std::string& scene_path, IndexPass pass, int shard,
@@ -35,7 +38,7 @@ struct IndexShardStats {
   int finished_shards = 0;            // that were there already, and were skipped
   std::uint64_t memory_bytes = 0;     // the budget
   std::uint64_t records = 0;          // read by count and distribute
-  std::uint64_t surfels = 0;          // counted, distributed or built
+  std::uint64_t surfels = 0;          // counted, distributed, built or sized
   std::uint64_t file_bytes = 0;       // of the files of shards that were written
   std::uint64_t temporary_bytes = 0;  // most bytes of temporary files at any time
 };
@@ -46,16 +49,17 @@ struct IndexShardStats {
 // and options that describe the scene; not on threads and memory. Where a far cloud asks for
 // another origin than a sample of it did, distribute counts the records anew, about that origin.
 // Errors: as indexClouds; kIncomplete, naming the shards of the pass before that are missing,
-// damaged or of another job; kInvalidArgument for a range outside 1 to count, inputs that are
-// streams, and for what one range cannot know of the others: sizes or normals from neighbours (the
-// message says what to do first). kBudgetTooSmall, too, where open blocks of all ranges do not fit.
+// damaged or of another job; kInvalidArgument for a range outside 1 to count, and for inputs that
+// are streams. kBudgetTooSmall, too, where open blocks of all ranges do not fit.
 SURFEIT_API Result<IndexShardStats> indexShards(const std::vector<std::string>& inputs,
                                                 const std::string& output,
                                                 const IndexOptions& options, IndexPass pass,
                                                 const ShardRange& shards, Progress& progress);
 
-// Writes the scene from the files of the build. `removes_shards`: the files of all passes go once
-// it is complete. The statistics are those of indexClouds. Errors: as indexShards.
+// Writes the scene from the files of the build, or of the sizes. Where neighbours must agree on the
+// sides of normals (NormalOrientation::Toward::kConsistent), that is done here, over the whole
+// scene, which is then built anew by this process. `removes_shards`: the files of all passes go
+// once it is complete. The statistics are those of indexClouds. Errors: as indexShards.
 SURFEIT_API Result<IndexStats> mergeIndexShards(const std::vector<std::string>& inputs,
                                                 const std::string& output,
                                                 const IndexOptions& options, int count,
@@ -69,16 +73,23 @@ struct IndexShardForecast {
   std::uint64_t shard_bytes = 0;   // of the files of all shards, beside the scene
   std::uint64_t memory_bytes = 0;  // that serves any task, the merge included
   double task_seconds = 0;         // the longest pass of a shard
-  double merge_seconds = 0;
+  double merge_seconds = 0;        // of the longer of merge and places
+  bool may_need_neighbours = false;
 };
 
 // Indexes a sample, as forecastIndex does, and applies the rules of docs/farm.md ("Memory and time
 // of an index") to the result. Opens all inputs, and writes nothing that stays. `memory_bytes` of
 // the options is that of the sample alone. Errors: as indexShards, for what it refuses before it
-// reads; kInvalidArgument, too, for clouds without sizes.
+// reads.
 SURFEIT_API Result<IndexShardForecast> forecastIndexShards(const std::vector<std::string>& inputs,
                                                            const std::string& output,
                                                            const IndexOptions& options, int count,
                                                            Progress& progress);
+
+// Whether the passes `places` and `sizes` may have something to do, by the channels of the clouds
+// and the options: a cloud without radii and areas, or with coverages, or normals that are asked
+// for. Opens all inputs, and reads no surfel.
+SURFEIT_API Result<bool> mayNeedNeighbours(const std::vector<std::string>& inputs,
+                                           const IndexOptions& options);
 
 }  // namespace surfeit

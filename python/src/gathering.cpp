@@ -31,9 +31,20 @@ GatherOptions gatherOptions(const py::dict& given) {
   return gather;
 }
 
+// And the stage of a gather from file to file.
+GatherOptions gatherJobOptions(const py::dict& given) {
+  Options options(given);
+  GatherOptions gather;
+  takeGather(options, gather);
+  options.into("stage", gather.stage_directory);
+  options.into("stage_limit", gather.stage_limit_bytes);
+  options.finish();
+  return gather;
+}
+
 py::dict gather(const std::string& scene, const std::string& receivers, const std::string& result,
                 const py::dict& given, const py::object& watcher) {
-  const GatherOptions options = gatherOptions(given);
+  const GatherOptions options = gatherJobOptions(given);
   return record(runFor<GatherStats>(watcher, [&](Progress& progress) {
     return gatherCloud(scene, receivers, result, options, progress);
   }));
@@ -43,7 +54,7 @@ py::dict gather(const std::string& scene, const std::string& receivers, const st
 py::dict gatherShardsOf(const std::string& scene, const std::string& receivers,
                         const std::string& result, const std::array<int, 3>& shards,
                         const py::dict& given, const py::object& watcher) {
-  const GatherOptions options = gatherOptions(given);
+  const GatherOptions options = gatherJobOptions(given);
   const ShardRange range = {shards[0], shards[1], shards[2]};
   return record(runFor<ShardStats>(watcher, [&](Progress& progress) {
     return gatherShards(scene, receivers, result, options, range, progress);
@@ -52,7 +63,7 @@ py::dict gatherShardsOf(const std::string& scene, const std::string& receivers,
 
 py::dict resume(const std::string& scene, const std::string& receivers, const std::string& result,
                 int parts, const py::dict& given, const py::object& watcher) {
-  const GatherOptions options = gatherOptions(given);
+  const GatherOptions options = gatherJobOptions(given);
   return record(runFor<ShardStats>(watcher, [&](Progress& progress) {
     return gatherResumable(scene, receivers, result, options, parts, progress);
   }));
@@ -73,7 +84,7 @@ py::dict merge(const std::string& scene, const std::string& receivers, const std
 
 py::dict forecast(const std::string& scene, const std::string& receivers, const py::dict& given,
                   const py::object& watcher) {
-  const GatherOptions options = gatherOptions(given);
+  const GatherOptions options = gatherJobOptions(given);
   return record(runFor<GatherForecast>(watcher, [&](Progress& progress) {
     return forecastGather(scene, receivers, options, progress);
   }));

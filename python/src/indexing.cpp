@@ -76,7 +76,9 @@ py::dict indexShardsOf(const std::vector<std::string>& inputs, const std::string
   const IndexOptions options = indexOptions(given);
   const IndexPass pass = pass_word == "count"        ? IndexPass::kCount
                          : pass_word == "distribute" ? IndexPass::kDistribute
-                                                     : IndexPass::kBuild;
+                         : pass_word == "build"      ? IndexPass::kBuild
+                         : pass_word == "places"     ? IndexPass::kPlaces
+                                                     : IndexPass::kSizes;
   const ShardRange range = {shards[0], shards[1], shards[2]};
   return record(runFor<IndexShardStats>(watcher, [&](Progress& progress) {
     return indexShards(inputs, output, options, pass, range, progress);

@@ -161,7 +161,8 @@ py::dict record(const GatherStats& stats) {
       "interpolated_receivers"_a = stats.interpolated_receivers,
       "gather_seconds"_a = stats.gather_seconds, "threads"_a = stats.threads,
       "memory_bytes"_a = stats.memory_bytes, "temporary_bytes"_a = stats.temporary_bytes,
-      "node_cache"_a = record(stats.node_cache), "surfel_cache"_a = record(stats.surfel_cache),
+      "staged_bytes_read"_a = stats.staged_bytes_read,
+      "staged_bytes_kept"_a = stats.staged_bytes_kept, "node_cache"_a = record(stats.node_cache), "surfel_cache"_a = record(stats.surfel_cache),
       "windows"_a = record(stats.windows));
 }
 

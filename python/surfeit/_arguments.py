@@ -103,7 +103,9 @@ def options_of(options: Mapping[str, Any], **more: Any) -> Dict[str, Any]:
     for name in ("transform", "from_space", "to_space"):
         if taken.get(name) is not None:
             taken[name] = matrix_of(taken[name], name)
-    for name in ("temporary_directory", "trajectory", "like", "passes", "brick", "caustic_photons"):
+    if isinstance(taken.get("stage_limit"), str):
+        taken["stage_limit"] = memory_bytes(taken["stage_limit"])
+    for name in ("temporary_directory", "stage", "trajectory", "like", "passes", "brick", "caustic_photons"):
         if taken.get(name) is not None:
             taken[name] = path_of(taken[name])
     for name in ("origin", "cube", "eye", "sensor", "crop"):

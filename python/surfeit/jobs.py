@@ -51,8 +51,9 @@ def index(source: Union[Mapping[str, Any], PathLike, Sequence[PathLike],
     dry_run: writes nothing, and returns an estimate of memory, files and time. Files alone.
 
     An index by many processes, of files alone (docs/farm.md): pass_="count", "distribute" and
-    "build", each with shard=(1, 4) to (4, 4) or "1/4"; then pass_="merge", shards=4, with
-    remove_shards=True to remove their files.
+    "build", each with shard=(1, 4) to (4, 4) or "1/4"; where sizes or normals follow from
+    neighbours, "places" with shard=(1, 4) and "sizes" with every shard; then pass_="merge",
+    shards=4, with remove_shards=True to remove their files.
 
     The scene depends on the surfels alone: the same arrays from a file give the same bytes. What is
     missing is filled in by the rules of docs/format.md, with a DataWarning each.
@@ -97,8 +98,9 @@ def _index_files(paths: List[str], output: str, options: Stats, watcher: Watcher
                              "expected pass_")
         return (_surfeit.forecast_index if dry_run else _surfeit.index_files)(
             paths, output, options, watcher)
-    if pass_ not in ("count", "distribute", "build", "merge"):
-        raise ValueError(f"pass_: found {pass_!r}, expected count, distribute, build or merge")
+    if pass_ not in ("count", "distribute", "build", "places", "sizes", "merge"):
+        raise ValueError(f"pass_: found {pass_!r}, expected count, distribute, build, places, sizes or "
+                         "merge")
     if dry_run:
         raise ValueError("dry_run estimates a whole index, expected no pass_")
     if pass_ == "merge":

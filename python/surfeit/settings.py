@@ -95,6 +95,9 @@ class _GatherJobSettings(GatherSettings, ReadSettings, JobSettings, total=False)
 class GatherJobSettings(_GatherJobSettings, LookSettings, total=False):
     """A gather from file to file; the look is of the output irradiance alone."""
 
+    stage: Union[str, "os.PathLike[str]"]  # directory of this machine for pages of the scene
+    stage_limit: Union[int, str]  # most bytes there
+
 
 class CubeSettings(_GatherJobSettings, total=False):
     show: Union[str, Sequence[str]]  # panels of a PNG: light, coverage, depth, layers, kind

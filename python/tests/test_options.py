@@ -81,6 +81,12 @@ def test_shards_resume_and_merge(room, tmp_path, run_program):
     assert surfeit.merge(scene, receivers, out, remove_shards=True)["shards"] == 3
     assert same_bytes(out, tmp_path / "one.ply")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.ply", "out.ply"]
+    # Pages of the scene are kept, and read again
+    for count, read in (("staged_bytes_kept", 0), ("staged_bytes_read", 1)):
+        stats = surfeit.gather(scene, receivers, out, quality="draft", stage=tmp_path, stage_limit="1G")
+        assert stats[count] > 0 and stats["staged_bytes_read"] >= read
+        assert same_bytes(out, tmp_path / "one.ply")
+    assert len(list(tmp_path.glob("surfeit-stage-*"))) == 1
 
     surfeit.gather(scene, receivers, tmp_path / "r.ply", resume=True, resume_parts=4,
                    quality="draft")
@@ -154,6 +160,17 @@ def test_indexes_with_groups_cubes_and_shards(room, tmp_path, run_program):
                   remove_shards=True, **inputs)
     assert same_bytes(tmp_path / "s.sft", tmp_path / "p.sft")
     assert not list(tmp_path.glob("s.sft.*"))
+
+    # Sizes and normals from neighbours
+    surfeit.convert(room / "room.ply", tmp_path / "bare.ply", keep=["position"])
+    surfeit.index(tmp_path / "bare.ply", tmp_path / "one.sft", normals="estimate")
+    for pass_ in ("count", "distribute", "build", "places", "sizes"):
+        for shard in (1, 2):
+            surfeit.index(tmp_path / "bare.ply", tmp_path / "s.sft", pass_=pass_, shard=(shard, 2),
+                          normals="estimate")
+    surfeit.index(tmp_path / "bare.ply", tmp_path / "s.sft", pass_="merge", shards=2,
+                  remove_shards=True, normals="estimate")
+    assert same_bytes(tmp_path / "s.sft", tmp_path / "one.sft")
     for wrong, message in [({"pass_": "sort"}, "count, distribute"), ({"shard": "1/2"}, "pass_"),
                            ({"pass_": "merge"}, "shards"), ({"pass_": "build"}, "shard"),
                            ({"pass_": "build", "shard": "3/2"}, "I/N")]:

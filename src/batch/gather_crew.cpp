@@ -12,6 +12,12 @@
 #include "gather/packet/group_gatherer.h"
 
 namespace surfeit {
+namespace {
+
+// Null unless pages are kept on this node, too.
+PageStage* stageOf(const PagedOctree& octree) { return octree.file().pages().stage().get(); }
+
+}  // namespace
 
 GatherCrew::GatherCrew(const Setup& setup, Sink sink)
     : setup_(setup),
@@ -96,6 +102,8 @@ SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, bool is_warm,
                            GatherStats& stats, Progress& progress,
                            const LoadedEnvironment* environment)
     : octree_(std::move(octree)),
+      staged_read_(is_warm && stageOf(*octree_) ? stageOf(*octree_)->bytesRead() : 0),
+      staged_kept_(is_warm && stageOf(*octree_) ? stageOf(*octree_)->bytesKept() : 0),
       prefetch_threads_(memory.prefetch_threads),
       rules_(gatherRules(options, environment)),
       look_(options.look),
@@ -137,6 +145,11 @@ void SortedGather::finish() {
   stats_.node_cache = controller_.nodeStats();
   stats_.surfel_cache = controller_.surfelStats();
   stats_.windows = controller_.windows();
+  PageStage* const stage = stageOf(*octree_);
+  if (stage == nullptr) return;
+  stats_.staged_bytes_read = stage->bytesRead() - staged_read_;
+  stats_.staged_bytes_kept = stage->bytesKept() - staged_kept_;
+  for (const std::string& note : stage->takeNotes()) progress_.inform(note);
 }
 
 }  // namespace surfeit

@@ -79,7 +79,7 @@ class SortedGather {
   // after them.
   Status gather(ExternalSorter& sorter, GatherCrew::Sink sink,
                 std::uint64_t count = ReceiverQueue::kAll);
-  // Fills in the statistics.
+  // Fills in the statistics, and tells what happened to the stage.
   void finish();
   // The octree, for another gather. The last call.
   std::unique_ptr<PagedOctree> takeOctree() { return std::move(octree_); }
@@ -90,6 +90,7 @@ class SortedGather {
                const LoadedEnvironment* environment);
 
   std::unique_ptr<PagedOctree> octree_;
+  const std::uint64_t staged_read_, staged_kept_;  // before
   const int prefetch_threads_;
   const GatherRules rules_;
   const BounceLook look_;

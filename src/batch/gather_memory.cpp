@@ -51,7 +51,8 @@ std::uint64_t fixedBytes(const SceneFile& file, const GatherWork& work, int pref
          PagedOctree::fixedBytes(file, work.threads + prefetch_threads) +
          threads * threadBytes(file, work) +
          static_cast<std::uint64_t>(prefetch_threads) * (kThreadBytes + sizeof(CutWalk)) + rows +
-         kStreamBytes + kQueueReceivers * sizeof(SortedReceiver) + PagingController::memoryBytes() +
+         (file.pages().stage() != nullptr ? PageStage::kMemoryBytes : 0) + kStreamBytes +
+         kQueueReceivers * sizeof(SortedReceiver) + PagingController::memoryBytes() +
          ReuseDistances::memoryBytes(file.nodePageCount(), kTrackedPages) +
          ReuseDistances::memoryBytes(file.surfelPageCount(), kTrackedPages);
 }

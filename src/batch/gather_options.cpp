@@ -97,11 +97,17 @@ Status checkSceneFor(const SceneFile& scene, const std::string& result_path,
   return checkGroupsFor(scene, options, progress);
 }
 
+Result<SceneFile> openSceneAsAsked(const std::string& scene_path, const GatherOptions& options) {
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, SceneFile::open(scene_path, sceneAccess(options)));
+  scene.stage({options.stage_directory, options.stage_limit_bytes});
+  return scene;
+}
+
 Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string& result_path,
                                const GatherOptions& options, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(checkGatherOptions(options));
-  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene,
-                           openSceneBeside(scene_path, result_path, sceneAccess(options)));
+  SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path, scene_path, "scene"));
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, openSceneAsAsked(scene_path, options));
   SURFEIT_RETURN_IF_ERROR(checkGroupsFor(scene, options, progress));
   return scene;
 }

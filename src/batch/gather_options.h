@@ -42,6 +42,9 @@ Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOpt
                                                                  UpAxis scene_up,
                                                                  Progress& progress);
 
+// Opens a scene as the options say its pages are read.
+Result<SceneFile> openSceneAsAsked(const std::string& scene_path, const GatherOptions& options);
+
 // How the pages of the scene are read.
 inline Access sceneAccess(const GatherOptions& options) {
   return options.direct_io ? Access::kDirect : Access::kCached;

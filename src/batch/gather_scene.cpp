@@ -85,6 +85,7 @@ Result<GatherScene> GatherScene::open(const std::string& scene_path, const std::
   GatherScene scene(kept);
   scene.path_ = scene_path;
   scene.access_ = sceneAccess(options);
+  scene.stage_ = {options.stage_directory, options.stage_limit_bytes};
   // A file that is replaced between this look and the opening is opened again by the next gather
   const bool is_there = ::stat(scene_path.c_str(), &scene.identity_) == 0;
   if (kept != nullptr && kept->octree != nullptr) {
@@ -96,7 +97,8 @@ Result<GatherScene> GatherScene::open(const std::string& scene_path, const std::
       return scene;
     }
   }
-  SURFEIT_ASSIGN_OR_RETURN(SceneFile file, openSceneFor(scene_path, result_path, options, progress));
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile file,
+                           openSceneFor(scene_path, result_path, options, progress));
   scene.file_.emplace(std::move(file));
   return scene;
 }
@@ -108,6 +110,7 @@ Status GatherScene::makeRoom(const GatherMemory& memory) {
   if (isLike(*octree_, memory.caches) && limitFrames(*octree_, memory.caches, bytes)) return {};
   octree_ = nullptr;
   SURFEIT_ASSIGN_OR_RETURN(SceneFile file, SceneFile::open(path_, access_));
+  file.stage(stage_);
   file_.emplace(std::move(file));
   return {};
 }

@@ -56,6 +56,7 @@ class GatherScene {
   KeptScene::State* kept_;
   std::string path_;
   Access access_ = Access::kCached;
+  PageStage::Options stage_;
   struct ::stat identity_ {};
   std::optional<SceneFile> file_;
   std::unique_ptr<PagedOctree> octree_;

@@ -102,6 +102,7 @@ class ShardGather {
     if (takes_all) begin = sorter->mark();
     SURFEIT_ASSIGN_OR_RETURN(SceneFile again,
                              SceneFile::open(scene.path(), sceneAccess(job_.options())));
+    again.stageAs(scene);
     SURFEIT_ASSIGN_OR_RETURN(ShardPlan plan,
                              planShards(std::move(again), job_, *sorter, shards_.count, progress_));
     plan.job = identity_;

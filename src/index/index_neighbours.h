@@ -3,13 +3,16 @@
 // build.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "index/phase_clock.h"
 #include "octree/build/sorted_surfels.h"
 #include "octree/neighbours/normal_rule.h"
+#include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
 #include "surfeit/progress.h"
@@ -32,7 +35,15 @@ struct NeighbourBuild {
 // The least memory_bytes for so many threads, but for what grows with the scene.
 std::uint64_t leastNeighbourBytes(const std::optional<NormalEstimation>& normals, int threads);
 
+// Reads what searches look up, with the caches that memory_bytes leave room for `beside` them.
+Result<std::unique_ptr<PagedOctree>> openNeighbours(SceneFile scene, std::uint64_t memory_bytes,
+                                                    int threads, std::uint64_t beside);
+
 Status buildFromNeighbours(SceneFile places, const NeighbourBuild& how, IndexStats& stats,
                            PhaseClock& clock, Progress& progress);
+
+// The last part of it: `scene` has normals that point to either side.
+Status buildOriented(SceneFile scene, const NeighbourBuild& how, IndexStats& stats,
+                     PhaseClock& clock, Progress& progress);
 
 }  // namespace surfeit

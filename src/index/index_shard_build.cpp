@@ -13,9 +13,9 @@
 #include "index/index_plan.h"
 #include "index/index_shard_passes.h"
 #include "index/index_shard_pieces.h"
+#include "index/index_shard_slabs.h"
 #include "index/scene_description.h"
 #include "octree/build/bucket_stream.h"
-#include "octree/build/built_slab_bytes.h"
 #include "octree/build/octree_builder.h"
 #include "octree/build/surfel_store.h"
 #include "octree/neighbours/repeated_surfels.h"
@@ -103,6 +103,9 @@ class ShardBuild {
                                       job_.output, surfels_, plan_.totals.surfels));
   }
 
+  // Neighbours are searched at the places as they are.
+  bool fullPrecision() const { return job_.options.full_precision || plan_.needs_neighbours; }
+
   Result<IndexPlan> planBuild() const {
     const IndexOptions& options = job_.options;
     IndexTask task;
@@ -110,7 +113,7 @@ class ShardBuild {
     task.threads = options.threads;
     task.records = range_.surfels;
     task.packed_bytes = double(bytes_) / double(surfels_);
-    task.slabs = {options.leaf_capacity, options.full_precision};
+    task.slabs = {options.leaf_capacity, fullPrecision()};
     task.filter_bytes = options.repeats == Repeats::kThin ? RepeatFilter::kBytesPerSurfel : 0;
     return planIndex(task);
   }
@@ -185,31 +188,23 @@ class ShardBuild {
                                                job_.temporary_directory},
                          progress_);
     RepeatFilter distinct(buckets, job_.options.repeats);
-    const SceneDescription description{job_.options,     job_.group_names, plan_.totals,
-                                       plan_.origin,     job_.up(),        nullptr,
-                                       job_.reader.crs()};
+    const std::optional<NormalRule> rule = normalRule(job_, plan_);
+    const SceneDescription description = describe(job_, plan_, rule);
     CountedSurfels left(distinct, plan_.splitters);
     const bool is_thin = job_.options.repeats == Repeats::kThin;
     SortedSurfelStream& stream = is_thin ? static_cast<SortedSurfelStream&>(left) : distinct;
-    CutSlabs slabs(stream, description.header(job_.options.full_precision), plan.slabs,
-                   range_.ends);
-    std::uint64_t surfels = 0, count = 0;
-    std::vector<std::byte> bytes;
-    const auto take = [&](const BuiltSlab& slab) -> Status {
-      encodeBuiltSlab(slab, bytes);
-      surfels += slab.surfel_count;
-      ++count;
-      const std::uint64_t head[] = {bytes.size(), checksumOf(bytes)};
-      SURFEIT_RETURN_IF_ERROR(writer.append(std::as_bytes(std::span(head))));
-      return writer.append(bytes);
-    };
+    CutSlabs cut(stream, description.header(fullPrecision()), plan.slabs, range_.ends);
+    ShardSlabs slabs(writer);
     progress_.beginPhase("build", range_.surfels, "surfels");
-    SURFEIT_RETURN_IF_ERROR(buildSlabs(slabs, plan.slabs, take, progress_));
-    if (surfels + distinct.leftOut() != range_.surfels) {
+    SURFEIT_RETURN_IF_ERROR(buildSlabs(
+        cut, plan.slabs, [&](const BuiltSlab& slab) { return slabs.append(slab); }, progress_));
+    if (slabs.surfels() + distinct.leftOut() != range_.surfels) {
       return Status::failed(fmt::format("{}: {} surfels built, expected {}: this is a bug",
-                                        job_.output, surfels, range_.surfels));
+                                        job_.output, slabs.surfels(), range_.surfels));
     }
-    facts["slabs"] = count;
+    slabs.addFacts(facts);
+    facts["begin_level"] = range_.ends.begin_level;
+    facts["end_level"] = range_.ends.end_level;
     if (is_thin) facts["left"] = left.counts();
     facts["repeated"] = distinct.repeated();
     facts["left_out"] = distinct.leftOut();

@@ -67,14 +67,6 @@ json expectedCount(const IndexShardJob& job, int shard, int round) {
           {"origin", jsonOf(job.reader.origin())}};
 }
 
-// What one range cannot know of the others.
-Status checkAlone(const CloudTotals& totals) {
-  const std::uint64_t lacking = totals.missing_both + totals.covering;
-  if (lacking == 0) return {};
-  return Status::invalidArgument(
-      fmt::format("{} surfels have no area of their own: {}", lacking, kNeighboursElsewhere));
-}
-
 class ShardCount {
  public:
   ShardCount(const IndexShardJob& job, int shard, int round, Progress& progress)
@@ -98,7 +90,6 @@ class ShardCount {
     };
     SURFEIT_ASSIGN_OR_RETURN(const CloudTotals totals,
                              job_.reader.read(records, consume, progress_));
-    SURFEIT_RETURN_IF_ERROR(checkAlone(totals));
     stats.records += records.end - records.begin;
     stats.surfels += totals.surfels;
     return write(totals, pinned ? pinned->outside() : 0, stats);
@@ -217,6 +208,8 @@ IndexShardPlan planOf(const IndexShardJob& job, RoundCounts counts, int round) {
   plan.origin = job.reader.origin();
   plan.cube = cubeAsked(job.options, plan.totals.bounds, plan.origin);
   plan.round = round;
+  const CloudTotals& totals = plan.totals;
+  plan.needs_neighbours = totals.missing_both + totals.covering > 0 || normalRule(job, plan);
   plan.sample.resize(plan.totals.sample.size());
   if (!plan.sample.empty()) {
     curveKeys(&plan.totals.sample.front().position, sizeof(Surfel), plan.cube, plan.sample);

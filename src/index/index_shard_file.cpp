@@ -32,11 +32,15 @@ void IndexShardWriter::Deleter::operator()(XXH3_state_s* hash) const { XXH3_free
 
 std::uint64_t checksumOf(Bytes bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 
+const char* passName(IndexPass pass) {
+  constexpr const char* kNames[] = {"count", "distribute", "build", "places", "sizes"};
+  return kNames[std::size_t(pass)];
+}
+
 std::string indexShardPath(const std::string& scene_path, IndexPass pass, int shard, int count,
                            int round) {
-  std::string name = pass == IndexPass::kCount        ? "count"
-                     : pass == IndexPass::kDistribute ? "ranges"
-                                                      : "slabs";
+  constexpr const char* kWords[] = {"count", "ranges", "slabs", "places", "sized"};
+  std::string name = kWords[std::size_t(pass)];
   if (round > 1) name += std::to_string(round);
   return fmt::format("{}.{}-{:0{}}-of-{}", scene_path, name, shard,
                      fmt::formatted_size("{}", count), count);

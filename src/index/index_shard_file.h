@@ -25,6 +25,9 @@ namespace surfeit {
 std::string indexShardPath(const std::string& scene_path, IndexPass pass, int shard, int count,
                            int round);
 
+// As on the command line.
+const char* passName(IndexPass pass);
+
 // XXH3-64.
 std::uint64_t checksumOf(Bytes bytes);
 

@@ -51,6 +51,11 @@ json identityOf(const IndexShardJob& job) {
   if (const auto& cube = options.cube) {
     identity["cube"] = {cube->corner.x, cube->corner.y, cube->corner.z, cube->size};
   }
+  if (const auto& normals = options.normals) {
+    const glm::dvec3& sensor = normals->orientation.sensor;
+    identity["normals"] = {static_cast<int>(normals->orientation.toward), sensor.x, sensor.y,
+                           sensor.z, normals->thin_is_two_sided};
+  }
   if (!job.groups.names.empty()) {
     json groups = json::array();
     for (const auto& group : job.groups.of_inputs) groups.push_back(group ? int(*group) : -1);
@@ -71,11 +76,6 @@ Status checkShardInputs(const GroupPlan& groups, const std::string& output,
   if (target.is_stream) {
     return Status::invalidArgument(
         fmt::format("{}: shards stand beside the scene, expected the name of a file", output));
-  }
-  if (options.normals) {
-    return Status::invalidArgument(
-        "shards of an index cannot find normals: neighbours lie in other shards; find them first "
-        "(surfeit normals CLOUD -o OUT.ply), or index on one machine");
   }
   return checkIndexOptions(options);
 }
@@ -128,6 +128,18 @@ CloudReader::Records IndexShardJob::recordsOf(int shard) const {
     return whole * std::uint64_t(shards) + rest * std::uint64_t(shards) / std::uint64_t(count);
   };
   return {end(shard - 1), end(shard)};
+}
+
+std::optional<NormalRule> normalRule(const IndexShardJob& job, const IndexShardPlan& plan) {
+  if (!job.options.normals || plan.totals.spheres == 0) return std::nullopt;
+  return NormalRule(*job.options.normals, job.up(), plan.origin,
+                    glm::vec3(plan.totals.bounds.centre()));
+}
+
+SceneDescription describe(const IndexShardJob& job, const IndexShardPlan& plan,
+                          const std::optional<NormalRule>& rule) {
+  return {job.options, job.group_names,         plan.totals,     plan.origin,
+          job.up(),    rule ? &*rule : nullptr, job.reader.crs()};
 }
 
 void LackingShards::add(int shard, const std::string& reason) {

@@ -15,19 +15,14 @@
 #include "index/group_plan.h"
 #include "index/index_shard_file.h"
 #include "index/index_shard_ranges.h"
+#include "index/scene_description.h"
+#include "octree/neighbours/normal_rule.h"
 #include "surfeit/index.h"
 #include "surfeit/index_shards.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
-
-// Why shards refuse surfels without sizes, and the way out.
-inline constexpr const char* kNeighboursElsewhere =
-    "sizes follow from neighbours, which lie in other shards: index on one machine, or give every "
-    "piece areas first (surfeit index PIECE -o PIECE.sft --precision full, surfeit convert "
-    "PIECE.sft "
-    "-o PIECE.ply)";
 
 // A job with its inputs open. What is read of them is counted from the origin of the reader.
 struct IndexShardJob {
@@ -45,6 +40,8 @@ struct IndexShardJob {
                                     const std::string& output, const IndexOptions& options,
                                     int count, Progress& progress);
 
+  // By the channels of the clouds. What their surfels lack, the counts tell.
+  bool mayNeedNeighbours() const { return reader.lacksSizes() || options.normals.has_value(); }
   UpAxis up() const { return options.up.value_or(reader.up()); }
   // The records of a shard.
   CloudReader::Records recordsOf(int shard) const;
@@ -62,6 +59,7 @@ struct IndexShardPlan {
   std::vector<CurveKey> splitters;  // where ranges begin
   std::string identity;             // files of one plan have it
   int round = 1;                    // of the counts
+  bool needs_neighbours = false;    // sizes or normals follow from neighbours
 
   std::size_t rangeCount() const { return splitters.size() + 1; }
 };
@@ -69,6 +67,12 @@ struct IndexShardPlan {
 // Makes the plan from the files of the counts, and counts positions from its origin from now on.
 // kIncomplete where some are missing; `next` is what is to be done once they are there.
 Result<IndexShardPlan> readPlan(IndexShardJob& job, const std::string& next, Progress& progress);
+
+// The rule by which normals are found; absent where no surfel asks for it.
+std::optional<NormalRule> normalRule(const IndexShardJob& job, const IndexShardPlan& plan);
+// Of the scene. All of it must stay where it is.
+SceneDescription describe(const IndexShardJob& job, const IndexShardPlan& plan,
+                          const std::optional<NormalRule>& rule);
 
 // Counts a shard, about every origin that the counts so far ask for, unless it is counted. True
 // when it was counted before.

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -11,179 +11,142 @@
 #include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/parallel.h"
+#include "index/index_neighbours.h"
 #include "index/index_notes.h"
 #include "index/index_plan.h"
 #include "index/index_shard_passes.h"
+#include "index/index_shard_places.h"
+#include "index/index_shard_slabs.h"
 #include "index/phase_clock.h"
 #include "index/scene_description.h"
-#include "octree/build/built_slab_bytes.h"
 #include "octree/build/octree_builder.h"
 #include "octree/build/scene_writer.h"
-#include "octree/neighbours/repeated_surfels.h"
 
 namespace surfeit {
 namespace {
 
-// No slab takes more: a claim of more is damage.
-constexpr std::uint64_t kMostSlabBytes = 512 << 20;
-
-// The slabs of all builds, in order.
-class StoredSlabs : public SlabSource {
- public:
-  StoredSlabs(const IndexShardJob& job, const IndexShardPlan& plan, std::size_t works)
-      : job_(job), plan_(plan), stored_(works) {}
-
-  Result<bool> fetch(std::size_t work) override {
-    while (!reader_ || offset_ == reader_->payloadBytes()) {
-      if (shard_ == job_.count) return false;
-      SURFEIT_RETURN_IF_ERROR(openNext());
-    }
-    Stored& stored = stored_[work];
-    std::uint64_t head[2] = {};
-    Status status = reader_->readAt(offset_, std::as_writable_bytes(std::span(head)));
-    if (status.ok() &&
-        (head[0] > kMostSlabBytes || head[0] > reader_->payloadBytes() - offset_ - sizeof head)) {
-      status = Status::corruption(
-          fmt::format("{}: slab at {}: {} bytes", reader_->path(), offset_, head[0]));
-    }
-    if (!status.ok()) return damaged(shard_, status);
-    stored.bytes.resize(static_cast<std::size_t>(head[0]));
-    status = reader_->readAt(offset_ + sizeof head, stored.bytes);
-    if (!status.ok()) return damaged(shard_, status);
-    stored.shard = shard_;
-    stored.checksum = head[1];
-    offset_ += sizeof head + head[0];
-    return true;
-  }
-
-  Status build(std::size_t work, BuiltSlab& built) override {
-    const Stored& stored = stored_[work];
-    if (checksumOf(stored.bytes) != stored.checksum) {
-      return damaged(stored.shard,
-                     Status::corruption(fmt::format("{}: a slab does not fit its checksum",
-                                                    job_.path(IndexPass::kBuild, stored.shard))));
-    }
-    const Status status = decodeBuiltSlab(stored.bytes, built);
-    return status.ok() ? status : damaged(stored.shard, status);
-  }
-
- private:
-  struct Stored {
-    std::vector<std::byte> bytes;
-    std::uint64_t checksum = 0;
-    int shard = 0;
-  };
-
-  Status openNext() {
-    ++shard_;
-    offset_ = 0;
-    LackingShards lacking;
-    SURFEIT_ASSIGN_OR_RETURN(reader_, openShard(job_.path(IndexPass::kBuild, shard_), shard_,
-                                                expectedShard(job_, plan_, shard_), lacking));
-    return lacking.status(job_, "build", "merge");
-  }
-
-  // Damage is named as what lacks; other failures pass.
-  Status damaged(int shard, const Status& status) const {
-    if (status.code() != StatusCode::kCorruption) return status;
-    LackingShards lacking;
-    lacking.add(shard, status.message());
-    return lacking.status(job_, "build", "merge");
-  }
-
-  const IndexShardJob& job_;
-  const IndexShardPlan& plan_;
-  std::vector<Stored> stored_;
-  std::optional<IndexShardReader> reader_;
-  int shard_ = 0;  // being read
-  std::uint64_t offset_ = 0;
-};
-
+// The scene of one job, from what the last pass has built.
 class IndexMerge {
  public:
   IndexMerge(const IndexShardJob& job, const IndexShardPlan& plan, Progress& progress)
-      : job_(job), plan_(plan), progress_(progress), clock_(stats_), left_(plan.splitters) {}
+      : job_(job),
+        plan_(plan),
+        pass_(plan.needs_neighbours ? IndexPass::kSizes : IndexPass::kBuild),
+        rule_(normalRule(job, plan)),
+        description_(describe(job, plan, rule_)),
+        progress_(progress),
+        clock_(stats_) {}
 
   Result<IndexStats> run() {
     SURFEIT_RETURN_IF_ERROR(readFacts());
     const IndexOptions& options = job_.options;
-    IndexTask task;
-    task.memory_bytes = options.memory_bytes;
-    task.threads = options.threads;
-    task.records = plan_.totals.surfels;
-    task.slabs = {options.leaf_capacity, options.full_precision};
-    SURFEIT_ASSIGN_OR_RETURN(const IndexPlan memory, planIndex(task));
+    SURFEIT_ASSIGN_OR_RETURN(memory_, planMerge());
     noteIndexRules(plan_.totals, job_.reader, options, progress_);
     noteRepeats(stats_, options, progress_);
     if (progress_.isCancelled()) return Status::interrupted();
 
-    const SceneDescription description{options,   job_.group_names, plan_.totals,     plan_.origin,
-                                       job_.up(), nullptr,          job_.reader.crs()};
-    SURFEIT_ASSIGN_OR_RETURN(
-        const std::unique_ptr<SceneWriter> writer,
-        SceneWriter::create(job_.output, description.header(options.full_precision),
-                            description.identity(options.full_precision)));
+    SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<SceneWriter> writer,
+                             createWriter(job_.output, options.full_precision));
     noteSceneName(job_.output, progress_);
-    progress_.beginPhase("merge", expected(), "surfels");
-    StoredSlabs slabs(job_, plan_, memory.slabs);
-    SURFEIT_RETURN_IF_ERROR(stitchOctree(slabs, *writer, memory.slabs, progress_));
-    if (writer->header().surfel_count != expected()) {
-      return Status::failed(fmt::format("{}: {} surfels merged, expected {}: this is a bug",
-                                        job_.output, writer->header().surfel_count, expected()));
-    }
-    clock_.finish("merge");
-    SURFEIT_RETURN_IF_ERROR(writer->finish(description.provenance()));
+    SURFEIT_RETURN_IF_ERROR(needsSides() ? mergeWithSides(*writer) : merge(*writer));
+    if (plan_.needs_neighbours) noteThinSurfels(stats_, options, progress_);
+    SURFEIT_RETURN_IF_ERROR(writer->finish(description_.provenance()));
     clock_.finish("finish");
     takeStats(*writer);
     return stats_;
   }
 
  private:
-  std::uint64_t expected() const { return plan_.totals.surfels - left_out_; }
+  // Neighbours must agree on the sides of their normals, over the whole scene.
+  bool needsSides() const { return rule_ && rule_->needsSides(); }
+  bool fullPrecision() const {
+    return plan_.needs_neighbours ? sizesAtFullPrecision(job_, plan_) : job_.options.full_precision;
+  }
 
-  // That all builds are there.
+  // That all shards of the last pass are there.
   Status readFacts() {
+    if (pass_ == IndexPass::kBuild) {
+      SURFEIT_ASSIGN_OR_RETURN(const BuiltShards built,
+                               readBuilds(job_, plan_, "merge", progress_));
+      takeBuilt(built);
+      return {};
+    }
+    SURFEIT_ASSIGN_OR_RETURN(const ShardPlaces places, readPlaces(job_, plan_, "merge"));
+    takeBuilt(places.built);
     LackingShards lacking;
     std::uint64_t surfels = 0;
     for (int shard = 1; shard <= job_.count; ++shard) {
       if (progress_.isCancelled()) return Status::interrupted();
-      SURFEIT_ASSIGN_OR_RETURN(const auto reader,
-                               openShard(job_.path(IndexPass::kBuild, shard), shard,
-                                         expectedShard(job_, plan_, shard), lacking));
+      SURFEIT_ASSIGN_OR_RETURN(
+          const auto reader,
+          openShard(job_.path(pass_, shard), shard, expectedShard(job_, plan_, shard), lacking));
       if (!reader) continue;
-      const nlohmann::json& facts = reader->facts();
-      surfels += facts.value("surfels", std::uint64_t{0});
-      left_out_ += facts.value("left_out", std::uint64_t{0});
-      if (shard > 1 && facts.value("begins", false)) begins_.push_back(std::size_t(shard) - 1);
-      addLeft(facts);
-      stats_.repeated_surfels += facts.value("repeated", std::uint64_t{0});
+      surfels += reader->facts().value("surfels", std::uint64_t{0});
+      stats_.normals_found += reader->facts().value("normals_found", std::uint64_t{0});
+      stats_.thin_surfels += reader->facts().value("thin_surfels", std::uint64_t{0});
     }
-    SURFEIT_RETURN_IF_ERROR(lacking.status(job_, "build", "merge"));
-    if (surfels == plan_.totals.surfels) return checkLeft();
-    return Status::failed(fmt::format("{}: {} surfels built, expected {}: this is a bug",
-                                      job_.output, surfels, plan_.totals.surfels));
+    SURFEIT_RETURN_IF_ERROR(lacking.status(job_, passName(pass_), "merge"));
+    if (surfels == expected_) return {};
+    return Status::failed(fmt::format("{}: sizes of {} surfels, expected {}: this is a bug",
+                                      job_.output, surfels, expected_));
   }
 
-  // Surfels that are left where repeated ones are left out.
-  void addLeft(const nlohmann::json& facts) {
-    const auto left = facts.value("left", std::vector<std::uint64_t>());
-    if (left.size() != left_.counts().size()) return;
-    std::vector<RangeCount> counts(left.size());
-    for (std::size_t i = 0; i < left.size(); ++i) counts[i].surfels = left[i];
-    left_.add(std::span<const RangeCount>(counts));
+  void takeBuilt(const BuiltShards& built) {
+    stats_.repeated_surfels = built.repeated;
+    expected_ = plan_.totals.surfels - built.left_out;
   }
 
-  // That no range begins within a brick.
-  Status checkLeft() const {
-    if (job_.options.repeats != Repeats::kThin) return {};
-    for (const std::size_t range : begins_) {
-      if (left_.hasBefore(range, kBrickSurfels)) continue;
-      return Status::invalidArgument(fmt::format(
-          "{}: so many surfels repeat others that the curve cannot be cut before shard {}: index "
-          "with fewer shards than {}, or on one machine",
-          job_.output, range + 1, job_.count));
-    }
+  Result<IndexPlan> planMerge() const {
+    IndexTask task;
+    task.memory_bytes = job_.options.memory_bytes;
+    task.threads = job_.options.threads;
+    task.records = plan_.totals.surfels;
+    task.slabs = {job_.options.leaf_capacity, fullPrecision()};
+    if (needsSides()) task.search_bytes = leastNeighbourBytes(job_.options.normals, task.threads);
+    return planIndex(task);
+  }
+
+  Result<std::unique_ptr<SceneWriter>> createWriter(const std::string& path,
+                                                    bool full_precision) const {
+    return SceneWriter::create(path, description_.header(full_precision),
+                               description_.identity(full_precision));
+  }
+
+  Status checkCount(const SceneWriter& writer) const {
+    if (writer.header().surfel_count == expected_) return {};
+    return Status::failed(fmt::format("{}: {} surfels merged, expected {}: this is a bug",
+                                      job_.output, writer.header().surfel_count, expected_));
+  }
+
+  Status merge(SceneWriter& writer) {
+    progress_.beginPhase("merge", expected_, "surfels");
+    StoredSlabs slabs(job_, plan_, pass_, "merge", memory_.slabs);
+    SURFEIT_RETURN_IF_ERROR(stitchOctree(slabs, writer, memory_.slabs, progress_));
+    SURFEIT_RETURN_IF_ERROR(checkCount(writer));
+    clock_.finish("merge");
     return {};
+  }
+
+  // As one machine does it: a scene without a name, whose normals point to either side, then the
+  // real one.
+  Status mergeWithSides(SceneWriter& writer) {
+    SURFEIT_ASSIGN_OR_RETURN(const auto unnamed,
+                             createWriter(job_.temporary_directory + "/surfeit-octree.sft", true));
+    SURFEIT_RETURN_IF_ERROR(merge(*unnamed));
+    SURFEIT_ASSIGN_OR_RETURN(SceneFile scene, unnamed->finishUnnamed(description_.provenance()));
+    NeighbourBuild how;
+    how.threads = job_.options.threads;
+    how.memory_bytes = memory_.octree_memory;
+    how.temporary_directory = job_.temporary_directory;
+    how.up = job_.up();
+    how.build = [&](SortedSurfelStream& stream) -> Status {
+      progress_.beginPhase("build", expected_, "surfels");
+      SURFEIT_RETURN_IF_ERROR(buildOctree(stream, writer, memory_.slabs, progress_));
+      SURFEIT_RETURN_IF_ERROR(checkCount(writer));
+      clock_.finish("build");
+      return {};
+    };
+    return buildOriented(std::move(scene), how, stats_, clock_, progress_);
   }
 
   void takeStats(const SceneWriter& writer) {
@@ -199,12 +162,14 @@ class IndexMerge {
 
   const IndexShardJob& job_;
   const IndexShardPlan& plan_;
+  const IndexPass pass_;  // whose slabs are merged
+  const std::optional<NormalRule> rule_;
+  const SceneDescription description_;
   Progress& progress_;
   IndexStats stats_;
   PhaseClock clock_;
-  std::uint64_t left_out_ = 0;
-  std::vector<std::size_t> begins_;  // ranges with which those begin that were built
-  RangeCounts left_;
+  IndexPlan memory_;
+  std::uint64_t expected_ = 0;  // surfels
 };
 
 void removeShards(const IndexShardJob& job, int rounds) {
@@ -214,7 +179,10 @@ void removeShards(const IndexShardJob& job, int rounds) {
     }
     unlink(job.path(IndexPass::kDistribute, shard).c_str());
     unlink(job.path(IndexPass::kBuild, shard).c_str());
+    unlink(job.path(IndexPass::kSizes, shard).c_str());
   }
+  unlink(job.path(IndexPass::kPlaces, 1).c_str());
+  unlink(placesPath(job).c_str());
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "index/index_shard_job.h"
 #include "index/index_shard_passes.h"
+#include "index/index_shard_places.h"
 
 namespace surfeit {
 namespace {
@@ -22,11 +23,18 @@ Result<bool> runShard(IndexShardJob& job, IndexPass pass, int shard,
     if (pass == IndexPass::kDistribute) {
       SURFEIT_RETURN_IF_ERROR(countShard(job, shard, stats, progress).status());
     }
-    SURFEIT_ASSIGN_OR_RETURN(
-        plan, readPlan(job, pass == IndexPass::kDistribute ? "distribute" : "build", progress));
+    SURFEIT_ASSIGN_OR_RETURN(plan, readPlan(job, passName(pass), progress));
   }
-  return pass == IndexPass::kDistribute ? distributeShard(job, *plan, shard, stats, progress)
-                                        : buildShard(job, *plan, shard, stats, progress);
+  switch (pass) {
+    case IndexPass::kDistribute:
+      return distributeShard(job, *plan, shard, stats, progress);
+    case IndexPass::kBuild:
+      return buildShard(job, *plan, shard, stats, progress);
+    case IndexPass::kPlaces:
+      return makePlaces(job, *plan, shard, stats, progress);
+    default:
+      return sizeShard(job, *plan, shard, stats, progress);
+  }
 }
 
 Result<IndexShardStats> runShards(IndexShardJob& job, IndexPass pass, const ShardRange& shards,

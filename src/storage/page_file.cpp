@@ -252,10 +252,16 @@ Status PageFile::checkTiling() const {
   return {};
 }
 
-Status PageFile::readPage(std::uint32_t page, AlignedBuffer& stored,
-                          std::vector<std::byte>& payload) const {
-  SURFEIT_ASSERT(page < pageCount());
+// The bytes of a page, checked: from the stage where they are there, else from the file.
+Result<Bytes> PageFile::readStored(std::uint32_t page, AlignedBuffer& stored) const {
   const PageEntry& at = entry(page);
+  const auto isPage = [&](Bytes bytes) {
+    return hash(bytes, pageSeed(identity_, at.offset)) == at.checksum;
+  };
+  if (stage_ != nullptr) {
+    const Bytes staged = stage_->find(file_, at.offset, at.stored_bytes, isPage, stored);
+    if (!staged.empty()) return staged;
+  }
   const Result<Bytes> read = file_.readView(at.offset, at.stored_bytes, stored);
   if (!read.ok()) return readError(page, read.status());
   const Bytes bytes = *read;
@@ -267,6 +273,14 @@ Status PageFile::readPage(std::uint32_t page, AlignedBuffer& stored,
       found != at.checksum) {
     return pageError(page, checksumMismatch(found, at.checksum));
   }
+  return bytes;
+}
+
+Status PageFile::readPage(std::uint32_t page, AlignedBuffer& stored,
+                          std::vector<std::byte>& payload) const {
+  SURFEIT_ASSERT(page < pageCount());
+  SURFEIT_ASSIGN_OR_RETURN(const Bytes bytes, readStored(page, stored));
+  const PageEntry& at = entry(page);
   payload.resize(at.payload_bytes);
   const Status status = decompressPage(bytes, payload);
   return status.ok() ? Status() : pageError(page, status.message());

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "storage/file.h"
+#include "storage/page_stage.h"
 #include "surfeit/status.h"
 #include "surfeit/version.h"
 
@@ -80,6 +81,11 @@ class PageFile {
   // most two alignments more than maxStoredBytes(). page must be below pageCount(). Messages read
   // "scene.sft: page 1832 at 30015488: checksum ..., expected ...".
   Status readPage(std::uint32_t page, AlignedBuffer& stored, std::vector<std::byte>& payload) const;
+  // From now on pages are looked for there first, and kept there when they are read. Before other
+  // threads read.
+  void setStage(std::shared_ptr<PageStage> stage) { stage_ = std::move(stage); }
+  // Null unless there is one.
+  const std::shared_ptr<PageStage>& stage() const { return stage_; }
   // Whether the pages fill the space between header and provenance without gap or overlap: that
   // they do in sum, open has checked. Takes memory of 16 bytes per page.
   Status checkTiling() const;
@@ -96,9 +102,11 @@ class PageFile {
   Status readError(std::uint32_t page, const Status& status) const;
   Status partError(const char* part, const std::string& message) const;
 
+  Result<Bytes> readStored(std::uint32_t page, AlignedBuffer& stored) const;
   PageEntry* directory() const { return reinterpret_cast<PageEntry*>(directory_.data()); }
 
   InputFile file_;
+  std::shared_ptr<PageStage> stage_;
   std::uint32_t format_version_ = 0;
   std::uint64_t identity_ = 0;
   std::uint32_t page_count_ = 0;

@@ -37,18 +37,134 @@ badIndexPlansAreRefused() {
   says "found 2 kinds"
   run 2 plan --index -o o.sft --shards 2 --slurm --memory 64M --time 1h
   says "no input cloud"
-  run 2 "${plan[@]}" --shards 2 --normals estimate
-  says "surfeit normals"
   run 2 "${plan[@]}" --shards 2 --mode bleeding
   run 2 "${plan[@]}" --shards 2 --leaf 0
   run 2 "${plan[@]}" --shards 20000
   run 2 plan a.ply b.ply -o o.sft --shards 2 --slurm --overlap thin
   run 2 plan --index a.##.ply -o o.sft --shards 2 --slurm --frames 1-2 --memory 64M --time 1h
   says "o.sft: with --frames every frame would replace"
-  # What follows from neighbours
+}
+
+# Whether the job has the passes for neighbours: by channels, options, and what is asked for.
+plansSeeWhoNeedsNeighbours() {
+  local plan=(-o o.sft --shards 2 --memory 64M --time 1h --slurm) five="count distribute build places sizes"
   printf '%s\n' "1 2 3" "2 3 4" "3 4 5" "5 6 7" > bare.xyz
-  run 2 plan --index bare.xyz -o o.sft --shards 2 --slurm
-  says "neither radii nor areas"
+  generate set.ply --surfels 1k
+  run 0 plan --index bare.xyz "${plan[@]}"
+  says "passes=($five)" "files=(count ranges slabs places sized)" "5 passes of 2 tasks"
+  run 0 plan --index set.ply "${plan[@]}"
+  says "passes=(count distribute build)" "files=(count ranges slabs)"
+  run 0 plan --index set.ply --group lamp=bare.xyz "${plan[@]}"
+  says "passes=($five)"
+  run 0 plan --index set.ply --normals estimate "${plan[@]}"
+  says "passes=($five)" "--normals=estimate"
+  run 0 plan --index set.ply --neighbours "${plan[@]}"
+  says "passes=($five)" "options=()"
+  run 0 plan --index none.ply "${plan[@]}"
+  says "none.ply" "planned as if every surfel had a size (--neighbours)" "passes=(count distribute build)"
+  run 0 plan --index none.ply --neighbours "${plan[@]}"
+  says "passes=($five)"
+  [[ $said != *planned* ]] || fail "$said"
+  # By a sample, and of the first frame
+  run 0 plan --index bare.xyz -o o.sft --shards 2 --slurm
+  says "passes=($five)"
+  cp bare.xyz c.3.xyz
+  run 0 plan --index c.%d.xyz -o o.%d.sft --shards 2 --memory 64M --make --frames 3-4
+  says "passes=($five)" "places-1" "places-3"
+}
+
+# Faults of the passes for neighbours, beside those below.
+makeNeighbourFaults() {
+  echo 100 > faults/memory-places-1
+  : > faults/killed-sizes-2
+  echo once > faults/files-sizes-3
+}
+
+neighbourFaultsAreOvercome() {
+  callsAre places-1 "64:33 128:0"
+  callsAre places-2 ""
+  callsAre sizes-2 "64:137 64:0"
+  callsAre sizes-3 "64:74 64:0"
+}
+
+parallelFindsSizes() {
+  command -v parallel > /dev/null || { echo "skipped: no GNU parallel"; exit 77; }
+  makeBareFarmCloud
+  makeFarmSurfeit
+  planIndex parallel 3 "out [1].sft" --normals estimate
+  printf '%s\n' "$said" > job.sh
+  makeNeighbourFaults
+  JOBS=2 bash job.sh || fail "exit status $? of the job"
+  sameBytes one.sft "out [1].sft"
+  neighbourFaultsAreOvercome
+  # The places are gone when the merge looks
+  rm -f faults/log "out [1].sft" "out [1].sft.sized-1-of-3"
+  echo "out [1].sft.sized-2-of-3" > faults/removed-sizes-2
+  rm -f "out [1].sft.places"
+  rm -f "out [1].sft.farm"/joblog-*
+  JOBS=2 bash job.sh || fail "exit status $? of the second run"
+  sameBytes one.sft "out [1].sft"
+}
+
+makeFindsSizes() {
+  command -v make > /dev/null || { echo "skipped: no make"; exit 77; }
+  makeBareFarmCloud
+  makeFarmSurfeit
+  planIndex make 3 "out [1].sft" --normals estimate --remove-shards
+  printf '%s\n' "$said" > job.mk
+  makeNeighbourFaults
+  make -f job.mk -j 2
+  sameBytes one.sft "out [1].sft"
+  neighbourFaultsAreOvercome
+  leavesNothing "out [1].sft." || fail "left behind: $(ls)"
+  # Frames
+  rm faults/log
+  local frame
+  for frame in 1 2; do
+    generate set.ply --surfels 20k --seed "$frame"
+    "$surfeit" convert -q set.ply -o "c.$frame.ply" --keep albedo
+    "$surfeit" index -q "c.$frame.ply" -o "one.$frame.sft" --memory 64M
+  done
+  run 0 plan --index c.%d.ply -o f.%d.sft --shards 2 --frames 1-2 --memory 64M --threads 1 --make
+  printf '%s\n' "$said" > job.mk
+  make -j 2 -f job.mk
+  for frame in 1 2; do sameBytes "one.$frame.sft" "f.$frame.sft"; done
+}
+
+slurmFindsSizes() {
+  makeBareFarmCloud
+  makeFarmSurfeit
+  makeFakeSlurm
+  planIndex slurm 3 "out [1].sft" --time 5m --normals estimate
+  printf '%s\n' "$said" > job.sh
+  makeNeighbourFaults
+  echo "out [1].sft.sized-1-of-3" > faults/removed-sizes-1
+  bash job.sh || fail "exit status $? of the job"
+  [[ $(cat "out [1].sft.farm/end") == 0 ]] || fail "ended with $(cat "out [1].sft.farm/end" "out [1].sft.farm/merge.log")"
+  sameBytes one.sft "out [1].sft"
+  # A round of places, one of sizes, and one of the shard that is gone
+  callsAre places-1 "64:33 128:0"
+  callsAre places-2 ""
+  callsAre count-1 "64:0"
+  callsAre build-2 "64:0"
+  [[ $(calls sizes-2) == "64:137 "*"64:0" ]] || fail "$(calls sizes-2)"
+  # The scene of places is gone, although the pass was done: it looks again
+  rm -f faults/log "out [1].sft" "out [1].sft.places" "out [1].sft.sized-2-of-3"
+  bash job.sh
+  [[ $(cat "out [1].sft.farm/end") == 0 ]] || fail "ended with $(cat "out [1].sft.farm/end" "out [1].sft.farm/merge.log")"
+  sameBytes one.sft "out [1].sft"
+}
+
+openJdFindsSizes() {
+  python3 -c "import yaml" 2> /dev/null || { echo "skipped: no PyYAML"; exit 77; }
+  makeBareFarmCloud
+  makeFarmSurfeit
+  planIndex openjd 3 "out [1].sft" --time 5m --normals estimate
+  printf '%s\n' "$said" > one.yaml
+  makeNeighbourFaults
+  python3 "$(dirname "$script")/run_openjd.py" one.yaml "$PWD" || fail "one.yaml"
+  sameBytes one.sft "out [1].sft"
+  neighbourFaultsAreOvercome
 }
 
 # What can go wrong in the passes of an index in 3 shards, 64 MiB at first.

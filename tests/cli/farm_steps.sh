@@ -92,6 +92,14 @@ makeFarmCloud() {
   "$surfeit" index -q "$cloud" --group lamp=lamp.ply -o one.sft --memory 128M
 }
 
+# The same of places alone, whose sizes and normals follow from neighbours.
+makeBareFarmCloud() {
+  makeFarmCloud
+  "$surfeit" convert -q "$cloud" -o bare.ply --keep albedo
+  mv bare.ply "$cloud"
+  "$surfeit" index -q "$cloud" --group lamp=lamp.ply --normals estimate -o one.sft --memory 128M
+}
+
 # planIndex KIND SHARDS RESULT OPTION...: a plan of an index of that cloud, in `said`.
 planIndex() {
   run 0 plan --index "$cloud" --group lamp=lamp.ply -o "$3" --shards "$2" --memory 64M --threads 1 \

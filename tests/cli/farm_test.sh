@@ -29,6 +29,8 @@ plansAreGolden() {
       --overlap thin --remove-shards "--$kind"
     isGolden "plan_index_frames_$kind.$extension" --index crowd.####.ply -o crowd.####.sft \
       --shards 7 --frames 1-7x3,-2 --memory 512M --time 90s --threads 1 "--$kind"
+    isGolden "plan_index_neighbours_$kind.$extension" --index scan.####.las -o scan.####.sft \
+      --shards 3 --frames 1-2 --memory 1G --time 45m --threads 2 --normals estimate "--$kind"
   done
 }
 
@@ -297,6 +299,8 @@ documentedCommandsWork() {
     generate "crowd.$n.ply" --surfels 200 --seed "$frame"
     cp street.ply "street.$n.ply"
   done
+  generate scan.las --surfels 3k
+  "$surfeit" convert -q scan.las -o scan.ply --keep position
   export TMPDIR=$PWD/scratch
   mkdir scratch
   bash -euxo pipefail -c "$commands" || fail "a command of $docs"
@@ -305,6 +309,8 @@ documentedCommandsWork() {
   for frame in 1 2 3; do exists "lit.000$frame.ply"; done
   "$surfeit" index -q crowd.0001.ply crowd.0002.ply -o one.sft --memory 64M
   sameBytes one.sft two.sft
+  "$surfeit" index -q scan.ply -o one.sft --normals estimate --memory 80M
+  sameBytes one.sft scan.sft
 }
 
 runCase

@@ -18,6 +18,7 @@ commands=(
   "gather scene.sft receivers.ply -o out.ply --quality draft --max-variation 0.02"
   "gather scene.sft receivers.ply -o out.ply --quality draft --mode glossy --camera 0.5,0.5,2"
   "gather scene.sft receivers.ply -o out.vdb --quality draft"
+  "gather scene.sft receivers.ply -o out.ply --quality draft --stage ."
   "tune scene.sft receivers.ply --quality draft"
   "relight scene.sft -o out.sft --light-directional 0,-1,0,1,1,1"
   "bounce scene.sft -o out.sft --bounces 2 --surfels-per-receiver 64 --spare-last"
@@ -33,6 +34,8 @@ commands=(
   "convert cloud.ply -o out.vdb --spacing 0.01"
   "merge scene.sft receivers.ply -o shards.ply"
   "composite passes.exr light.exr -o out.png --channel lit"
+  "index points.ply -o pass.sft --normals estimate --pass sizes --shard 2/2"
+  "index points.ply -o sided.sft --normals estimate --orient consistent --pass merge --shards 2"
   "plan scene.sft receivers.ply -o out.ply --quality draft --shards 2 --slurm"
 )
 
@@ -50,7 +53,15 @@ makeInputs() {
   run 0 convert cloud.ply -o receivers.ply --every 100 --quiet
   run 0 sample cornell.obj -o photons.ply --photons 50000 --quiet
   run 0 brick cloud.ply --channel radiosity -o map.vdb --quiet
-  local shard
+  local shard pass
+  for pass in count distribute build places sizes; do
+    for shard in 1/2 2/2; do
+      run 0 index points.ply -o sided.sft --normals estimate --orient consistent --pass "$pass" \
+        --shard $shard --quiet
+      [[ $pass == sizes ]] || run 0 index points.ply -o pass.sft --normals estimate --pass "$pass" \
+        --shard $shard --quiet
+    done
+  done
   for shard in 1/2 2/2; do
     run 0 gather scene.sft receivers.ply -o shards.ply --quality draft --shard $shard --quiet
   done
@@ -80,7 +91,7 @@ sys.exit(status)' "$@"
 runWithin() {
   local command=$2 status=0 start=("$surfeit") stats=(--stats stats.json)
   [[ $command != plan* ]] || start=(withPeak "$surfeit") stats=()
-  rm -f out.* stats.json
+  rm -f out.* pass.sft.sized-* stats.json
   # shellcheck disable=SC2086 # a list of words
   said=$("${start[@]}" $command "${stats[@]}" --progress none "${@:3}" 2>&1) || status=$?
   case $status in

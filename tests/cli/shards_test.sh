@@ -52,6 +52,57 @@ stoppedGathersGoOn() {
   sameBytes out.ply one.ply
 }
 
+# Two tasks at once with one stage, then one whose pages are all there, damaged ones among them.
+stagesHaveTheSameBytes() {
+  makeJob
+  mkdir node
+  local shard gather=(gather set.sft places.ply -o out.ply --quality draft --memory 64M --threads 1)
+  for shard in 1 2; do
+    "$surfeit" "${gather[@]}" --stage node --shard "$shard/4" --stats "$shard.json" --quiet &
+  done
+  wait
+  run 0 "${gather[@]}" --stage node --shard 3/4 --stats 3.json
+  says "stage: " " read there"
+  (($(du -k node | cut -f 1) > 100 && $(field 3.json staged_bytes_read) > 0)) || fail "nothing staged"
+  [[ $(ls node) == surfeit-stage-*.pages ]] || fail "$(ls node)"
+  # Of the environment, as jobs of a plan have it
+  SCRATCH=$PWD run 0 "${gather[@]}" --stage '$SCRATCH/node' --shard 4/4 --stats 4.json
+  (($(field 4.json staged_bytes_read) > 0)) || fail "another stage"
+  run 0 merge set.sft places.ply -o out.ply --memory 64M --remove-shards
+  sameBytes out.ply one.ply
+  # Damage in the middle, and a whole gather
+  dd if=set.ply of="$(echo node/*)" bs=1k seek=100 count=300 conv=notrunc status=none
+  run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --stage node --resume
+  says ": damaged at "
+  sameBytes out.ply one.ply
+  run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --stage node --stage-limit 1G
+  [[ $said != *damaged* ]] || fail "not mended"
+  sameBytes out.ply one.ply
+  # Another scene of this name
+  generate other.ply --surfels 30k --seed 7
+  run 0 index other.ply -o set.sft --memory 64M
+  run 0 gather set.sft places.ply -o one.ply --quality draft --memory 64M
+  run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --stage node
+  sameBytes out.ply one.ply
+  [[ $(ls node | wc -l) == 2 ]] || fail "$(ls node)"
+  # No such directory, a limit, a full disk: told, and no failure
+  run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --stage nowhere
+  says "nowhere/" "cannot open" "what lacks is read from the scene"
+  sameBytes out.ply one.ply
+  rm node/*
+  run 0 gather set.sft places.ply -o out.ply --quality draft --memory 64M --stage node --stage-limit 100k
+  says "the limit is reached"
+  sameBytes out.ply one.ply
+  (($(du -k node | cut -f 1) <= 140)) || fail "$(du -k node)"
+  run 2 gather set.sft places.ply -o out.ply --stage '$NO_SUCH_VARIABLE/node'
+  says "a variable of the environment that is set"
+  run 2 gather set.sft places.ply -o out.ply --stage-limit 1G
+  run 2 gather set.sft places.ply -o out.ply --stage node --stage-limit 50%
+  # Plans have it as it is given
+  run 0 plan set.sft places.ply -o out.ply --shards 2 --memory 64M --make --stage '$TMPDIR' --stage-limit 20G
+  says "'--stage=\$\$TMPDIR'" "--stage-limit=20G"
+}
+
 shardsAreNamedWhereTheyLack() {
   makeJob
   local shard

@@ -66,9 +66,9 @@ sequencesAreOneArray() {
   for frame in 1 2 3; do sameBytes expected.ply "lit.000$frame.ply"; done
 }
 
-# runIndexJob SHARDS: plans and runs an index, and waits for its end.
+# runIndexJob SHARDS OPTION...: plans and runs an index, and waits for its end.
 runIndexJob() {
-  planIndex slurm "$1" out.sft --time 5m
+  planIndex slurm "$1" out.sft --time 5m "${@:2}"
   printf '%s\n' "$said" > job.sh
   bash job.sh || fail "exit status $? of the job"
   waitUntil 240 test -e out.sft.farm/end ||
@@ -97,6 +97,22 @@ indexesGiveTheSameBytes() {
     runIndexJob "$shards"
     sameBytes one.sft out.sft
   done
+}
+
+# The same of a cloud whose sizes and normals follow from neighbours; `places` has one task.
+sizesGiveTheSameBytes() {
+  skipWithoutSlurm
+  makeBareFarmCloud
+  makeFarmSurfeit
+  startSlurm
+  echo 100 > faults/memory-places-1
+  : > faults/lost-sizes-3
+  : > faults/stopped-sizes-2
+  runIndexJob 4 --normals estimate
+  sameBytes one.sft out.sft
+  callsAre places-1 "64:33 128:0"
+  callsAre places-2 ""
+  [[ $(calls sizes-3) == *"64:lost"*"64:0" ]] || fail "$(calls sizes-3)"
 }
 
 runCase

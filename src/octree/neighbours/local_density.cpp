@@ -25,7 +25,11 @@ bool needsSize(const Surfel& surfel) { return (surfel.flags & kSurfelNeedsSize) 
 SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap,
                                      std::optional<NormalRule> normals, int threads,
                                      const Progress& progress)
-    : octree_(octree), overlap_(overlap), normals_(std::move(normals)), progress_(progress) {
+    : octree_(octree),
+      overlap_(overlap),
+      normals_(std::move(normals)),
+      progress_(progress),
+      end_page_(octree.file().surfelPageCount()) {
   for (int i = 0; i < threads; ++i) searchers_.emplace_back(octree);
 }
 
@@ -128,10 +132,9 @@ void SizedSurfelStream::applyNormal(Surfel& surfel, const SurfaceAt& surface) {
 
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const SceneFile& file = octree_.file();
-  if (next_page_ == file.surfelPageCount()) return std::shared_ptr<const SortedBatch>();
+  if (next_page_ == end_page_) return std::shared_ptr<const SortedBatch>();
   const std::uint32_t pages = kThreadPages * std::uint32_t(searchers_.size());
-  SURFEIT_RETURN_IF_ERROR(
-      readPages(next_page_ + std::min(pages, file.surfelPageCount() - next_page_)));
+  SURFEIT_RETURN_IF_ERROR(readPages(next_page_ + std::min(pages, end_page_ - next_page_)));
 
   SURFEIT_RETURN_IF_ERROR(findOnThreads(
       searchers_, surfels_,

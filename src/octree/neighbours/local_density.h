@@ -37,6 +37,9 @@ class SizedSurfelStream : public SortedSurfelStream {
 
   // Samples the cloud for the limit below. Call once, before next().
   Status prepare();
+  // Only the surfels of some pages are handed out, `end` not included; the limit below is that of
+  // all. Before next().
+  void setPages(std::uint32_t begin, std::uint32_t end) { next_page_ = begin, end_page_ = end; }
   // No radius off a surface becomes larger: strays far from everything would cover the scene.
   float largestRadius() const { return largest_radius_; }
 
@@ -59,7 +62,7 @@ class SizedSurfelStream : public SortedSurfelStream {
   const Progress& progress_;
   std::vector<SurfaceSearch> searchers_;
   float largest_radius_ = 0;
-  std::uint32_t next_page_ = 0;
+  std::uint32_t next_page_ = 0, end_page_ = 0;
   std::vector<Surfel> surfels_;  // of the pages being sized
   std::atomic<std::uint64_t> normals_found_ = 0, thin_surfels_ = 0;
 };

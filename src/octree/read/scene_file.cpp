@@ -46,6 +46,12 @@ std::uint64_t SceneFile::fileBytes() const { return pages_.fileBytes(); }
 const SceneHeader& SceneFile::header() const { return header_; }
 const std::string& SceneFile::provenance() const { return pages_.provenance(); }
 const PageFile& SceneFile::pages() const { return pages_; }
+void SceneFile::stage(const PageStage::Options& options) {
+  if (options.directory.empty()) return;
+  pages_.setStage(std::make_shared<PageStage>(
+      options,
+      PageStage::Scene{pages_.identity(), pages_.directoryChecksum(), pages_.fileBytes()}));
+}
 std::uint32_t SceneFile::nodePageCount() const { return pages_.nodePageCount(); }
 std::uint32_t SceneFile::surfelPageCount() const {
   return pages_.pageCount() - pages_.nodePageCount();

@@ -38,6 +38,11 @@ class SceneFile {
   std::uint32_t nodePageCount() const;
   std::uint32_t surfelPageCount() const;
   const PageFile& pages() const;
+  // Pages are kept in a directory of this node, too (storage/page_stage.h), unless it is empty.
+  // Before any is read.
+  void stage(const PageStage::Options& options);
+  // In the same way as those of the same scene, opened before.
+  void stageAs(const SceneFile& other) { pages_.setStage(other.pages_.stage()); }
 
   // Scratch for one decoding thread.
   struct Scratch {

@@ -70,17 +70,17 @@ export surfeit_plan
 .PHONY: all
 all:
 
-count_tasks := $(addprefix count-,$(shell seq 16))
+count_tasks := $(addprefix count-,$(shell seq 1 1 16))
 .PHONY: $(count_tasks)
 $(count_tasks): count-%:
 	@bash -c "$$surfeit_plan" surfeit-plan count $*
 
-distribute_tasks := $(addprefix distribute-,$(shell seq 16))
+distribute_tasks := $(addprefix distribute-,$(shell seq 1 1 16))
 .PHONY: $(distribute_tasks)
 $(distribute_tasks): distribute-%:
 	@bash -c "$$surfeit_plan" surfeit-plan distribute $*
 
-build_tasks := $(addprefix build-,$(shell seq 16))
+build_tasks := $(addprefix build-,$(shell seq 1 1 16))
 .PHONY: $(build_tasks)
 $(build_tasks): build-%:
 	@bash -c "$$surfeit_plan" surfeit-plan build $*

@@ -67,7 +67,7 @@ export surfeit_plan
 .PHONY: all
 all:
 
-gather_tasks := $(addprefix gather-,$(shell seq 16))
+gather_tasks := $(addprefix gather-,$(shell seq 1 1 16))
 .PHONY: $(gather_tasks)
 $(gather_tasks): gather-%:
 	@bash -c "$$surfeit_plan" surfeit-plan gather $*

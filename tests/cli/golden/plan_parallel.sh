@@ -35,6 +35,13 @@ merge() {
     --threads="$threads" --memory="$2M" --shards="$shards" ${frame:+"--frames=$frame"}
 }
 
+# tasksOf PASS: the numbers of its tasks. The pass `places` has one for each frame.
+tasksOf() {
+  local step=1
+  [[ $1 != places ]] || step=$shards
+  seq 1 "$step" "$tasks"
+}
+
 # runTask PASS TASK TRIES: a shard, by the rules above; TRIES limits 74, 137 and 143.
 runTask() {
   local memory=$memory most status tries=0
@@ -86,7 +93,7 @@ rm -f "$farm"/*.stop
 # them
 for _ in 1 2 3; do
   for pass in "${passes[@]}"; do
-    seq "$tasks" | parallel --quote --joblog "$farm/joblog-$pass-$shards" --resume-failed \
+    tasksOf "$pass" | parallel --quote --joblog "$farm/joblog-$pass-$shards" --resume-failed \
       --retries 3 --jobs "$jobs" --workdir "$PWD" bash "$script" task "$pass" {}
   done
   status=0

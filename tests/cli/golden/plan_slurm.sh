@@ -45,6 +45,13 @@ minutes=90
 merge_minutes=90
 files=(shard)
 results=('lit [1].ply')
+# tasksOf PASS: the numbers of its tasks. The pass `places` has one for each frame.
+tasksOf() {
+  local step=1
+  [[ $1 != places ]] || step=$shards
+  seq 1 "$step" "$tasks"
+}
+
 farm=$result.farm
 rounds=${ROUNDS:-6}
 script=${BASH_SOURCE[0]:-}
@@ -58,9 +65,10 @@ submit() {
 
 # submitTasks PASS MEMORY TASK...: behind the jobs `before`; adds the jobs to `jobs`.
 submitTasks() {
-  local pass=$1 memory=$2 task most offset job
+  local pass=$1 memory=$2 limit=$minutes task most offset job
   local -A lists=()
   shift 2
+  [[ $pass != places ]] || limit=$merge_minutes
   # The numbers of an array are below MaxArraySize, so many tasks are several arrays
   most=$(scontrol show config | sed -n -E 's/^MaxArraySize *= *([0-9]+).*/\1/p')
   most=$((${most:-1001} - 1))
@@ -72,7 +80,7 @@ submitTasks() {
   done
   for offset in "${!lists[@]}"; do
     # Beside its budget, a task has the shell that runs it
-    job=$(submit --job-name="surfeit-$pass" --array="${lists[$offset]#,}" --time="$minutes" \
+    job=$(submit --job-name="surfeit-$pass" --array="${lists[$offset]#,}" --time="$limit" \
       --mem="$((memory + 64))M" ${before:+"--dependency=afterany$before"} \
       "$script" task "$pass" "$memory" "$offset") || return
     jobs+=:$job
@@ -92,7 +100,7 @@ submitAll() {
   for pass in "${passes[@]}"; do
     jobs=
     # shellcheck disable=SC2046
-    submitTasks "$pass" "$memory" $(seq "$tasks") || return
+    submitTasks "$pass" "$memory" $(tasksOf "$pass") || return
     before=$jobs
   done
   submitMerge 1 "$memory"
@@ -113,16 +121,17 @@ shardFile() {
 # Where shards are missing although none of their files is (the merge says so, or a task of the next
 # pass, by 75), one of them is none of this job, and all tasks look.
 missingTasks() {
-  local place pass shard task status memory looks=1 fails
+  local place pass shard last task status memory looks=1 fails
   local -a absent
   local -A own mine=()
   for ((place = ${#passes[@]} - 1; place >= 0; --place)); do
-    pass=${passes[place]} absent=() fails=0
-    for ((shard = 1; shard <= shards; ++shard)); do
+    pass=${passes[place]} absent=() fails=0 last=$shards
+    [[ $pass != places ]] || last=1
+    for ((shard = 1; shard <= last; ++shard)); do
       [[ -e $(shardFile "$1" "$place" "$shard") ]] || absent+=("$shard")
     done
     # shellcheck disable=SC2207
-    if ((looks && ${#absent[@]} == 0)); then absent=($(seq "$shards")); fi
+    if ((looks && ${#absent[@]} == 0)); then absent=($(seq "$last")); fi
     looks=0 own=()
     for shard in "${absent[@]}"; do
       task=$(($1 * shards + shard))
