@@ -64,7 +64,7 @@ Result<PageFile> PageFile::open(InputFile file) {
   pages.file_ = std::move(file);
   SURFEIT_RETURN_IF_ERROR(pages.readHeader());
 
-  std::uint64_t directory_offset, provenance_offset, provenance_checksum;
+  std::uint64_t directory_offset = 0, provenance_offset = 0, provenance_checksum = 0;
   SURFEIT_RETURN_IF_ERROR(
       pages.readFooter(directory_offset, provenance_offset, provenance_checksum));
 
