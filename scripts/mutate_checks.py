@@ -20,6 +20,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tempfile
 import time
 
 FILES = [
@@ -27,16 +28,19 @@ FILES = [
     "src/octree/page/byte_planes.h", "src/octree/page/column_codec.cpp",
     "src/octree/page/transparency_columns.h", "src/octree/page/surfel_group.cpp",
     "src/octree/page/node_group.cpp", "src/octree/page/facet_columns.cpp",
-    "src/octree/page/node_moments.cpp", "src/octree/read/scene_file.cpp",
+    "src/octree/page/node_moments.cpp", "src/octree/page/node_references.cpp",
+    "src/octree/page/lobe_columns.cpp", "src/octree/read/scene_file.cpp",
     "src/octree/read/verify.cpp", "src/octree/read/verify_bounds.cpp",
     "src/octree/read/verify_sums.cpp",
 ]
-TESTS = ["io/page_file_test.cpp"] + ["octree/" + name for name in (
+TESTS = ["io/page_file_test.cpp", "io/sparse_page_file_test.cpp"] + ["octree/" + name for name in (
     "column_codec_test.cpp", "surfel_group_test.cpp", "node_group_test.cpp", "node_bounds_test.cpp",
     "golden_test.cpp", "verify_test.cpp", "verify_hostile_test.cpp", "verify_sums_test.cpp",
-    "scene_header_test.cpp")]
+    "scene_header_test.cpp", "lobe_columns_test.cpp", "radiosity_rewriter_test.cpp",
+    "page_fields_test.cpp", "column_damage_test.cpp", "verify_claims_test.cpp")]
 # Tests that only sound files pass through: less refusal does not fail them.
 SKIPPED = "*.Sound*:VerifySumsTest.Clouds*:NodeBoundsTest.*:ColumnCodec.*Error*"
+SLOW = .1  # Seconds: a test that takes longer is not among the quick ones.
 FAILURE = (r"\s*\{?\s*(?:return\s+(?:false|damaged\(|wrongField\(|partError\(|pageError\(|"
            r"Status::corruption\(|message\(|fmt::format\()|wrong_ =|findings_?\.add\(|"
            r"packed\.take\()")
@@ -191,7 +195,6 @@ def main():
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="compilers at a time")
     parser.add_argument("--no-build", action="store_true")
-    parser.add_argument("--timeout", type=float, default=120, help="seconds of a run")
     arguments = parser.parse_args()
     source = os.path.abspath(os.path.join(os.path.dirname(__file__), ".."))
     os.chdir(source)
@@ -212,14 +215,16 @@ def main():
         build(edited, arguments, program)
 
     left, begin = [], time.monotonic()
-    failed = killedBy(program, 0, 10 * arguments.timeout, arguments.tests)
-    if failed:
-        sys.exit("mutate_checks.py: %s fails without a mutant" % failed)
+    seconds = times(program, arguments.tests or "-" + SKIPPED)
+    killers = {}  # of a file: the slow tests that have killed a mutant of it
     for i in chosen:
-        by = killedBy(program, i, arguments.timeout, arguments.tests)
+        path = mutants.all[i - 1][0]
+        by = killedBy(program, i, batches(seconds, killers.setdefault(path, [])), seconds)
         print("%3d %s:%d: %s: %s" % (i, *mutants.all[i - 1], by or "LEFT"), flush=True)
         if not by:
             left.append(i)
+        elif seconds.get(by, 0) > SLOW and by not in killers[path]:
+            killers[path].append(by)
     print("\n| file | checks | killed | left |\n|---|---|---|---|")
     for path in FILES:
         of_file = [i for i in chosen if mutants.all[i - 1][0] == path]
@@ -237,12 +242,39 @@ def put(path, text):
         file.write(text)
 
 
-def killedBy(program, number, timeout, tests):
-    """The first test that fails, or nothing. Quick tests come first."""
-    if tests:
-        return failing(program, number, timeout, tests)
-    return failing(program, number, timeout, "-Verify*:" + SKIPPED) or failing(
-        program, number, timeout, "Verify*-" + SKIPPED)
+def times(program, tests):
+    """The seconds of every test, all of which must pass as long as nothing is taken away."""
+    with tempfile.NamedTemporaryFile(suffix=".json") as report:
+        environment = dict(os.environ, SURFEIT_MUTANT="0", GTEST_FILTER=tests, GTEST_BRIEF="1",
+                           GTEST_OUTPUT="json:" + report.name)
+        done = subprocess.run([program], env=environment, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True, errors="replace")
+        if done.returncode != 0:
+            sys.exit("mutate_checks.py: fails without a mutant\n" + done.stdout[-4000:])
+        return {"%s.%s" % (suite["name"], test["name"]): float(test["time"].rstrip("s"))
+                for suite in json.load(report)["testsuites"] for test in suite["testsuite"]}
+
+
+def batches(seconds, first):
+    """Lists of tests: the quick ones, then `first`, then ever slower ones."""
+    in_order = sorted(seconds, key=seconds.get)
+    result = [[test for test in in_order if seconds[test] <= SLOW], [*first]]
+    for test in in_order:
+        if seconds[test] <= SLOW or test in first:
+            continue
+        if sum(map(seconds.get, result[-1])) > seconds[test] or len(result) == 2:
+            result.append([])
+        result[-1].append(test)
+    return list(filter(None, result))
+
+
+def killedBy(program, number, in_batches, seconds):
+    """The first test that fails, or nothing."""
+    for batch in in_batches:
+        failed = failing(program, number, 20 + 10 * sum(map(seconds.get, batch)), ":".join(batch))
+        if failed:
+            return failed
+    return ""
 
 
 def failing(program, number, timeout, tests):

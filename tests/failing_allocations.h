@@ -10,9 +10,13 @@ namespace {
 std::atomic<long> live_allocations{0};
 std::atomic<long> allocations_until_failure{-1};  // negative: none fails
 std::atomic<bool> fails_for_ever{false}, has_failed{false};
+// Whether those of the code at an address are let through; null: of none.
+std::atomic<bool (*)(const void*)> is_spared{nullptr};
 
-void* allocate(std::size_t bytes, std::size_t alignment) {
-  if (allocations_until_failure >= 0 && allocations_until_failure.fetch_sub(1) == 0) {
+void* allocate(std::size_t bytes, std::size_t alignment, const void* caller) {
+  const auto spares = is_spared.load();
+  if (allocations_until_failure >= 0 && (spares == nullptr || !spares(caller)) &&
+      allocations_until_failure.fetch_sub(1) == 0) {
     if (fails_for_ever) allocations_until_failure = 0;
     has_failed = true;
     throw std::bad_alloc();
@@ -31,13 +35,13 @@ void release(void* memory) {
 
 }  // namespace
 
-void* operator new(std::size_t bytes) { return allocate(bytes, 16); }
-void* operator new[](std::size_t bytes) { return allocate(bytes, 16); }
+void* operator new(std::size_t bytes) { return allocate(bytes, 16, __builtin_return_address(0)); }
+void* operator new[](std::size_t bytes) { return allocate(bytes, 16, __builtin_return_address(0)); }
 void* operator new(std::size_t bytes, std::align_val_t alignment) {
-  return allocate(bytes, std::size_t(alignment));
+  return allocate(bytes, std::size_t(alignment), __builtin_return_address(0));
 }
 void* operator new[](std::size_t bytes, std::align_val_t alignment) {
-  return allocate(bytes, std::size_t(alignment));
+  return allocate(bytes, std::size_t(alignment), __builtin_return_address(0));
 }
 void operator delete(void* memory) noexcept { release(memory); }
 void operator delete[](void* memory) noexcept { release(memory); }

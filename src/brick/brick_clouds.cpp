@@ -359,11 +359,11 @@ Status checkOptions(const std::vector<std::string>& inputs, const BrickOptions& 
 
 Result<BrickStats> brickClouds(const std::vector<std::string>& inputs, const std::string& output,
                                const BrickOptions& given, Progress& progress) {
-  BrickOptions options = given;
-  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
-  SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
-  const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
   return guarded(output, [&]() -> Result<BrickStats> {
+    BrickOptions options = given;
+    if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
+    SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
+    const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
     std::optional<Result<BrickStats>> result;
     withThreads(threads, [&] { result = BrickBuild(inputs, output, options, progress).run(); });
     if (result->ok()) {

@@ -10,6 +10,15 @@
 
 namespace surfeit {
 
+// A kFailed of both texts; of a short one alone, which takes none, when there is no memory for it.
+inline Status failedAt(const std::string& subject, const char* what) noexcept {
+  try {
+    return Status::failed(subject + ": " + what);
+  } catch (const std::exception&) {
+    return Status::failed("out of memory");
+  }
+}
+
 // What `work` returns, a Status or a Result; what it throws becomes a kFailed that begins with
 // `subject`, a path for example.
 template <typename Work>
@@ -17,9 +26,9 @@ auto guarded(const std::string& subject, Work&& work) -> decltype(work()) {
   try {
     return std::forward<Work>(work)();
   } catch (const std::bad_alloc&) {
-    return Status::failed(subject + ": out of memory");
+    return failedAt(subject, "out of memory");
   } catch (const std::exception& exception) {
-    return Status::failed(subject + ": " + exception.what());
+    return failedAt(subject, exception.what());
   }
 }
 

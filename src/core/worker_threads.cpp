@@ -35,6 +35,8 @@ Status runOnThreads(int threads, FirstFailure& failure, const char* doing,
       for (int i = 1; i < threads; ++i) others.emplace_back(workOrNote);
     } catch (const std::system_error& error) {
       failure.note(Status::failed(fmt::format("cannot start a thread: {}", error.what())));
+    } catch (const std::bad_alloc&) {
+      failure.note(Status::failed("out of memory"));  // which ends those that have begun
     }
     workOrNote();
   }  // all threads have ended

@@ -429,10 +429,10 @@ Result<SceneFile> indexPlaces(const std::string& input, const std::string& besid
 Result<IndexStats> indexFrom(const std::vector<std::string>& inputs, const SourceOpener& opener,
                              const std::string& output, const IndexOptions& given,
                              Progress& progress) {
-  IndexOptions options = given;
-  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualIndexMemory);
-  const int threads = indexThreads(options, progress);
   return guarded(output, [&]() -> Result<IndexStats> {
+    IndexOptions options = given;
+    if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualIndexMemory);
+    const int threads = indexThreads(options, progress);
     SURFEIT_ASSIGN_OR_RETURN(const GroupPlan groups, planGroups(inputs, options.named, !opener));
     Result<IndexStats> result = Status::failed("index: not run");
     withThreads(threads, [&] {

@@ -331,12 +331,12 @@ Status checkOptions(const LookupOptions& options) {
 Result<LookupStats> lookupCloud(const std::string& map, const std::string& receivers,
                                 const std::string& result, const LookupOptions& given,
                                 Progress& progress) {
-  LookupOptions options = given;
-  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
-  SURFEIT_RETURN_IF_ERROR(checkOptions(options));
-  SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result, map, "map"));
-  const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
-  return guarded(result, [&] {
+  return guarded(result, [&]() -> Result<LookupStats> {
+    LookupOptions options = given;
+    if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
+    SURFEIT_RETURN_IF_ERROR(checkOptions(options));
+    SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result, map, "map"));
+    const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
     Result<LookupStats> stats = Status::failed("lookup: not run");
     withThreads(threads, [&] {
       stats = CloudLookup(map, receivers, result, options, threads, progress).run();

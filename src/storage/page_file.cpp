@@ -64,7 +64,7 @@ Result<PageFile> PageFile::open(InputFile file) {
   pages.file_ = std::move(file);
   SURFEIT_RETURN_IF_ERROR(pages.readHeader());
 
-  std::uint64_t directory_offset, provenance_offset, provenance_checksum;
+  std::uint64_t directory_offset = 0, provenance_offset = 0, provenance_checksum = 0;
   SURFEIT_RETURN_IF_ERROR(
       pages.readFooter(directory_offset, provenance_offset, provenance_checksum));
 
@@ -144,7 +144,8 @@ Status PageFile::checkEntry(std::uint32_t page, const PageEntry& entry,
 Status PageFile::readHeader() {
   std::vector<std::byte> header(kFileHeaderBytes);
   SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, file_.readSome(0, header));
-  if (got < sizeof kHeaderMagic || std::memcmp(header.data(), kHeaderMagic, 8) != 0) {
+  // Bytes that the file lacks are zero
+  if (std::memcmp(header.data(), kHeaderMagic, 8) != 0) {
     return partError("header", "not a Surfeit scene: the first bytes are not those of a .sft file");
   }
   if (got < kFileHeaderBytes) {

@@ -53,7 +53,7 @@ Status TemporaryBytes::append(Bytes bytes) {
 Status TemporaryBytes::appendUnit() {
   const std::uint64_t checksum = checksumOf(unit_, unit_number_++);
   std::memcpy(unit_.data(), &checksum, sizeof checksum);
-  const Status status = file_.append(unit_).status();
+  Status status = file_.append(unit_).status();
   unit_.resize(kChecksumBytes);
   return status;
 }

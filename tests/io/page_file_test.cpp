@@ -384,7 +384,54 @@ TEST_F(PageFileTest, PageIsExactlyOneFrame) {
   EXPECT_TRUE(refuses(behind, payload.size()));
   EXPECT_TRUE(refuses(twice, payload.size()));
   EXPECT_TRUE(refuses(twice, 2 * payload.size()));
+  skipped.resize(skipped.size() + 4);
   EXPECT_TRUE(refuses(skipped, 4));  // nothing, and four bytes as they are
+}
+
+TEST_F(PageFileTest, WhatIsWrongWithAFrameIsTold) {
+  const std::vector<std::byte> payload = payloadOf(0);
+  std::vector<std::byte> frame;
+  ASSERT_TRUE(compressPage(payload, frame).ok());
+  const auto told = [](Bytes stored, std::size_t bytes) {
+    std::vector<std::byte> decoded(bytes);
+    return std::string(decompressPage(stored, decoded).message());
+  };
+  ASSERT_EQ(told(frame, payload.size()), "");
+  // Its header is cut, or does not say how much it holds (bits 5 to 7 of the descriptor)
+  EXPECT_THAT(told(Bytes(frame).first(4), payload.size()), HasSubstr("no frame of known size"));
+  std::vector<std::byte> unknown = frame;
+  unknown[4] &= std::byte{0x1f};
+  EXPECT_THAT(told(unknown, payload.size()), HasSubstr("no frame of known size"));
+  // It holds more than the page, or the page more than it and all bytes behind it
+  EXPECT_THAT(told(frame, payload.size() - 1), HasSubstr("decoded size"));
+  EXPECT_THAT(told(frame, payload.size() + frame.size() + 1), HasSubstr("decoded size"));
+  // A wrong block is told in zstd's words
+  int refused = 0;
+  for (std::size_t at = 5; at < frame.size(); ++at) {
+    std::vector<std::byte> wrong = frame;
+    wrong[at] ^= std::byte{0x7f};
+    const std::string message = told(wrong, payload.size());
+    EXPECT_THAT(message, testing::Not(HasSubstr("decoded size 18446744")));
+    refused += message.starts_with("zstd: ") ? 1 : 0;
+  }
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(PageFileTest, PagesThatOverlapDoNotTileTheFile) {
+  writePages("big.sft", 20, 100);
+  std::string file = contents("big.sft");
+  const Result<PageFile> sound = PageFile::open(path("big.sft"));
+  ASSERT_TRUE(sound.ok() && sound->checkTiling().ok());
+  // A page that is another one, of as many bytes
+  const std::size_t directory = getAt<std::uint64_t>(file, footerAt(file) + kDirectoryOffsetAt);
+  std::uint32_t other = 1;
+  while (sound->entry(other).stored_bytes != sound->entry(0).stored_bytes) ++other;
+  file.replace(directory, kEntryBytes, file, directory + other * kEntryBytes, kEntryBytes);
+  sealFile(file);
+  write("twice.sft", file);
+  const Result<PageFile> pages = PageFile::open(path("twice.sft"));
+  ASSERT_TRUE(pages.ok()) << pages.status().message();
+  EXPECT_THAT(pages->checkTiling().message(), HasSubstr("expected at"));
 }
 
 TEST_F(PageFileTest, MissingFileAndDirectoryAreIoErrors) {

@@ -1,5 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -32,6 +34,26 @@ class SparseFileTest : public PageFileTest {
     std::ofstream(path("sparse.sft"), std::ios::binary | std::ios::app) << file.substr(at);
   }
 
+  // A hole of as many bytes amid the pages, and then one in the directory.
+  void writeSparseTwice(std::uint64_t hole) {
+    std::string file = sample();
+    const std::uint64_t pages_end = fieldOf(file, kProvenanceOffsetAt);
+    writeSparse(file, pages_end - 1, hole);
+    std::ifstream in(path("sparse.sft"), std::ios::binary);
+    in.seekg(-static_cast<std::streamoff>(kFooterBytes), std::ios::end);
+    std::string footer(kFooterBytes, '\0');
+    in.read(footer.data(), static_cast<std::streamsize>(footer.size()));
+    in.close();
+    setAt(footer, kFileBytesAt, getAt<std::uint64_t>(footer, kFileBytesAt) + hole);
+    setAt(footer, kFooterChecksumAt,
+          XXH3_64bits_withSeed(footer.data(), kFooterChecksumAt, getAt<std::uint64_t>(file, 16)));
+    const std::uint64_t size = std::filesystem::file_size(path("sparse.sft"));
+    std::filesystem::resize_file(path("sparse.sft"),
+                                 getAt<std::uint64_t>(footer, kDirectoryOffsetAt));
+    std::filesystem::resize_file(path("sparse.sft"), size + hole - kFooterBytes);
+    std::ofstream(path("sparse.sft"), std::ios::binary | std::ios::app) << footer;
+  }
+
   void expectRefused(const std::string& what) {
     const std::uint64_t peak_before = peakResidentBytes();
     const Result<PageFile> pages = PageFile::open(path("sparse.sft"));
@@ -61,28 +83,41 @@ TEST_F(SparseFileTest, DirectoryOfAHoleIsRefusedBeforeItTakesMemory) {
   }
 }
 
+// The address space of this process, while it lives.
+class LimitedAddressSpace {
+ public:
+  explicit LimitedAddressSpace(std::uint64_t bytes) {
+    EXPECT_EQ(::getrlimit(RLIMIT_AS, &before_), 0);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    EXPECT_EQ(::setrlimit(RLIMIT_AS, &limit), 0);
+  }
+  LimitedAddressSpace(const LimitedAddressSpace&) = delete;
+  LimitedAddressSpace& operator=(const LimitedAddressSpace&) = delete;
+  ~LimitedAddressSpace() { ::setrlimit(RLIMIT_AS, &before_); }
+
+ private:
+  rlimit before_;
+};
+
+std::uint64_t addressSpaceBytes() {
+  std::uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  return pages * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+}
+
+// Room for it is not even asked for: a limit of the address space does not matter.
 TEST_F(SparseFileTest, DirectoryOfAHoleIsRefusedHoweverManyBytesThePagesHave) {
-  std::string file = sample();
-  const std::uint64_t pages_end = fieldOf(file, kProvenanceOffsetAt);
-  const std::uint64_t hole = 100'000'000 * kEntryBytes;
-  // Pages of a hole, and then a directory of one
-  const std::string tail = file.substr(pages_end);
-  writeSparse(file, pages_end - 1, hole);
-  std::string grown = file.substr(0, pages_end);
-  std::ifstream in(path("sparse.sft"), std::ios::binary);
-  in.seekg(-static_cast<std::streamoff>(kFooterBytes), std::ios::end);
-  std::string footer(kFooterBytes, '\0');
-  in.read(footer.data(), static_cast<std::streamsize>(footer.size()));
-  in.close();
-  setAt(footer, kFileBytesAt, getAt<std::uint64_t>(footer, kFileBytesAt) + hole);
-  setAt(footer, kFooterChecksumAt,
-        XXH3_64bits_withSeed(footer.data(), kFooterChecksumAt, getAt<std::uint64_t>(file, 16)));
-  const std::uint64_t size = std::filesystem::file_size(path("sparse.sft"));
-  std::filesystem::resize_file(path("sparse.sft"),
-                               getAt<std::uint64_t>(footer, kDirectoryOffsetAt));
-  std::filesystem::resize_file(path("sparse.sft"), size + hole - kFooterBytes);
-  std::ofstream(path("sparse.sft"), std::ios::binary | std::ios::app) << footer;
+  writeSparseTwice(100'000'000 * kEntryBytes);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const LimitedAddressSpace limit(addressSpaceBytes() + (std::uint64_t{1} << 30));
+#endif
   expectRefused("page 0 at 0");
+}
+
+TEST_F(SparseFileTest, MorePagesThanHaveNumbersAreRefused) {
+  writeSparseTwice((std::uint64_t{1} << 32) * kEntryBytes);
+  expectRefused("is no whole number of entries");
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <limits>
 
+#include "octree/axis_columns.h"
+#include "octree/payload_cuts.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {
@@ -31,6 +33,13 @@ Buffer roundTrip(std::vector<T>& values, const Put& put, const Get& get) {
     std::vector<T> scratch(values.size());
     EXPECT_FALSE(get(cut, std::span<T>(scratch)) && cut.ok()) << size << " bytes";
   }
+  // Where nothing but the column's own end tells, with sound values in every scratch
+  for (std::uint32_t size = kPayloadHeaderBytes; size < packedBytesOf(buffer); ++size) {
+    const Buffer shorter = withPackedPart(buffer, size);
+    PayloadReader cut(shorter);
+    std::vector<T> scratch = values;
+    EXPECT_FALSE(get(cut, std::span<T>(scratch))) << size << " packed bytes";
+  }
   Buffer extended = buffer;
   extended.push_back(std::byte{0x5a});
   PayloadReader reader(extended);
@@ -39,23 +48,6 @@ Buffer roundTrip(std::vector<T>& values, const Put& put, const Get& get) {
   EXPECT_EQ(reader.remaining(), 1u);
   return buffer;
 }
-
-// Vectors as the columns of their axes.
-struct AxisColumns {
-  explicit AxisColumns(std::size_t count) {
-    for (std::vector<float>& axis : values) axis.resize(count);
-  }
-  explicit AxisColumns(std::span<const glm::vec3> vectors) : AxisColumns(vectors.size()) {
-    for (std::size_t i = 0; i < vectors.size(); ++i) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        values[axis][i] = vectors[i][static_cast<int>(axis)];
-      }
-    }
-  }
-  Axes axes() const { return {values[0], values[1], values[2]}; }
-  MutableAxes mutableAxes() { return {values[0], values[1], values[2]}; }
-  std::array<std::vector<float>, 3> values;
-};
 
 // putNormals and the like for vectors.
 template <typename Put, typename... Arguments>

@@ -189,10 +189,10 @@ bool getPositions(PayloadReader& reader, const MutableAxes& values) {
   const std::uint8_t form = reader.packed.get<std::uint8_t>();
   if (form == kFormFloat) return getAxesAsFloats(reader, values);
   const float step = reader.packed.get<float>();
-  if ((form != 2 && form != 3) || !std::isfinite(step) || !(step > 0)) return false;
+  // An infinite step or least coordinate makes positions that are refused as such
+  if ((form != 2 && form != 3) || !(step > 0)) return false;
   for (const std::span<float> axis : values) {
     const float min = reader.packed.get<float>();
-    if (!std::isfinite(min)) return false;
     if (!(form == 2 ? getGridAxis<2, std::uint16_t>(reader, axis, min, step)
                     : getGridAxis<3, std::uint32_t>(reader, axis, min, step))) {
       return false;

@@ -27,7 +27,9 @@ struct TransparencyColumns {
   }
   // False when the columns end early, or hold what is no transparency.
   bool get(PayloadReader& reader) const {
-    if (!getBytes8(reader, bytes[0]) || !getBytes8(reader, bytes[1])) return false;
+    for (const auto& column : bytes) {
+      if (!getBytes8(reader, column)) return false;
+    }
     for (std::size_t i = 0; i < bytes[0].size(); ++i) {
       if (at(i) > kMostTransparency) return false;
     }
