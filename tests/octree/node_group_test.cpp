@@ -242,6 +242,9 @@ TEST_F(NodeGroupTest, HiddenSidesAreKeptAndThoseOfNoSuchPieceRejected) {
         EXPECT_EQ(found_[i].facets[k].hidden, i == 3 && k == 1 ? kHiddenFront : 0);
       }
     }
+    // Nothing stays of what was there before
+    ASSERT_TRUE(storeAndRead(someNodes(20), form).ok());
+    for (const Node& node : std::span(found_).first(20)) EXPECT_EQ(node.hidden, 0);
     // A one-sided piece has no back
     for (const int wrong : {int(kHiddenBack), int(kHiddenSides), 4}) {
       nodes[0].node.hidden = std::uint8_t(wrong);

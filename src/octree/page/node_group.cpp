@@ -148,6 +148,7 @@ class Columns {
       node.child_count = child_count[i];
       node.flags = flags[i];
       node.facet_count = 0;
+      node.hidden = 0;
       node.rough = {};
       node.surfel_count = surfel_count[i];
       node.groups = form.has_groups ? groups[i] : groupBit(0);
