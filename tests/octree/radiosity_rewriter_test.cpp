@@ -87,9 +87,58 @@ Node withoutLight(Node node) {
 
 bool sameBytes(const Node& a, const Node& b) {
   if (std::memcmp(&a, &b, offsetof(Node, facet_count)) != 0) return false;
-  if (a.facet_count != b.facet_count) return false;
+  if (a.facet_count != b.facet_count || a.hidden != b.hidden) return false;
   if (a.hasFacets()) return a.facets == b.facets;
   return std::memcmp(&a.rough, &b.rough, sizeof a.rough) == 0;
+}
+
+// Two sheets, one close behind the other, that face along a diagonal.
+std::vector<Surfel> layeredCloud() {
+  const glm::vec3 n = glm::normalize(glm::vec3(1, 2, 3));
+  const glm::vec3 u = glm::normalize(glm::cross(n, glm::vec3(0, 1, 0))), v = glm::cross(n, u);
+  std::vector<Surfel> cloud;
+  for (int i = 0; i < 2 * 60 * 60; ++i) {
+    Surfel& surfel = cloud.emplace_back();
+    const float x = float(i % 60), y = float(i / 60 % 60), depth = i < 60 * 60 ? 0.f : .2f;
+    surfel.position = x * u + y * v - depth * n;
+    surfel.normal = n;
+    surfel.area = 1;
+    surfel.radius = .71f;
+    surfel.radiosity = glm::vec3(1);
+  }
+  return cloud;
+}
+glm::vec3 lightOfFrontLayer(const Surfel& surfel) {
+  return glm::vec3(glm::dot(surfel.position, glm::vec3(1, 2, 3)) > -.3f ? 3.f : .5f);
+}
+
+TEST_F(RadiosityRewriterTest, LayersHaveLightOfTheirOwn) {
+  for (const bool full_precision : {true, false}) {
+    IndexOptions options;
+    options.full_precision = full_precision;
+    std::vector<Surfel> cloud = layeredCloud();
+    const std::string scene = index(cloud, kAllChannels, options);
+    for (Surfel& surfel : cloud) surfel.radiosity = lightOfFrontLayer(surfel);
+    const ReadScene expected = read(index(cloud, kAllChannels, options));
+    const std::string rewritten = rewrite(scene, "lit.sft", lightOfFrontLayer);
+    EXPECT_TRUE(findingsOf(rewritten).empty());
+    const ReadScene found = read(rewritten);
+    EXPECT_TRUE(found.header.has_layers);
+    ASSERT_EQ(found.nodes.size(), expected.nodes.size());
+    std::size_t hidden = 0;
+    for (std::size_t i = 0; i < found.nodes.size(); ++i) {
+      const Node &a = found.nodes[i].node, &b = expected.nodes[i].node;
+      ASSERT_EQ(a.hidden, b.hidden);
+      ASSERT_EQ(a.facet_count, b.facet_count);
+      hidden += a.hidden;
+      for (std::size_t k = 0; k < a.facet_count; ++k) {
+        ASSERT_EQ(a.facets[k].hidden, b.facets[k].hidden);
+        EXPECT_NEAR(a.facets[k].radiosity.x, b.facets[k].radiosity.x, .02f);
+        hidden += a.facets[k].hidden;
+      }
+    }
+    EXPECT_GT(hidden, 100u);
+  }
 }
 
 TEST_F(RadiosityRewriterTest, AtFullPrecisionItIsWhatIndexingGives) {
