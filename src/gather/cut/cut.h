@@ -97,6 +97,7 @@ SiblingClassifier fastestSiblingClassifier();
 struct OpenedNode {
   std::uint32_t hull_lanes = 0;  // receivers that see its hull, or that of a node above it, as bits
   bool is_sheet = false;         // isSheet()
+  bool is_thicket = false;       // isThicket()
 };
 
 // Calls visit.node(const Node&, const LaneParts*) for the nodes that some receiver sees as a whole,

@@ -12,18 +12,22 @@ namespace {
 struct DrawCut {
   PacketRaster& raster;
   const PagedOctree::Reader& octree;
-  bool are_tiles = false;  // the two-sided surfels of the last leaf
+  PacketRaster::TwoSided two_sided = PacketRaster::TwoSided::kAlone;  // surfels of the last leaf
   void setFrame(const InstanceFrame* frame) { raster.setFrame(frame); }
   void node(const Node& node, const LaneParts* parts) {
     raster.addNode(node, parts, octree.lobesOf(node));
   }
   OpenedNode opened(const Node& node, const LaneParts* parts, OpenedNode parent) {
     const OpenedNode opened = raster.addHull(node, parts, parent);
-    are_tiles = parent.is_sheet || opened.is_sheet;
+    const bool is_sheet = parent.is_sheet || opened.is_sheet;
+    const bool is_thicket = parent.is_thicket && opened.is_thicket;
+    two_sided = is_sheet     ? PacketRaster::TwoSided::kTiles
+                : is_thicket ? PacketRaster::TwoSided::kThicket
+                             : PacketRaster::TwoSided::kAlone;
     return opened;
   }
   void surfels(std::span<const Surfel> run, const LaneParts* parts) {
-    raster.addSurfels(run, parts, octree.lobesOf(run), are_tiles);
+    raster.addSurfels(run, parts, octree.lobesOf(run), two_sided);
   }
 };
 

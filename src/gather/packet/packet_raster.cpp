@@ -364,7 +364,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts,
-                              std::span<const Lobe> lobes, bool are_tiles) {
+                              std::span<const Lobe> lobes, TwoSided two_sided) {
   const std::uint32_t all_parts = keepParts(lane_parts);
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
@@ -404,7 +404,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.lets_through = surfel.transparency != 0;
     if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
     patch.thicket = thicketPart(surfel);
-    patch.is_solid = mayTile(surfel) || are_tiles;
+    if (two_sided == TwoSided::kThicket && surfel.isTwoSided() && patch.thicket == 0) {
+      patch.overlap = patch.thicket = 1;
+      patch.reach = 0;
+    }
+    patch.is_solid = mayTile(surfel) || two_sided == TwoSided::kTiles;
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float size = nearFieldSize(patch.radius, ribbon);
     const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;

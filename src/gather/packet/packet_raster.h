@@ -72,10 +72,12 @@ class PacketRaster {
   // that see no hull of a node above it.
   OpenedNode addHull(const Node& node, const LaneParts* parts = nullptr,
                      const OpenedNode& parent = {});
-  // Adds those of the surfels that some receiver may see. `lobes`: as many, or none. `are_tiles`:
-  // they are of a node that isSheet().
+  // What the two-sided surfels of a leaf are, by it and the node above it: leaves that stand alone
+  // for all that is known, tiles of what isSheet(), or leaves in what isThicket().
+  enum class TwoSided : std::uint8_t { kAlone, kTiles, kThicket };
+  // Adds those of the surfels that some receiver may see. `lobes`: as many, or none.
   void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr,
-                  std::span<const Lobe> lobes = {}, bool are_tiles = false);
+                  std::span<const Lobe> lobes = {}, TwoSided two_sided = TwoSided::kAlone);
 
   // Sorts what was added, and draws it.
   void sort();

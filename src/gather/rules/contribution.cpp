@@ -220,8 +220,8 @@ float volumePart(const SymmetricMatrix& covariance) {
 }  // namespace
 
 bool isThicket(const Node& node) {
-  return hasTwoSidedPieces(node) && volumePart(node.covariance) > kFidelity.thin_volume &&
-         !isSheet(node);
+  const bool is_two_sided = node.isRough() ? thicketPart(node) > 0.5f : hasTwoSidedPieces(node);
+  return is_two_sided && volumePart(node.covariance) > kFidelity.thin_volume && !isSheet(node);
 }
 
 float thicketPart(const Surfel& surfel) {

@@ -78,8 +78,8 @@ inline bool mayTile(const Surfel& surfel) { return !surfel.isSphere() && !surfel
 // Whether two-sided surfels of a node lie side by side, on a plane or on each of a few, and fill
 // it: then they are tiles of a surface as well. One alone may be a leaf.
 bool isSheet(const Node& node);
-// Whether two-sided facets of a node lie before and behind each other anywhere, as leaves do: it is
-// no sheet, and no thin slab either, as half of a sheet in folds is.
+// Whether two-sided facets or surfels of a node lie before and behind each other anywhere, as
+// leaves do: it is no sheet, and no thin slab either, as half of a sheet in folds is.
 bool isThicket(const Node& node);
 // How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
 float thicketPart(const Surfel& surfel);
