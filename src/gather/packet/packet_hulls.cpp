@@ -51,7 +51,7 @@ std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
 
 OpenedNode PacketRaster::addHull(const Node& node, const LaneParts* parts,
                                  const OpenedNode& parent) {
-  OpenedNode opened = {parent.hull_lanes, isSheet(node), isThicket(node)};
+  OpenedNode opened = {parent.hull_lanes, isSheet(node), node.isRough() && isThicket(node)};
   const std::uint32_t others = kAllLanes & ~parent.hull_lanes;
   if (others == 0 || !mayLeaveHull(node)) return opened;
   const auto addPiece = [&](Facet facet) {
