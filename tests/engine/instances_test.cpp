@@ -155,8 +155,8 @@ TEST_F(InstancesTest, ManyAreAsOneSceneOfAllOfThem) {
   EXPECT_LT(difference.mean_occlusion, .003);
   EXPECT_LT(difference.mean_light, .02);
 
-  // With nothing left out and nothing that stands in for anything, only the hulls and rounding
-  // differ
+  // With nothing left out and nothing that stands in for anything, only hulls, which leaves are of a
+  // thicket, and rounding differ
   GatherSettings exact = bleedingSettings();
   exact.quality.max_solid_angle = 0;
   receivers.resize(200);
@@ -165,7 +165,7 @@ TEST_F(InstancesTest, ManyAreAsOneSceneOfAllOfThem) {
   const Difference of_exact =
       differenceOf(gatherAt(exact_forest, receivers), gatherAt(exact_whole, receivers));
   EXPECT_LT(of_exact.mean_occlusion, .003);
-  EXPECT_LT(of_exact.mean_light, .008);
+  EXPECT_LT(of_exact.mean_light, .009);
 }
 
 TEST_F(InstancesTest, TransformsThatAreNoSimilarityAreRefused) {
