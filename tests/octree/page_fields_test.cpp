@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "octree/node/hidden_layers.h"
 #include "octree/node/lobe.h"
 #include "octree/node/node_sums.h"
 #include "octree/page/column_codec.h"
@@ -203,14 +204,18 @@ TEST_F(NodePageFields, RelitPageThatEndsWithinOneIsToldByItsName) {
 // Their numbers and what they are made of are two columns of one name.
 TEST_F(NodePageFields, EveryByteOfFacetsIsLookedAt) {
   constexpr std::size_t kNodes = 3, kFacets = 3;
-  const Payload payload = encode({});
-  int told = 0;
-  for (std::uint32_t bytes = kPayloadHeaderBytes; bytes < packedBytesOf(payload); ++bytes) {
-    ASSERT_TRUE(decode(payload, {}).ok());
-    told +=
-        decode(withPackedPart(payload, bytes), {}).message() == "node group: damaged field facets";
+  // Without hidden sides and with some, a byte for each facet and the flat node
+  for (const bool has_hidden : {false, true}) {
+    if (has_hidden) nodes_[1].node.facets[1].hidden = nodes_[2].node.hidden = kHiddenFront;
+    const Payload payload = encode({});
+    std::size_t told = 0;
+    for (std::uint32_t bytes = kPayloadHeaderBytes; bytes < packedBytesOf(payload); ++bytes) {
+      ASSERT_TRUE(decode(payload, {}).ok());
+      told += decode(withPackedPart(payload, bytes), {}).message() ==
+              "node group: damaged field facets";
+    }
+    EXPECT_EQ(told, kNodes + 1 + kFacets * (4 * 2 + 9) + (has_hidden ? kFacets + 1 : 0));
   }
-  EXPECT_EQ(told, kNodes + 1 + kFacets * (4 * 2 + 9));
 }
 
 TEST_F(NodePageFields, PageThatEndsWithinItsLastColumnIsRefused) {
