@@ -122,6 +122,29 @@ TEST(HiddenSurfels, FarSheetsAndTranslucentOnesHideNothing) {
   EXPECT_EQ(hiddenCount(pane), 0);
 }
 
+TEST(HiddenSurfels, ScaleAndPlaceDoNotMatter) {
+  std::vector<Surfel> rug = sheet(16, 0);
+  std::erase_if(rug, [](const Surfel& surfel) { return surfel.position.y > 2; });
+  const std::vector<Surfel> plain = together(rug, sheet(16, -.25f));
+  std::vector<Surfel> expected = plain;
+  markHidden(expected);
+  ASSERT_EQ(hiddenCount(expected), std::ptrdiff_t(rug.size()));
+  for (const float scale : {1e-15f, 1e-6f, 1e6f, 1e15f}) {
+    for (const float place : {0.f, 1000.f}) {
+      std::vector<Surfel> cell = plain;
+      for (Surfel& surfel : cell) {
+        surfel.position = scale * (surfel.position + glm::vec3(place));
+        surfel.radius *= scale;
+        surfel.area *= scale * scale;
+      }
+      markHidden(cell);
+      for (std::size_t i = 0; i < cell.size(); ++i) {
+        ASSERT_EQ(hiddenSidesOf(cell[i]), hiddenSidesOf(expected[i])) << scale << ' ' << place;
+      }
+    }
+  }
+}
+
 // Rows of an even grid have heights of their own, which are no layers; and a bent sheet behind
 // another one has no clear gap along one normal.
 TEST(HiddenSurfels, BentSheetsAreSheets) {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "core/symmetric_matrix.h"
 #include "core/thread_scratch.h"
 #include "octree/node/area_sums.h"
+#include "octree/node/facet_sums.h"
 #include "octree/node/hidden_layers.h"
 
 namespace surfeit {
@@ -27,7 +29,7 @@ constexpr float kClearGap = 3;
 constexpr std::size_t kMostSheets = 6;
 // Sheets are looked for where so much of the area of a cell lies behind the rest.
 constexpr float kLeastHidden = 0.125f;
-// Of its outline, a sheet without gaps fills so much.
+// Of its outline, a sheet without gaps fills so much: as Fidelity::least_filled.
 constexpr float kLeastFilled = 0.7f;
 // Directions of a cell in which sheets are looked for: a room has six.
 constexpr std::size_t kMostFacings = 8;
@@ -99,10 +101,9 @@ struct Direction {
 
   // Within 10 degrees, those with two sides to either side.
   bool holds(const Surfel& surfel) const {
-    constexpr float kCosineSq = 0.97f;
     if (surfel.isTwoSided() != is_two_sided) return false;
     const float cosine = glm::dot(normal, surfel.normal);
-    return (cosine > 0 || is_two_sided) && cosine * cosine > kCosineSq;
+    return (cosine > 0 || is_two_sided) && cosine * cosine > float(kAlikeCosineSq);
   }
   float sideOf(const Surfel& surfel) const {
     return glm::dot(normal, surfel.normal) < 0 ? -1.f : 1.f;
@@ -124,7 +125,7 @@ class Facing {
   struct Sheet {
     std::span<const Height> heights;
     AreaSums sums;
-    bool is_filled;  // it has no gaps
+    bool is_filled = false;  // it has no gaps
   };
   bool findNormal();
   bool isPiled() const;
@@ -147,9 +148,10 @@ class Facing {
 };
 
 bool Facing::findNormal() {
+  const float first = cell_[heights_.front().surfel].area;
   for (const Height& each : heights_) {
     const Surfel& surfel = cell_[each.surfel];
-    normal_ += surfel.area * direction_.sideOf(surfel) * surfel.normal;
+    normal_ += surfel.area / first * direction_.sideOf(surfel) * surfel.normal;
   }
   const float length = glm::length(normal_);
   if (!(length > 0)) return false;
@@ -162,10 +164,12 @@ bool Facing::isPiled() const {
   float area = 0;
   glm::vec3 mean(0);
   std::array<float, SymmetricMatrix::kEntries> second{};
+  // In units of the first surfel: a cloud may be of any scale
+  const float first = cell_[heights_.front().surfel].area, unit = 1 / std::sqrt(first);
   for (const Height& each : heights_) {
     const Surfel& surfel = cell_[each.surfel];
-    const glm::vec3 x = surfel.position - origin_, n = surfel.normal;
-    const float a = surfel.area, spread = a * a / (4 * kPi);
+    const glm::vec3 x = unit * (surfel.position - origin_), n = surfel.normal;
+    const float a = surfel.area / first, spread = a * a / (4 * kPi);
     area += a;
     mean += a * x;
     second[0] += a * x.x * x.x + spread * (1 - n.x * n.x);
@@ -225,16 +229,20 @@ void Facing::findHeights() {
 
 // Of the ellipse that spreads as they do, along the normal.
 float Facing::outlineOf(const SymmetricMatrix& spread) const {
-  return 4 * kPi * std::sqrt(std::max(0.f, quadraticForm(adjugate(spread), normal_)));
+  // Products of lengths may be zero or infinite
+  const float trace = spread.trace();
+  if (!(trace >= std::numeric_limits<float>::min())) return 0;
+  const float minor = quadraticForm(adjugate((1 / trace) * spread), normal_);
+  return 4 * kPi * trace * std::sqrt(std::max(0.f, minor));
 }
 
 // Of a rectangle that spreads as they do, along its shorter side.
 float Facing::widthOf(const AreaSums& sums) const {
   const SymmetricMatrix spread = sums.covariance();
   // The lesser principal moment across the normal, from the sum and the product of both
-  const float product = std::max(0.f, quadraticForm(adjugate(spread), normal_));
   const float half = 0.5f * (spread.trace() - quadraticForm(spread, normal_));
-  return std::sqrt(12 * (half - std::sqrt(std::max(0.f, half * half - product))));
+  const float root = outlineOf(spread) / (4 * kPi), part = root / half;
+  return std::sqrt(12 * half * (1 - std::sqrt(std::max(0.f, 1 - part * part))));
 }
 
 Facing::Sheet Facing::sheetOf(std::span<const Height> heights) const {
@@ -296,9 +304,11 @@ void Facing::mark() {
   findHeights();
   std::sort(heights_.begin(), heights_.end());
   const HeightGaps gaps(heights_);
+  std::array<Sheet, kMostSheets> sheets;
+  for (std::size_t i = 0; i < gaps.count(); ++i) sheets[i] = sheetOf(gaps.at(i));
   for (std::size_t i = 0; i < gaps.count(); ++i) {
     for (std::size_t k = i + 1; k < gaps.count(); ++k) {
-      const Sheet front = sheetOf(gaps.at(i)), back = sheetOf(gaps.at(k));
+      const Sheet &front = sheets[i], &back = sheets[k];
       if (!areLayers(front, back)) continue;
       hide(back, front, true);
       if (direction_.is_two_sided) hide(front, back, false);

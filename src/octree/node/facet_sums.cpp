@@ -38,10 +38,9 @@ bool areLayers(const FacetGroup& a, const FacetGroup& b) {
 
 // Within 10 degrees, and hidden alike.
 bool faceAlike(const FacetGroup& a, const FacetGroup& b) {
-  constexpr double kCosineSq = 0.97;
   if (a.is_two_sided != b.is_two_sided || areLayers(a, b)) return false;
   const double dot = facingDot(a, b);
-  return dot > 0 && dot * dot > kCosineSq * dotOfNormals(a, a) * dotOfNormals(b, b);
+  return dot > 0 && dot * dot > kAlikeCosineSq * dotOfNormals(a, a) * dotOfNormals(b, b);
 }
 
 }  // namespace

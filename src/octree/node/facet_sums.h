@@ -12,6 +12,9 @@
 
 namespace surfeit {
 
+// Normals within 10 degrees of each other are alike: the square of their cosine is above this.
+inline constexpr double kAlikeCosineSq = 0.97;
+
 // Surfels that face about one way; two-sided ones of a plane may face the other way as well.
 struct FacetGroup : AreaSums {
   bool is_two_sided = false;  // `normal` is the sum of those turned to one side, within a plane
