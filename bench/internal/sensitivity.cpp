@@ -54,8 +54,6 @@ const std::vector<Number>& allNumbers() {
       {"nested", &F::nested, 0},
       {"own_order", &F::own_order, 0},
       {"least_filled", &F::least_filled, 0},
-      {"fewest_tiles", &F::fewest_tiles, 1},
-      {"thin_volume", &F::thin_volume, 0},
       {"fill_doubt", &F::fill_doubt, 0},
       {"hull_widening", &F::hull_widening, 0},
       {"most_in_hull", &F::most_in_hull, 0},
@@ -352,6 +350,9 @@ Status applyChange(const std::string& change) {
 Status run(const SensitivityOptions& options) {
   std::vector<JudgedSet> sets;
   SURFEIT_RETURN_IF_ERROR(prepare(options, sets));
+  if (options.as_is) {
+    for (const std::string& change : options.changes) SURFEIT_RETURN_IF_ERROR(applyChange(change));
+  }
   std::vector<std::vector<Errors>> each;
   SURFEIT_ASSIGN_OR_RETURN(const std::vector<SetErrors> before, judgeAll(sets, options, &each));
   printAsIs(sets, before, each);
@@ -400,7 +401,7 @@ int main(int argc, char** argv) {
   app.add_option("--first-seed", options.first_seed, "The first of them")->capture_default_str();
   app.add_option("--number", options.numbers, "Numbers to change [all]");
   app.add_option("--change", options.changes, "Several at once, \"nested=0,layer_gap=0\"");
-  app.add_flag("--as-is", options.as_is, "Print errors, change nothing");
+  app.add_flag("--as-is", options.as_is, "Print errors of each scene, with --change");
   app.add_option("--surfels", options.place.surfels, "Of each scene")->capture_default_str();
   app.add_option("--data", options.place.data, "Directory of meshes")->capture_default_str();
   app.add_option("--keep", options.place.keep, "Directory for scenes and true values [none]");

@@ -14,6 +14,11 @@ enum SurfelFlags : std::uint32_t {
   // points to; and of a two-sided one, on the other side. It is not seen from there.
   kSurfelHiddenFront = 1u << 2,
   kSurfelHiddenBack = 1u << 3,
+  // Set by the indexer: a sphere or two-sided, and no tile of a surface, as particles, leaves and
+  // hair, which hide each other at random; and of these, nothing lies beside it on its plane, as
+  // another piece of the same leaf does.
+  kSurfelLoose = 1u << 4,
+  kSurfelLone = 1u << 5,
 };
 
 // Number of object groups. A surfel belongs to one object group; a gather may see some of them
@@ -53,6 +58,8 @@ struct Surfel {
 
   bool isSphere() const { return (flags & kSurfelSphere) != 0; }
   bool isTwoSided() const { return (flags & kSurfelTwoSided) != 0; }
+  bool isLoose() const { return (flags & kSurfelLoose) != 0; }
+  bool isLone() const { return (flags & kSurfelLone) != 0; }
   // How much of its area covers what lies behind, and sends its radiosity: above 0, up to 1.
   float opacity() const { return opacityOf(transparency); }
 };

@@ -1,10 +1,12 @@
 // Symmetric 3 x 3 matrices: spreads of surface around a point.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 
 namespace surfeit {
 
@@ -50,6 +52,17 @@ inline SymmetricMatrix adjugate(const SymmetricMatrix& m) {
   const float xx = m(0, 0), yy = m(1, 1), zz = m(2, 2), xy = m(0, 1), xz = m(0, 2), yz = m(1, 2);
   return {{yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy, xz * yz - xy * zz,
            xy * yz - xz * yy, xy * xz - xx * yz}};
+}
+
+// How much of a volume something with this covariance fills, 0 to 1: all where it spreads alike in
+// all directions, nothing where it lies on a plane. 9 det C / (trace C trace adj C).
+inline float volumePart(const SymmetricMatrix& covariance) {
+  const float trace = covariance.trace();
+  if (!(trace >= std::numeric_limits<float>::min())) return 0;
+  const SymmetricMatrix c = (1 / trace) * covariance, minors = adjugate(c);
+  const float determinant =
+      c(0, 0) * minors(0, 0) + c(0, 1) * minors(0, 1) + c(0, 2) * minors(0, 2);
+  return minors.trace() > 0 ? std::clamp(9 * determinant / minors.trace(), 0.f, 1.f) : 0;
 }
 
 }  // namespace surfeit

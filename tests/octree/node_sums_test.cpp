@@ -172,7 +172,7 @@ TEST(NodeSums, TwoSidedSurfelsHaveFacetsOfTheirOwn) {
   cloud = boxCloud(8, .1f);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (i % 64 < 32) cloud[i].normal = -cloud[i].normal;  // half of each wall
-    cloud[i].flags = kSurfelTwoSided;
+    cloud[i].flags = kSurfelTwoSided | kSurfelLoose;
   }
   NodeSums sums = sumsOf(cloud);
   node = sums.toNode(.97f, radiusOfBox(sums.centre(), sums.disk_bounds));

@@ -102,7 +102,7 @@ TEST_F(SurfelPageFields, PageThatEndsWithinOneIsToldByItsName) {
 
 TEST_F(SurfelPageFields, ValuesThatThereAreNotAreToldByTheirName) {
   std::vector<Surfel> cloud = fewSurfels();
-  cloud[2].flags = 0x20;
+  cloud[2].flags = kSurfelSphere | 1u << 5;
   EXPECT_THAT(decode(encode(cloud, kAllColumns), kAllColumns).message(), HasSubstr("field flags"));
   cloud = fewSurfels();
   cloud[2].transparency = kMostTransparency + 1;

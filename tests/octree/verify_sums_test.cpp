@@ -317,6 +317,13 @@ TEST_F(VerifySumsTest, FacetsAboveSpheresAreFound) {
               Contains(HasSubstr("facets, expected none above spheres")));
 }
 
+TEST_F(VerifySumsTest, LooseOrNotIsByTheAreaBelow) {
+  const NodeEdit turn = {"loose, expected otherwise",
+                         [](Node& n) { n.flags ^= std::uint8_t(kNodeLoose); }};
+  expectFound(withoutNormals(sphereCloud(700)), {turn});
+  expectFound(thicket(700), {turn});
+}
+
 TEST_F(VerifySumsTest, PlaceNormalAndSpreadThatAreNotThoseBelowAreFound) {
   std::vector<NodeEdit> edits = {
       {"position x", [](Node& n) { n.position.x += .02f * n.radius; }},

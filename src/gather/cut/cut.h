@@ -96,8 +96,6 @@ SiblingClassifier fastestSiblingClassifier();
 // What a visitor knows of a node that it was told to look into.
 struct OpenedNode {
   std::uint32_t hull_lanes = 0;  // receivers that see its hull, or that of a node above it, as bits
-  bool is_sheet = false;         // isSheet()
-  bool is_thicket = false;       // it is rough, and isThicket()
 };
 
 // Calls visit.node(const Node&, const LaneParts*) for the nodes that some receiver sees as a whole,

@@ -12,22 +12,15 @@ namespace {
 struct DrawCut {
   PacketRaster& raster;
   const PagedOctree::Reader& octree;
-  PacketRaster::TwoSided two_sided = PacketRaster::TwoSided::kAlone;  // surfels of the last leaf
   void setFrame(const InstanceFrame* frame) { raster.setFrame(frame); }
   void node(const Node& node, const LaneParts* parts) {
     raster.addNode(node, parts, octree.lobesOf(node));
   }
   OpenedNode opened(const Node& node, const LaneParts* parts, OpenedNode parent) {
-    const OpenedNode opened = raster.addHull(node, parts, parent);
-    const bool is_sheet = parent.is_sheet || opened.is_sheet;
-    const bool is_thicket = parent.is_thicket && opened.is_thicket;
-    two_sided = is_sheet     ? PacketRaster::TwoSided::kTiles
-                : is_thicket ? PacketRaster::TwoSided::kThicket
-                             : PacketRaster::TwoSided::kAlone;
-    return opened;
+    return raster.addHull(node, parts, parent);
   }
   void surfels(std::span<const Surfel> run, const LaneParts* parts) {
-    raster.addSurfels(run, parts, octree.lobesOf(run), two_sided);
+    raster.addSurfels(run, parts, octree.lobesOf(run));
   }
 };
 

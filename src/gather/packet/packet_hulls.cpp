@@ -51,12 +51,11 @@ std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
 
 OpenedNode PacketRaster::addHull(const Node& node, const LaneParts* parts,
                                  const OpenedNode& parent) {
-  OpenedNode opened = {parent.hull_lanes, isSheet(node), node.isRough() && isThicket(node)};
+  OpenedNode opened = parent;
   const std::uint32_t others = kAllLanes & ~parent.hull_lanes;
   if (others == 0 || !mayLeaveHull(node)) return opened;
-  const auto addPiece = [&](Facet facet) {
-    if (facet.is_two_sided && !opened.is_sheet) return 0u;
-    facet.is_thicket = false;
+  const auto addPiece = [&](const Facet& facet) {
+    if (facet.is_two_sided && node.isLoose()) return 0u;
     return addFacetHull(node, facet, parts, others);
   };
   std::uint32_t see_all = others;

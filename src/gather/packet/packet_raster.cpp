@@ -231,14 +231,11 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
     addFacet(node, facet, false, seen, lobeOf(i));
   };
   if (node.isFlat()) return add(0, facetOf(node));
-  const bool is_thicket = isThicket(node);
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
-      Facet facet = node.facet(i);
-      facet.is_thicket = facet.is_thicket && is_thicket;
-      add(i, facet);
+      add(i, node.facet(i));
     }
   }
 }
@@ -301,7 +298,7 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
   patch.lets_through = facet.opacity < 1;
   if (patch.lets_through) patch.opacity = facetOpacity(facet);
-  patch.is_solid = is_hull || isFilled(node, facet);
+  patch.is_solid = is_hull || (!facet.is_thicket && isFilled(node, facet));
   patch.lets_through = patch.lets_through || !patch.is_solid;
   patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);
@@ -364,7 +361,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts,
-                              std::span<const Lobe> lobes, TwoSided two_sided) {
+                              std::span<const Lobe> lobes) {
   const std::uint32_t all_parts = keepParts(lane_parts);
   const PacketCanvas canvas = this->canvas();
   for (const Surfel& stored : surfels) {
@@ -404,11 +401,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.lets_through = surfel.transparency != 0;
     if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
     patch.thicket = thicketPart(surfel);
-    if (two_sided == TwoSided::kThicket && surfel.isTwoSided() && patch.thicket == 0) {
+    if (surfel.isLone() && patch.thicket == 0) {
       patch.overlap = patch.thicket = 1;
       patch.reach = 0;
     }
-    patch.is_solid = mayTile(surfel) || two_sided == TwoSided::kTiles;
+    patch.is_solid = !surfel.isSphere() && !surfel.isLoose();
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float size = nearFieldSize(patch.radius, ribbon);
     const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;

@@ -72,12 +72,9 @@ class PacketRaster {
   // that see no hull of a node above it.
   OpenedNode addHull(const Node& node, const LaneParts* parts = nullptr,
                      const OpenedNode& parent = {});
-  // What the two-sided surfels of a leaf are, by it and the node above it: leaves that stand alone
-  // for all that is known, tiles of what isSheet(), or leaves in what isThicket().
-  enum class TwoSided : std::uint8_t { kAlone, kTiles, kThicket };
   // Adds those of the surfels that some receiver may see. `lobes`: as many, or none.
   void addSurfels(std::span<const Surfel> surfels, const LaneParts* parts = nullptr,
-                  std::span<const Lobe> lobes = {}, TwoSided two_sided = TwoSided::kAlone);
+                  std::span<const Lobe> lobes = {});
 
   // Sorts what was added, and draws it.
   void sort();

@@ -69,6 +69,7 @@ Facet facetOf(const Node& node) {
           .radiosity = node.radiosity,
           .covariance = node.covariance,
           .is_two_sided = node.isTwoSided(),
+          .is_thicket = node.isTwoSided() && node.isLoose(),
           .opacity = node.opacity()};
 }
 
@@ -184,46 +185,6 @@ float reachOf(const Facet& facet, const glm::vec3& direction) {
   return layerReach(facet.radius, quadraticForm(facet.covariance, direction));
 }
 
-namespace {
-bool hasTwoSidedPieces(const Node& node) {
-  constexpr std::uint8_t kAnyTwoSided = ((1u << kMostFacets) - 1) * kNodeTwoSided;
-  return (node.flags & kAnyTwoSided) != 0;
-}
-}  // namespace
-
-bool isSheet(const Node& node) {
-  if (!hasTwoSidedPieces(node)) return false;
-  const float fewest = kFidelity.fewest_tiles * node.area / float(node.surfel_count);
-  const auto isTiled = [&](const Facet& facet) {
-    return facet.area >= fewest && isFilled(node, facet);
-  };
-  if (node.isFlat()) return isTiled(facetOf(node));
-  float area = 0;
-  for (std::size_t i = 0; i < node.facet_count; ++i) {
-    const Facet facet = node.facet(i);
-    if (isTiled(facet)) area += facet.area;
-  }
-  return area >= kFidelity.least_filled * node.area;
-}
-
-namespace {
-// How much of a volume something with this covariance fills, 0 to 1: all where it spreads alike in
-// all directions, nothing where it lies on a plane.
-float volumePart(const SymmetricMatrix& covariance) {
-  const float trace = covariance.trace();
-  if (!(trace >= std::numeric_limits<float>::min())) return 0;
-  const SymmetricMatrix c = (1 / trace) * covariance, minors = adjugate(c);
-  const float determinant =
-      c(0, 0) * minors(0, 0) + c(0, 1) * minors(0, 1) + c(0, 2) * minors(0, 2);
-  return minors.trace() > 0 ? std::clamp(9 * determinant / minors.trace(), 0.f, 1.f) : 0;
-}
-}  // namespace
-
-bool isThicket(const Node& node) {
-  const bool is_two_sided = node.isRough() ? thicketPart(node) > 0.5f : hasTwoSidedPieces(node);
-  return is_two_sided && volumePart(node.covariance) > kFidelity.thin_volume && !isSheet(node);
-}
-
 float thicketPart(const Surfel& surfel) {
   if (!surfel.isTwoSided()) return 0;
   const bool is_ribbon = surfel.long_side != kNoLongSide
@@ -239,12 +200,11 @@ float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
   return layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
 }
 
-// Spheres are a surface. Codes round: what is about none is none.
+// Codes round: what is about none is none.
 float thicketPart(const Node& node) {
+  if (!node.isLoose()) return 0;
   constexpr float kNone = 0.05f;
-  const float more = partsOfBand0(node) - 1;
-  const float part = std::min(more, 0.5f * (3 - more));
-  return std::clamp((part - kNone) / (1 - 2 * kNone), 0.f, 1.f);
+  return std::clamp((partsOfBand0(node) - 1 - kNone) / (1 - 2 * kNone), 0.f, 1.f);
 }
 
 SymmetricMatrix shapeOf(const SymmetricMatrix& covariance) {

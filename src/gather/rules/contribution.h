@@ -72,18 +72,10 @@ float reachOf(const Facet& facet, const glm::vec3& direction);
 // How far before and behind its middle a surfel meets others of its layer, seen in this direction.
 // `radius`: drawnRadius.
 float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius, const glm::vec3& direction);
-// Whether a surfel is a tile of a surface by all that it tells: spheres and two-sided ones, leaves,
-// may stand alone.
-inline bool mayTile(const Surfel& surfel) { return !surfel.isSphere() && !surfel.isTwoSided(); }
-// Whether two-sided surfels of a node lie side by side, on a plane or on each of a few, and fill
-// it: then they are tiles of a surface as well. One alone may be a leaf.
-bool isSheet(const Node& node);
-// Whether two-sided facets or surfels of a node lie before and behind each other anywhere, as
-// leaves do: it is no sheet, and no thin slab either, as half of a sheet in folds is.
-bool isThicket(const Node& node);
 // How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
 float thicketPart(const Surfel& surfel);
-// How much of a rough node is leaves or hair, 0..1: what of it is two-sided.
+// How much of a rough node is leaves, hair or particles, 0..1: of a loose one, what is two-sided or
+// spheres.
 float thicketPart(const Node& node);
 
 // How what has this covariance spreads, as Patch::shape.

@@ -108,17 +108,7 @@ struct Fidelity {
   // any number, 2 % of the light behind a ball of 50,000 disks leaks at draft quality.)
   float most_in_hull = 64;
 
-  // --- Leaves, hair and grass ("Thickets", "Ribbons") ---
-
-  // Part, 0 to 1, of a ball that a node spreads as, 9 det C / (trace C trace adj C) of its
-  // covariance C. One that spreads as less is a slab, at most .15 times as thick as wide: no leaves
-  // lie behind each other in it. (0: two-sided and one-sided folds together are off by .043, rms,
-  // instead of .022; random_test, Folds.)
-  float thin_volume = 0.1f;
-
-  // Surfels. Fewer two-sided ones on a plane are no sheet, for they may be leaves: each fills its
-  // own outline, and two may happen to.
-  float fewest_tiles = 3;
+  // --- Hair and grass ("Ribbons") ---
 
   // Part of a disk. A two-sided surfel without a longer side that fills less is a piece of a
   // ribbon.

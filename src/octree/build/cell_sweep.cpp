@@ -63,8 +63,7 @@ void CellSweep::close(const OpenCell& cell, std::span<const Surfel> surfels, Fin
   node.first = place.first;
   node.child_count = cell.child_count;
   parent.node.child_level = static_cast<std::uint8_t>(cell.level + 1);
-  parent.node.has_layers = std::any_of(children.begin(), children.end(),
-                                       [](const LevelNode& child) { return child.has_layers; });
+  for (const LevelNode& child : children) parent.node.marks |= child.marks;
 }
 
 }  // namespace surfeit

@@ -5,6 +5,7 @@
 #include "core/assert.h"
 #include "core/thread_scratch.h"
 #include "octree/page/scene_header.h"
+#include "octree/page/surfel_marks.h"
 #include "storage/page_codec.h"
 
 namespace surfeit {
@@ -24,7 +25,10 @@ GroupPlace SceneWriter::addSiblings(int level, std::span<const LevelNode> siblin
   const GroupPlace place{at.full_pages, static_cast<std::uint16_t>(at.open.size())};
   at.open.insert(at.open.end(), siblings.begin(), siblings.end());
   header_.node_count += siblings.size();
-  for (const LevelNode& node : siblings) header_.has_layers |= node.has_layers;
+  for (const LevelNode& node : siblings) {
+    header_.has_layers |= (node.marks & kSurfelHiddenSides) != 0;
+    header_.has_loose |= (node.marks & kSurfelLoose) != 0;
+  }
   return place;
 }
 

@@ -1,12 +1,14 @@
 #include "octree/build/slab_builder.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/thread_scratch.h"
 #include "octree/build/hidden_surfels.h"
-#include "octree/node/hidden_layers.h"
+#include "octree/build/loose_surfels.h"
 #include "octree/page/node_bounds.h"
 #include "octree/page/surfel_group.h"
+#include "octree/page/surfel_marks.h"
 #include "storage/page_codec.h"
 
 namespace surfeit {
@@ -52,11 +54,19 @@ class SlabBuilder {
   }
 
  private:
+  struct Cell {
+    std::size_t begin, size;
+    int level;
+  };
   void fetchSurfels();
   void buildBrick(std::size_t begin, const Brick& brick);
-  void markLayers(std::size_t first, const Brick& brick);
-  std::size_t cellSize(std::size_t begin, std::size_t end, int boundary_level,
-                       std::size_t capacity) const;
+  void markSurfels(std::size_t first, const Brick& brick);
+  void markLoose(const Cell& cell);
+  template <typename Visit>
+  void visitCells(std::size_t begin, std::size_t end, int boundary_level, std::size_t capacity,
+                  const Visit& visit);
+  Cell cellAt(std::size_t begin, std::size_t end, int boundary_level, std::size_t capacity) const;
+  Bounds3 cubeOf(const Cell& cell) const;
   void makeLeaf(std::size_t begin, std::size_t end, FinishedNode& leaf);
   GroupPlace placeSurfels(std::size_t begin, std::size_t end);
   Status encodePages();
@@ -66,6 +76,7 @@ class SlabBuilder {
   BuiltSlab& built_;
   SlabSiblings sink_;
   CellSweep sweep_;
+  LooseSurfels loose_;
   std::vector<Surfel>& surfels_ = surfelScratch();
   std::vector<CurveKey>& keys_ = keyScratch();
   std::vector<std::size_t> page_begins_;  // surfels at which pages begin
@@ -100,13 +111,13 @@ void SlabBuilder::fetchSurfels() {
 }
 
 void SlabBuilder::buildBrick(std::size_t begin, const Brick& brick) {
-  if (!slab_.giant) markLayers(begin, brick);
+  if (!slab_.giant) markSurfels(begin, brick);
   FinishedNode node;
   int boundary_level = brick.level;
   while (begin < brick.end) {
     std::size_t end = brick.end;
     if (!slab_.giant)
-      end = begin + cellSize(begin, brick.end, boundary_level, header_.leaf_capacity);
+      end = begin + cellAt(begin, brick.end, boundary_level, header_.leaf_capacity).size;
     makeLeaf(begin, end, node);
     boundary_level =
         end < brick.end ? firstDifferentLevel(keys_[end - 1], keys_[end]) : brick.level;
@@ -116,26 +127,45 @@ void SlabBuilder::buildBrick(std::size_t begin, const Brick& brick) {
   built_.roots.push_back({node, brick.boundary_level, built_.siblings.size()});
 }
 
-void SlabBuilder::markLayers(std::size_t first, const Brick& brick) {
+// Hidden sides, and what is loose.
+void SlabBuilder::markSurfels(std::size_t first, const Brick& brick) {
   for (std::size_t i = first; i < brick.end; ++i) {
-    surfels_[i].flags &= static_cast<std::uint16_t>(~(kSurfelHiddenFront | kSurfelHiddenBack));
+    surfels_[i].flags &= static_cast<std::uint16_t>(~kSurfelMarks);
   }
   for (const std::size_t most : kLayerCells) {
-    int boundary_level = brick.level;
-    for (std::size_t begin = first; begin < brick.end;) {
-      const std::size_t size = cellSize(begin, brick.end, boundary_level, most);
-      if (size <= most) markHidden(std::span(surfels_).subspan(begin, size));
-      begin += size;
-      if (begin < brick.end) boundary_level = firstDifferentLevel(keys_[begin - 1], keys_[begin]);
-    }
+    visitCells(first, brick.end, brick.level, most, [&](const Cell& cell) {
+      markHidden(std::span(surfels_).subspan(cell.begin, cell.size));
+    });
+  }
+  visitCells(first, brick.end, brick.level, kLooseCell, [&](const Cell& cell) { markLoose(cell); });
+}
+
+void SlabBuilder::markLoose(const Cell& cell) {
+  const std::span<Surfel> surfels = std::span(surfels_).subspan(cell.begin, cell.size);
+  if (!loose_.look(surfels, cubeOf(cell), cubeOf({0, 1, 0}))) return;
+  visitCells(cell.begin, cell.begin + cell.size, cell.level, kLoosePart, [&](const Cell& part) {
+    loose_.mark(part.begin - cell.begin, std::span(surfels_).subspan(part.begin, part.size));
+  });
+}
+
+// The largest cells of up to `capacity` surfels. More surfels in one cell of the finest level are
+// left out.
+template <typename Visit>
+void SlabBuilder::visitCells(std::size_t begin, std::size_t end, int boundary_level,
+                             std::size_t capacity, const Visit& visit) {
+  while (begin < end) {
+    const Cell cell = cellAt(begin, end, boundary_level, capacity);
+    if (cell.size <= capacity) visit(cell);
+    begin += cell.size;
+    if (begin < end) boundary_level = firstDifferentLevel(keys_[begin - 1], keys_[begin]);
   }
 }
 
-// Surfels of the cell that begins here, the largest with no more than `capacity`: its level is at
+// The cell that begins here, the largest with no more than `capacity` surfels: its level is at
 // least the boundary's, and deep enough to leave out the surfel after the last one that fits. More
 // surfels than that in one cell of the finest level are one.
-std::size_t SlabBuilder::cellSize(std::size_t begin, std::size_t end, int boundary_level,
-                                  std::size_t capacity) const {
+SlabBuilder::Cell SlabBuilder::cellAt(std::size_t begin, std::size_t end, int boundary_level,
+                                      std::size_t capacity) const {
   int level = boundary_level;
   std::size_t limit = std::min(end - begin, capacity);
   if (end - begin > capacity) {
@@ -147,7 +177,21 @@ std::size_t SlabBuilder::cellSize(std::size_t begin, std::size_t end, int bounda
   }
   std::size_t size = 1;
   while (size < limit && firstDifferentLevel(keys_[begin], keys_[begin + size]) > level) ++size;
-  return size;
+  return {begin, size, level};
+}
+
+Bounds3 SlabBuilder::cubeOf(const Cell& cell) const {
+  std::uint32_t place[3];
+  curveCell(keys_[cell.begin], place[0], place[1], place[2]);
+  const double size = std::ldexp(header_.cube.size, -cell.level);
+  Bounds3 cube;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low =
+        header_.cube.origin[axis] + size * double(place[axis] >> (kCurveLevels - cell.level));
+    cube.min[axis] = float(low);
+    cube.max[axis] = float(low + size);
+  }
+  return cube;
 }
 
 void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& leaf) {
@@ -163,9 +207,8 @@ void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& lea
   node = leaf.sums.toNode(header_.flatness_limit, radius);
   boundSurfels(surfels, leaf.node);
   leaf.node.child_level = 0;
-  leaf.node.has_layers = std::any_of(surfels.begin(), surfels.end(), [](const Surfel& surfel) {
-    return hiddenSidesOf(surfel) != 0;
-  });
+  leaf.node.marks = 0;
+  for (const Surfel& surfel : surfels) leaf.node.marks |= surfel.flags & kSurfelMarks;
   const GroupPlace place = placeSurfels(begin, end);
   node.page = place.page;
   node.first = place.first;

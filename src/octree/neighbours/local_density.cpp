@@ -106,7 +106,7 @@ float SizedSurfelStream::coveringArea(float coverage, float radius, float local_
 }
 
 void SizedSurfelStream::applySize(Surfel& surfel, const SurfaceAt& surface) const {
-  surfel.flags &= ~(kSurfelNeedsSize | kSurfelHiddenFront | kSurfelHiddenBack);
+  surfel.flags &= ~(kSurfelNeedsSize | kSurfelMarks);
   if (surfel.radius > kPlaceholderSize) {
     surfel.area =
         coveringArea(std::min(surfel.area / kPlaceholderSize, 1.f), surfel.radius, surface.area);

@@ -416,7 +416,7 @@ Result<std::shared_ptr<const SortedBatch>> OrientedSurfelStream::next() {
   for (std::size_t i = 0; i < count; ++i) {
     Surfel& surfel = batch->surfels[i];
     if (is_turned[i]) surfel.normal = -surfel.normal;
-    surfel.flags &= ~(kSurfelNeedsSide | kSurfelHiddenFront | kSurfelHiddenBack);
+    surfel.flags &= ~(kSurfelNeedsSide | kSurfelMarks);
     batch->tickets[i] = {curveKey(surfel.position, scene_.header().cube), i};
   }
   return std::shared_ptr<const SortedBatch>(batch);

@@ -21,6 +21,8 @@ enum NodeFlags : std::uint8_t {
   // Bit 1 + i: facet i is of two-sided surfels, and its normal is one of two; with i = 0, all of a
   // flat node.
   kNodeTwoSided = 1u << 1,
+  // Most of its spheres and two-sided surfels, by area, are kSurfelLoose.
+  kNodeLoose = 1u << 7,
 };
 
 // A node that is neither flat nor made of a few facets is rough: it is drawn as what its harmonics
@@ -104,10 +106,12 @@ struct Node {
   bool isRough() const { return !isFlat() && !hasFacets(); }
   // Of facet i, or of a flat node.
   std::uint8_t hiddenSides(std::size_t i) const { return isFlat() ? hidden : facets[i].hidden; }
+  bool isLoose() const { return (flags & kNodeLoose) != 0; }
   bool isTwoSided(std::size_t i = 0) const { return (flags & (kNodeTwoSided << i)) != 0; }
   Facet facet(std::size_t i) const {
     Facet facet = facets[i].decode(position, radius, area);
-    facet.is_two_sided = facet.is_thicket = isTwoSided(i);
+    facet.is_two_sided = isTwoSided(i);
+    facet.is_thicket = facet.is_two_sided && isLoose();
     return facet;
   }
 };

@@ -26,7 +26,7 @@ struct Facet {
   glm::vec3 radiosity;         // mean, weighted by area and opacity
   SymmetricMatrix covariance;  // Node::covariance
   bool is_two_sided = false;   // seen from both sides; the normal is one of two
-  bool is_thicket = false;     // two-sided, and one of several: it may be of leaves, or hair
+  bool is_thicket = false;     // two-sided and loose: of leaves, or hair
   float opacity = 1;           // area-weighted mean
 };
 

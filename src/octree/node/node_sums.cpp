@@ -44,6 +44,7 @@ void NodeSums::add(const Surfel& surfel) {
   surfel_count += 1;
   groups |= groupBit(surfel.group);
   const double a = double(surfel.area);
+  if (!has_one_front) loose_area += surfel.isLoose() ? a : -a;
   const double o = double(surfel.opacity());
   const double area_and_power[4] = {1, o * double(surfel.radiosity[0]),
                                     o * double(surfel.radiosity[1]),
@@ -85,6 +86,7 @@ void NodeSums::add(const NodeSums& child) {
   }
   surfel_count += child.surfel_count;
   groups |= child.groups;
+  loose_area += child.loose_area;
   for (int i = 0; i < kShCount; ++i) {
     for (int k = 0; k < 4; ++k) sh[i][k] += child.sh[i][k];
     band_4[i] += child.band_4[i];
@@ -140,9 +142,10 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   node.transparency = transparencyOf(covered / area);
   node.covariance = all.covariance;
   setNormal(*this, node);
+  if (loose_area > 0) node.flags = kNodeLoose;
   const bool is_flat = node.flatness > flatness_limit;
   if (is_flat && !facets.hasLayers()) {
-    node.flags = kNodeFlat;
+    node.flags |= kNodeFlat;
     node.hidden = facets.hiddenSides();
     return node;
   }
@@ -153,7 +156,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   }
   if (fewest.groups().size() == 1 && fewest.groups().front().is_two_sided) {
     setNormal(fewest.groups().front(), node);
-    node.flags = kNodeFlat | kNodeTwoSided;
+    node.flags |= kNodeFlat | kNodeTwoSided;
     node.hidden = fewest.groups().front().hidden;
     return node;
   }

@@ -18,6 +18,7 @@ namespace surfeit {
 struct NodeSums : AreaSums {
   std::uint64_t surfel_count = 0;
   std::uint64_t groups = 0;        // set of groups
+  double loose_area = 0;           // of kSurfelLoose, less that of other spheres and two-sided ones
   double origin[3] = {};           // of positions: the first surfel, so that nothing cancels
   double front_moment[3][3] = {};  // sum A x n^T over one-sided disks
   double sh[kShCount][4] = {};     // sum A K_l Y_lm(n) times 1, o B_r, o B_g and o B_b

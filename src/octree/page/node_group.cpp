@@ -240,7 +240,7 @@ Status checkFlags(std::span<const Node> nodes) {
   for (const Node& node : nodes) {
     const std::size_t pieces = node.isFlat() ? 1 : node.facet_count;
     const std::uint32_t two_sided = kNodeTwoSided * ((1u << pieces) - 1);
-    if ((node.flags & ~(kNodeFlat | two_sided)) != 0) return damaged("flags");
+    if ((node.flags & ~(kNodeFlat | kNodeLoose | two_sided)) != 0) return damaged("flags");
   }
   return {};
 }

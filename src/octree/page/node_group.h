@@ -26,7 +26,7 @@ struct LevelNode {
   std::uint8_t child_level = 0;  // of an interior node; 0 for a leaf
   // Of Node::normal_cosine, of which nothing is known as yet: a cosine says little of small angles.
   float normal_angle = kUnknownAngle;
-  bool has_layers = false;  // a surfel below has a hidden side
+  std::uint16_t marks = 0;  // kSurfelMarks of the surfels below
 };
 
 // What references of a group may point at; from the header.

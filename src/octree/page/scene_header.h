@@ -44,6 +44,7 @@ struct SceneHeader {
   bool full_precision = false;  // pages hold floats instead of quantized values
   bool has_lobes = false;       // surfels and nodes have lobes (octree/node/lobe.h)
   bool has_layers = false;      // some have hidden sides (octree/node/hidden_layers.h)
+  bool has_loose = false;       // some are kSurfelLoose
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 

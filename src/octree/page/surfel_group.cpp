@@ -18,7 +18,8 @@ namespace {
 
 // Flags that a page may hold; the last two only in the indexer's own temporary files.
 constexpr std::uint8_t kStoredFlags = kSurfelSphere | kSurfelTwoSided | kSurfelHiddenFront |
-                                      kSurfelHiddenBack | kSurfelNeedsSize | kSurfelNeedsSide;
+                                      kSurfelHiddenBack | kSurfelLoose | kSurfelLone |
+                                      kSurfelNeedsSize | kSurfelNeedsSide;
 
 Status damaged(const char* field) {
   return Status::corruption(fmt::format("surfel group: damaged field {}", field));
@@ -126,6 +127,9 @@ Status decodeGeometry(PayloadReader& reader, const Columns& columns) {
   if (!getBytes8(reader, columns.flags)) return damaged("flags");
   for (const std::uint8_t flags : columns.flags) {
     if ((flags & ~kStoredFlags) != 0) return damaged("flags");
+    const bool may_be_loose = (flags & (kSurfelSphere | kSurfelTwoSided)) != 0;
+    if ((flags & kSurfelLoose) != 0 && !may_be_loose) return damaged("flags");
+    if ((flags & kSurfelLone) != 0 && (flags & kSurfelLoose) == 0) return damaged("flags");
   }
   if (!getPositions(reader, columns.position)) return damaged("position");
   if (!getNormals(reader, columns.normal)) return damaged("normal");

@@ -7,6 +7,9 @@ namespace surfeit {
 
 // Marks surfels whose radius and area are to be found, and those whose normal may point to either
 // side of their surface (octree/neighbours/orientation.h); never in a finished file.
+// What the builder finds of a surfel and of those around it.
+inline constexpr std::uint16_t kSurfelHiddenSides = kSurfelHiddenFront | kSurfelHiddenBack;
+inline constexpr std::uint16_t kSurfelMarks = kSurfelHiddenSides | kSurfelLoose | kSurfelLone;
 inline constexpr std::uint32_t kSurfelNeedsSize = 1u << 7, kSurfelNeedsSide = 1u << 6;
 // Radius and area of such a surfel meanwhile: positive, because pages hold nothing else.
 inline constexpr float kPlaceholderSize = 1e-30f;

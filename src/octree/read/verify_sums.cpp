@@ -76,6 +76,7 @@ class NodeCheck {
 
   std::string run() {
     checkPlace();
+    checkLoose();
     node_.isFlat() && node_.isTwoSided() ? checkTwoSided() : checkNormal();
     checkCovariance();
     if (node_.isRough()) checkRough();
@@ -99,6 +100,7 @@ class NodeCheck {
   }
 
   void checkPlace();
+  void checkLoose();
   void checkNormal();
   void checkTwoSided();
   void checkCovariance();
@@ -128,6 +130,15 @@ void NodeCheck::checkPlace() {
     expect("position", kAxes[axis], double(node_.position[axis]),
            sums_.origin[axis] + middle_[axis], (slack(5e-3, 1e-5) + rounding_) * radius_);
   }
+}
+
+// Half and half is told by areas that codes round.
+void NodeCheck::checkLoose() {
+  const bool is_clear = std::abs(sums_.loose_area) > slack(2e-3, 1e-5) * sums_.area;
+  const bool is_right = node_.isLoose() == (sums_.loose_area > 0) || !is_clear;
+  if (!wrong_.empty() || is_right) return;
+  wrong_ = fmt::format("{}, expected otherwise from what lies below",
+                       node_.isLoose() ? "loose" : "not loose");
 }
 
 void NodeCheck::checkNormal() {

@@ -1,0 +1,194 @@
+#include "octree/build/loose_surfels.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "core/symmetric_matrix.h"
+
+namespace surfeit {
+namespace {
+
+// Roots of the area of a surfel within which its neighbours are: on a plane, some 19 of its size.
+constexpr float kReach = 2.5f;
+// One surfel of so many is asked. It is odd, lest rows of a grid are left out.
+constexpr std::size_t kAskedApart = 3;
+// Fewer that were asked do not decide.
+constexpr std::size_t kFewestVotes = 4;
+// Two-sided neighbours lie beside each other if they face alike within 60 degrees and lie within 30
+// degrees of each other's plane: of leaves that face anywhere, one in 16 does.
+constexpr float kAlike = 0.5f, kOffPlane = 0.5f;
+// Within this part of the reach they may also be beyond a ridge, right-angled or less sharp: within
+// 46 degrees of each other's plane.
+constexpr float kRidgeReach = 0.5f, kOffRidge = 0.72f;
+// A surfel with others beside it in fewer sectors is lone; the three others of a leaf of 2 x 2 are
+// in three.
+constexpr int kFewestBeside = 3;
+// Spheres with fewer neighbours do not touch them: half of a plane has 9.
+constexpr std::size_t kFewestAround = 5;
+// Spheres around which others fill more of a volume (volumePart) lie in one. Samples of a plane
+// with noise of half a spacing come to .5, samples of a volume to .87.
+constexpr float kVolume = 0.6f;
+
+bool mayBeLoose(const Surfel& surfel) { return surfel.isSphere() || surfel.isTwoSided(); }
+
+bool contains(const Bounds3& box, const glm::vec3& p) {
+  return p.x >= box.min.x && p.y >= box.min.y && p.z >= box.min.z && p.x <= box.max.x &&
+         p.y <= box.max.y && p.z <= box.max.z;
+}
+
+// Directions on a plane, in 16 sectors.
+class Sectors {
+ public:
+  explicit Sectors(const glm::vec3& normal)
+      : u_(glm::normalize(glm::cross(
+            normal, std::abs(normal.x) < 0.5f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0)))),
+        v_(glm::cross(normal, u_)) {}
+
+  void add(const glm::vec3& offset) {
+    constexpr float kTanEighth = 0.41421356f;  // of 22.5 degrees
+    const float a = glm::dot(offset, u_), b = glm::dot(offset, v_);
+    const unsigned quadrant = b >= 0 ? (a >= 0 ? 0 : 1) : (a < 0 ? 2 : 3);
+    const float size_a = std::abs(a), size_b = std::abs(b);
+    const float x = quadrant % 2 == 0 ? size_a : size_b, y = quadrant % 2 == 0 ? size_b : size_a;
+    const unsigned within = y <= x ? (y > kTanEighth * x ? 1 : 0) : (x > kTanEighth * y ? 2 : 3);
+    filled_ |= 1u << (4 * quadrant + within);
+  }
+  glm::vec3 direction(float turns) const {
+    const float angle = turns * 6.2831853f;
+    return std::cos(angle) * u_ + std::sin(angle) * v_;
+  }
+  int count() const { return std::popcount(filled_); }
+  // No gap of six, 135 degrees: at a straight edge it is 180, of which neighbours along the edge
+  // may take two sectors.
+  bool areAround() const {
+    const unsigned empty = ~filled_ & 0xFFFFu, twice = empty | empty << 16;
+    const unsigned two = twice & twice >> 1;
+    return (two & two >> 2 & two >> 4) == 0;
+  }
+
+ private:
+  glm::vec3 u_, v_;
+  unsigned filled_ = 0;
+};
+
+}  // namespace
+
+bool LooseSurfels::look(std::span<const Surfel> cell, const Bounds3& cube, const Bounds3& all) {
+  if (std::none_of(cell.begin(), cell.end(), mayBeLoose)) return false;
+  votes_.assign(cell.size(), Vote::kNone);
+  all_ = {};
+  Bounds3 known = cube;
+  for (int axis = 0; axis < 3; ++axis) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    if (cube.min[axis] <= all.min[axis]) known.min[axis] = -kInfinity;
+    if (cube.max[axis] >= all.max[axis]) known.max[axis] = kInfinity;
+  }
+  ask(cell, true, known);
+  ask(cell, false, known);
+  return true;
+}
+
+void LooseSurfels::ask(std::span<const Surfel> cell, bool spheres, const Bounds3& known) {
+  places_.clear();
+  for (std::size_t i = 0; i < cell.size(); ++i) {
+    const Surfel& surfel = cell[i];
+    if (spheres ? surfel.isSphere() : surfel.isTwoSided() && !surfel.isSphere()) {
+      places_.push_back({surfel.position, std::uint32_t(i)});
+    }
+  }
+  if (places_.empty()) return;
+  std::sort(places_.begin(), places_.end(), [](const Place& a, const Place& b) {
+    return a.position.x != b.position.x ? a.position.x < b.position.x : a.surfel < b.surfel;
+  });
+  for (const Place& place : places_) {
+    if (place.surfel % kAskedApart != 0) continue;
+    const float reach = kReach * std::sqrt(cell[place.surfel].area);
+    Vote& vote = votes_[place.surfel];
+    if (spheres) {
+      const glm::vec3 margin(reach);
+      if (!contains(known, place.position - margin) || !contains(known, place.position + margin)) {
+        continue;
+      }
+      vote = voteOfSphere(place, reach);
+    } else {
+      vote = voteOfDisk(cell, place, reach, known);
+    }
+    all_.add(vote);
+  }
+}
+
+template <typename Visit>
+void LooseSurfels::visitAround(const Place& place, float reach, const Visit& visit) const {
+  const auto first =
+      std::lower_bound(places_.begin(), places_.end(), place.position.x - reach,
+                       [](const Place& other, float least) { return other.position.x < least; });
+  for (auto other = first; other != places_.end(); ++other) {
+    const glm::vec3 offset = other->position - place.position;
+    if (offset.x > reach) break;
+    if (glm::dot(offset, offset) <= reach * reach && other->surfel != place.surfel) {
+      visit(offset, *other);
+    }
+  }
+}
+
+LooseSurfels::Vote LooseSurfels::voteOfSphere(const Place& place, float reach) const {
+  std::size_t count = 1;  // itself
+  glm::vec3 sum(0);
+  SymmetricMatrix squares{};
+  visitAround(place, reach, [&](const glm::vec3& offset, const Place&) {
+    ++count;
+    sum += offset;
+    for (std::size_t i = 0; i < squares.entries.size(); ++i) {
+      squares.entries[i] += offset[SymmetricMatrix::kRow[i]] * offset[SymmetricMatrix::kColumn[i]];
+    }
+  });
+  if (count <= kFewestAround) return Vote::kLone;
+  for (std::size_t i = 0; i < squares.entries.size(); ++i) {
+    squares.entries[i] -=
+        sum[SymmetricMatrix::kRow[i]] * sum[SymmetricMatrix::kColumn[i]] / float(count);
+  }
+  return volumePart(squares) > kVolume ? Vote::kLone : Vote::kTile;
+}
+
+// A disk inside of a sheet has others all around on its plane. One at the edge has not, as most of
+// a leaf of a few surfels.
+LooseSurfels::Vote LooseSurfels::voteOfDisk(std::span<const Surfel> cell, const Place& place,
+                                            float reach, const Bounds3& known) const {
+  const glm::vec3& normal = cell[place.surfel].normal;
+  Sectors around(normal), beside(normal);
+  for (int i = 0; i < 8; ++i) {
+    if (!contains(known, place.position + reach * around.direction(float(i) / 8)))
+      return Vote::kNone;
+  }
+  visitAround(place, reach, [&](const glm::vec3& offset, const Place& other) {
+    const glm::vec3& facing = cell[other.surfel].normal;
+    const float distance = glm::length(offset);
+    const float off_plane =
+        std::max(std::abs(glm::dot(offset, normal)), std::abs(glm::dot(offset, facing)));
+    const bool is_beside =
+        std::abs(glm::dot(normal, facing)) > kAlike && off_plane < kOffPlane * distance;
+    if (is_beside) beside.add(offset);
+    if (is_beside || (distance < kRidgeReach * reach && off_plane < kOffRidge * distance)) {
+      around.add(offset);
+    }
+  });
+  if (around.areAround()) return Vote::kTile;
+  return beside.count() < kFewestBeside ? Vote::kLone : Vote::kPiece;
+}
+
+void LooseSurfels::mark(std::size_t begin, std::span<Surfel> part) const {
+  Votes votes;
+  for (std::size_t i = begin; i < begin + part.size(); ++i) votes.add(votes_[i]);
+  if (votes.count() < kFewestVotes) votes = all_;
+  if (votes.pieces + votes.lone <= votes.tiles) return;
+  std::uint16_t marks = kSurfelLoose;
+  if (votes.lone > votes.pieces) marks |= kSurfelLone;
+  for (Surfel& surfel : part) {
+    if (mayBeLoose(surfel)) surfel.flags |= marks;
+  }
+}
+
+}  // namespace surfeit
