@@ -9,11 +9,13 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "core/luminance.h"
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
 #include "gather/rules/coverage_rules.h"
 #include "gather/rules/layers.h"
 #include "gather/rules/lobe_light.h"
+#include "gather/rules/result_sums.h"
 #include "gather/rules/ribbon.h"
 #include "octree/node/hidden_layers.h"
 
@@ -113,6 +115,7 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
   parts_.resize(1);   // that of what counts wholly
   lights_.resize(1);  // of what sends evenly
   order_count_ = 0;
+  has_tints_ = false;
   setFrame(nullptr);
 }
 
@@ -217,6 +220,7 @@ std::uint32_t PacketRaster::keepParts(const LaneParts* parts) {
 }
 
 void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const NodeLobes* lobes) {
+  has_tints_ |= node.isTinted();
   const std::uint32_t parts = keepParts(lane_parts);
   const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
   gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
@@ -236,6 +240,7 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
+      has_tints_ |= codes.tint != Tint{};
       Facet facet = node.facet(i);
       facet.is_thicket = facet.is_thicket && is_thicket;
       add(i, facet);
@@ -299,8 +304,8 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
   patch.reach = reachOf(facet, direction);
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
-  patch.lets_through = facet.opacity < 1;
-  if (patch.lets_through) patch.opacity = facetOpacity(facet);
+  patch.lets_through = facet.opacity[color_] < 1;
+  if (patch.lets_through) patch.opacity = facetOpacity(facet, color_);
   patch.is_solid = is_hull || isFilled(node, facet);
   patch.lets_through = patch.lets_through || !patch.is_solid;
   patch.is_spread = !node.isFlat() || !patch.is_solid;
@@ -337,7 +342,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.position = node.position + visible.middle;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
-  patch.lets_through = node.transparency != 0;
+  patch.lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
   if (!patch.lets_through) {
     patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   }
@@ -345,14 +350,14 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.thicket = thicketPart(node);
   patch.is_solid = false;
   const RoughCover cover =
-      roughCover(node, direction, visible.perspective * round_area, patch.thicket);
+      roughCover(node, direction, visible.perspective * round_area, patch.thicket, color_);
   patch.area = patch.round_area = cover.area;
   patch.most_area = cover.most;
   patch.opacity = cover.opacity;
   patch.parts = parts;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) {
-    patch.radiosity = (gain_ * front / (round_area * node.opacity())) * seen.radiosity;
+    patch.radiosity = (gain_ * front / (round_area * node.opacity(color_))) * seen.radiosity;
   }
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
@@ -374,6 +379,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
       if (!keepSeenParts(seen_of, lane_parts, parts)) continue;
     }
     const Surfel surfel = withSides(stored, rules_.quality.sides);
+    has_tints_ |= surfel.isTinted();
+    const bool lets_through = transparencyOf(surfel.transparency, surfel.tint, color_) != 0;
     Patch& patch = patches_.emplace_back();
     patch.position = surfel.position;
     patch.normal = surfel.normal;
@@ -382,7 +389,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
       // Only what is opaque may cover more than it should to leave no gaps
-      const bool is_exact = surfel.isTwoSided() || surfel.transparency != 0;
+      const bool is_exact = surfel.isTwoSided() || lets_through;
       patch.soft_peak = softDiskPeak(patch.radius, surfel.area, is_exact);
     } else {
       patch.shape = ribbon.shape();
@@ -400,8 +407,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
-    patch.opacity = surfel.opacity();
-    patch.lets_through = surfel.transparency != 0;
+    patch.opacity = surfel.opacity(color_);
+    patch.lets_through = lets_through;
     if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
     patch.thicket = thicketPart(surfel);
     if (two_sided == TwoSided::kThicket && surfel.isTwoSided() && patch.thicket == 0) {
@@ -435,6 +442,7 @@ PacketCanvas PacketRaster::canvas() const {
           .bias = rules_.quality.bias,
           .turned = rules_.quality.sides == GatherSides::kBack ? -1.f : 1.f,
           .max_distance_sq = max_distance_sq_,
+          .luminance = luminance_,
           .centre = view_.centre,
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
@@ -459,7 +467,33 @@ std::size_t PacketRaster::tracedCount() const {
 }
 
 void PacketRaster::integrate(std::span<GatherResult> results) {
+  luminance_ = kLuminance;
+  of_colors_.clear();
   kernel_.integrate(canvas(), results);
+  for (GatherResult& result : results) makeDirectionsUnit(result);
+}
+
+void PacketRaster::integrateColor(std::span<GatherResult> results) {
+  // Of the light of the other colors no direction is told
+  luminance_ = glm::vec3(0);
+  luminance_[color_] = kLuminance[color_];
+  std::array<GatherResult, kPacketReceivers> drawn;
+  kernel_.integrate(canvas(), std::span(drawn).first(results.size()));
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    if (color_ == 0) results[i] = {};
+    addColor(drawn[i], color_, results[i]);
+    if (color_ == 2) makeDirectionsUnit(results[i]);
+  }
+  if (recorder_ == nullptr) return;
+  std::vector<PixelContent> pixels(geometry_.pixels().size());
+  kernel_.readPixels(canvas(), pixels);
+  if (color_ == 0) of_colors_.assign(pixels.size(), {.open = glm::vec3(0)});
+  for (std::size_t i = 0; i < pixels.size(); ++i) addColor(pixels[i], color_, of_colors_[i]);
+}
+
+void PacketRaster::readPixels(std::span<PixelContent> pixels) const {
+  if (of_colors_.empty()) return kernel_.readPixels(canvas(), pixels);
+  std::copy(of_colors_.begin(), of_colors_.end(), pixels.begin());
 }
 
 std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
