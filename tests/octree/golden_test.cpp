@@ -50,7 +50,7 @@ constexpr Golden kGoldens[] = {
     {"v2_groups.sft", 12687918996693723113ull, 6009126428172456815ull, true, false},
     {"v2_long_sides.sft", 16580172462110769372ull, 3774583152376164457ull, false, true},
     {"v3_opacity.sft", 7818277089028598686ull, 16727090283409600907ull, false, false, 3},
-    {"v3_tints.sft", 1, 1, false, false, 3, true},
+    {"v3_tints.sft", 12228443692316353389ull, 11119776789287335687ull, false, false, 3, true},
 };
 // The zstd that compressed them: another one may store the same payloads in other bytes.
 constexpr unsigned kZstdVersion = 10504;
