@@ -301,8 +301,8 @@ yellow .95,.95,.1 0 -0.5"
   index tint_panes.ply tint_sky.ply -o tints.sft
   gather tints.sft tint_floor.ply -o tint_light.ply --mode bleeding
   local view=(--eye "0 5 5" --look-at "0 0 0.1" --fov 40 --size 420x240)
-  draw tints_sun tint_sun.ply --channel radiosity --exposure 0.9 "${view[@]}"
-  draw tints_sky tint_light.ply --channel irradiance --exposure 0.3 "${view[@]}"
+  draw tints_sun tint_sun.ply --channel radiosity --exposure 0 "${view[@]}"
+  draw tints_sky tint_light.ply --channel irradiance --exposure -1.3 "${view[@]}"
 }
 
 hair() {

@@ -264,6 +264,66 @@ TEST_F(Tint, SmokeFollowsBeerAndLambertInEachColor) {
   }
 }
 
+// Three filters above a floor, and a bright ceiling, against rays through squares.
+TEST_F(Tint, FiltersLetThroughWhatRaysSay) {
+  struct Square {
+    glm::dvec3 middle;
+    double half;
+    Color opacity;
+    double light;
+  };
+  const std::vector<Square> squares = {{{-.5, .3, .5}, .9, {.9, .05, .05}, 0},
+                                       {{.5, .3, .9}, .9, {.05, .9, .05}, 0},
+                                       {{0, -.5, 1.3}, .9, {.05, .05, .9}, 0},
+                                       {{0, 0, 4}, 6, {1, 1, 1}, 2}};
+  Table cloud = emptyTinted();
+  for (const Square& square : squares) {
+    constexpr int kSide = 150;
+    const double step = 2 * square.half / kSide;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const double x = square.middle.x - square.half + (i % kSide + .5) * step;
+      const double y = square.middle.y - square.half + (i / kSide + .5) * step;
+      cloud.rows.push_back({x, y, square.middle.z, 0, 0, -1, step * std::sqrt(.5), step * step,
+                            square.opacity[0], square.opacity[1], square.opacity[2], square.light,
+                            square.light, square.light});
+    }
+  }
+  receivers_.rows.clear();
+  for (const auto& [x, y] : {std::pair(-.5, .3), {.5, .3}, {0., -.5}, {.9, .3}, {0., 0.}}) {
+    receivers_.rows.push_back({x, y, 0, 0, 0, 1});
+  }
+  for (const float max_solid_angle : {0.f, .1f}) {
+    const Table found = gatherTable(cloud, bleeding(max_solid_angle));
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (std::size_t at = 0; at < receivers_.rows.size(); ++at) {
+      constexpr int kRays = 200000;
+      Color light{};
+      double covered = 0;
+      for (int i = 0; i < kRays; ++i) {
+        const double u = unit(random), phi = 6.283185307 * unit(random), s = std::sqrt(u);
+        const glm::dvec3 ray(s * std::cos(phi), s * std::sin(phi), std::sqrt(1 - u));
+        Color open = {1, 1, 1};
+        for (const Square& square : squares) {
+          const glm::dvec3 offset = receivers_.rows[at][0] * glm::dvec3(1, 0, 0) +
+                                    receivers_.rows[at][1] * glm::dvec3(0, 1, 0) +
+                                    square.middle.z / ray.z * ray - square.middle;
+          if (std::max(std::abs(offset.x), std::abs(offset.y)) > square.half) continue;
+          for (std::size_t c = 0; c < 3; ++c) {
+            light[c] += open[c] * square.opacity[c] * square.light / kRays;
+            open[c] *= 1 - square.opacity[c];
+          }
+        }
+        covered += (1 - (open[0] + open[1] + open[2]) / 3) / kRays;
+      }
+      EXPECT_NEAR(found.column("occlusion")[at], covered, .02) << at;
+      for (std::size_t c = 0; c < 3; ++c) {
+        EXPECT_NEAR(found.column(kIrradiance[c])[at], light[c], .06) << at << ' ' << c;
+      }
+    }
+  }
+}
+
 TEST_F(Tint, BouncesKeepIt) {
   Table cloud = tintedThings();
   for (const char* name : {"albedo_r", "albedo_g", "albedo_b"}) cloud.addProperty(name);

@@ -91,6 +91,30 @@ TEST_F(ObjMaterialFiles, FilesWithoutTextureCoordinatesToo) {
   EXPECT_THAT(notes_.notes, IsEmpty());
 }
 
+// opacity = 1 - (1 - d) Tf, unless Tf is what exporters write where nobody said anything.
+TEST_F(ObjMaterialFiles, TfFiltersWhatDLetsThrough) {
+  struct Case {
+    std::string material;
+    glm::vec3 opacity;
+  };
+  const std::vector<Case> cases = {{"d .2\nTf 1 .1 .5\n", {.2f, .92f, .6f}},
+                                   {"Tr .8\nTf 1 .1 .5\n", {.2f, .92f, .6f}},
+                                   {"d 0\nTf .9 .2 0\n", {.1f, .8f, 1}},
+                                   {"d .2\nTf 1 1 1\n", glm::vec3(.2f)},
+                                   {"d .2\nTf 0 0 0\n", glm::vec3(.2f)},
+                                   {"d .2\nTf .5\n", glm::vec3(.6f)},
+                                   {"illum 4\nd .2\nTf 1 .1 .5\n", {.2f, .92f, .6f}},
+                                   {"d 1\nTf 1 .1 .5\n", glm::vec3(1)}};
+  for (const Case& of : cases) {
+    const Mesh mesh = load("newmtl A\nKd .5 .5 .5\nNi 1.5\n" + of.material);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(at(mesh, 0).opacity[c], of.opacity[c], 1e-6f) << of.material << c;
+    }
+    EXPECT_EQ(mesh.hasTints(), of.opacity != glm::vec3(of.opacity.r)) << of.material;
+    EXPECT_THAT(notes_.notes, IsEmpty()) << of.material;
+  }
+}
+
 TEST_F(ObjMaterialFiles, NumbersOutOfTheirRangeAreTold) {
   struct Case {
     std::string material;
