@@ -140,7 +140,8 @@ RowCopier::RowCopier(const RowLayout& from, const RowLayout& to)
     found = color != nullptr ? index.find(color) : index.end();
     if (found != index.end() && holdsColor(target.type, from.properties[found->second].type)) {
       addCopy(from.properties[found->second], target, is_color[found->second]);
-      colored_.push_back(target.name);
+      // One opacity is that of each color: nothing to tell
+      if (!isTintName(target.name)) colored_.push_back(target.name);
     } else if (!addFull(target)) {
       absent_.push_back(target.name);
     }

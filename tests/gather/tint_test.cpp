@@ -13,6 +13,7 @@
 #include "gather/test_clouds.h"
 #include "surfeit/bake.h"
 #include "surfeit/bounce.h"
+#include "surfeit/cube.h"
 #include "surfeit/index_shards.h"
 #include "surfeit/progress.h"
 #include "surfeit/scene.h"
@@ -322,6 +323,26 @@ TEST_F(Tint, FiltersLetThroughWhatRaysSay) {
       }
     }
   }
+}
+
+// The pixels that are shown sum up to the result.
+TEST_F(Tint, CubesShowAllColors) {
+  index(tintedThings(), file("scene.sft"));
+  const auto cube = gatherCube(file("scene.sft"), {{.2, -.1, 0}, {0, 0, 1}}, bleeding(), progress_);
+  ASSERT_TRUE(cube.ok()) << cube.status().message();
+  double weights = 0, coverage = 0;
+  glm::dvec3 light(0);
+  for (const CubePixel& pixel : cube->pixels) {
+    const double weight = double(pixel.weight) * double(pixel.solid_angle);
+    weights += weight;
+    coverage += weight * double(pixel.coverage);
+    light += weight * glm::dvec3(pixel.light);
+  }
+  EXPECT_NEAR(coverage / weights, double(cube->occlusion), 1e-4);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(light[c] / weights, double(cube->irradiance[c]), 1e-4) << c;
+  }
+  EXPECT_GT(std::abs(light.r - light.b), .1);
 }
 
 TEST_F(Tint, BouncesKeepIt) {
