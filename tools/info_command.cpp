@@ -34,8 +34,8 @@ std::vector<std::string> channelNames(const CloudChannels& channels) {
   if (channels.two_sided) names.emplace_back("two_sided");
   if (channels.group) names.emplace_back("group");
   if (channels.long_side) names.emplace_back("long_side");
-  if (channels.opacity)
-    names.emplace_back(channels.tint ? "opacity (red, green, blue)" : "opacity");
+  if (channels.opacity) names.emplace_back("opacity");
+  if (channels.tint) names.emplace_back("tint");
   return names;
 }
 
