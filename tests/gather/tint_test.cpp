@@ -10,7 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "gather/packet_clouds.h"
 #include "gather/test_clouds.h"
+#include "gather/test_scene.h"
 #include "surfeit/bake.h"
 #include "surfeit/bounce.h"
 #include "surfeit/cube.h"
@@ -323,6 +325,24 @@ TEST_F(Tint, FiltersLetThroughWhatRaysSay) {
       }
     }
   }
+}
+
+// Three times as much is drawn where a tint is in sight, and once elsewhere.
+TEST_F(Tint, WhoSeesNoneIsGatheredOnce) {
+  Cloud cloud;
+  addGround(cloud, 40, 8);
+  const std::size_t end = cloud.size();
+  addSphere(cloud, 2000, {0, 0, 3}, 1);
+  for (std::size_t i = end; i < cloud.size(); ++i) cloud[i].setOpacity(.2, 1, .6);
+  TestScene scene(cloud);
+  const GatherQuality quality;
+  scene.gather({{2, 0, .01f}, {0, 0, 1}}, quality);
+  EXPECT_EQ(scene.work().packets, 3u);
+  // Below the ground, which hides nothing from there, facing down; and beside the scene
+  scene.gather({{2, 0, -.5f}, {0, 0, -1}}, quality);
+  EXPECT_EQ(scene.work().packets, 1u);
+  scene.gather({{9, 0, 2}, {1, 0, 0}}, quality);
+  EXPECT_EQ(scene.work().packets, 1u);
 }
 
 // The pixels that are shown sum up to the result.

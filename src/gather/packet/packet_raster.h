@@ -119,7 +119,7 @@ class PacketRaster {
   // Adds a facet of the node, or all of a flat one, or the hull of that alone.
   void addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
                 const Lobe* lobe);
-  bool mayLeaveHull(const Node& node) const;
+  bool mayLeaveHull(const Node& node);
   std::uint32_t lanesBeyond(const glm::vec3& position, float distance) const;
   // Adds a hull for those of these lanes that see it, and says which need no other.
   std::uint32_t addFacetHull(const Node& node, const Facet& facet, const LaneParts* parts,
