@@ -2,7 +2,7 @@
 # Makes the pictures of docs/gallery.md, in docs/gallery/, from scenes that it makes itself. Clouds
 # and scenes go to out/gallery/. Minutes on two cores. Chapters may be named to make only these:
 #
-#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics translucent hair screen relit looked_up look brightness shiny]
+#   scripts/gallery.sh [direct area photons environment bounces occlusion glossy volume subset cube camera caustics translucent tints hair screen relit looked_up look brightness shiny]
 #
 # SURFEIT_BUILD names a build directory to take the programs from; else build/release is built.
 set -euo pipefail
@@ -273,6 +273,38 @@ translucent() {
   draw translucent_light pane_light.ply --channel irradiance --exposure 1 "${view[@]}"
 }
 
+tints() {
+  say "Filters of cyan, magenta and yellow glass above a floor"
+  printf '%s\n' "newmtl floor" "Kd .8 .8 .8" "newmtl sky" "Kd 0 0 0" "Ke 1 1 1" > tints.mtl
+  echo "mtllib tints.mtl" > tint_panes.obj
+  local name filter x z y=0.1
+  while read -r name filter x z; do
+    y=$(awk -v y=$y 'BEGIN { print y + .4 }')
+    printf '%s\n' "newmtl $name" "Kd 0 0 0" "d 0" "Tf ${filter//,/ }" >> tints.mtl
+    awk -v name="$name" -v x="$x" -v y="$y" -v z="$z" 'BEGIN {
+      print "usemtl", name
+      for (i = 0; i < 4; i++) print "v", x + (i == 1 || i == 2 ? .9 : -.9), y, z + (i < 2 ? .9 : -.9)
+      print "f -4 -3 -2 -1"
+    }' >> tint_panes.obj
+  done <<< "cyan .1,.95,.95 -0.5 0.3
+magenta .95,.1,.95 0.5 0.3
+yellow .95,.95,.1 0 -0.5"
+  printf '%s\n' "mtllib tints.mtl" "usemtl sky" "v -6 4 -6" "v 6 4 -6" "v 6 4 6" "v -6 4 6" "f 1 2 3 4" > tint_sky.obj
+  printf '%s\n' "mtllib tints.mtl" "usemtl floor" "v -3 0 2" "v 3 0 2" "v 3 0 -2" "v -3 0 -2" "f 1 2 3 4" > tint_floor.obj
+  sample tint_floor.obj -o tint_floor.ply --count 200000
+  index tint_floor.ply -o tint_floor.sft
+  timed surfeit relight tint_floor.sft -o tint_sun.sft --mesh tint_panes.obj \
+    --light-samples 64 --light-area "0 12 0  0.4 0 0  0 0 0.4  240 240 240"
+  timed surfeit convert tint_sun.sft -o tint_sun.ply
+  sample tint_panes.obj -o tint_panes.ply --count 100000 --two-sided
+  sample tint_sky.obj -o tint_sky.ply --count 20000 --emission
+  index tint_panes.ply tint_sky.ply -o tints.sft
+  gather tints.sft tint_floor.ply -o tint_light.ply --mode bleeding
+  local view=(--eye "0 5 5" --look-at "0 0 0.1" --fov 40 --size 420x240)
+  draw tints_sun tint_sun.ply --channel radiosity --exposure 0 "${view[@]}"
+  draw tints_sky tint_light.ply --channel irradiance --exposure -1.3 "${view[@]}"
+}
+
 hair() {
   say "A ball with fur"
   clouds fur fur.hair 12000
@@ -393,7 +425,7 @@ shiny() {
 chapters=("$@")
 if ((${#chapters[@]} == 0)); then
   chapters=(direct quality area subset photons environment bounces occlusion glossy volume cube
-    camera caustics translucent hair screen relit looked_up look brightness shiny)
+    camera caustics translucent tints hair screen relit looked_up look brightness shiny)
   scenes
 elif [[ ! -e black_receivers.ply ]]; then
   scenes

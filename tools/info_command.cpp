@@ -35,6 +35,7 @@ std::vector<std::string> channelNames(const CloudChannels& channels) {
   if (channels.group) names.emplace_back("group");
   if (channels.long_side) names.emplace_back("long_side");
   if (channels.opacity) names.emplace_back("opacity");
+  if (channels.tint) names.emplace_back("tint");
   return names;
 }
 

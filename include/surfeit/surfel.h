@@ -1,6 +1,8 @@
 // A surfel: an oriented disk that stands for a small piece of surface (memo 08-01, section 3.1).
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 
@@ -40,7 +42,18 @@ constexpr std::uint16_t transparencyOf(double opacity) {
   return code >= kMostTransparency ? kMostTransparency : static_cast<std::uint16_t>(code);
 }
 
-// Plain data, 64 bytes without padding, so that a surfel can be stored and compared as bytes.
+// Where colors are let through differently: the codes of green and blue less that of red, modulo
+// 65536. Zero where all are let through alike.
+using Tint = std::array<std::uint16_t, 2>;
+// The code of a color (0 red, 1 green, 2 blue), from that of red.
+constexpr std::uint16_t transparencyOf(std::uint16_t red, const Tint& tint, int color) {
+  return color == 0 ? red : static_cast<std::uint16_t>(red + tint[std::size_t(color - 1)]);
+}
+constexpr Tint tintOf(std::uint16_t red, std::uint16_t green, std::uint16_t blue) {
+  return {static_cast<std::uint16_t>(green - red), static_cast<std::uint16_t>(blue - red)};
+}
+
+// Plain data, 68 bytes without padding, so that a surfel can be stored and compared as bytes.
 struct Surfel {
   glm::vec3 position{0};    // world units
   float radius = 0;         // > 0; the disk holds the piece of surface, so disks leave no gaps
@@ -48,22 +61,31 @@ struct Surfel {
   float area = 0;           // > 0; exact area of the piece; for a sphere, its cross-section
   glm::vec3 radiosity{0};   // radiant exitance, scene-linear rgb, >= 0
   std::uint16_t flags = 0;  // SurfelFlags
-  std::uint16_t transparency = 0;  // 1 - opacity, in 1/65535; 0: opaque
+  std::uint16_t transparency = 0;  // 1 - opacity in red, in 1/65535; 0: opaque
   glm::vec3 albedo{0};             // diffuse reflectance, scene-linear rgb, for further bounces
   std::uint8_t group = 0;          // object group, 0 to kMaxGroups - 1; 0 in clouds without groups
   // Ratio of length to width of the piece, and direction of its longer side, as codes
   // (core/long_side.h); 0: not known. Two-sided surfels with a longer side are drawn as rectangles.
   std::uint8_t elongation = 0;
   std::uint16_t long_side = 0;
+  Tint tint{};  // of the transparency
 
   bool isSphere() const { return (flags & kSurfelSphere) != 0; }
   bool isTwoSided() const { return (flags & kSurfelTwoSided) != 0; }
   bool isLoose() const { return (flags & kSurfelLoose) != 0; }
   bool isLone() const { return (flags & kSurfelLone) != 0; }
-  // How much of its area covers what lies behind, and sends its radiosity: above 0, up to 1.
-  float opacity() const { return opacityOf(transparency); }
+  bool isTinted() const { return tint != Tint{}; }
+  // How much of its area covers what lies behind in a color, and sends its radiosity: above 0, up
+  // to 1.
+  float opacity(int color = 0) const {
+    return opacityOf(transparencyOf(transparency, tint, color));
+  }
+  void setOpacity(double red, double green, double blue) {
+    transparency = transparencyOf(red);
+    tint = tintOf(transparency, transparencyOf(green), transparencyOf(blue));
+  }
 };
-static_assert(sizeof(Surfel) == 64);
+static_assert(sizeof(Surfel) == 68);
 
 // The optional channels that a cloud has; the rules of docs/format.md fill in the others.
 struct CloudChannels {
@@ -76,6 +98,7 @@ struct CloudChannels {
   bool group = false;
   bool long_side = false;
   bool opacity = false;
+  bool tint = false;  // an opacity for each color; then there is an opacity
 };
 
 }  // namespace surfeit

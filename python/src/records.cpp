@@ -17,7 +17,7 @@ py::list channelNames(const CloudChannels& channels) {
         std::pair("area", channels.area), std::pair("radiosity", channels.radiosity),
         std::pair("albedo", channels.albedo), std::pair("two_sided", channels.two_sided),
         std::pair("group", channels.group), std::pair("long_side", channels.long_side),
-        std::pair("opacity", channels.opacity)}) {
+        std::pair("opacity", channels.opacity), std::pair("tint", channels.tint)}) {
     if (is_there) names.append(name);
   }
   return names;
@@ -162,8 +162,8 @@ py::dict record(const GatherStats& stats) {
       "gather_seconds"_a = stats.gather_seconds, "threads"_a = stats.threads,
       "memory_bytes"_a = stats.memory_bytes, "temporary_bytes"_a = stats.temporary_bytes,
       "staged_bytes_read"_a = stats.staged_bytes_read,
-      "staged_bytes_kept"_a = stats.staged_bytes_kept, "node_cache"_a = record(stats.node_cache), "surfel_cache"_a = record(stats.surfel_cache),
-      "windows"_a = record(stats.windows));
+      "staged_bytes_kept"_a = stats.staged_bytes_kept, "node_cache"_a = record(stats.node_cache),
+      "surfel_cache"_a = record(stats.surfel_cache), "windows"_a = record(stats.windows));
 }
 
 py::dict record(const ConvertStats& stats) {

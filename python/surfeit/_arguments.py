@@ -132,7 +132,7 @@ _MISNOMERS = {
 }
 # Channels of a number of values that is fixed.
 _VALUES = {"position": (3,), "normal": (3,), "color": (3, 4), "radiosity": (3,), "albedo": (3,),
-           "long_side": (3,), "radius": (1,), "area": (1,), "coverage": (1,), "opacity": (1,),
+           "long_side": (3,), "radius": (1,), "area": (1,), "coverage": (1,), "opacity": (1, 3),
            "group": (1,), "two_sided": (1,)}
 _LARGEST_EXACT = 2**53
 

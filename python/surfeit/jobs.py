@@ -41,8 +41,8 @@ def index(source: Union[Mapping[str, Any], PathLike, Sequence[PathLike],
     source: one of
         - a dict of arrays by channel: "position" (n, 3) is needed; "normal" (n, 3), "radius" (n,),
           "area" (n,), "radiosity" (n, 3), "albedo" (n, 3), "two_sided" (n,), "group" (n,),
-          "long_side" (n, 3), "opacity" (n,), "color" (n, 3: uint8 or uint16 sRGB, or linear
-          floats). They are not copied and not counted in the budget;
+          "long_side" (n, 3), "opacity" (n,) or, for red, green and blue, (n, 3), "color" (n, 3:
+          uint8 or uint16 sRGB, or linear floats). They are not copied and not counted in the budget;
         - a path or several, of clouds of any format;
         - an iterable of such dicts with the same channels. They go through a temporary file.
     group: {"lamp": path or paths, ...}, clouds whose surfels are an object group of that name, for

@@ -127,7 +127,7 @@ class PixelViews {
     pixel.coverage = content.coverage;
     pixel.occlusion = content.occlusion;
     pixel.light = content.radiosity;
-    pixel.environment = (1 - content.coverage) * environment(i, pixel);
+    pixel.environment = content.open * environment(i, pixel);
     pixel.depth = record.depth;
     pixel.layers = record.layers();
     pixel.filled = std::max(0.f, content.coverage - record.total);

@@ -1,8 +1,12 @@
 #include "bounce/bounce_receivers.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 namespace surfeit {
 namespace {
@@ -23,6 +27,55 @@ constexpr float kAgreement = 0.9f;
 constexpr float kOffPlane = 3;
 
 constexpr std::uint32_t kKindFlags = kSurfelSphere | kSurfelTwoSided;
+
+// Receivers around a place, and their light at the place: of the plane that fits it best by their
+// weights, so that a slope does not show as a step where they lie to one side. No less and no more
+// than that of one of them.
+class NearReceivers {
+ public:
+  void add(float weight, const glm::vec3& offset, const glm::vec3& light) {
+    near_[count_++] = {double(weight), offset, light};
+    weights_ += double(weight);
+    middle_ += double(weight) * glm::dvec3(offset);
+  }
+
+  glm::vec3 light() const {
+    // In double, for squares of small and large lengths
+    const glm::dvec3 middle = middle_ / weights_;
+    glm::dmat3 spread(0);
+    for (const Near& each : near()) {
+      const glm::dvec3 d = glm::dvec3(each.offset) - middle;
+      spread += glm::outerProduct(each.weight / weights_ * d, d);
+    }
+    // Across a surface they do not spread, and tell nothing of the slope
+    const double ridge = kRidge * (spread[0][0] + spread[1][1] + spread[2][2]);
+    glm::dvec3 slope(0);
+    if (ridge > 0) slope = glm::inverse(spread + glm::dmat3(ridge)) * middle;
+    glm::dvec3 sum(0);
+    glm::vec3 least = near_[0].light, most = least;
+    for (const Near& each : near()) {
+      const double along = glm::dot(slope, glm::dvec3(each.offset) - middle);
+      sum += each.weight * (1 - along) * glm::dvec3(each.light);
+      least = glm::min(least, each.light);
+      most = glm::max(most, each.light);
+    }
+    return glm::clamp(glm::vec3(sum / weights_), least, most);
+  }
+
+ private:
+  // Of the spread: less fits slopes to rounding and to what three receivers happen to tell.
+  static constexpr double kRidge = 0.03;
+  struct Near {
+    double weight;
+    glm::vec3 offset, light;
+  };
+  std::span<const Near> near() const { return std::span(near_).first(count_); }
+
+  std::array<Near, 2 * kWindow> near_;
+  std::size_t count_ = 0;
+  double weights_ = 0;
+  glm::dvec3 middle_{0};  // sum of weighted offsets
+};
 
 }  // namespace
 
@@ -84,15 +137,13 @@ glm::vec3 BounceReceivers::irradiance(std::size_t i,
   if (before > 0 && chosen_[before - 1].surfel == i) return irradianceOf(before - 1, at_receivers);
   const std::size_t begin = before - std::min(before, kWindow);
   const std::size_t end = std::min(before + kWindow, chosen_.size());
-  glm::vec3 sum(0);
-  float weights = 0;
+  NearReceivers near;
   for (std::size_t place = begin; place < end; ++place) {
-    const float w = weight(surfels_[i], surfels_[chosen_[place].surfel]);
-    if (w == 0) continue;
-    sum += w * irradianceOf(place, at_receivers);
-    weights += w;
+    const Surfel& from = surfels_[chosen_[place].surfel];
+    const float w = weight(surfels_[i], from);
+    if (w > 0) near.add(w, from.position - surfels_[i].position, irradianceOf(place, at_receivers));
   }
-  return sum / weights;  // at least of the one that covers it
+  return near.light();  // there is at least the one that covers it
 }
 
 }  // namespace surfeit

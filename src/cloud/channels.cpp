@@ -93,7 +93,14 @@ const KnownChannel* findKnown(std::string_view name) {
 
 bool hasComponents(const KnownChannel& known, std::size_t components) {
   return known.components == components ||
-         (known.name == "color" && components == 4);  // with alpha
+         (known.name == "color" && components == 4) ||  // with alpha
+         (known.name == "opacity" && components == 3);  // of colors
+}
+
+// Opacities of three colors as RenderMan calls them; single values of these names are something
+// else.
+bool isOpacityOfColors(std::string_view name, std::size_t components) {
+  return components == 3 && (name == "Oi" || name == "Os" || name == "_opacity");
 }
 
 // Our name of a file's channel: exact case first, then any.
@@ -267,6 +274,7 @@ std::vector<std::string> propertyNames(std::string_view name, std::size_t compon
     known = nullptr;
     if (!is_renamed) ours = fitName(name);  // a single v is no velocity
   }
+  if (!is_renamed && isOpacityOfColors(name, components)) known = findKnown(ours = "opacity");
 
   // What we know has its own names
   if (known != nullptr && !known->properties[0].empty()) {
@@ -278,7 +286,7 @@ std::vector<std::string> propertyNames(std::string_view name, std::size_t compon
   // Others by their letters
   std::vector<std::string> names;
   if (components == 1) return {ours};
-  if (known != nullptr) kind = known->kind;
+  if (known != nullptr) kind = known->components == 1 ? ChannelKind::kColor : known->kind;
   const auto& suffixes = kind == ChannelKind::kColor ? kColorSuffixes : kVectorSuffixes;
   for (std::size_t i = 0; i < components; ++i) {
     names.push_back(components == 3 ? ours + std::string(suffixes[i])

@@ -198,7 +198,7 @@ class ColorPlan {
   bool isCodeGiven() const { return bitsGiven() > 0; }
 
   static bool isOpacity(const RowChannel& channel) {
-    return channel.name == kOpacity && channel.properties.size() == 1 &&
+    return channel.name == kOpacity && channel.properties.size() != 2 &&
            channel.type != ValueType::kInt8;
   }
   static bool isUnsignedNormal(const RowChannel& channel) {
@@ -286,10 +286,12 @@ class ColorPlan {
     if (is_real ? sample.largest <= 1 : sample.type == ValueType::kUint8 && sample.largest > 1) {
       return;
     }
-    RowProperty& property = element_.properties[sample.properties[0]];
     const bool is_flag = sample.largest <= 1;
-    changes_.push_back({is_flag ? Kind::kFlag : Kind::kCode8, property});
-    property.type = ValueType::kUint8;
+    for (const std::size_t i : sample.properties) {
+      RowProperty& property = element_.properties[i];
+      changes_.push_back({is_flag ? Kind::kFlag : Kind::kCode8, property});
+      property.type = ValueType::kUint8;
+    }
     notes_.push_back(fmt::format("opacity is 0-{} in {} ({} {}): {} is opaque", is_flag ? 1 : 255,
                                  typeText(sample.type), sampled_, sample.largest,
                                  is_flag ? 1 : 255));

@@ -91,8 +91,15 @@ void convertValues(const std::byte* from, std::size_t from_stride, std::size_t c
   }
 }
 
-// The property of a color that stands for this one of radiosity or albedo; else nullptr.
+bool isTintName(std::string_view name) {
+  return std::find(std::begin(kOpacityNames), std::end(kOpacityNames), name) !=
+         std::end(kOpacityNames);
+}
+
+// The property of a color that stands for this one of radiosity or albedo, or of one opacity for
+// that of a color; else nullptr.
 const char* colorFor(std::string_view name) {
+  if (isTintName(name)) return "opacity";
   for (int i = 0; i < 3; ++i) {
     if (name == kRadiosityNames[i] || name == kAlbedoNames[i]) return kColorNames[i];
   }
@@ -133,7 +140,8 @@ RowCopier::RowCopier(const RowLayout& from, const RowLayout& to)
     found = color != nullptr ? index.find(color) : index.end();
     if (found != index.end() && holdsColor(target.type, from.properties[found->second].type)) {
       addCopy(from.properties[found->second], target, is_color[found->second]);
-      colored_.push_back(target.name);
+      // One opacity is that of each color: nothing to tell
+      if (!isTintName(target.name)) colored_.push_back(target.name);
     } else if (!addFull(target)) {
       absent_.push_back(target.name);
     }
@@ -151,8 +159,8 @@ void RowCopier::addCopy(const RowProperty& source, const RowProperty& target, bo
 }
 
 bool RowCopier::addFull(const RowProperty& target) {
-  const bool is_full =
-      target.name == "opacity" || target.name == "coverage" || target.name == "alpha";
+  const bool is_full = target.name == "opacity" || isTintName(target.name) ||
+                       target.name == "coverage" || target.name == "alpha";
   if (!is_full) return false;
   filled_.push_back(target);
   full_.push_back(target.name);

@@ -28,9 +28,9 @@ class RowUnion {
 class RowCopier {
  public:
   // Properties that `to` lacks are left out. Those that only `to` has become what their absence
-  // means: opacity, coverage and alpha are full, radiosity and albedo are the color where `from`
-  // has one, all others are 0. Those that both have must be of a type in `to` that holds the
-  // values.
+  // means: opacity (of a color: the one of all colors), coverage and alpha are full, radiosity and
+  // albedo are the color where `from` has one, all others are 0. Those that both have must be of a
+  // type in `to` that holds the values.
   RowCopier(const RowLayout& from, const RowLayout& to);
 
   // Properties that become 0, that are full, and that are the color.

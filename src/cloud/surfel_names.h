@@ -13,6 +13,7 @@ inline constexpr const char* kNormalNames[3] = {"nx", "ny", "nz"};
 inline constexpr const char* kLongSideNames[3] = {"long_side_x", "long_side_y", "long_side_z"};
 inline constexpr const char* kRadiosityNames[3] = {"radiosity_r", "radiosity_g", "radiosity_b"};
 inline constexpr const char* kAlbedoNames[3] = {"albedo_r", "albedo_g", "albedo_b"};
+inline constexpr const char* kOpacityNames[3] = {"opacity_r", "opacity_g", "opacity_b"};
 inline constexpr const char* kColorNames[3] = {"red", "green", "blue"};
 
 // The radius of a surfel: the first of these that a cloud has; a width is twice the radius.
@@ -28,8 +29,8 @@ inline bool isSurfelProperty(std::string_view name) {
   };
   return holds(kPositionNames) || holds(kNormalNames) || holds(kRadiosityNames) ||
          holds(kAlbedoNames) || holds(kColorNames) || holds(kRadiusNames) || holds(kGroupNames) ||
-         holds(kLongSideNames) || name == "area" || name == "coverage" || name == "opacity" ||
-         name == "two_sided";
+         holds(kLongSideNames) || holds(kOpacityNames) || name == "area" || name == "coverage" ||
+         name == "opacity" || name == "two_sided";
 }
 
 }  // namespace surfeit

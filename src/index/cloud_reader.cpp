@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <mutex>
 #include <optional>
 
@@ -99,9 +100,11 @@ void InputPass::decode(const RowFetcher::Rows& rows) {
 }
 
 CloudChannels unionOf(const CloudChannels& a, const CloudChannels& b) {
-  return {a.normal || b.normal,       a.radius || b.radius,       a.area || b.area,
-          a.radiosity || b.radiosity, a.albedo || b.albedo,       a.two_sided || b.two_sided,
-          a.group || b.group,         a.long_side || b.long_side, a.opacity || b.opacity};
+  return {a.normal || b.normal,   a.radius || b.radius,
+          a.area || b.area,       a.radiosity || b.radiosity,
+          a.albedo || b.albedo,   a.two_sided || b.two_sided,
+          a.group || b.group,     a.long_side || b.long_side,
+          a.opacity || b.opacity, a.tint || b.tint};
 }
 
 }  // namespace
@@ -117,7 +120,8 @@ void CloudTotals::add(std::span<const Surfel> added) {
     bright += albedo > 1 ? 1 : 0;
     largest_albedo = std::max(largest_albedo, albedo);
     bounds.add(surfel.position);
-    content += XXH3_64bits(&surfel, sizeof surfel);
+    // The same as ever where nothing has a tint
+    content += XXH3_64bits(&surfel, surfel.isTinted() ? sizeof surfel : offsetof(Surfel, tint));
   }
   surfels += added.size();
 }

@@ -34,7 +34,8 @@ json jsonOf(const glm::dvec3& place) { return {place.x, place.y, place.z}; }
 constexpr bool CloudChannels::*kChannelFlags[] = {
     &CloudChannels::normal,    &CloudChannels::radius,    &CloudChannels::area,
     &CloudChannels::radiosity, &CloudChannels::albedo,    &CloudChannels::two_sided,
-    &CloudChannels::group,     &CloudChannels::long_side, &CloudChannels::opacity};
+    &CloudChannels::group,     &CloudChannels::long_side, &CloudChannels::opacity,
+    &CloudChannels::tint};
 
 json jsonOf(const CloudTotals& totals) {
   json text = {{"surfels", totals.surfels},

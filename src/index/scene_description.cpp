@@ -45,7 +45,7 @@ std::uint64_t SceneDescription::identity(bool full_precision) const {
           std::uint64_t{channels.area} << 2 | std::uint64_t{channels.radiosity} << 3 |
           std::uint64_t{channels.albedo} << 4 | std::uint64_t{channels.two_sided} << 5 |
           std::uint64_t{channels.group} << 6 | std::uint64_t{channels.long_side} << 7 |
-          std::uint64_t{channels.opacity} << 8,
+          std::uint64_t{channels.opacity} << 8 | std::uint64_t{channels.tint} << 9,
       XXH3_64bits(text.data(), text.size())};
   return XXH3_64bits(parts, sizeof parts);
 }

@@ -85,10 +85,10 @@ glm::vec3 DirectLight::rayOrigin(const SurfacePoint& point) const {
   return point.position + (offset_ + point.lift) * point.geometric_normal;
 }
 
-bool DirectLight::isShadowed(const SurfacePoint& point, const glm::vec3& target) const {
-  if (scene_ == nullptr) return false;
+glm::vec3 DirectLight::passedLight(const SurfacePoint& point, const glm::vec3& target) const {
+  if (scene_ == nullptr) return glm::vec3(1);
   const glm::vec3 origin = rayOrigin(point);
-  return scene_->isOccluded(origin, target - origin, 0, 1 - 1e-5f);
+  return scene_->passedLight(origin, target - origin, 0, 1 - 1e-5f);
 }
 
 // Light from a small piece of an emitter, per unit of its area: L cos cos' / d^2.
@@ -101,8 +101,8 @@ glm::vec3 DirectLight::fromEmitterPoint(const SurfacePoint& point, const glm::ve
   const float arriving = arrival(point, towards);
   const float cosines = arriving * -glm::dot(towards, normal);
   if (arriving <= 0 || cosines <= 0) return glm::vec3(0);
-  if (isShadowed(point, position + offset_ * normal)) return glm::vec3(0);
-  return radiance * (falloff * (cosines / (distance_sq * distance_sq)));
+  const glm::vec3 passed = passedLight(point, position + offset_ * normal);
+  return passed * radiance * (falloff * (cosines / (distance_sq * distance_sq)));
 }
 
 glm::vec3 DirectLight::fromAreaLight(const AreaLight& light, const SurfacePoint& point,
@@ -161,16 +161,19 @@ glm::vec3 DirectLight::irradiance(const SurfacePoint& point, std::uint64_t seed,
     const glm::vec3 position(light.position), towards = position - point.position;
     const float distance_sq = glm::dot(towards, towards);
     const float cos_theta = arrival(point, towards) / std::sqrt(distance_sq);
-    if (!(cos_theta > 0) || isShadowed(point, position)) continue;
-    sum += light.intensity * (falloffAt(distance_sq) * (cos_theta / distance_sq));
+    if (!(cos_theta > 0)) continue;
+    sum += passedLight(point, position) * light.intensity *
+           (falloffAt(distance_sq) * (cos_theta / distance_sq));
   }
   for (const DirectionalLight& light : lights_.directionals) {
     const glm::vec3 towards = -glm::normalize(light.direction);
     const float cos_theta = arrival(point, towards);
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     if (!(cos_theta > 0)) continue;
-    if (scene_ != nullptr && scene_->isOccluded(rayOrigin(point), towards, 0, kInfinity)) continue;
-    sum += light.irradiance * cos_theta;
+    const glm::vec3 passed = scene_ != nullptr
+                                 ? scene_->passedLight(rayOrigin(point), towards, 0, kInfinity)
+                                 : glm::vec3(1);
+    sum += passed * light.irradiance * cos_theta;
   }
   for (std::size_t i = 0; i < lights_.areas.size(); ++i) {
     sum += fromAreaLight(lights_.areas[i], point, splitMix(seed) + i, samples);

@@ -47,7 +47,7 @@ class DirectLight {
 
   float falloffAt(float distance_sq) const;
   glm::vec3 rayOrigin(const SurfacePoint& point) const;
-  bool isShadowed(const SurfacePoint& point, const glm::vec3& target) const;
+  glm::vec3 passedLight(const SurfacePoint& point, const glm::vec3& target) const;
   glm::vec3 fromEmitterPoint(const SurfacePoint& point, const glm::vec3& position,
                              const glm::vec3& normal, const glm::vec3& radiance,
                              float falloff) const;

@@ -29,7 +29,13 @@ bool Mesh::isOpaque() const {
 
 bool Mesh::isTranslucent() const {
   return std::any_of(materials.begin(), materials.end(), [](const Material& material) {
-    return material.opacity > 0 && material.opacity < 1;
+    return material.opacity != glm::vec3(0) && material.opacity != glm::vec3(1);
+  });
+}
+
+bool Mesh::hasTints() const {
+  return std::any_of(materials.begin(), materials.end(), [](const Material& material) {
+    return material.opacity != glm::vec3(material.opacity.r);
   });
 }
 
@@ -58,7 +64,7 @@ double triangleArea(const Mesh& mesh, std::uint32_t triangle) {
                                       glm::dvec3(mesh.position[corners.z]) - a));
 }
 
-float opacityAt(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
+glm::vec3 opacityAt(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
   const Material& material = mesh.materials[mesh.triangle_material[triangle]];
   if (material.mask == kNoTexture || mesh.uv.empty()) return material.opacity;
   const glm::uvec3& corners = mesh.triangle[triangle];

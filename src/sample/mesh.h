@@ -28,7 +28,7 @@ struct Material {
   glm::vec3 emission{0};               // radiant exitance: pi times the radiance Ke
   std::uint32_t texture = kNoTexture;  // into Mesh::textures; multiplies the albedo
   std::uint32_t glow = kNoTexture;     // map_Ke, into Mesh::textures; multiplies the emission
-  float opacity = 1;                   // d
+  glm::vec3 opacity{1};                // d, filtered by Tf: 1 - (1 - d) Tf
   std::uint32_t mask = kNoTexture;     // map_d, into Mesh::masks: part of the surface that is there
   Scattering scattering = Scattering::kMatte;
   glm::vec3 specular{0};  // Ks of a mirror
@@ -38,7 +38,7 @@ struct Material {
 
   std::uint8_t group = 0;     // object group of its surfels
   bool is_two_sided = false;  // curves
-  bool isOpaque() const { return opacity >= 1 && mask == kNoTexture; }
+  bool isOpaque() const { return opacity == glm::vec3(1) && mask == kNoTexture; }
 };
 
 // Triangles of one or several files. Vertex attributes are empty, or have one entry per position;
@@ -66,6 +66,8 @@ struct Mesh {
   bool isOpaque() const;
   // Whether some material lets a part of the light through, everywhere alike.
   bool isTranslucent() const;
+  // Whether some material lets colors through differently.
+  bool hasTints() const;
   // Whether some material has two sides.
   bool hasTwoSides() const;
   // Gives vertices that came without an attribute that others have its neutral value, and Embree
@@ -84,15 +86,15 @@ struct SurfacePoint {
   glm::vec3 geometric_normal{0};
   glm::vec3 albedo{0};
   glm::vec3 emission{0};  // radiant exitance
-  float opacity = 1;
+  glm::vec3 opacity{1};
   float lift = 0;  // how much farther off the surface shadow rays start than rounding asks for
 };
 
 // The point of a triangle with barycentric weights (1 - u - v, u, v).
 SurfacePoint surfacePoint(const Mesh& mesh, std::uint32_t triangle, float u, float v);
 
-// The part of the surface that is there at that point, from 0 to 1.
-float opacityAt(const Mesh& mesh, std::uint32_t triangle, float u, float v);
+// The part of the surface that is there at that point for each color, from 0 to 1.
+glm::vec3 opacityAt(const Mesh& mesh, std::uint32_t triangle, float u, float v);
 
 // Mean exitance of a triangle: exact without a texture, else of a grid of places on it.
 glm::vec3 meanEmission(const Mesh& mesh, std::uint32_t triangle);

@@ -87,12 +87,17 @@ void ObjMaterials::import(int id, const MaterialSource& source) {
   if (source.has_kd) material.albedo = reflectanceOf(parsed);
   material.emission = float(kPi) * colorOf(parsed, "Ke", parsed.emission, kNoLimit);
   // Written so that NaN is opaque
-  material.opacity = parsed.dissolve < 1 ? float(std::max(parsed.dissolve, 0.0)) : 1;
+  const float dissolve = parsed.dissolve < 1 ? float(std::max(parsed.dissolve, 0.0)) : 1;
   if (!(parsed.dissolve >= 0 && parsed.dissolve <= 1)) {
     note(parsed, fmt::format("has d {:g} (or Tr {:g}): read as d {:g}, expected 0 to 1",
-                             parsed.dissolve, 1 - parsed.dissolve, material.opacity));
+                             parsed.dissolve, 1 - parsed.dissolve, dissolve));
   }
-  importScattering(parsed, material);
+  const glm::vec3 filter = colorOf(parsed, "Tf", parsed.transmittance, 1);
+  const bool has_filter = filter != glm::vec3(0) && filter != glm::vec3(1);
+  if (has_filter) material.transmission = filter;
+  // What d lets through is filtered
+  material.opacity = has_filter ? 1.f - (1 - dissolve) * filter : glm::vec3(dissolve);
+  importScattering(parsed, has_filter && dissolve == 1, material);
 
   Material bare = material;
   importPictures(parsed, source.directory, material);
@@ -100,7 +105,7 @@ void ObjMaterials::import(int id, const MaterialSource& source) {
     bare.albedo = mesh_.materials[begin_].albedo;
     importWithoutKd(parsed, material);
   }
-  if (material.opacity == 0) {
+  if (material.opacity == glm::vec3(0)) {
     note(parsed, "is clear (d 0 or Tr 1): its faces give no surfels and shade nothing");
   }
   mesh_.materials.push_back(material);
@@ -149,8 +154,10 @@ glm::vec3 ObjMaterials::reflectanceOf(const tinyobj::material_t& parsed) const {
 }
 
 // Illumination models of MTL: 3, 5 and 8 reflect, 4, 6, 7 and 9 refract. Others let through Tf
-// where it says more than the default of exporters, which is all or nothing.
-void ObjMaterials::importScattering(const tinyobj::material_t& parsed, Material& material) {
+// where it says more than the default of exporters, which is all or nothing, and nothing is let
+// through by d.
+void ObjMaterials::importScattering(const tinyobj::material_t& parsed, bool is_translucent,
+                                    Material& material) {
   const bool reflects = parsed.illum == 3 || parsed.illum == 5 || parsed.illum == 8;
   const bool refracts =
       parsed.illum == 4 || parsed.illum == 6 || parsed.illum == 7 || parsed.illum == 9;
@@ -159,12 +166,8 @@ void ObjMaterials::importScattering(const tinyobj::material_t& parsed, Material&
     material.specular = colorOf(parsed, "Ks", parsed.specular, 1);
     return;
   }
-  if (!refracts && material.opacity < 1) return;
-  const glm::vec3 filter = colorOf(parsed, "Tf", parsed.transmittance, 1);
-  const bool has_filter = filter != glm::vec3(0) && filter != glm::vec3(1);
-  if (has_filter) material.transmission = filter;
   if (!refracts) {
-    if (has_filter) material.scattering = Scattering::kTranslucent;
+    if (is_translucent) material.scattering = Scattering::kTranslucent;
     return;
   }
   material.scattering = Scattering::kGlass;
@@ -201,7 +204,7 @@ void ObjMaterials::importWithoutKd(const tinyobj::material_t& parsed, Material& 
     return;
   }
   material.albedo = glm::vec3(0);
-  if (material.opacity == 0 || material.emission != glm::vec3(0) ||
+  if (material.opacity == glm::vec3(0) || material.emission != glm::vec3(0) ||
       material.scattering == Scattering::kMirror || material.scattering == Scattering::kGlass) {
     return;
   }

@@ -42,7 +42,7 @@ class ObjMaterials {
   glm::vec3 colorOf(const tinyobj::material_t& parsed, const char* statement,
                     const double (&rgb)[3], double most) const;
   glm::vec3 reflectanceOf(const tinyobj::material_t& parsed) const;
-  void importScattering(const tinyobj::material_t& parsed, Material& material);
+  void importScattering(const tinyobj::material_t& parsed, bool is_translucent, Material& material);
   void importPictures(const tinyobj::material_t& parsed, const std::string& directory,
                       Material& material);
   void importWithoutKd(const tinyobj::material_t& parsed, Material& material);

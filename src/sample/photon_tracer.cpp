@@ -424,6 +424,11 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
     SURFEIT_ASSIGN_OR_RETURN(
         PhotonFiles files,
         PhotonFiles::create(output, options, mesh.origin != glm::dvec3(0), progress));
+    if (mesh.hasTints()) {
+      progress.note(
+          "some materials let colors through differently (Tf beside d): photons of all colors pass "
+          "them as the mean of the three does");
+    }
     const PhotonTracer tracer(mesh, scene, emitters, options);
     SURFEIT_RETURN_IF_ERROR(writePhotons(tracer, options, stats.threads, files, progress, stats));
     if (stats.stored + stats.caustic == 0) {

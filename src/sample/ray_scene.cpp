@@ -19,12 +19,14 @@ namespace {
 // Of a triangle, while the hierarchy is built.
 constexpr std::uint64_t kHierarchyBytes = 75;
 
-RTCRay makeRay(const glm::vec3& origin, const glm::vec3& direction, float begin, float end) {
+// Embree hands its number to the filter: the color.
+RTCRay makeRay(const glm::vec3& origin, const glm::vec3& direction, float begin, float end,
+               std::uint32_t color) {
   RTCRay ray;
   ray.org_x = origin.x, ray.org_y = origin.y, ray.org_z = origin.z;
   ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
   ray.tnear = begin, ray.tfar = end;
-  ray.time = 0, ray.mask = ~0u, ray.id = 0, ray.flags = 0;
+  ray.time = 0, ray.mask = ~0u, ray.id = color, ray.flags = 0;
   return ray;
 }
 
@@ -36,6 +38,11 @@ float placeNumber(std::uint32_t triangle, float u, float v) {
   return float(bits >> 40) * 0x1p-24f;
 }
 
+float opacityFor(std::uint32_t color, const glm::vec3& opacity) {
+  if (color < RayScene::kNoColor) return opacity[int(color)];
+  return opacity == glm::vec3(opacity.r) ? opacity.r : (opacity.r + opacity.g + opacity.b) / 3;
+}
+
 // Lets rays through where the surface is not there; Embree calls it at each hit.
 void passThroughMasks(const RTCFilterFunctionNArguments* arguments) {
   const Mesh& mesh = *static_cast<const Mesh*>(arguments->geometryUserPtr);
@@ -44,7 +51,9 @@ void passThroughMasks(const RTCFilterFunctionNArguments* arguments) {
     const std::uint32_t triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
     const float u = RTCHitN_u(arguments->hit, arguments->N, i);
     const float v = RTCHitN_v(arguments->hit, arguments->N, i);
-    if (placeNumber(triangle, u, v) >= opacityAt(mesh, triangle, u, v)) arguments->valid[i] = 0;
+    const float opacity =
+        opacityFor(RTCRayN_id(arguments->ray, arguments->N, i), opacityAt(mesh, triangle, u, v));
+    if (placeNumber(triangle, u, v) >= opacity) arguments->valid[i] = 0;
   }
 }
 
@@ -102,6 +111,7 @@ Result<RayScene> RayScene::build(const Mesh& mesh, int threads) {
 
   RayScene scene(std::move(handles));
   scene.bounds_ = mesh.bounds();
+  scene.has_tints_ = mesh.hasTints();
   const glm::vec3 reach = glm::max(glm::abs(scene.bounds_.min), glm::abs(scene.bounds_.max));
   scene.surface_offset_ = std::max(1e-5f * glm::length(scene.bounds_.extent()),
                                    4e-7f * std::max({reach.x, reach.y, reach.z}));
@@ -109,20 +119,30 @@ Result<RayScene> RayScene::build(const Mesh& mesh, int threads) {
 }
 
 bool RayScene::isOccluded(const glm::vec3& origin, const glm::vec3& direction, float begin,
-                          float end) const {
+                          float end, std::uint32_t color) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  RTCRay ray = makeRay(origin, direction, begin, end);
+  RTCRay ray = makeRay(origin, direction, begin, end, color);
   rtcOccluded1(handles_->scene, &context, &ray);
   return ray.tfar < 0;  // Embree marks occluded rays with -inf
 }
 
+glm::vec3 RayScene::passedLight(const glm::vec3& origin, const glm::vec3& direction, float begin,
+                                float end) const {
+  if (!has_tints_) return glm::vec3(isOccluded(origin, direction, begin, end) ? 0.f : 1.f);
+  glm::vec3 passed(1);
+  for (std::uint32_t color = 0; color < 3; ++color) {
+    if (isOccluded(origin, direction, begin, end, color)) passed[int(color)] = 0;
+  }
+  return passed;
+}
+
 std::optional<RayHit> RayScene::closestHit(const glm::vec3& origin, const glm::vec3& direction,
-                                           float begin, float end) const {
+                                           float begin, float end, std::uint32_t color) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query;
-  query.ray = makeRay(origin, direction, begin, end);
+  query.ray = makeRay(origin, direction, begin, end, color);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(handles_->scene, &context, &query);

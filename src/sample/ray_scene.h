@@ -29,12 +29,19 @@ class RayScene {
   RayScene& operator=(RayScene&&) noexcept;
   ~RayScene();
 
+  // Whose light a ray is: what has a tint lets each color through by its own opacity. Light of no
+  // color passes by the mean of the three.
+  static constexpr std::uint32_t kNoColor = 3;
+
   // Is anything hit between distances begin and end along the ray? Its origin is counted from that
   // of the mesh.
-  bool isOccluded(const glm::vec3& origin, const glm::vec3& direction, float begin,
-                  float end) const;
+  bool isOccluded(const glm::vec3& origin, const glm::vec3& direction, float begin, float end,
+                  std::uint32_t color = kNoColor) const;
+  // By color 0 where something is hit, else 1.
+  glm::vec3 passedLight(const glm::vec3& origin, const glm::vec3& direction, float begin,
+                        float end) const;
   std::optional<RayHit> closestHit(const glm::vec3& origin, const glm::vec3& direction, float begin,
-                                   float end) const;
+                                   float end, std::uint32_t color = kNoColor) const;
 
   // How far off a surface a ray must start so as not to meet it again: covers the rounding of
   // positions of the size of this scene.
@@ -47,6 +54,7 @@ class RayScene {
   std::unique_ptr<Handles> handles_;
   Bounds3 bounds_;
   float surface_offset_ = 0;
+  bool has_tints_ = false;
 };
 
 }  // namespace surfeit

@@ -85,6 +85,23 @@ glm::vec3 ReferenceScene::rayOrigin(const glm::dvec3& position, const glm::vec3&
 
 ReferenceGather ReferenceScene::gather(const glm::dvec3& position, const glm::vec3& normal,
                                        std::uint64_t seed, const ReferenceQuality& quality) const {
+  if (!state_->mesh.hasTints()) {
+    return gatherColor(position, normal, seed, quality, RayScene::kNoColor);
+  }
+  ReferenceGather all;
+  for (int color = 0; color < 3; ++color) {
+    const ReferenceGather one = gatherColor(position, normal, seed, quality, std::uint32_t(color));
+    all.occlusion_front += one.occlusion_front / 3;
+    all.occlusion_both += one.occlusion_both / 3;
+    all.irradiance_front[color] = one.irradiance_front[color];
+    all.irradiance_both[color] = one.irradiance_both[color];
+  }
+  return all;
+}
+
+ReferenceGather ReferenceScene::gatherColor(const glm::dvec3& position, const glm::vec3& normal,
+                                            std::uint64_t seed, const ReferenceQuality& quality,
+                                            std::uint32_t color) const {
   const RayScene& rays = *state_->rays;
   const glm::vec3 start = rayOrigin(position, normal, quality.offset);
   const CosineDirections directions(normal, quality.rays, seed);
@@ -97,7 +114,7 @@ ReferenceGather ReferenceScene::gather(const glm::dvec3& position, const glm::ve
     // coplanar triangles does
     constexpr int kMaxLayers = 64;
     for (int layer = 0; layer < kMaxLayers; ++layer) {
-      const auto hit = rays.closestHit(start, direction, begin, quality.max_distance);
+      const auto hit = rays.closestHit(start, direction, begin, quality.max_distance, color);
       if (!hit) break;
       if (layer == 0) ++both;
       const SurfacePoint point = surfacePoint(state_->mesh, hit->triangle, hit->u, hit->v);

@@ -55,6 +55,9 @@ class ReferenceScene {
 
  private:
   struct State;
+  ReferenceGather gatherColor(const glm::dvec3& position, const glm::vec3& normal,
+                              std::uint64_t seed, const ReferenceQuality& quality,
+                              std::uint32_t color) const;
   explicit ReferenceScene(std::unique_ptr<State> state);
   glm::vec3 rayOrigin(const glm::dvec3& position, const glm::vec3& normal, float offset) const;
   std::unique_ptr<State> state_;

@@ -267,8 +267,11 @@ std::uint64_t Relighter::meshContent() const {
   content = hash(mesh_.triangle_material, content);
   for (const Material& material : mesh_.materials) {
     const float values[] = {material.emission.r, material.emission.g, material.emission.b,
-                            material.opacity};
+                            material.opacity.r};
     content = XXH3_64bits_withSeed(values, sizeof values, content ^ material.mask);
+    if (material.opacity != glm::vec3(material.opacity.r)) {
+      content = XXH3_64bits_withSeed(&material.opacity, sizeof material.opacity, content);
+    }
     if (material.glow != kNoTexture) content = mesh_.textures[material.glow].content(content);
   }
   for (const Mask& mask : mesh_.masks) content = mask.content(content);

@@ -222,6 +222,7 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
     channels.radiosity = light.hasLight();
     channels.two_sided = channels.long_side = options.is_two_sided || mesh.hasTwoSides();
     channels.opacity = mesh.isTranslucent();
+    channels.tint = mesh.hasTints();
     channels.group = options.groups != SampleGroups::kNone;
     SURFEIT_ASSIGN_OR_RETURN(
         SurfelWriter writer,

@@ -19,9 +19,13 @@ Surfel SurfelMaker::make(std::uint32_t triangle, const PiecePart& part, std::uin
   surfel.albedo = point.albedo;
   if (light_ != nullptr) surfel.radiosity = light_->exitance(point, seed, light_->samples());
   const Material& material = mesh_.materials[mesh_.triangle_material[triangle]];
-  there = material.opacity > 0 ? point.opacity / material.opacity : 0;
+  const glm::vec3& opacity = material.opacity;
+  const int most = opacity.r >= std::max(opacity.g, opacity.b) ? 0 : opacity.g >= opacity.b ? 1 : 2;
+  there = opacity[most] > 0 ? point.opacity[most] / opacity[most] : 0;
   surfel.group = material.group;
-  if (material.opacity < 1) surfel.transparency = transparencyOf(double(material.opacity));
+  if (opacity != glm::vec3(1)) {
+    surfel.setOpacity(double(opacity.r), double(opacity.g), double(opacity.b));
+  }
   if (is_two_sided_ || material.is_two_sided) showBothSides(point, seed, part, surfel);
   return surfel;
 }

@@ -12,7 +12,7 @@ namespace {
 // Four lanes on every machine that gcc and clang know; SSE2 on x86-64.
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
-constexpr std::size_t kVectors = sizeof(Surfel) / sizeof(Float4);
+constexpr std::size_t kVectors = 4;  // of the floats that are held against limits
 
 // Copies `Floats` floats per row. A constant size makes each copy a move or two.
 template <std::size_t Floats>
@@ -38,7 +38,7 @@ bool isAllOnes(const Int4& lanes) {
 }  // namespace
 
 void FloatRowDecoder::addFloat(std::size_t offset, std::size_t place, float least, float most) {
-  SURFEIT_CHECK(place % sizeof(float) == 0 && place + sizeof(float) <= sizeof(Surfel));
+  SURFEIT_CHECK(place % sizeof(float) == 0 && place < kFloats * sizeof(float));
   least_[place / sizeof(float)] = least;
   most_[place / sizeof(float)] = most;
 
@@ -56,7 +56,7 @@ void FloatRowDecoder::addFloat(std::size_t offset, std::size_t place, float leas
 
 void FloatRowDecoder::addByte(std::size_t offset, std::size_t place,
                               const std::array<float, 256>& floats) {
-  SURFEIT_CHECK(place % sizeof(float) == 0 && place + sizeof(float) <= sizeof(Surfel));
+  SURFEIT_CHECK(place % sizeof(float) == 0 && place < kFloats * sizeof(float));
   const auto [least, most] = std::minmax_element(floats.begin(), floats.end());
   least_[place / sizeof(float)] = *least;
   most_[place / sizeof(float)] = *most;

@@ -37,7 +37,7 @@ class FloatRowDecoder {
   std::uint64_t decode(const std::byte* rows, std::size_t count, Surfel* surfels) const;
 
  private:
-  static constexpr std::size_t kFloats = sizeof(Surfel) / sizeof(float);
+  static constexpr std::size_t kFloats = 16;  // of a surfel; what follows stays 0
 
   struct FloatCopy {  // neighbours in row and surfel
     std::size_t offset = 0, place = 0;

@@ -130,11 +130,12 @@ Result<SurfelMapping> SurfelMapping::create(const RowLayout& element, const std:
   }
 
   if (!mapping.coverage_.isPresent()) {
-    SURFEIT_ASSIGN_OR_RETURN(mapping.opacity_, findField(element, "opacity", path));
-    const ValueType type = mapping.opacity_.type;
-    mapping.opacity_scale_ =
-        isFloatType(type) ? 1 : 1 / (valueTypeBytes(type) == 1 ? 255. : 65535.);
-    channels.opacity = mapping.opacity_.isPresent();
+    SURFEIT_ASSIGN_OR_RETURN(channels.tint,
+                             findTriple(element, kOpacityNames, path, mapping.opacity_));
+    if (!channels.tint) {
+      SURFEIT_ASSIGN_OR_RETURN(mapping.opacity_[0], findField(element, "opacity", path));
+    }
+    channels.opacity = mapping.opacity_[0].isPresent();
   }
   SURFEIT_ASSIGN_OR_RETURN(mapping.two_sided_, findField(element, "two_sided", path));
   channels.two_sided = mapping.two_sided_.isPresent();
@@ -226,6 +227,10 @@ double SurfelMapping::Field::read(const std::byte* row) const {
   return linearFromSrgbCode(rowValue(row + offset, type) / 65535);
 }
 
+double SurfelMapping::Field::whole() const {
+  return isFloatType(type) ? 1 : valueTypeBytes(type) == 1 ? 255 : 65535;
+}
+
 glm::dvec3 SurfelMapping::positionOf(const std::byte* row) const {
   return {position_[0].read(row), position_[1].read(row), position_[2].read(row)};
 }
@@ -241,19 +246,19 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     }
     return value;
   };
-  double position[3], normal[3], radiosity[3], albedo[3], long_side[3];
+  double position[3], normal[3], radiosity[3], albedo[3], long_side[3], opacity[3];
   for (int i = 0; i < 3; ++i) {
     position[i] = read(position_[i]);
     normal[i] = read(normal_[i]);
     radiosity[i] = read(radiosity_[i]);
     albedo[i] = read(albedo_[i]);
     long_side[i] = read(long_side_[i]);
+    opacity[i] = read(opacity_[i]) / opacity_[i].whole();
   }
   const double radius = radius_scale_ * read(radius_);
   const double area = read(area_);
   const bool is_two_sided = read(two_sided_) != 0;
   const double coverage = read(coverage_);
-  const double opacity = opacity_.isPresent() ? opacity_scale_ * read(opacity_) : 1;
   const double group = read(group_);
   if (defect.kind != nullptr) return defect;
 
@@ -323,10 +328,15 @@ SurfelMapping::Defect SurfelMapping::decodeRow(const std::byte* row, Surfel& sur
     return {&SurfelDefects::bad_group, group_.name, group, "0 to 63"};
   }
   surfel.group = static_cast<std::uint8_t>(group);
-  if (!(opacity > 0 && opacity <= 1)) {
-    return {&SurfelDefects::bad_opacity, opacity_.name, opacity, "more than 0 and at most 1"};
+  if (!channels_.opacity) return {};
+  // Clear in all colors is nothing, in one it is a tint
+  const double most = channels_.tint ? std::max({opacity[0], opacity[1], opacity[2]}) : opacity[0];
+  for (int i = 0; i < (channels_.tint ? 3 : 1); ++i) {
+    if (opacity[i] >= 0 && opacity[i] <= 1 && most > 0) continue;
+    return {&SurfelDefects::bad_opacity, opacity_[i].name, opacity[i], "more than 0 and at most 1"};
   }
-  surfel.transparency = transparencyOf(opacity);
+  surfel.transparency = transparencyOf(opacity[0]);
+  if (channels_.tint) surfel.setOpacity(opacity[0], opacity[1], opacity[2]);
   return {};
 }
 

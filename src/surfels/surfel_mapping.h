@@ -37,7 +37,9 @@ namespace surfeit {
 //                              radiosity and albedo is absent, whose channel then counts as there
 //   two_sided                  not zero: both sides send and block light
 //   long_side_x _y _z          the longer side of the piece, as a vector; zero: not known
-//   opacity                    above 0 and at most 1, or of 255 (uchar) or 65535 (ushort); where
+//   opacity_r _g _b            0 to 1, not all 0, or of 255 (uchar) or 65535 (ushort); else
+//   opacity                    of all colors, above 0 and at most 1, or of 255 (uchar) or 65535
+//   (ushort); where
 //                              there is a coverage, that counts alone
 //   group | light_group        group, a whole number from 0 to 63 of any type
 // What is absent stays 0: radius and area for the indexer's rules, which need the neighbourhood.
@@ -87,6 +89,8 @@ class SurfelMapping {
 
     bool isPresent() const { return offset >= 0; }
     double read(const std::byte* row) const;
+    // What integers are counted in where they are parts of a whole.
+    double whole() const;
   };
   // The first defect of a row, and the property and value that show it: found, expected.
   struct Defect {
@@ -107,8 +111,7 @@ class SurfelMapping {
   CloudChannels channels_;
   std::size_t row_bytes_ = 0;
   Field position_[3], normal_[3], radius_, area_, radiosity_[3], albedo_[3], two_sided_, group_;
-  Field long_side_[3], coverage_, opacity_;
-  double opacity_scale_ = 1;
+  Field long_side_[3], coverage_, opacity_[3];  // of one opacity the first
   double radius_scale_ = 1;
   std::map<std::string, std::string, std::less<>> drops_;  // of --channels, by channel
   glm::dvec3 origin_{0};

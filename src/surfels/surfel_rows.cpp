@@ -24,7 +24,11 @@ SurfelRows::SurfelRows(const CloudChannels& channels, const glm::dvec3& origin)
   if (channels.two_sided) add("two_sided", ValueType::kUint8);
   if (channels.group) add(kGroupNames[0], ValueType::kUint8);
   if (channels.long_side) addTriple(kLongSideNames, ValueType::kFloat32);
-  if (channels.opacity) add("opacity", ValueType::kFloat32);
+  if (channels.tint) {
+    addTriple(kOpacityNames, ValueType::kFloat32);
+  } else if (channels.opacity) {
+    add("opacity", ValueType::kFloat32);
+  }
 }
 
 void SurfelRows::add(const char* name, ValueType type) {
@@ -57,7 +61,7 @@ void SurfelRows::pack(std::span<const Surfel> surfels, std::byte* rows) const {
     if (channels_.two_sided) put(static_cast<std::uint8_t>(surfel.isTwoSided()));
     if (channels_.group) put(surfel.group);
     if (channels_.long_side) put(longSideOf(surfel));
-    if (channels_.opacity) put(surfel.opacity());
+    for (int c = 0; channels_.opacity && c < (channels_.tint ? 3 : 1); ++c) put(surfel.opacity(c));
   }
 }
 

@@ -12,6 +12,7 @@
 #include "cloud/comment_notes.h"
 #include "cloud/property_aliases.h"
 #include "cloud/row_reader.h"
+#include "cloud/surfel_names.h"
 #include "core/crs_comment.h"
 #include "core/up_comment.h"
 #include "surfels/dark_colors.h"
@@ -138,19 +139,18 @@ class RowSurfelSource final : public SurfelSource {
   // What of an opacity is not used.
   void noteOpacity(std::vector<std::string>& notes) const {
     const RowLayout& element = reader_->element();
-    const bool is_used = mapping_.channels().opacity;
-    if (!is_used && element.find("opacity") != nullptr && element.find("f_dc_0") == nullptr) {
+    const CloudChannels& has = mapping_.channels();
+    const bool has_one = element.find("opacity") != nullptr;
+    const bool has_tint = element.find(kOpacityNames[0]) != nullptr;
+    if (!has.opacity && (has_one || has_tint) && element.find("f_dc_0") == nullptr) {
       notes.push_back(
           fmt::format("opacity is not used beside coverage: --channels {} leaves that out",
                       dropsOf(element, "coverage")));
     }
-    if (!is_used && element.find("opacity_r") != nullptr) {
-      // Where a file has them as one channel, they cannot be named one by one
-      const bool is_channel = typedNames(element, "opacity_g").front() != "opacity_g";
+    if (has.tint && has_one) {
       notes.push_back(fmt::format(
-          "opacity_r opacity_g opacity_b are not used: a surfel has one opacity; {} the green one",
-          is_channel ? "convert --set \"alpha = opacity_g\", then --channels alpha=opacity, takes"
-                     : "--channels opacity_g=opacity takes"));
+          "opacity is not used beside opacity_r opacity_g opacity_b: --channels {} leaves it out",
+          dropsOf(element, "opacity")));
     }
   }
 

@@ -275,12 +275,11 @@ TEST_F(Opacity, WhatIsNotUsedIsTold) {
   addPane(1, .3, 1, 10, covered);
   for (const char* name : {"opacity_r", "opacity_g", "opacity_b"}) tints.addProperty(name);
   for (auto& row : tints.rows) row.insert(row.end(), {.2, .4, .6});
-  tints.properties[8].name = "other";
   covered.properties[7].name = "coverage";  // in place of the area
   for (auto& row : covered.rows) row[7] = .5;
   const std::string path = directory_.file("cloud.ply"), scene = directory_.file("scene.sft");
   for (const auto& [cloud, told, way_out] :
-       {std::tuple(tints, "opacity_r opacity_g opacity_b are not used", "opacity_g=opacity"),
+       {std::tuple(tints, "opacity is not used beside opacity_r opacity_g opacity_b", "opacity=-"),
         std::tuple(covered, "opacity is not used beside coverage", "coverage=-")}) {
     writeTable(cloud, path);
     ToldNotes notes, silence;

@@ -32,6 +32,8 @@ class TestScene {
     });
     channels.group = std::any_of(cloud.begin(), cloud.end(),
                                  [](const Surfel& surfel) { return surfel.group != 0; });
+    channels.opacity = channels.tint = std::any_of(
+        cloud.begin(), cloud.end(), [](const Surfel& surfel) { return surfel.isTinted(); });
     const std::string cloud_path = directory_.file("cloud.ply"), path = directory_.file("c.sft");
     Result<SurfelWriter> writer = SurfelWriter::create(cloud_path, channels);
     expectOk(writer.status());

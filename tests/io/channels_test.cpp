@@ -62,7 +62,14 @@ TEST(Channels, WellKnownNamesOfManyProgramsAreOneChannel) {
               ElementsAre("velocity_x", "velocity_y", "velocity_z"));
   EXPECT_THAT(names("v", 3, ChannelKind::kVector),
               ElementsAre("velocity_x", "velocity_y", "velocity_z"));
+  for (const char* name : {"opacity", "Opacity", "Oi", "Os", "_opacity"}) {
+    EXPECT_THAT(names(name, 3, ChannelKind::kVector),
+                ElementsAre("opacity_r", "opacity_g", "opacity_b"))
+        << name;
+  }
+  EXPECT_THAT(names("opacity", 1, ChannelKind::kFloat), ElementsAre("opacity"));
   // By number of values too
+  EXPECT_THAT(names("Os", 1, ChannelKind::kFloat), ElementsAre("Os"));
   EXPECT_THAT(names("v", 1, ChannelKind::kFloat), ElementsAre("v"));
   EXPECT_THAT(names("N", 1, ChannelKind::kFloat), ElementsAre("N"));
 }

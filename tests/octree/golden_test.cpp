@@ -25,6 +25,7 @@ struct Golden {
   std::uint64_t surfel_hash, node_hash;
   bool has_groups, has_long_sides;
   std::uint32_t format_version = 2;
+  bool has_tints = false;
 
   bool hasOpacity() const { return format_version == 3; }
   bool isPresent() const { return format_version > 1; }
@@ -35,6 +36,7 @@ struct Golden {
                              : has_long_sides ? kAllAndLongSides
                                               : kAllChannels;
     channels.opacity = hasOpacity();
+    channels.tint = has_tints;
     return channels;
   }
   // For the names of the tests
@@ -48,6 +50,7 @@ constexpr Golden kGoldens[] = {
     {"v2_groups.sft", 12687918996693723113ull, 6009126428172456815ull, true, false},
     {"v2_long_sides.sft", 16580172462110769372ull, 3774583152376164457ull, false, true},
     {"v3_opacity.sft", 7818277089028598686ull, 16727090283409600907ull, false, false, 3},
+    {"v3_tints.sft", 12228443692316353389ull, 11119776789287335687ull, false, false, 3, true},
 };
 // The zstd that compressed them: another one may store the same payloads in other bytes.
 constexpr unsigned kZstdVersion = 10504;
@@ -71,6 +74,7 @@ std::vector<Surfel> goldenCloud(const Golden& golden) {
       surfel.normal = glm::vec3(0);
     }
     if (golden.hasOpacity()) surfel.transparency = static_cast<std::uint16_t>(i * 211);
+    if (golden.has_tints) surfel.tint = {std::uint16_t(i * 7), std::uint16_t(-i * 200)};
     if (golden.has_groups) surfel.group = static_cast<std::uint8_t>(i / 50 * 11);
     cloud.push_back(surfel);
   }
@@ -84,6 +88,17 @@ std::string fieldsOf(const Node& node, std::uint32_t format_version) {
       format_version >= 2 ? offsetof(Node, area) : offsetof(Node, normal_cosine);
   return std::string(bytes, end) +
          std::string(bytes + offsetof(Node, area), bytes + offsetof(Node, facet_count));
+}
+
+// What there was before tints, then these.
+std::uint64_t hashOf(const std::vector<Surfel>& surfels, const Golden& golden) {
+  std::string bytes;
+  for (const Surfel& surfel : surfels) {
+    const std::size_t end = golden.has_tints ? sizeof surfel : offsetof(Surfel, tint);
+    bytes.append(reinterpret_cast<const char*>(&surfel), end);
+    EXPECT_EQ(surfel.isTinted() && !golden.has_tints, false);
+  }
+  return XXH3_64bits(bytes.data(), bytes.size());
 }
 
 class GoldenTest : public SceneTest, public testing::WithParamInterface<Golden> {};
@@ -101,6 +116,7 @@ TEST_P(GoldenTest, DecodesToTheSameContents) {
   EXPECT_EQ(scene->header.format_version, golden.format_version);
   EXPECT_EQ(scene->header.channels.group, golden.has_groups);
   EXPECT_EQ(scene->header.channels.opacity, golden.hasOpacity());
+  EXPECT_EQ(scene->header.channels.tint, golden.has_tints);
   EXPECT_EQ(scene->header.channels.long_side, golden.has_long_sides);
   std::uint64_t node_hash = 0;
   for (const auto& [node, first] : scene->nodes) {
@@ -112,18 +128,19 @@ TEST_P(GoldenTest, DecodesToTheSameContents) {
     for (std::size_t k = 0; k < node.facet_count; ++k) {
       const Facet facet = node.facet(k);
       add(&facet, offsetof(Facet, is_two_sided));  // those are flags of the node
-      if (golden.hasOpacity()) add(&facet.opacity, sizeof facet.opacity);
+      if (golden.hasOpacity()) add(&facet.opacity.r, sizeof facet.opacity.r);
+      if (golden.has_tints) add(&facet.opacity.g, 2 * sizeof facet.opacity.g);
     }
     if (!node.hasFacets()) add(&node.rough, sizeof node.rough);
     if (golden.hasOpacity()) add(&node.transparency, sizeof node.transparency);
+    if (golden.has_tints) add(&node.tint, sizeof node.tint);
     EXPECT_TRUE(golden.has_groups || node.groups == groupBit(0));
     if (golden.format_version == 1) {
       EXPECT_EQ(node.thickness, node.radius);
       EXPECT_EQ(node.normal_cosine, -1);
     }
   }
-  EXPECT_EQ(XXH3_64bits(scene->surfels.data(), scene->surfels.size() * sizeof(Surfel)),
-            golden.surfel_hash);
+  EXPECT_EQ(hashOf(scene->surfels, golden), golden.surfel_hash);
   EXPECT_EQ(node_hash, golden.node_hash);
 }
 

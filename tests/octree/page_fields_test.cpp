@@ -31,7 +31,8 @@ constexpr PageForm kAllColumns = {.has_albedo = true,
                                   .has_groups = true,
                                   .has_long_sides = true,
                                   .has_opacity = true,
-                                  .has_lobes = true};
+                                  .has_lobes = true,
+                                  .has_tints = true};
 
 PageForm exact(PageForm form) {
   form.full_precision = true;
@@ -47,7 +48,7 @@ Messages damagedFields(const std::string& page, const std::vector<const char*>& 
 // Few enough that no column looks like noise: all are in the packed part.
 std::vector<Surfel> fewSurfels() {
   std::vector<Surfel> cloud = inGroups(withLongSides(randomCloud(6)), 4);
-  cloud[3].transparency = 300;
+  cloud[3].setOpacity(.995, .4, .7);
   return cloud;
 }
 
@@ -81,11 +82,11 @@ class SurfelPageFields : public testing::Test {
 TEST_F(SurfelPageFields, PageThatEndsWithinOneIsToldByItsName) {
   for (const bool is_exact : {false, true}) {
     const auto form = [&](PageForm of) { return is_exact ? exact(of) : of; };
-    expectCuts(form(kAllColumns), {"flags", "position", "normal", "radius", "area", "radiosity",
-                                   "albedo", "group", "long_side", "transparency", "lobes"});
+    expectCuts(form(kAllColumns),
+               {"flags", "position", "normal", "radius", "area", "radiosity", "albedo", "group",
+                "long_side", "transparency", "tint", "lobes"});
     // Each of those that some pages lack is the last one, too
-    const std::vector<const char*> all = {"flags",  "position", "normal",
-                                          "radius", "area",     "radiosity"};
+    std::vector<const char*> all = {"flags", "position", "normal", "radius", "area", "radiosity"};
     const auto with = [&](const char* last) {
       std::vector<const char*> fields = all;
       fields.push_back(last);
@@ -97,6 +98,8 @@ TEST_F(SurfelPageFields, PageThatEndsWithinOneIsToldByItsName) {
     expectCuts(form({.has_long_sides = true}), with("long_side"));
     expectCuts(form({.has_opacity = true}), with("transparency"));
     expectCuts(form({.has_lobes = true}), with("lobes"));
+    all.push_back("transparency");
+    expectCuts(form({.has_opacity = true, .has_tints = true}), with("tint"));
   }
 }
 
@@ -108,6 +111,32 @@ TEST_F(SurfelPageFields, ValuesThatThereAreNotAreToldByTheirName) {
   cloud[2].transparency = kMostTransparency + 1;
   EXPECT_THAT(decode(encode(cloud, kAllColumns), kAllColumns).message(),
               HasSubstr("field transparency"));
+  for (const int color : {0, 1}) {
+    cloud = fewSurfels();
+    cloud[2].transparency = 40000;
+    cloud[2].tint[std::size_t(color)] = 65535 - 40000;
+    EXPECT_THAT(decode(encode(cloud, kAllColumns), kAllColumns).message(), HasSubstr("field tint"));
+  }
+}
+
+TEST_F(SurfelPageFields, TintsComeBack) {
+  const std::vector<Surfel> cloud = fewSurfels();
+  ASSERT_TRUE(decode(encode(cloud, kAllColumns), kAllColumns).ok());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    for (int color = 0; color < 3; ++color) {
+      EXPECT_EQ(found_[i].opacity(color), cloud[i].opacity(color)) << i;
+    }
+  }
+  // Lit again, the page keeps them
+  Payload replaced;
+  const std::vector<glm::vec3> light(cloud.size(), glm::vec3(1));
+  ASSERT_TRUE(
+      replaceSurfelRadiosity(encode(cloud, kAllColumns), kAllColumns, light, replaced).ok());
+  PageForm without_lobes = kAllColumns;
+  without_lobes.has_lobes = false;
+  ASSERT_TRUE(decode(replaced, without_lobes).ok());
+  EXPECT_EQ(found_[3].tint, cloud[3].tint);
+  EXPECT_TRUE(found_[3].isTinted());
 }
 
 TEST_F(SurfelPageFields, HeaderIsThatOfThePage) {
@@ -172,12 +201,13 @@ class NodePageFields : public testing::Test {
   std::vector<Node> found_ = std::vector<Node>(128);
 };
 
-constexpr PageForm kAllOfNodes = {.has_groups = true, .has_opacity = true, .has_lobes = true};
+constexpr PageForm kAllOfNodes = {
+    .has_groups = true, .has_opacity = true, .has_lobes = true, .has_tints = true};
 const std::vector<const char*> kNodeFields = {
     "position",     "radius", "area",      "normal",       "flatness",
     "thickness",    "cone",   "radiosity", "flags",        "child count",
     "child level",  "page",   "first",     "surfel count", "groups",
-    "transparency", "facets", "moments",   "coefficients"};
+    "transparency", "tint",   "facets",    "moments",      "coefficients"};
 
 TEST_F(NodePageFields, PageThatEndsWithinOneIsToldByItsName) {
   for (const PageForm& form : {kAllOfNodes, exact(kAllOfNodes)}) {
@@ -234,6 +264,19 @@ TEST_F(NodePageFields, ValuesThatThereAreNotAreToldByTheirName) {
   ASSERT_TRUE(nodes_[1].node.hasFacets());
   nodes_[1].node.facets[2].transparency = kMostTransparency + 1;
   EXPECT_THAT(decodeEdited(opacity).message(), HasSubstr("field facets"));
+
+  const PageForm tints = {.has_opacity = true, .has_tints = true};
+  nodes_[1].node.facets[2].transparency = 0;
+  ASSERT_EQ(decodeEdited(tints).message(), "");
+  nodes_[1].node.facets[2].tint = {0, 65535};
+  EXPECT_THAT(decodeEdited(tints).message(), HasSubstr("field facets"));
+  nodes_[1].node.facets[2].tint = {65534, 0};
+  nodes_[0].node.tint = {65535, 0};
+  EXPECT_THAT(decodeEdited(tints).message(), HasSubstr("field tint"));
+  nodes_[0].node.tint = {65534, 3};
+  ASSERT_EQ(decodeEdited(tints).message(), "");
+  EXPECT_EQ(found_[0].tint, nodes_[0].node.tint);
+  EXPECT_EQ(found_[1].facets[2].tint, nodes_[1].node.facets[2].tint);
 }
 
 TEST_F(NodePageFields, ReferencesToSurfelsStayInTheirPages) {

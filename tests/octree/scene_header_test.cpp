@@ -86,11 +86,26 @@ TEST(SceneHeader, UnknownBitsAreRefused) {
       std::vector<std::byte> fields = right;
       fields[at + std::size_t(bit / 8)] |= std::byte(1 << bit % 8);
       const Result<SceneHeader> decoded = decodeSceneHeader(fields, kNodePages, kSurfelPages);
+      // Without opacity there is no tint, bit 9 of the channels
       EXPECT_EQ(decoded.ok(), bit < known) << told << ' ' << bit;
       if (decoded.ok()) continue;
       EXPECT_THAT(decoded.status().message(), HasSubstr(told));
     }
   }
+}
+
+TEST(SceneHeader, TintsAreOfWhatHasOpacity) {
+  SceneHeader header = rightHeader();
+  header.channels.opacity = header.channels.tint = true;
+  const Result<SceneHeader> decoded =
+      decodeSceneHeader(encodeSceneHeader(header), kNodePages, kSurfelPages);
+  ASSERT_TRUE(decoded.ok()) << decoded.status().message();
+  EXPECT_TRUE(decoded->channels.tint);
+  EXPECT_TRUE(decoded->pageForm().has_tints);
+  header.channels.opacity = false;
+  EXPECT_THAT(
+      decodeSceneHeader(encodeSceneHeader(header), kNodePages, kSurfelPages).status().message(),
+      HasSubstr("channel bits"));
 }
 
 }  // namespace

@@ -59,6 +59,21 @@ TEST_F(VerifyClaimsTest, NodesAreToldByWhatTheyClaimWrongly) {
     EXPECT_THAT(findingsAfter(scene, 0, [&](Node& n) { n.transparency = transparency; }),
                 Contains(AllOf(HasSubstr(": opacity "), HasSubstr("from what lies below"))));
   }
+  // Nodes that are not tinted, of what is
+  channels.tint = true;
+  for (Surfel& surfel : cloud) surfel.tint = {0, 5000};
+  const std::string tinted = sceneOf(cloud, channels);
+  ASSERT_THAT(findingsAfter(tinted, 0, [](Node&) {}), IsEmpty());
+  EXPECT_THAT(findingsAfter(tinted, 0,
+                            [](Node& n) {
+                              n.tint = {5000, 5000};
+                            }),
+              Contains(AllOf(HasSubstr(": green opacity "), HasSubstr("from what lies below"))));
+  EXPECT_THAT(findingsAfter(tinted, 0,
+                            [](Node& n) {
+                              n.tint = {0, 10000};
+                            }),
+              Contains(AllOf(HasSubstr(": blue opacity "), HasSubstr("from what lies below"))));
   EXPECT_THAT(findingsAfter(scene, 0, [](Node& n) { n.position.x += 10; }),
               Contains(HasSubstr("for the centres of its children")));
   EXPECT_THAT(findingsAfter(scene, leaves, [](Node& n) { n.radius *= .5f; }),

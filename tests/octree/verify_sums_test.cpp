@@ -41,6 +41,19 @@ std::vector<Surfel> translucent(std::vector<Surfel> cloud) {
   return cloud;
 }
 
+// Each color by its own opacity.
+std::vector<Surfel> tinted(std::vector<Surfel> cloud) {
+  TestRandom random(8);
+  const auto opacity = [&] { return double(random.between(.2f, 1)); };
+  for (Surfel& surfel : cloud) surfel.setOpacity(opacity(), opacity() / 2, opacity() / 4);
+  return cloud;
+}
+
+CloudChannels withTints(CloudChannels channels) {
+  channels.opacity = channels.tint = true;
+  return channels;
+}
+
 // Leaves in a heap: half of each kind, anywhere.
 std::vector<Surfel> thicket(std::size_t count) {
   std::vector<Surfel> cloud = twoSided(sphereCloud(count));
@@ -91,6 +104,9 @@ std::vector<NamedCloud> cloudsOfEveryKind() {
           {"all kinds", randomCloud(700), kAllChannels},
           {"translucent box", translucent(boxCloud(9, .1f))},
           {"translucent thicket", translucent(thicket(600))},
+          {"tinted box", tinted(boxCloud(9, .1f)), withTints(kAllAndOpacity)},
+          {"tinted thicket", tinted(thicket(600)), withTints(kAllAndOpacity)},
+          {"tints of all kinds", tinted(randomCloud(700)), withTints(kAllChannels)},
           {"one surfel", randomCloud(1)},
           {"one point", withoutNormals(randomCloud(1))}};
 }

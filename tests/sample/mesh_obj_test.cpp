@@ -332,7 +332,7 @@ TEST_F(ObjFiles, DissolveAndMasksSayHowMuchIsThere) {
   EXPECT_FALSE(mesh->isOpaque());
   const float expected[] = {.3f, .75f, .5f, .5f, 0, .5f};
   for (std::uint32_t i = 0; i < 6; ++i) {
-    EXPECT_NEAR(surfacePoint(*mesh, i, .3f, .3f).opacity, expected[i], 1e-6f) << i;
+    EXPECT_NEAR(surfacePoint(*mesh, i, .3f, .3f).opacity.r, expected[i], 1e-6f) << i;
   }
   EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("1 of 3 faces of material \"leaf\"")));
 }

@@ -57,11 +57,11 @@ TEST_F(ObjMaterialFiles, FacesWithoutTextureCoordinatesHaveNoPictures) {
       ASSERT_EQ(mesh.triangle.size(), 3u);
       EXPECT_NEAR(at(mesh, 0).albedo.x, of.albedo, 1e-5f) << of.map;
       EXPECT_NEAR(at(mesh, 0).emission.x, of.emission, 1e-5f) << of.map;
-      EXPECT_NEAR(at(mesh, 0).opacity, of.opacity, 1e-5f) << of.map;
+      EXPECT_NEAR(at(mesh, 0).opacity.r, of.opacity, 1e-5f) << of.map;
       for (const std::uint32_t bare : {1u, 2u}) {
         EXPECT_NEAR(at(mesh, bare).albedo.x, .5f, 1e-5f) << of.map;
         EXPECT_NEAR(at(mesh, bare).emission.x, 2 * kPiFloat, 1e-5f) << of.map;
-        EXPECT_NEAR(at(mesh, bare).opacity, .8f, 1e-5f) << of.map;
+        EXPECT_NEAR(at(mesh, bare).opacity.r, .8f, 1e-5f) << of.map;
       }
       EXPECT_THAT(notes_.notes,
                   ElementsAre(AllOf(HasSubstr("2 of 3 faces of material \"A\" have no texture"),
@@ -77,7 +77,7 @@ TEST_F(ObjMaterialFiles, FilesWithoutTextureCoordinatesToo) {
       "usemtl A\nf 1 2 3 4\nusemtl B\nf 1 2 3\n");
   EXPECT_EQ(at(mesh, 0).albedo, glm::vec3(.5f));
   EXPECT_NEAR(at(mesh, 0).emission.x, 2 * kPiFloat, 1e-5f);
-  EXPECT_EQ(at(mesh, 0).opacity, 1);
+  EXPECT_EQ(at(mesh, 0).opacity.r, 1);
   // Without pictures, B says nothing
   EXPECT_EQ(at(mesh, 2).albedo, glm::vec3(.25f));
   EXPECT_EQ(at(mesh, 2).emission, glm::vec3(0));
@@ -89,6 +89,30 @@ TEST_F(ObjMaterialFiles, FilesWithoutTextureCoordinatesToo) {
   load("newmtl A\nKd .5 .5 .5\nnewmtl B\nKd 1 1 1\nmap_Kd t.ppm\n",
        "usemtl A\nf 1 2 3 4\nusemtl B\nf 1/1 2/2 3/3\n");
   EXPECT_THAT(notes_.notes, IsEmpty());
+}
+
+// opacity = 1 - (1 - d) Tf, unless Tf is what exporters write where nobody said anything.
+TEST_F(ObjMaterialFiles, TfFiltersWhatDLetsThrough) {
+  struct Case {
+    std::string material;
+    glm::vec3 opacity;
+  };
+  const std::vector<Case> cases = {{"d .2\nTf 1 .1 .5\n", {.2f, .92f, .6f}},
+                                   {"Tr .8\nTf 1 .1 .5\n", {.2f, .92f, .6f}},
+                                   {"d 0\nTf .9 .2 0\n", {.1f, .8f, 1}},
+                                   {"d .2\nTf 1 1 1\n", glm::vec3(.2f)},
+                                   {"d .2\nTf 0 0 0\n", glm::vec3(.2f)},
+                                   {"d .2\nTf .5\n", glm::vec3(.6f)},
+                                   {"illum 4\nd .2\nTf 1 .1 .5\n", {.2f, .92f, .6f}},
+                                   {"d 1\nTf 1 .1 .5\n", glm::vec3(1)}};
+  for (const Case& of : cases) {
+    const Mesh mesh = load("newmtl A\nKd .5 .5 .5\nNi 1.5\n" + of.material);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(at(mesh, 0).opacity[c], of.opacity[c], 1e-6f) << of.material << c;
+    }
+    EXPECT_EQ(mesh.hasTints(), of.opacity != glm::vec3(of.opacity.r)) << of.material;
+    EXPECT_THAT(notes_.notes, IsEmpty()) << of.material;
+  }
 }
 
 TEST_F(ObjMaterialFiles, NumbersOutOfTheirRangeAreTold) {
@@ -124,7 +148,7 @@ TEST_F(ObjMaterialFiles, NumbersOutOfTheirRangeAreTold) {
     const SurfacePoint point = at(mesh, 0);
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(point.albedo[i], of.albedo[i], 1e-5f) << of.material;
     EXPECT_NEAR(point.emission.x, of.emission, 1e-3f) << of.material;
-    EXPECT_EQ(point.opacity, of.opacity) << of.material;
+    EXPECT_EQ(point.opacity.r, of.opacity) << of.material;
     if (of.said.empty()) {
       EXPECT_THAT(notes_.notes, IsEmpty()) << of.material;
     } else {

@@ -288,6 +288,43 @@ TEST_F(Sampling, ShadowsAreAsDenseAsWhatCastsThem) {
   EXPECT_NEAR(light / count, .7, .02);
 }
 
+// Red glass, by its Tf; and half of it is there, by a mask.
+TEST_F(Sampling, ShadowsOfTintsHaveTheirColor) {
+  for (const bool has_mask : {false, true}) {
+    write("mask.ppm", std::string("P6\n2 1\n255\n\xff\xff\xff") + std::string(3, '\0'));
+    write("m.mtl",
+          std::string("newmtl glass\nd .2\nTf 1 .25 .25\n") + (has_mask ? "map_d mask.ppm\n" : ""));
+    write("plate.obj",
+          "mtllib m.mtl\nv -2 3 2\nv 2 3 2\nv 2 3 -2\nv -2 3 -2\nvt 0 0\nvt 8 0\nvt 8 8\nvt 0 8\n"
+          "usemtl glass\nf 1/1 2/2 3/3 4/4\n");
+    SampleOptions options;
+    options.count = 20000;
+    options.surroundings.lights.directionals.push_back({{0, -1, 0}, glm::vec3(1)});
+    ASSERT_TRUE(sampleMeshes({write("floor.ply", floorPly(2)), path("plate.obj")}, path("out.ply"),
+                             options, notes_)
+                    .ok());
+    glm::dvec3 light(0);
+    double glass_area = 0;
+    int count = 0;
+    for (const Surfel& surfel : readCloud(path("out.ply"))) {
+      if (surfel.position.y > 1) {
+        EXPECT_NEAR(surfel.opacity(0), .2, 1e-4);
+        EXPECT_NEAR(surfel.opacity(1), .8, 1e-4);
+        EXPECT_NEAR(surfel.opacity(2), .8, 1e-4);
+        glass_area += double(surfel.area);
+        continue;
+      }
+      light += glm::dvec3(surfel.radiosity) / .5;
+      ++count;
+    }
+    const double part = has_mask ? .5 : 1;
+    EXPECT_NEAR(glass_area, 16 * part, .1);
+    EXPECT_NEAR(light.r / count, 1 - .2 * part, .02);
+    EXPECT_NEAR(light.g / count, 1 - .8 * part, .02);
+    EXPECT_NEAR(light.b / count, 1 - .8 * part, .02);
+  }
+}
+
 TEST_F(Sampling, AMeshOnAMapGivesTheSurfelsOfThatAtZero) {
   const auto mesh = [](double x, double y) {
     std::string text;

@@ -41,7 +41,28 @@ void PacketGatherer::endPhase(double& seconds) {
 Status PacketGatherer::gatherTogether(std::span<const LocalReceiver> receivers,
                                       std::span<const std::uint16_t> places, WorldReader& world,
                                       std::span<GatherResult> results) {
+  std::array<GatherResult, kPacketReceivers> packet_results;
+  const std::span<GatherResult> found = std::span(packet_results).first(receivers.size());
   const PacketView view = viewPacket(receivers, rules_);
+  SURFEIT_RETURN_IF_ERROR(drawColor(0, view, receivers, world));
+  if (!raster_.hasTints()) {
+    raster_.integrate(found);
+    endPhase(work_.integrate_seconds);
+  } else {
+    for (int color = 0; color < 3; ++color) {
+      if (color > 0) SURFEIT_RETURN_IF_ERROR(drawColor(color, view, receivers, world));
+      raster_.integrateColor(found);
+      endPhase(work_.integrate_seconds);
+    }
+  }
+  for (std::size_t k = 0; k < receivers.size(); ++k) results[places[k]] = packet_results[k];
+  return {};
+}
+
+// Where nothing has a tint, red stands for all.
+Status PacketGatherer::drawColor(int color, const PacketView& view,
+                                 std::span<const LocalReceiver> receivers, WorldReader& world) {
+  raster_.setColor(color);
   raster_.begin(receivers, view);
   SURFEIT_RETURN_IF_ERROR(walk_.walk(view, receivers, world, DrawCut{raster_, world.octree()}));
   work_.nodes_visited += walk_.nodesVisited();
@@ -53,11 +74,6 @@ Status PacketGatherer::gatherTogether(std::span<const LocalReceiver> receivers,
   endPhase(work_.sort_seconds);
   raster_.draw();
   endPhase(work_.draw_seconds);
-
-  std::array<GatherResult, kPacketReceivers> packet_results;
-  raster_.integrate(std::span(packet_results).first(receivers.size()));
-  for (std::size_t k = 0; k < receivers.size(); ++k) results[places[k]] = packet_results[k];
-  endPhase(work_.integrate_seconds);
   return {};
 }
 

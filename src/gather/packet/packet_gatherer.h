@@ -68,6 +68,8 @@ class PacketGatherer {
   Status gatherTogether(std::span<const LocalReceiver> receivers,
                         std::span<const std::uint16_t> places, WorldReader& world,
                         std::span<GatherResult> results);
+  Status drawColor(int color, const PacketView& view, std::span<const LocalReceiver> receivers,
+                   WorldReader& world);
   void endPhase(double& seconds);
 
   const GatherRules rules_;

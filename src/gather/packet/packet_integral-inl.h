@@ -85,7 +85,8 @@ class Integral {
           hn::GetLane(sight.coverage),
           hn::GetLane(sight.occlusion),
           {hn::GetLane(sight.radiosity.x), hn::GetLane(sight.radiosity.y),
-           hn::GetLane(sight.radiosity.z)}};
+           hn::GetLane(sight.radiosity.z)},
+          glm::vec3(1 - hn::GetLane(sight.coverage))};
     });
   }
 
@@ -226,7 +227,7 @@ class Integral {
     if (rules_.has(kOutputBentNormal | kOutputIlluminationDirection)) {
       const V3 world = InWorld(pixel.direction);
       AddTo(kBentNormal, hn::Mul(weight, open), world);
-      AddTo(kIllumination, hn::Mul(weight, Dot(light, kLuminance)), world);
+      AddTo(kIllumination, hn::Mul(weight, Dot(light, canvas_.luminance)), world);
     }
     if (!rules_.has(kOutputFluence | kOutputRadianceSh)) return;
     const V seen = hn::IfThenElseZero(hn::Gt(direction_weight, hn::Zero(d)), Splat(1));

@@ -113,6 +113,7 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
   parts_.resize(1);   // that of what counts wholly
   lights_.resize(1);  // of what sends evenly
   order_count_ = 0;
+  has_tints_ = false;
   setFrame(nullptr);
 }
 
@@ -217,6 +218,7 @@ std::uint32_t PacketRaster::keepParts(const LaneParts* parts) {
 }
 
 void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const NodeLobes* lobes) {
+  has_tints_ |= node.isTinted();
   const std::uint32_t parts = keepParts(lane_parts);
   const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
   gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
@@ -235,6 +237,7 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
+      has_tints_ |= codes.tint != Tint{};
       add(i, node.facet(i));
     }
   }
@@ -296,8 +299,8 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
   patch.reach = reachOf(facet, direction);
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
-  patch.lets_through = facet.opacity < 1;
-  if (patch.lets_through) patch.opacity = facetOpacity(facet);
+  patch.lets_through = facet.opacity[color_] < 1;
+  if (patch.lets_through) patch.opacity = facetOpacity(facet, color_);
   patch.is_solid = is_hull || (!facet.is_thicket && isFilled(node, facet));
   patch.lets_through = patch.lets_through || !patch.is_solid;
   patch.is_spread = !node.isFlat() || !patch.is_solid;
@@ -334,7 +337,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.position = node.position + visible.middle;
   patch.radius = node.radius;
   patch.normal = node.flatness * node.normal;
-  patch.lets_through = node.transparency != 0;
+  patch.lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
   if (!patch.lets_through) {
     patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
   }
@@ -342,14 +345,14 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.thicket = thicketPart(node);
   patch.is_solid = false;
   const RoughCover cover =
-      roughCover(node, direction, visible.perspective * round_area, patch.thicket);
+      roughCover(node, direction, visible.perspective * round_area, patch.thicket, color_);
   patch.area = patch.round_area = cover.area;
   patch.most_area = cover.most;
   patch.opacity = cover.opacity;
   patch.parts = parts;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) {
-    patch.radiosity = (gain_ * front / (round_area * node.opacity())) * seen.radiosity;
+    patch.radiosity = (gain_ * front / (round_area * node.opacity(color_))) * seen.radiosity;
   }
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
@@ -371,6 +374,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
       if (!keepSeenParts(seen_of, lane_parts, parts)) continue;
     }
     const Surfel surfel = withSides(stored, rules_.quality.sides);
+    has_tints_ |= surfel.isTinted();
+    const bool lets_through = transparencyOf(surfel.transparency, surfel.tint, color_) != 0;
     Patch& patch = patches_.emplace_back();
     patch.position = surfel.position;
     patch.normal = surfel.normal;
@@ -379,7 +384,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
       // Only what is opaque may cover more than it should to leave no gaps
-      const bool is_exact = surfel.isTwoSided() || surfel.transparency != 0;
+      const bool is_exact = surfel.isTwoSided() || lets_through;
       patch.soft_peak = softDiskPeak(patch.radius, surfel.area, is_exact);
     } else {
       patch.shape = ribbon.shape();
@@ -397,8 +402,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     const float distance_sq =
         std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
     patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
-    patch.opacity = surfel.opacity();
-    patch.lets_through = surfel.transparency != 0;
+    patch.opacity = surfel.opacity(color_);
+    patch.lets_through = lets_through;
     if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
     patch.thicket = thicketPart(surfel);
     if (surfel.isLone() && patch.thicket == 0) {
@@ -432,6 +437,7 @@ PacketCanvas PacketRaster::canvas() const {
           .bias = rules_.quality.bias,
           .turned = rules_.quality.sides == GatherSides::kBack ? -1.f : 1.f,
           .max_distance_sq = max_distance_sq_,
+          .luminance = luminance_,
           .centre = view_.centre,
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
@@ -453,10 +459,6 @@ std::size_t PacketRaster::tracedCount() const {
   return std::size_t(std::count_if(patches_.begin(), patches_.end(), [&](const Patch& patch) {
     return glm::length(patch.position - view_.centre) < patch.near_distance;
   }));
-}
-
-void PacketRaster::integrate(std::span<GatherResult> results) {
-  kernel_.integrate(canvas(), results);
 }
 
 std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {

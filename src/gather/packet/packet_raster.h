@@ -30,6 +30,7 @@
 #include "gather/cut/cut.h"
 #include "gather/cut/instance_tree.h"
 #include "gather/packet/packet_kernel.h"
+#include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
 #include "gather/rules/raster_geometry.h"
 #include "gather/rules/receiver.h"
@@ -83,6 +84,14 @@ class PacketRaster {
   // One result per receiver.
   void integrate(std::span<GatherResult> results);
 
+  // Whether something of what was added lets colors through differently: then what was drawn holds
+  // for one color alone (docs/algorithm.md, "Tints").
+  bool hasTints() const { return has_tints_; }
+  // The color, 0 to 2, whose opacities count in what is added from now on; at first red.
+  void setColor(int color) { color_ = color; }
+  // Instead of integrate(): the part of that color in the results; the colors come in their order.
+  void integrateColor(std::span<GatherResult> results);
+
   std::size_t patchCount() const { return patches_.size(); }
 
   // Tells it from now on what every pixel of the first receiver gets; null, as at first: nobody. It
@@ -90,7 +99,7 @@ class PacketRaster {
   void setRecorder(PixelRecorder* recorder) { recorder_ = recorder; }
   const RasterGeometry& geometry() const { return geometry_; }
   // After drawing, what the first receiver has in its pixels, as many as the geometry has.
-  void readPixels(std::span<PixelContent> pixels) const { kernel_.readPixels(canvas(), pixels); }
+  void readPixels(std::span<PixelContent> pixels) const;
   // Patches of surfels so near to the packet's centre that they are ray traced at least in part.
   std::size_t tracedCount() const;
 
@@ -107,7 +116,7 @@ class PacketRaster {
   // Adds a facet of the node, or all of a flat one, or the hull of that alone.
   void addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
                 const Lobe* lobe);
-  bool mayLeaveHull(const Node& node) const;
+  bool mayLeaveHull(const Node& node);
   std::uint32_t lanesBeyond(const glm::vec3& position, float distance) const;
   // Adds a hull for those of these lanes that see it, and says which need no other.
   std::uint32_t addFacetHull(const Node& node, const Facet& facet, const LaneParts* parts,
@@ -142,6 +151,10 @@ class PacketRaster {
   glm::vec3 local_centre_{0};  // of the view, in the frame of what is added
   float local_radius_ = 0;
   float gain_ = 1;  // of the node that is added
+  int color_ = 0;
+  bool has_tints_ = false;
+  glm::vec3 luminance_{0};               // PacketCanvas::luminance
+  std::vector<PixelContent> of_colors_;  // with a recorder: what readPixels() tells of all colors
   std::vector<Patch> patches_;
   std::vector<PacketParts> parts_;
   std::vector<PacketLights> lights_;

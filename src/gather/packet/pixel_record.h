@@ -17,7 +17,16 @@ namespace surfeit {
 struct PixelContent {
   float coverage = 0, occlusion = 0;  // occlusion: with falloff
   glm::vec3 radiosity{0};             // times the coverage; zero without light
+  glm::vec3 open{1};                  // 1 less the coverage, by color
 };
+
+// Adds what was drawn for a color: of coverage and occlusion their means over the colors.
+inline void addColor(const PixelContent& drawn, int color, PixelContent& sum) {
+  sum.coverage += drawn.coverage / 3;
+  sum.occlusion += drawn.occlusion / 3;
+  sum.radiosity[color] = drawn.radiosity[color];
+  sum.open[color] = drawn.open[color];
+}
 
 struct PixelRecord {
   std::array<float, kCubeKinds> covered{};  // by what it was drawn as; gaps are not filled yet

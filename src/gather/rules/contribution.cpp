@@ -70,7 +70,7 @@ Facet facetOf(const Node& node) {
           .covariance = node.covariance,
           .is_two_sided = node.isTwoSided(),
           .is_thicket = node.isTwoSided() && node.isLoose(),
-          .opacity = node.opacity()};
+          .opacity = {node.opacity(0), node.opacity(1), node.opacity(2)}};
 }
 
 // Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,
@@ -131,17 +131,18 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
 // in front plus back, which the limit of the area takes back head-on.)
 // The outline of a thicket is that of a ball full of leaves, pi r^2, which has a covariance of r^2
 // / 5 along every axis, so an ellipse of 4 pi r^2 / 5.
-RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket) {
+RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket,
+                      int color) {
   const float ellipse = ellipseArea(node, direction), sphere = kPi * node.radius * node.radius;
   const float filled = kFidelity.filled_outline + spherePart(node) * (1 - kFidelity.filled_outline);
   const float most = std::min({node.area, sphere, filled * ellipse});
   const float surface = std::min(shown, most);
   constexpr float kThicketOutline = 5.f / 4;
   const float outline = std::min(sphere, kThicketOutline * ellipse);
-  const float opacity = layersOpacity(node.opacity(), shown / surface);
+  const float each = node.opacity(color);
+  const float opacity = layersOpacity(each, shown / surface);
   if (!(thicket > 0 && outline > 0)) return {surface, opacity, most};
-  const float hidden =
-      outline * thicketOpacity(node.opacity() * std::min(shown, node.area), outline);
+  const float hidden = outline * thicketOpacity(each * std::min(shown, node.area), outline);
   const float area = surface + thicket * (outline - surface), solid = opacity * surface;
   return {area, (solid + thicket * (hidden - solid)) / area, std::max(area, most)};
 }
@@ -174,9 +175,9 @@ bool isFilled(const Node& node, const Facet& facet) {
   return layers * node.area * (1.f / 65535) * shown >= least * facet.area;
 }
 
-float facetOpacity(const Facet& facet) {
+float facetOpacity(const Facet& facet, int color) {
   const float depth = std::max(1.f, facetLayers(facet));
-  return layersOpacity(facet.opacity, depth) / depth;
+  return layersOpacity(facet.opacity[color], depth) / depth;
 }
 
 float reachOf(const Facet& facet, const glm::vec3& direction) {

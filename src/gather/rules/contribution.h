@@ -54,18 +54,19 @@ float facetLayers(const Facet& facet);
 // Whether a facet of a node, or a flat node, has no gaps, seen head-on: with all that other facets
 // show in that direction it fills its outline, as the slopes of folds do together.
 bool isFilled(const Node& node, const Facet& facet);
-// What a translucent facet hides of what its area covers. More area than that of the ellipse that
-// spreads as it does lies behind itself, and is as many layers.
-float facetOpacity(const Facet& facet);
+// What a translucent facet hides of what its area covers, in a color (0 red, 1 green, 2 blue). More
+// area than that of the ellipse that spreads as it does lies behind itself, and is as many layers.
+float facetOpacity(const Facet& facet, int color);
 
-// What a rough node covers that shows `shown` of its area in unit direction `direction` (or its
-// opposite), and of which `thicket` is leaves or hair: an area, and what it hides of that. A
-// surface fills what it shows, a thicket is spread over its outline.
+// What a rough node covers in a color that shows `shown` of its area in unit direction `direction`
+// (or its opposite), and of which `thicket` is leaves or hair: an area, and what it hides of that.
+// A surface fills what it shows, a thicket is spread over its outline.
 struct RoughCover {
   float area, opacity;
   float most;  // what `area` might be, however much is shown
 };
-RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket);
+RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket,
+                      int color = 0);
 
 // How far before and behind its middle a facet meets others of its layer, seen in this direction.
 float reachOf(const Facet& facet, const glm::vec3& direction);

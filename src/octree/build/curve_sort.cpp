@@ -139,11 +139,10 @@ std::uint64_t contentWord(const Surfel& surfel, int word) {
     return bits;
   }
   // Bytes compare from the front
-  std::uint64_t content;
-  std::memcpy(&content,
-              reinterpret_cast<const std::byte*>(&surfel) +
-                  sizeof content * std::size_t(word - kFinerWords),
-              sizeof content);
+  std::uint64_t content = 0;
+  const std::size_t at = sizeof content * std::size_t(word - kFinerWords);
+  std::memcpy(&content, reinterpret_cast<const std::byte*>(&surfel) + at,
+              std::min(sizeof content, sizeof surfel - at));
   return __builtin_bswap64(content);
 }
 

@@ -23,7 +23,7 @@ bool contentLess(const Surfel& a, const Surfel& b);
 
 // Words that compare as contentLess does, one after the other; `word` is below kContentWords.
 inline constexpr int kFinerWords = 2;
-inline constexpr int kContentWords = kFinerWords + int(sizeof(Surfel) / sizeof(std::uint64_t));
+inline constexpr int kContentWords = kFinerWords + int((sizeof(Surfel) + 7) / 8);
 std::uint64_t contentWord(const Surfel& surfel, int word);
 
 // Sorts tickets by key with all threads of the current arena; `scratch` has the same size. Within a

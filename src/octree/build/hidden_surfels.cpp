@@ -330,7 +330,8 @@ bool Facing::areLayers(const Sheet& a, const Sheet& b) const {
 // Marks the surfels of a sheet that lie behind (or before) another one; what is translucent hides
 // nothing.
 void Facing::hide(const Sheet& sheet, const Sheet& by, bool is_behind) {
-  if (by.sums.covered < by.sums.area) return;
+  const auto& covered = by.sums.covered;
+  if (std::min({covered[0], covered[1], covered[2]}) < by.sums.area) return;
   for (const Height& each : sheet.heights) {
     Surfel& surfel = cell_[each.surfel];
     if (!covers(by, sheet, each)) continue;

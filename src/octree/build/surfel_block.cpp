@@ -1,8 +1,8 @@
 // A packed block:
 //
-//   [ checksum : 8 | count : 4 | widths : 16 x 1 | shared : 16 x 4 | rows | 4 zeros ]
+//   [ checksum : 8 | count : 4 | widths : 17 x 1 | shared : 17 x 4 | rows | 4 zeros ]
 //
-// A surfel is 16 words of 32 bits. Word w of a row takes widths[w] bytes, its low ones; the high
+// A surfel is 17 words of 32 bits. Word w of a row takes widths[w] bytes, its low ones; the high
 // ones are those of shared[w]. The zeros let the last word be read as four bytes.
 #include "octree/build/surfel_block.h"
 

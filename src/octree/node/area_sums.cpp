@@ -19,14 +19,15 @@ double diskSpread(const Surfel& surfel) {
 
 AreaSums::AreaSums(const Surfel& surfel, const double (&origin)[3]) {
   const double a = double(surfel.area), spread = diskSpread(surfel);
-  const double o = double(surfel.opacity());
   area = a;
-  covered = a * o;
   double x[3], n[3];
   for (int axis = 0; axis < 3; ++axis) {
     x[axis] = double(surfel.position[axis]) - origin[axis];
     n[axis] = surfel.isSphere() ? 0 : double(surfel.normal[axis]);
     position[axis] = a * x[axis];
+    // Axes count colors, too
+    const double o = double(surfel.opacity(axis));
+    covered[axis] = a * o;
     radiosity[axis] = a * o * double(surfel.radiosity[axis]);
     // Both sides of a two-sided disk face everywhere: it gives a node no direction
     if (!surfel.isTwoSided()) normal[axis] = a * n[axis];
@@ -50,13 +51,13 @@ void AreaSums::move(const double (&shift)[3]) {
 
 void AreaSums::add(const AreaSums& other) {
   area += other.area;
-  covered += other.covered;
   for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
     second_moment[i] += other.second_moment[i];
   }
   for (int axis = 0; axis < 3; ++axis) {
     position[axis] += other.position[axis];
     normal[axis] += other.normal[axis];
+    covered[axis] += other.covered[axis];
     radiosity[axis] += other.radiosity[axis];
   }
 }

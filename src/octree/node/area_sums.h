@@ -16,7 +16,7 @@ struct AreaSums {
   double position[3] = {};                               // sum A x
   double second_moment[SymmetricMatrix::kEntries] = {};  // sum A (x x^T + what a disk spreads)
   double normal[3] = {};                                 // sum A n over one-sided disks
-  double covered = 0;                                    // sum A o
+  double covered[3] = {};                                // sum A o, by color
   double radiosity[3] = {};                              // sum A o B
 
   AreaSums() = default;

@@ -74,11 +74,10 @@ Lobe LobeSums::toLobe() const {
 
 void addToPiece(const Node& node, const Surfel& surfel, const Lobe& lobe, PieceSums& sums) {
   const bool is_two_sided = surfel.isTwoSided() && !surfel.isSphere();
-  const double covered = double(surfel.area) * double(surfel.opacity());
   const glm::vec3 shares = lobe.shares(), direction = lobe.meanDirection();
   LobeSums one;
   for (int c = 0; c < 3; ++c) {
-    one.power[c] = covered * double(surfel.radiosity[c]);
+    one.power[c] = double(surfel.area) * double(surfel.opacity(c)) * double(surfel.radiosity[c]);
     one.lobe[c] = one.power[c] * double(shares[c]);
   }
   // One direction stands for all colors

@@ -81,6 +81,7 @@ struct Node {
   std::uint8_t facet_count;    // 0: it is flat or rough
   std::uint8_t hidden;         // HiddenSides of a flat node, by its normal
   std::uint16_t transparency;  // of the area-weighted mean of opacities, as in Surfel
+  Tint tint;                   // the same
   // How far surfels lie off the planes that a flat node or one of facets is drawn on, at most or by
   // their moments; 0 in a rough node. Not stored.
   float off_plane;
@@ -99,7 +100,10 @@ struct Node {
   // Sets off_plane by everything else.
   void findOffPlane();
 
-  float opacity() const { return opacityOf(transparency); }
+  bool isTinted() const { return tint != Tint{}; }
+  float opacity(int color = 0) const {
+    return opacityOf(transparencyOf(transparency, tint, color));
+  }
   bool isLeaf() const { return child_count == 0; }
   bool isFlat() const { return (flags & kNodeFlat) != 0; }
   bool hasFacets() const { return facet_count > 0; }
@@ -115,7 +119,7 @@ struct Node {
     return facet;
   }
 };
-static_assert(sizeof(Node) == 328);
+static_assert(sizeof(Node) == 336);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

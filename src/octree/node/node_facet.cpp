@@ -16,7 +16,9 @@ NodeFacet NodeFacet::encode(const Facet& facet, const glm::vec3& position, float
   const float part = 65535 * std::min(1.f, facet.area / area);
   codes.area = static_cast<std::uint16_t>(std::max(1.f, part + 0.5f));
   codes.covariance = covarianceCodes(facet.covariance, radius);
-  codes.transparency = transparencyOf(double(facet.opacity));
+  codes.transparency = transparencyOf(double(facet.opacity.r));
+  codes.tint = tintOf(codes.transparency, transparencyOf(double(facet.opacity.g)),
+                      transparencyOf(double(facet.opacity.b)));
   return codes;
 }
 

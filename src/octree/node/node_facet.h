@@ -27,7 +27,7 @@ struct Facet {
   SymmetricMatrix covariance;  // Node::covariance
   bool is_two_sided = false;   // seen from both sides; the normal is one of two
   bool is_thicket = false;     // two-sided and loose: of leaves, or hair
-  float opacity = 1;           // area-weighted mean
+  glm::vec3 opacity{1};        // area-weighted mean, by color
 };
 
 // A facet in codes, relative to its node, as pages hold it in either precision: six take less room
@@ -40,6 +40,7 @@ struct NodeFacet {
   CovarianceCodes covariance;          // within its radius
   std::uint8_t hidden;                 // HiddenSides, by its normal
   std::uint16_t transparency;          // as in Surfel
+  Tint tint;
 
   static NodeFacet encode(const Facet& facet, const glm::vec3& position, float radius, float area);
   // These and decode(): what the facet is, by the position, radius and area of the node.
@@ -61,10 +62,14 @@ struct NodeFacet {
             .area = node_area * (float(area) * (1.f / 65535)),
             .radiosity = radiosity,
             .covariance = covarianceOf(covariance, node_radius),
-            .opacity = opacityOf(transparency)};
+            .opacity = opacity()};
+  }
+  glm::vec3 opacity() const {
+    return {opacityOf(transparency), opacityOf(transparencyOf(transparency, tint, 1)),
+            opacityOf(transparencyOf(transparency, tint, 2))};
   }
   bool operator==(const NodeFacet&) const = default;
 };
-static_assert(sizeof(NodeFacet) == 32);
+static_assert(sizeof(NodeFacet) == 36);
 
 }  // namespace surfeit

@@ -45,10 +45,10 @@ void NodeSums::add(const Surfel& surfel) {
   groups |= groupBit(surfel.group);
   const double a = double(surfel.area);
   if (!has_one_front) loose_area += surfel.isLoose() ? a : -a;
-  const double o = double(surfel.opacity());
-  const double area_and_power[4] = {1, o * double(surfel.radiosity[0]),
-                                    o * double(surfel.radiosity[1]),
-                                    o * double(surfel.radiosity[2])};
+  double area_and_power[4] = {1};
+  for (int c = 0; c < 3; ++c) {
+    area_and_power[powerKind(c)] = double(surfel.opacity(c)) * double(surfel.radiosity[c]);
+  }
   const ZonalFactors& factors = lobeOf(surfel);
   const double bands[3] = {a * double(factors[0]), a * double(factors[1]), a * double(factors[2])};
   const ShCoefficients basis = shBasis(surfel.normal);
@@ -106,9 +106,9 @@ Facet NodeSums::toFacet(const AreaSums& group) const {
   for (int axis = 0; axis < 3; ++axis) {
     facet.position[axis] = float(origin[axis] + group.position[axis] / group.area);
     facet.normal[axis] = float(group.normal[axis] / group.area);
-    facet.radiosity[axis] = float(group.radiosity[axis] / group.covered);
+    facet.radiosity[axis] = float(group.radiosity[axis] / group.covered[axis]);
+    facet.opacity[axis] = float(group.covered[axis] / group.area);
   }
-  facet.opacity = float(group.covered / group.area);
   facet.covariance = group.covariance();
   return facet;
 }
@@ -139,7 +139,9 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   node.position = all.position;
   node.area = all.area;
   node.radiosity = all.radiosity;
-  node.transparency = transparencyOf(covered / area);
+  node.transparency = transparencyOf(covered[0] / area);
+  node.tint = tintOf(node.transparency, transparencyOf(covered[1] / area),
+                     transparencyOf(covered[2] / area));
   node.covariance = all.covariance;
   setNormal(*this, node);
   if (loose_area > 0) node.flags = kNodeLoose;

@@ -14,14 +14,15 @@
 
 namespace surfeit {
 
-// Sums over surfels i with area A, opacity o, position x, normal n, radiosity B. Plain data.
+// Sums over surfels i with area A, opacity o (by color), position x, normal n, radiosity B. Plain
+// data.
 struct NodeSums : AreaSums {
   std::uint64_t surfel_count = 0;
   std::uint64_t groups = 0;        // set of groups
   double loose_area = 0;           // of kSurfelLoose, less that of other spheres and two-sided ones
   double origin[3] = {};           // of positions: the first surfel, so that nothing cancels
   double front_moment[3][3] = {};  // sum A x n^T over one-sided disks
-  double sh[kShCount][4] = {};     // sum A K_l Y_lm(n) times 1, o B_r, o B_g and o B_b
+  double sh[kShCount][4] = {};     // sum A K_l Y_lm(n) times 1, o_r B_r, o_g B_g and o_b B_b
   double band_4[kShCount] = {};    // Node::area_band_4
   FacetSums facets;
   Bounds3 disk_bounds;  // boxes around every surfel's bounding sphere, as it is read back

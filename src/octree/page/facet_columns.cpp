@@ -6,24 +6,26 @@
 #include "core/thread_scratch.h"
 #include "octree/node/hidden_layers.h"
 #include "octree/page/column_codec.h"
+#include "octree/page/transparency_columns.h"
 
 namespace surfeit {
 namespace {
 
 // Entries of a facet: its area and normal in 16 bits, its offset and covariance in bytes.
-// Where facets have an opacity, its code in two bytes more.
+// Where facets have an opacity, its code in two bytes more; where they have tints, in four more.
 constexpr std::size_t kWide = 4, kBytes = 3 + SymmetricMatrix::kEntries;
 
 // Entry `k` of all facets lies side by side.
 struct Codes {
   std::size_t count;
-  bool has_opacity;
+  bool has_opacity, has_tints;
   std::vector<std::int16_t>& wide = threadScratch<std::vector<std::int16_t>>([] {});
   std::vector<std::uint8_t>& bytes = threadScratch<std::vector<std::uint8_t>>([] {});
 
-  Codes(std::size_t facets, bool with_opacity) : count(facets), has_opacity(with_opacity) {
+  Codes(std::size_t facets, const PageForm& form)
+      : count(facets), has_opacity(form.has_opacity), has_tints(form.has_tints) {
     wide.resize(kWide * facets);
-    bytes.resize((kBytes + (has_opacity ? 2 : 0)) * facets);
+    bytes.resize((kBytes + (has_opacity ? 2 : 0) + (has_tints ? 4 : 0)) * facets);
   }
   bool get(PayloadReader& reader) {
     return getSmallIntegers(reader, wide) && getBytes8(reader, bytes);
@@ -36,9 +38,8 @@ struct Codes {
     for (std::size_t k = 0; k < facet.covariance.size(); ++k) {
       bytes[(3 + k) * count + i] = facet.covariance[k];
     }
-    if (!has_opacity) return;
-    bytes[kBytes * count + i] = static_cast<std::uint8_t>(facet.transparency & 0xff);
-    bytes[(kBytes + 1) * count + i] = static_cast<std::uint8_t>(facet.transparency >> 8);
+    if (has_opacity) setPair(0, i, facet.transparency);
+    for (std::size_t k = 0; has_tints && k < 2; ++k) setPair(1 + k, i, facet.tint[k]);
   }
   NodeFacet at(std::size_t i) const {
     NodeFacet facet{};
@@ -48,11 +49,20 @@ struct Codes {
     for (std::size_t k = 0; k < facet.covariance.size(); ++k) {
       facet.covariance[k] = bytes[(3 + k) * count + i];
     }
-    if (has_opacity) {
-      facet.transparency = static_cast<std::uint16_t>(bytes[kBytes * count + i] |
-                                                      bytes[(kBytes + 1) * count + i] << 8);
-    }
+    if (has_opacity) facet.transparency = pairAt(0, i);
+    for (std::size_t k = 0; has_tints && k < 2; ++k) facet.tint[k] = pairAt(1 + k, i);
     return facet;
+  }
+
+  // Of transparency and tint: low byte and high byte.
+  void setPair(std::size_t pair, std::size_t i, std::uint16_t code) {
+    const std::size_t at = (kBytes + 2 * pair) * count + i;
+    bytes[at] = static_cast<std::uint8_t>(code & 0xff);
+    bytes[at + count] = static_cast<std::uint8_t>(code >> 8);
+  }
+  std::uint16_t pairAt(std::size_t pair, std::size_t i) const {
+    const std::size_t at = (kBytes + 2 * pair) * count + i;
+    return static_cast<std::uint16_t>(bytes[at] | bytes[at + count] << 8);
   }
 };
 
@@ -115,9 +125,9 @@ void FacetColumns::add(const Node& node) {
   facets_.insert(facets_.end(), node.facets.begin(), node.facets.begin() + node.facet_count);
 }
 
-void FacetColumns::put(PayloadWriter& writer, bool has_opacity) const {
+void FacetColumns::put(PayloadWriter& writer, const PageForm& form) const {
   putBytes8(writer, counts_);
-  Codes codes(facets_.size(), has_opacity);
+  Codes codes(facets_.size(), form);
   for (std::size_t i = 0; i < facets_.size(); ++i) codes.set(i, facets_[i]);
   putSmallIntegers(writer, codes.wide);
   putBytes8(writer, codes.bytes);
@@ -132,12 +142,12 @@ void FacetColumns::putRadiosity(PayloadWriter& writer, bool full_precision) cons
   putColors(writer, constAxes(columns), full_precision);
 }
 
-bool FacetColumns::pass(PayloadReader& reader, bool has_opacity) const {
-  return getBytes8(reader, counts_) && Codes(facets_.size(), has_opacity).get(reader) &&
+bool FacetColumns::pass(PayloadReader& reader, const PageForm& form) const {
+  return getBytes8(reader, counts_) && Codes(facets_.size(), form).get(reader) &&
          (hidden_.empty() || getBytes8(reader, hidden_));
 }
 
-bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, bool has_opacity) {
+bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, const PageForm& form) {
   std::vector<std::uint8_t>& counts = threadScratch<std::vector<std::uint8_t>>([] {});
   counts.resize(nodes.size());
   std::size_t hidden_count = 0;
@@ -147,7 +157,7 @@ bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, bool has_op
     if (nodes[i].facet_count > (nodes[i].isFlat() ? 0 : kMostFacets)) return false;
     if ((counts[i] & kHasHidden) != 0) hidden_count += pieceCount(nodes[i]);
   }
-  Codes codes(countFacets(nodes), has_opacity);
+  Codes codes(countFacets(nodes), form);
   if (!codes.get(reader)) return false;
   std::size_t next = 0;
   for (Node& node : nodes) {
@@ -155,7 +165,9 @@ bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, bool has_op
     node.facets = {};
     for (std::size_t k = 0; k < node.facet_count; ++k) {
       node.facets[k] = codes.at(next++);
-      if (node.facets[k].transparency > kMostTransparency) return false;
+      const NodeFacet& facet = node.facets[k];
+      if (facet.transparency > kMostTransparency) return false;
+      if (!areTransparencies(facet.transparency, facet.tint)) return false;
     }
   }
   return hidden_count == 0 || getHidden(reader, counts, hidden_count, nodes);

@@ -7,6 +7,7 @@
 
 #include "octree/node/node.h"
 #include "octree/page/byte_planes.h"
+#include "octree/page/page_form.h"
 
 namespace surfeit {
 
@@ -18,14 +19,14 @@ class FacetColumns {
   void add(const Node& node);
 
   // Numbers of facets and all of them but radiosities, and these.
-  void put(PayloadWriter& writer, bool has_opacity) const;
+  void put(PayloadWriter& writer, const PageForm& form) const;
   void putRadiosity(PayloadWriter& writer, bool full_precision) const;
   // Takes what put() gives for as many nodes and facets; false when it ends early.
-  bool pass(PayloadReader& reader, bool has_opacity) const;
+  bool pass(PayloadReader& reader, const PageForm& form) const;
 
   // Gives nodes their facets: flags and child counts are there. False when the columns end early,
   // or cannot be those of such nodes. First get(), then getRadiosity().
-  static bool get(PayloadReader& reader, std::span<Node> nodes, bool has_opacity);
+  static bool get(PayloadReader& reader, std::span<Node> nodes, const PageForm& form);
   static bool getRadiosity(PayloadReader& reader, std::span<Node> nodes);
 
  private:

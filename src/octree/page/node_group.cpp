@@ -86,6 +86,8 @@ class Columns {
     thickness = column(bytes, 3);
     cone = column(bytes, 4);
     transparency.bytes = {column(bytes, 5), column(bytes, 6)};
+    tints.differences = {TransparencyColumns{{column(bytes, 7), column(bytes, 8)}},
+                         TransparencyColumns{{column(bytes, 9), column(bytes, 10)}}};
     page = column(integers, 0);
     first = column(integers, 1);
     surfel_count = column(integers, 2);
@@ -105,6 +107,7 @@ class Columns {
       flatness[i] = node.flatness;
       flags[i] = node.flags;
       transparency.set(i, node.transparency);
+      tints.set(i, node.tint);
       child_count[i] = node.child_count;
       child_level[i] = nodes[i].child_level;
       page[i] = node.page;
@@ -153,6 +156,7 @@ class Columns {
       node.surfel_count = surfel_count[i];
       node.groups = form.has_groups ? groups[i] : groupBit(0);
       node.transparency = form.has_opacity ? transparency.at(i) : std::uint16_t{0};
+      node.tint = form.has_tints ? tints.at(i) : Tint{};
     }
   }
 
@@ -160,10 +164,11 @@ class Columns {
   std::span<float> radius, area, flatness;
   std::span<std::uint8_t> flags, child_count, child_level, thickness, cone;
   TransparencyColumns transparency;
+  TintColumns tints;
   std::span<std::uint64_t> page, first, surfel_count, groups;
 
  private:
-  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 7, kIntegerColumns = 4;
+  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 11, kIntegerColumns = 4;
 
   static glm::vec3 at(const MutableAxes& axes, std::size_t i) {
     return {axes[0][i], axes[1][i], axes[2][i]};
@@ -187,7 +192,8 @@ std::array<std::span<T>, kCoefficientKinds> coefficientColumns(std::size_t rough
 // What coefficients of a kind are stored relative to.
 float coefficientScale(const Node& node, std::size_t kind) {
   if (kind == kAreaKind) return node.area;
-  return node.area * node.opacity() * node.radiosity[static_cast<int>(kind) - 1];
+  const int color = static_cast<int>(kind) - 1;
+  return node.area * node.opacity(color) * node.radiosity[color];
 }
 
 // The columns of a page but for the coefficients, checked one by one: those before the radiosity,
@@ -221,6 +227,7 @@ Status decodeReferences(PayloadReader& reader, const PageForm& form, const Colum
     }
   }
   if (form.has_opacity && !columns.transparency.get(reader)) return damaged("transparency");
+  if (form.has_tints && !columns.tints.get(reader, columns.transparency)) return damaged("tint");
   return {};
 }
 
@@ -366,13 +373,14 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   putCounts(writer, columns.surfel_count);
   if (form.has_groups) putCounts(writer, columns.groups);
   if (form.has_opacity) columns.transparency.put(writer);
+  if (form.has_tints) columns.tints.put(writer);
   FacetColumns facets;
   RoughNodes rough;
   for (const LevelNode& node : nodes) {
     facets.add(node.node);
     rough.add(node.node);
   }
-  facets.put(writer, form.has_opacity);
+  facets.put(writer, form);
   MomentColumns moments(nodes.size(), rough.nodes.size(), full_precision);
   for (const LevelNode& node : nodes) moments.add(node.node);
   moments.put(writer);
@@ -410,7 +418,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
     SURFEIT_RETURN_IF_ERROR(resolveReference(limits, level, columns.child_level[i], columns.page[i],
                                              columns.first[i], out[i]));
   }
-  if (!FacetColumns::get(reader, out, form.has_opacity)) return damaged("facets");
+  if (!FacetColumns::get(reader, out, form)) return damaged("facets");
   SURFEIT_RETURN_IF_ERROR(checkFlags(out));
   SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
   SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
@@ -453,7 +461,7 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
     facets.add(node);
     rough.add(node);
   }
-  if (!facets.pass(reader, form.has_opacity)) return damaged("facets");
+  if (!facets.pass(reader, form)) return damaged("facets");
   if (!MomentColumns(nodes.size(), rough.nodes.size(), full_precision).get(reader)) {
     return damaged("moments");
   }

@@ -13,6 +13,7 @@ struct PageForm {
   bool has_bounds = true;    // slabs and cones of nodes: since format version 2
   bool has_opacity = false;  // since format version 3
   bool has_lobes = false;    // since format version 4
+  bool has_tints = false;    // of what has an opacity
 };
 
 }  // namespace surfeit

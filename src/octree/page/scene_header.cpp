@@ -22,7 +22,8 @@ enum ChannelBits : std::uint32_t {
   kHasGroup = 64,
   kHasLongSide = 128,
   kHasOpacity = 256,
-  kAllChannels = 511,
+  kHasTint = 512,
+  kAllChannels = 1023,
 };
 
 // Bits of the feature field. A reader refuses bits that it does not know.
@@ -46,7 +47,7 @@ std::uint32_t channelBits(const CloudChannels& channels) {
          (channels.area ? kHasArea : 0u) | (channels.radiosity ? kHasRadiosity : 0u) |
          (channels.albedo ? kHasAlbedo : 0u) | (channels.two_sided ? kHasTwoSided : 0u) |
          (channels.group ? kHasGroup : 0u) | (channels.long_side ? kHasLongSide : 0u) |
-         (channels.opacity ? kHasOpacity : 0u);
+         (channels.opacity ? kHasOpacity : 0u) | (channels.tint ? kHasTint : 0u);
 }
 
 CloudChannels channelsFromBits(std::uint32_t bits) {
@@ -60,6 +61,7 @@ CloudChannels channelsFromBits(std::uint32_t bits) {
   channels.group = (bits & kHasGroup) != 0;
   channels.long_side = (bits & kHasLongSide) != 0;
   channels.opacity = (bits & kHasOpacity) != 0;
+  channels.tint = (bits & kHasTint) != 0;
   return channels;
 }
 
@@ -174,6 +176,10 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
     return wrongField("channel bits", fmt::format("{:#x}", channels), "known channels");
   }
   header.channels = channelsFromBits(channels);
+  if (header.channels.tint && !header.channels.opacity) {
+    return wrongField("channel bits", fmt::format("{:#x}", channels),
+                      "opacity where there are tints");
+  }
   header.surfel_count = reader.get<std::uint64_t>();
   header.node_count = reader.get<std::uint64_t>();
   header.leaf_capacity = reader.get<std::uint32_t>();

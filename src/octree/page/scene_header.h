@@ -50,7 +50,7 @@ struct SceneHeader {
 
   PageForm pageForm() const {
     return {full_precision,      channels.albedo,  channels.group, channels.long_side,
-            format_version >= 2, channels.opacity, has_lobes};
+            format_version >= 2, channels.opacity, has_lobes,      channels.tint};
   }
 };
 

@@ -53,6 +53,10 @@ class Columns {
     }
     transparency.bytes = {std::span(bytes).subspan(5 * count, count),
                           std::span(bytes).subspan(6 * count, count)};
+    for (std::size_t k = 0; k < 2; ++k) {
+      tints.differences[k].bytes = {std::span(bytes).subspan((7 + 2 * k) * count, count),
+                                    std::span(bytes).subspan((8 + 2 * k) * count, count)};
+    }
   }
 
   void gather(std::span<const Surfel> surfels) {
@@ -70,6 +74,7 @@ class Columns {
       long_side[1][i] = static_cast<std::uint8_t>(surfels[i].long_side >> 8);
       long_side[2][i] = surfels[i].elongation;
       transparency.set(i, surfels[i].transparency);
+      tints.set(i, surfels[i].tint);
     }
   }
 
@@ -87,6 +92,7 @@ class Columns {
       surfel.long_side = form.has_long_sides ? longSideAt(i) : kNoLongSide;
       surfel.elongation = form.has_long_sides ? long_side[2][i] : std::uint8_t{0};
       surfel.transparency = form.has_opacity ? transparency.at(i) : std::uint16_t{0};
+      surfel.tint = form.has_tints ? tints.at(i) : Tint{};
       if (surfel.isSphere()) surfel.normal = glm::vec3(0);
       if (!form.has_albedo) surfel.albedo = glm::vec3(0);
     }
@@ -97,12 +103,13 @@ class Columns {
   std::span<std::uint8_t> flags, group;
   std::array<std::span<std::uint8_t>, 3> long_side;  // lower and upper byte, elongation
   TransparencyColumns transparency;
+  TintColumns tints;
   std::uint16_t longSideAt(std::size_t i) const {
     return static_cast<std::uint16_t>(long_side[0][i] | long_side[1][i] << 8);
   }
 
  private:
-  static constexpr std::size_t kFloatColumns = 14, kByteColumns = 7;
+  static constexpr std::size_t kFloatColumns = 14, kByteColumns = 11;
 
   static void gatherVectors(std::span<const Surfel> surfels, glm::vec3 Surfel::*field,
                             const MutableAxes& axes) {
@@ -156,6 +163,7 @@ Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns
     }
   }
   if (form.has_opacity && !columns.transparency.get(reader)) return damaged("transparency");
+  if (form.has_tints && !columns.tints.get(reader, columns.transparency)) return damaged("tint");
   return {};
 }
 
@@ -181,6 +189,7 @@ std::size_t encodeSurfelGroup(std::span<const Surfel> surfels, const PageForm& f
     for (const auto& bytes : columns.long_side) putBytes8(writer, bytes);
   }
   if (form.has_opacity) columns.transparency.put(writer);
+  if (form.has_tints) columns.tints.put(writer);
   if (form.has_lobes) putSurfelLobes(writer, surfels.size(), {});
   return writer.finish();
 }

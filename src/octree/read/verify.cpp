@@ -146,9 +146,17 @@ class PageChecker {
 
   static constexpr const char* kColors[] = {"red", "green", "blue"};
 
+  // Area times opacity, by color.
+  template <typename Record>
+  static glm::dvec3 coveredBy(const Record& record) {
+    return double(record.area) *
+           glm::dvec3(record.opacity(0), record.opacity(1), record.opacity(2));
+  }
+
   // What a node claims, against what lies below it.
   struct Below {
-    double area = 0, covered = 0;
+    double area = 0;
+    glm::dvec3 covered{0};  // by color
     std::uint64_t surfels = 0;
     std::uint64_t groups = 0;
     glm::dvec3 power{0};
@@ -161,8 +169,9 @@ class PageChecker {
     void add(const Node& node, const Record& record, float radius, std::uint64_t count,
              std::uint64_t record_groups) {
       area += double(record.area);
-      covered += double(record.area) * double(record.opacity());
-      power += double(record.area) * double(record.opacity()) * glm::dvec3(record.radiosity);
+      const glm::dvec3 part = coveredBy(record);
+      covered += part;
+      power += part * glm::dvec3(record.radiosity);
       for (int c = 0; c < 3; ++c) brightest = std::max(brightest, record.radiosity[c]);
       surfels += count;
       groups |= record_groups;
@@ -170,8 +179,7 @@ class PageChecker {
     }
     template <typename Record>
     void addLobe(const Record& record, const Lobe& of_record) {
-      lobe += double(record.area) * double(record.opacity()) * glm::dvec3(record.radiosity) *
-              glm::dvec3(of_record.shares());
+      lobe += coveredBy(record) * glm::dvec3(record.radiosity) * glm::dvec3(of_record.shares());
     }
   };
 
@@ -204,20 +212,23 @@ class PageChecker {
       return Status::corruption(
           fmt::format("area {}, expected {} from what lies below", node.area, below.area));
     }
-    const double covered = double(node.area) * double(node.opacity());
-    if (std::abs(below.covered - covered) > double(kAreaTolerance * node.area)) {
-      return Status::corruption(fmt::format("opacity {}, expected {} from what lies below",
-                                            node.opacity(), below.covered / below.area));
+    const glm::dvec3 covered = coveredBy(node);
+    for (int c = 0; c < 3; ++c) {
+      if (std::abs(below.covered[c] - covered[c]) <= double(kAreaTolerance * node.area)) continue;
+      return Status::corruption(
+          fmt::format("{}opacity {}, expected {} from what lies below",
+                      node.isTinted() ? fmt::format("{} ", kColors[c]) : std::string(),
+                      node.opacity(c), below.covered[c] / below.area));
     }
     // What is a millionth as bright as the brightest may be lost: steps are parts of a page's
     // largest
     const double slack = 1e-6 * below.area * double(std::max(below.brightest, page_brightest_));
     for (int c = 0; c < 3; ++c) {
-      const double power = double(node.area) * double(node.opacity()) * double(node.radiosity[c]);
+      const double power = covered[c] * double(node.radiosity[c]);
       if (std::abs(below.power[c] - power) <= kPowerTolerance * below.power[c] + slack) continue;
       return Status::corruption(fmt::format("{} radiosity {}, expected {} from what lies below",
                                             kColors[c], node.radiosity[c],
-                                            below.power[c] / below.covered));
+                                            below.power[c] / below.covered[c]));
     }
     return compareLobes(node, below, slack);
   }

@@ -49,8 +49,8 @@ Entries secondMoment(const AreaSums& sums, const glm::dvec3& about) {
 
 // Facets of one kind, or what they must add up to, as parts of the node's area and radius.
 struct FacetTotals {
-  double area = 0, covered = 0;
-  glm::dvec3 normal{0}, place{0};
+  double area = 0;
+  glm::dvec3 covered{0}, normal{0}, place{0};
   Entries spread{};         // second moment around the node's position
   Entries tensor{};         // sum A n n^T
   double front[3][3] = {};  // sum A (x - p) n^T
@@ -242,7 +242,7 @@ FacetTotals NodeCheck::stored(bool is_two_sided, FacetSlack& slack) const {
     const double deviation = double(deviationOf(facet.covariance, 1)) + kHalfStep;
     const double length = std::min(glm::length(normal), 1.0);
     totals.area += area;
-    totals.covered += area * double(opacityOf(facet.transparency));
+    totals.covered += area * glm::dvec3(facet.opacity());
     totals.normal += area * normal;
     totals.place += area * at;
     slack.place += area * place;
@@ -275,8 +275,8 @@ FacetTotals NodeCheck::expected(bool is_two_sided) const {
     if (group.is_two_sided != is_two_sided) continue;
     const Entries moment = secondMoment(group, at);
     totals.area += group.area / sums_.area;
-    totals.covered += group.covered / sums_.area;
     for (int axis = 0; axis < 3; ++axis) {
+      totals.covered[axis] += group.covered[axis] / sums_.area;
       totals.normal[axis] += group.normal[axis] / sums_.area;
       totals.place[axis] += (group.position[axis] - group.area * at[axis]) / (sums_.area * radius_);
     }
@@ -304,7 +304,10 @@ void NodeCheck::checkFacetKind(bool is_two_sided) {
   const FacetTotals below = expected(is_two_sided);
   const double area_slack = 2e-3 + double(node_.facet_count) / 65535;
   expect("area of facets", "", found.area, below.area, area_slack);
-  expect("opacity of facets", "", found.covered, below.covered, area_slack);
+  for (int color = 0; color < 3; ++color) {
+    expect("opacity of facets", node_.isTinted() ? kColorNames[color] : "", found.covered[color],
+           below.covered[color], area_slack);
+  }
   for (int axis = 0; axis < 3; ++axis) {
     expect("offset of facets", kAxes[axis], found.place[axis], below.place[axis],
            slack.place + area_slack);
@@ -378,7 +381,7 @@ void NodeCheck::checkFacetLight() {
       const double found = double(facet.radiosity[color]);
       if (match) {
         const FacetGroup& group = groups.groups()[i];
-        const double mean = group.radiosity[color] / group.covered;
+        const double mean = group.radiosity[color] / group.covered[color];
         expect("facet radiosity in", kColorNames[color], found, mean, 1e-2 * mean + lost);
       } else {
         expect("facet radiosity in", kColorNames[color], found,

@@ -50,7 +50,7 @@ std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
 void setFacetRadiosity(const NodeSums& node_sums, float flatness_limit, Node& node) {
   const FacetSums& sums = node_sums.facets;
   struct Light {
-    double covered = 0, power[3] = {};
+    double covered[3] = {}, power[3] = {};
   };
   std::array<Light, kMostFacets> lights;
   const std::span<NodeFacet> facets = std::span(node.facets).first(node.facet_count);
@@ -61,21 +61,23 @@ void setFacetRadiosity(const NodeSums& node_sums, float flatness_limit, Node& no
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const FacetGroup& group = groups[i];
     Light& light = lights[match ? (*match)[i] : nearestFacet(node, group)];
-    light.covered += group.covered;
-    for (int c = 0; c < 3; ++c) light.power[c] += group.radiosity[c];
+    for (int c = 0; c < 3; ++c) {
+      light.covered[c] += group.covered[c];
+      light.power[c] += group.radiosity[c];
+    }
   }
   for (std::size_t k = 0; k < facets.size(); ++k) {
     const Light& light = lights[k];
     for (int c = 0; c < 3; ++c) {
       facets[k].radiosity[c] =
-          light.covered > 0 ? float(light.power[c] / light.covered) : node.radiosity[c];
+          light.covered[c] > 0 ? float(light.power[c] / light.covered[c]) : node.radiosity[c];
     }
   }
 }
 
 // What the indexer's NodeSums::toNode gives from the same sums; the rest of the node stays.
 void setRadiosity(const NodeSums& sums, float flatness_limit, Node& node) {
-  for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.covered);
+  for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.covered[c]);
   if (node.hasFacets()) setFacetRadiosity(sums, flatness_limit, node);
   if (!node.isRough()) return;
   for (int i = 0; i < kShCount; ++i) {
