@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "cloud/houdini/bgeo_json_walk.h"
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/column_rows.h"
 
 namespace surfeit {
@@ -60,6 +61,10 @@ class BgeoJsonReader final : public ColumnRowReader, private BgeoJsonWalk {
         return kind == "pointattributes" ? readAttributes() : skipValue();
       });
     }));
+    if (std::string note = noteOfBytesBehind(input_.size() - cursor_.offset(), "value");
+        !note.empty()) {
+      notes_.push_back(std::move(note));
+    }
     if (!has_count || !has_attributes) {
       return Status::corruption(path_ + ": no pointcount or no attributes, expected geometry");
     }
