@@ -12,6 +12,7 @@
 #include "cloud/comment_notes.h"
 #include "cloud/property_aliases.h"
 #include "cloud/row_reader.h"
+#include "cloud/surfel_names.h"
 #include "core/crs_comment.h"
 #include "core/up_comment.h"
 #include "surfels/dark_colors.h"
@@ -62,6 +63,30 @@ class RowSurfelSource final : public SurfelSource {
     if (!row_notes_) row_notes_ = notesOfRows();
     notes.insert(notes.end(), row_notes_->begin(), row_notes_->end());
     return notes;
+  }
+
+  std::string albedoAdvice() const override {
+    const RowLayout& element = reader_->element();
+    if (element.find(kAlbedoNames[0]) != nullptr) {
+      const std::string drops = dropsOf(element, "albedo");
+      return drops.empty() ? "" : fmt::format("--channels {} leaves the albedo out", drops);
+    }
+    const std::string renaming = renamingOf(element, "color", "radiosity");
+    if (element.find(kColorNames[0]) == nullptr || renaming.empty()) return {};
+    return fmt::format("where colors are light, --channels {} reads them as such alone", renaming);
+  }
+
+  SizeNames sizeNames() const override {
+    const RowLayout& element = reader_->element();
+    SizeNames names;
+    names.has_area = element.find("area") != nullptr;
+    for (const char* name : {kRadiusNames[0], kRadiusNames[1], kRadiusNames[2], "area"}) {
+      if (element.find(name) == nullptr) continue;
+      if (names.property.empty()) names.property = name;
+      const std::string drops = dropsOf(element, name);
+      names.drops += (names.drops.empty() || drops.empty() ? "" : ",") + drops;
+    }
+    return names;
   }
 
   std::size_t rowBytes() const override { return mapping_.rowBytes(); }
