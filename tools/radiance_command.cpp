@@ -46,6 +46,7 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
                              {"skipped_photons", stats.skipped_photons},
                              {"surfels", stats.surfels},
                              {"sparse_surfels", stats.sparse_surfels},
+                             {"bounded_surfels", stats.bounded_surfels},
                              {"area", stats.area},
                              {"power", jsonOf(stats.power)},
                              {"reflected_power", jsonOf(stats.reflected_power)},

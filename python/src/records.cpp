@@ -162,8 +162,8 @@ py::dict record(const GatherStats& stats) {
       "gather_seconds"_a = stats.gather_seconds, "threads"_a = stats.threads,
       "memory_bytes"_a = stats.memory_bytes, "temporary_bytes"_a = stats.temporary_bytes,
       "staged_bytes_read"_a = stats.staged_bytes_read,
-      "staged_bytes_kept"_a = stats.staged_bytes_kept, "node_cache"_a = record(stats.node_cache), "surfel_cache"_a = record(stats.surfel_cache),
-      "windows"_a = record(stats.windows));
+      "staged_bytes_kept"_a = stats.staged_bytes_kept, "node_cache"_a = record(stats.node_cache),
+      "surfel_cache"_a = record(stats.surfel_cache), "windows"_a = record(stats.windows));
 }
 
 py::dict record(const ConvertStats& stats) {
@@ -277,7 +277,8 @@ py::dict record(const BrickStats& stats) {
 py::dict record(const RadianceStats& stats) {
   return py::dict(
       "photons"_a = stats.photons, "skipped_photons"_a = stats.skipped_photons,
-      "surfels"_a = stats.surfels, "sparse_surfels"_a = stats.sparse_surfels, "area"_a = stats.area,
+      "surfels"_a = stats.surfels, "sparse_surfels"_a = stats.sparse_surfels,
+      "bounded_surfels"_a = stats.bounded_surfels, "area"_a = stats.area,
       "power"_a = place(stats.power), "reflected_power"_a = place(stats.reflected_power),
       "mean_radius"_a = stats.mean_radius, "max_radius"_a = stats.max_radius,
       "temporary_bytes"_a = stats.temporary_bytes, "memory_bytes"_a = stats.memory_bytes,

@@ -10,6 +10,8 @@
 #include <numbers>
 #include <vector>
 
+#include "octree/page/surfel_marks.h"
+
 namespace surfeit {
 namespace {
 
@@ -52,6 +54,7 @@ std::string noteOfRadii(std::span<const Surfel> sample, std::uint64_t count,
   for (std::size_t i = 0; i < sample.size(); i += step) {
     const Surfel& surfel = sample[i];
     places.push_back(surfel.position);
+    if (surfel.radius == kPlaceholderSize) return {};
     if (surfel.radius > 0) {
       radii.push_back(double(surfel.radius));
     } else if (surfel.area > 0) {

@@ -109,8 +109,8 @@ Status evaluateBezier(const HoudiniBasis& basis, std::span<const CurvePoint> con
                       std::span<const float> weights, std::vector<CurvePoint>& points) {
   const std::size_t degree = basis.order - 1;
   if ((control.size() - 1) % degree != 0) {
-    return Status::corruption(fmt::format("{} vertices, expected a multiple of {} and one more",
-                                          control.size(), degree));
+    return Status::corruption(
+        fmt::format("{} vertices, expected a multiple of {} and one more", control.size(), degree));
   }
   const int steps = degree > 1 ? kSplineSteps : 1;
   for (std::size_t begin = 0; begin + degree < control.size(); begin += degree) {
@@ -145,9 +145,8 @@ Status evaluateSpline(const HoudiniBasis& basis, std::span<const CurvePoint> con
   if (std::any_of(weights.begin(), weights.end(), [](float w) { return !(w > 0 && w < 1e6f); })) {
     return Status::corruption("a weight that is not above 0");
   }
-  return basis.kind == HoudiniBasis::Kind::kNurbs
-             ? evaluateNurbs(basis, control, weights, points)
-             : evaluateBezier(basis, control, weights, points);
+  return basis.kind == HoudiniBasis::Kind::kNurbs ? evaluateNurbs(basis, control, weights, points)
+                                                  : evaluateBezier(basis, control, weights, points);
 }
 
 }  // namespace surfeit

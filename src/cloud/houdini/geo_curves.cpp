@@ -69,8 +69,8 @@ class BinaryGeo {
       }
       window_begin_ = at_;
       SURFEIT_ASSIGN_OR_RETURN(
-          window_, input_.readView(at_, std::size_t(std::min<std::uint64_t>(left, kWindowBytes)),
-                                   buffer_));
+          window_,
+          input_.readView(at_, std::size_t(std::min<std::uint64_t>(left, kWindowBytes)), buffer_));
     }
     const std::byte* const found = window_.data() + (at_ - window_begin_);
     at_ += bytes;
@@ -109,7 +109,8 @@ class BinaryGeo {
         continue;
       }
       if (type < 0 || type > kVector || type == 3) {
-        return damaged(begin, fmt::format("an attribute of type {}, expected 0, 1, 2, 4 or 5", type));
+        return damaged(begin,
+                       fmt::format("an attribute of type {}, expected 0, 1, 2, 4 or 5", type));
       }
       const std::size_t record = (type == kString ? 1 : kWordBytes) * std::size_t{values};
       at_ += record;  // defaults
@@ -178,8 +179,8 @@ class BinaryGeo {
     const std::uint64_t begin = at_;
     SURFEIT_RETURN_IF_ERROR(next(basis.order));
     if (basis.order < 2 || basis.order > kMostOrder) {
-      return damaged(begin, fmt::format("a curve of order {}, expected 2 to {}", basis.order,
-                                        kMostOrder));
+      return damaged(begin,
+                     fmt::format("a curve of order {}, expected 2 to {}", basis.order, kMostOrder));
     }
     bool has_knots = true;
     if (type == GeoType::kNurbs) {

@@ -15,8 +15,8 @@
 //               else u32), attributes
 //   behind      attributes of the primitive        [attributes]
 //
-// Knots are f32: of NURBS curves those from the first to the last of the range, once each, or, where
-// ends are not interpolated, all but the outermost two.
+// Knots are f32: of NURBS curves those from the first to the last of the range, once each, or,
+// where ends are not interpolated, all but the outermost two.
 #pragma once
 
 #include <string>

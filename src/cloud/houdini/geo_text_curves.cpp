@@ -17,8 +17,7 @@ constexpr std::uint32_t kMostAttributes = 1024, kMostDefaults = 1 << 20, kMostOr
 
 class TextGeo {
  public:
-  explicit TextGeo(ByteInput input)
-      : path_(input.path()), words_(std::move(input), kOwnWords) {}
+  explicit TextGeo(ByteInput input) : path_(input.path()), words_(std::move(input), kOwnWords) {}
 
   Result<HoudiniCurves> read() {
     words_.moveTo(kMagic.size());
@@ -70,8 +69,7 @@ class TextGeo {
   }
   template <typename T>
   Status number(T& value) {
-    constexpr ValueType kType =
-        std::is_same_v<T, float> ? ValueType::kFloat32 : ValueType::kUint32;
+    constexpr ValueType kType = std::is_same_v<T, float> ? ValueType::kFloat32 : ValueType::kUint32;
     SURFEIT_RETURN_IF_ERROR(words_.next(word_));
     return parsePlyNumber(word_, kType, reinterpret_cast<std::byte*>(&value))
                ? Status()
