@@ -47,7 +47,7 @@ class SizeUnits : public DirectoryTest {
 TEST_F(SizeUnits, SizesInAnotherUnitThanPlacesAreTold) {
   const std::string radius = "property float radius\n";
   for (const auto& [value, advice] : {std::pair("50", "radius *= 1e-3"),
-                                      {"1500", "radius *= 1e-4"},
+                                      {"800", "radius *= 1e-4"},
                                       {".0004", "radius *= 1e+2"},
                                       {".00002", "radius *= 1e+3"}}) {
     const std::vector<std::string> notes = indexed(grid(radius, value));
@@ -64,7 +64,7 @@ TEST_F(SizeUnits, SizesInAnotherUnitThanPlacesAreTold) {
   }
   // By the names that the file has
   EXPECT_THAT(indexed(grid("property float pscale\n", "50")),
-              Contains(AllOf(HasSubstr("radius *= 1e-3"), HasSubstr("--channels pscale=-"))));
+              Contains(AllOf(HasSubstr("pscale *= 1e-3"), HasSubstr("--channels pscale=-"))));
   EXPECT_THAT(indexed(grid("property float width\n", "90")),
               Contains(AllOf(HasSubstr("width *= 1e-3"), HasSubstr("--channels width=-"))));
   EXPECT_THAT(indexed(grid("property float radius\nproperty float area\n", "50 7800")),
@@ -84,13 +84,17 @@ TEST_F(SizeUnits, AlbedosAboveOneNameTheProperty) {
               Contains(HasSubstr("--channels color=radiosity")));
   EXPECT_THAT(
       indexed(grid(colors("diffuse_red", "diffuse_green", "diffuse_blue"), ".05 2.5 .1 .1")),
-      Contains(HasSubstr("--channels diffuse_red=radiosity_r,diffuse_green=radiosity_g,"
-                         "diffuse_blue=radiosity_b")));
+      Contains(HasSubstr("--channels color=radiosity")));
+  EXPECT_THAT(indexed(grid(colors("a", "b", "c"), ".05 2.5 .1 .1"), "a=red,b=green,c=blue"),
+              Contains(HasSubstr("--channels a=radiosity_r,b=radiosity_g,c=radiosity_b")));
   EXPECT_THAT(indexed(grid(colors("albedo_r", "albedo_g", "albedo_b"), ".05 2.5 .1 .1")),
               Contains(HasSubstr("--channels albedo=- leaves the albedo out")));
   // And that works
   EXPECT_THAT(indexed(grid(colors("diffuse_red", "diffuse_green", "diffuse_blue"), ".05 2.5 .1 .1"),
-                      "diffuse_red=radiosity_r,diffuse_green=radiosity_g,diffuse_blue=radiosity_b"),
+                      "color=radiosity"),
+              Not(Contains(HasSubstr("an albedo above 1"))));
+  EXPECT_THAT(indexed(grid(colors("a", "b", "c"), ".05 2.5 .1 .1"),
+                      "a=radiosity_r,b=radiosity_g,c=radiosity_b"),
               Not(Contains(HasSubstr("an albedo above 1"))));
 }
 

@@ -99,7 +99,7 @@ std::string indices(const std::vector<std::uint16_t>& numbers) {
 }
 
 // Four points with pscale, three arcs of a quarter and a polygon of the same points.
-constexpr float kHalf = 0.70710678f;
+constexpr float kRootOfHalf = 0.70710678f;
 const std::string kGeoText =
     "PGEOMETRY V5\nNPoints 4 NPrims 5\nNPointGroups 0 NPrimGroups 0\n"
     "NPointAttrib 1 NVertexAttrib 1 NPrimAttrib 1 NAttrib 0\n"
@@ -109,7 +109,7 @@ const std::string kGeoText =
     "PrimitiveAttrib\nname 1 index 1 arc\n"
     "NURBCurve 3 : Basis 3 end  0 1 \n 0 (0 0) 1 (0 0) 2 (0 0) [0]\n"
     "BezierCurve 3 : Basis 3 use 0 1 \n 0 (0 0) 1 (0 0) 2 (0 0) [0]\n"
-    "Run 3 Poly\n 3 : 0 (0 0) 3 (0 0) 2 (0 0) [0]\n 2 : 0 (0 0) 3 (0 0) [0]\n"
+    "Run 3 Poly\n 2 : 3 (0 0) 2 (0 0) [0]\n 2 : 0 (0 0) 3 (0 0) [0]\n"
     " 3 < 0 (0 0) 1 (0 0) 2 (0 0) [0]\nbeginExtra\nendExtra\n";
 
 std::string geoBinary() {
@@ -119,7 +119,7 @@ std::string geoBinary() {
   std::string bytes = "BgeoV" + words({5, 4, 5, 0, 0, 1, 1, 1, 0});
   bytes += name("pscale") + bigEndian(std::uint16_t(1)) + words({0}) + floats({1});
   for (const std::vector<float>& point :
-       {std::vector<float>{1, 0, 0, 1}, {1, 1, 0, kHalf}, {0, 1, 0, 1}, {0, 0, 5, 1}}) {
+       {std::vector<float>{1, 0, 0, 1}, {1, 1, 0, kRootOfHalf}, {0, 1, 0, 1}, {0, 0, 5, 1}}) {
     bytes += floats(point) + floats({.01f});
   }
   bytes += name("uv") + bigEndian(std::uint16_t(2)) + words({0}) + floats({0, 0});
@@ -135,7 +135,7 @@ std::string geoBinary() {
   bytes +=
       words({4, 3}) + ":" + words({3}) + std::string("\1") + floats({0, 1}) + vertices({0, 1, 2});
   bytes += words({-1}) + indices({3}) + words({1});
-  bytes += words({3}) + ":" + vertices({0, 3, 2});
+  bytes += words({2}) + ":" + vertices({3, 2});
   bytes += words({2}) + ":" + vertices({0, 3});
   bytes += words({3}) + "<" + vertices({0, 1, 2});
   return bytes + std::string("\0\xFF", 2);
@@ -159,7 +159,7 @@ class HoudiniSplines : public SceneFiles {
 };
 
 TEST_F(HoudiniSplines, GeometryOfVersion5HasItsCurves) {
-  const double straight = 2 * std::sqrt(26.) + std::sqrt(26.);
+  const double straight = 2 * std::sqrt(26.);
   for (const bool is_text : {true, false}) {
     notes_ = {};
     const double length = lengthOf(is_text ? kGeoText : geoBinary(), is_text ? "a.geo" : "a.bgeo");
@@ -191,7 +191,7 @@ TEST_F(HoudiniSplines, BinaryJsonHasThemToo) {
                     json.paged(1024, json.text("rawpagedata") + json.floats(values))));
   };
   const std::string attributes = attribute("P", 3, {1, 0, 0, 1, 1, 0, 0, 1, 0}) +
-                                 attribute("Pw", 1, {1, kHalf, 1}) +
+                                 attribute("Pw", 1, {1, kRootOfHalf, 1}) +
                                  attribute("pscale", 1, {.01f, .01f, .01f});
   const std::string no("\x30"), yes("\x31");
   const std::string basis = json.list(json.text("type"), json.text("NURBS"), json.text("order"),

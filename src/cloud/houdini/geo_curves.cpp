@@ -152,6 +152,9 @@ class BinaryGeo {
     vertices_.clear();
     for (std::uint32_t i = 0; i < count; ++i) SURFEIT_RETURN_IF_ERROR(readVertex(index_bytes));
     at_ += primitive_bytes_;
+    if (at_ > input_.size()) {
+      return damaged(begin, fmt::format("file ends early, in a primitive of {} vertices", count));
+    }
     addGeoCurve(type, is_closed, std::move(basis), vertices_, curves_);
     return {};
   }

@@ -122,6 +122,9 @@ class XyzReader final : public CountedRowReader {
       return ": it has characters that are not ASCII, such as blanks that do not break or other "
              "signs for minus: replace them";
     }
+    if (line.find('\'') != line.npos) {
+      return ": numbers have no apostrophes between thousands: leave them out (tr -d \"'\")";
+    }
     const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns);
     if (words.size() < 3 && std::all_of(words.begin(), words.end(), isTextNumber)) {
       return ": a place needs a third, 0 for flat clouds";

@@ -104,15 +104,17 @@ bool hasAngles(std::string_view line) {
       if (word.empty()) continue;
     }
     std::size_t signs = 0;
+    bool has_degrees = false;  // 2'600'000 is a number with thousands
     bool is_angle = std::isdigit(static_cast<unsigned char>(word.front())) != 0 ||
                     word.front() == '-' || word.front() == '+';
     for (const char c : word.substr(std::min<std::size_t>(1, word.size()))) {
       const bool is_sign = std::string_view("dms:'\"").find(c) != std::string_view::npos;
       signs += is_sign ? 1 : 0;
+      has_degrees = has_degrees || c == 'd' || c == ':';
       is_angle = is_angle && (is_sign || c == '.' || std::isdigit(static_cast<unsigned char>(c)));
     }
     if (is_compass && !is_angle) return false;  // words
-    angles += is_angle && signs >= 2 ? 1 : 0;
+    angles += is_angle && signs >= 2 && has_degrees ? 1 : 0;
   }
   return angles >= 2 || (east == 1 && north == 1);
 }
