@@ -169,7 +169,15 @@ void addBinaries(std::vector<BroughtFile>& files) {
                        const char* told = "") {
     files.push_back({kind, variant, name, content, count, first, told, 0});
   };
-  const char* kind = "text mode";
+  const char* kind = "not what its name says";
+  add(kind, "a web page", "a.las", "<!DOCTYPE html><html><head>", 0, {}, "download the file");
+  add(kind, "a pointer of Git LFS", "a.ply", "version https://git-lfs.github.com/spec/v1\noid x\n",
+      0, {}, "git lfs pull");
+  add(kind, "an archive", "a.ply", std::string("PK\3\4") + std::string(99, '\0'), 0, {},
+      "unpack it first");
+  add(kind, "nothing", "a.pcd", "", 0, {}, "the file is empty");
+
+  kind = "text mode";
   std::vector<float> places;
   for (int i = 0; i < 900; ++i) places.push_back(std::bit_cast<float>(0x3f0a0a00 + 10 * i));
   add(kind, "PLY", "a.ply",
@@ -231,6 +239,36 @@ void addMeshes(std::vector<BroughtFile>& files) {
   add(kind, "two corners", square + "f 1 2\nf 1 2 3 4\n", 4, "Degenerated face");
   add(kind, "corners again", square + "f 1 2 2 3 4 4\n", 4);
   add(kind, "reals", square + "f 1.0 2.0 3.0\n", 2);
+
+  const auto addPly = [&](const char* variant, const std::string& elements, double area,
+                          const char* told) {
+    files.push_back({"faces of PLY",
+                     variant,
+                     "a_mesh.ply",
+                     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
+                     "y\nproperty float z\n" +
+                         elements,
+                     area > 0 ? 50u : 0u,
+                     {},
+                     told,
+                     area});
+  };
+  const std::string corners = "end_header\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n";
+  const std::string lists = "property list uchar int vertex_index\n";
+  addPly("beyond the vertices", "element face 1\n" + lists + corners + "3 0 1 7\n", 0,
+         "vertex 7, expected 0 to 3");
+  addPly("below 0", "element face 1\n" + lists + corners + "3 0 1 -1\n", 0, "vertex -1");
+  addPly("two corners", "element face 2\n" + lists + corners + "2 0 1\n4 0 1 2 3\n", 4,
+         "1 faces without area");
+  addPly("strips",
+         "element tristrips 1\nproperty list int int vertex_indices\n" + corners + "4 0 1 2 3\n", 0,
+         "triangle strips are not read");
+  addPly("none", corners, 0, "clouds need no sampling");
+  addPly("colors",
+         "element face 1\n" + lists +
+             "property uchar red\nproperty uchar green\nproperty uchar blue\n" + corners +
+             "4 0 1 2 3 255 0 0\n",
+         4, "colors of faces are not read");
 
   kind = "bytes of OBJ";
   add(kind, "a mark in front", "\xEF\xBB\xBF" + square + "f 1 2 3 4\n", 4);
