@@ -47,12 +47,13 @@ TEST_F(SamplingCasesTest, GridsOccludeAsTheirExactAreas) {
 
 // Cells of a wall end at the floor, not half-way to its points.
 TEST_F(SamplingCasesTest, SurfacesThatMeetHaveTheirAreas) {
-  struct Row {
+  struct Meeting {
     const char* cloud;
     double floor, wall;  // points times steps
   };
-  for (const Row& row : {Row{"lines/grid.ply", 98.01, 29.7}, Row{"lines/ratio_1.ply", 98.01, 29.7},
-                         Row{"lines/ratio_10.ply", 99.225, 28.35}}) {
+  for (const Meeting& row :
+       {Meeting{"lines/grid.ply", 98.01, 29.7}, Meeting{"lines/ratio_1.ply", 98.01, 29.7},
+        Meeting{"lines/ratio_10.ply", 99.225, 28.35}}) {
     Progress quiet;
     ASSERT_TRUE(indexClouds({sharedCase(row.cloud)}, path("scene.sft"), {}, quiet).ok());
     ASSERT_TRUE(convertClouds({path("scene.sft")}, path("scene.ply"), {}, quiet).ok());
