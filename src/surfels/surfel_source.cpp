@@ -166,7 +166,8 @@ class RowSurfelSource final : public SurfelSource {
     const bool is_used = mapping_.channels().opacity;
     const RowProperty* const coverage = element.find("coverage");
     const bool is_made = coverage != nullptr && coverage->is_made;  // of the same opacity
-    if (!is_used && !is_made && element.find("opacity") != nullptr && element.find("f_dc_0") == nullptr) {
+    if (!is_used && !is_made && element.find("opacity") != nullptr &&
+        element.find("f_dc_0") == nullptr) {
       notes.push_back(
           fmt::format("opacity is not used beside coverage: --channels {} leaves that out",
                       dropsOf(element, "coverage")));
