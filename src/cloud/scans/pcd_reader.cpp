@@ -398,18 +398,11 @@ class PcdCompressedReader final : public CountedRowReader {
       return Status::corruption(fmt::format("{}: file ends early: {} bytes, expected {} at {}",
                                             path_, *input_.size(), sizes[0], begin));
     }
-    SURFEIT_RETURN_IF_ERROR(lookBehind(begin + sizes[0]));
+    if (input_.size()) addNote(noteOfBytesBehind(*input_.size() - begin - sizes[0], "point"));
+    SURFEIT_RETURN_IF_ERROR(checkNothingBehind(input_, begin + sizes[0], "point"));
     SURFEIT_ASSIGN_OR_RETURN(TemporaryFile spool, TemporaryFile::create(spoolDirectory()));
     spool_.emplace(std::move(spool));
     return decodeLzf(input_, begin, sizes[0], sizes[1], *spool_);
-  }
-
-  Status lookBehind(std::uint64_t end) {
-    if (input_.size()) {
-      addNote(noteOfBytesBehind(*input_.size() - end, "point"));
-      return {};
-    }
-    return checkNothingBehind(input_, end, "point");
   }
 
   Status decodeRows(std::size_t count, std::byte* rows) override {
