@@ -242,6 +242,13 @@ py::dict record(const IndexForecast& forecast) {
                   "file_bytes"_a = forecast.file_bytes, "seconds"_a = forecast.seconds);
 }
 
+py::dict record(const SampleForecast& forecast) {
+  return py::dict("records"_a = forecast.records, "sampled_records"_a = forecast.sampled_records,
+                  "input_bytes"_a = forecast.input_bytes,
+                  "temporary_bytes"_a = forecast.temporary_bytes,
+                  "output_bytes"_a = forecast.output_bytes, "seconds"_a = forecast.seconds);
+}
+
 py::dict record(const ShardStats& stats) {
   py::dict dict = record(static_cast<const GatherStats&>(stats));
   dict["gathered_shards"] = stats.gathered_shards;

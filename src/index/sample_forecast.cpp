@@ -85,6 +85,17 @@ Result<std::uint64_t> sampleCloud(RowReader& reader, std::uint64_t most, const s
   return taken;
 }
 
+// The status with the user's own file in the place of every temporary one.
+Status statusOf(const Status& status, const std::vector<std::string>& samples,
+                const std::vector<std::string>& inputs) {
+  std::string message = status.message();
+  for (std::size_t i = samples.size(); i-- > 0;) {
+    const std::size_t at = message.find(samples[i]);
+    if (at != std::string::npos) message.replace(at, samples[i].size(), inputs[i]);
+  }
+  return {status.code(), message};
+}
+
 Result<SampleForecast> forecast(const std::vector<std::string>& inputs, const std::string& output,
                                 const RowReaderOptions& reading, const std::string& directory,
                                 const SampleJob& job, Progress& progress) {
@@ -119,10 +130,11 @@ Result<SampleForecast> forecast(const std::vector<std::string>& inputs, const st
   const std::string result = folder.file(std::filesystem::path(output).filename().string());
   QuietProgress quiet(progress);
   const auto start = std::chrono::steady_clock::now();
-  SURFEIT_ASSIGN_OR_RETURN(const std::uint64_t temporary_bytes, job(samples, result, quiet));
+  const Result<std::uint64_t> temporary_bytes = job(samples, result, quiet);
+  if (!temporary_bytes.ok()) return statusOf(temporary_bytes.status(), samples, inputs);
   const double times = double(forecast.records) / double(forecast.sampled_records);
   forecast.seconds = secondsSince(start) * times;
-  forecast.temporary_bytes = std::uint64_t(double(temporary_bytes) * times);
+  forecast.temporary_bytes = std::uint64_t(double(*temporary_bytes) * times);
   std::error_code ignored;
   forecast.output_bytes =
       std::uint64_t(double(std::filesystem::file_size(result, ignored)) * times);

@@ -231,6 +231,8 @@ dryRunsWriteNothing() {
     rm "$output"
   done
   run 74 normals no_such_file.ply -o none.ply --dry-run
+  run 3 radiance city.ply -o none.ply --dry-run
+  says "city.ply: element vertex"
 }
 
 interruptLeavesNothing() {
