@@ -16,6 +16,7 @@
 #include "tools/camera_options.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/matrix_option.h"
 #include "tools/number_list.h"
 #include "tools/up_option.h"
@@ -31,6 +32,7 @@ struct ConvertArguments {
   double scale = 1;  // of --units
   ConvertOptions options;
   DensityArguments cameras;  // of the options' density
+  bool is_dry_run = false;
 };
 
 // Metres of a unit, by name or as a number; 0 for what is none.
@@ -77,6 +79,16 @@ Status runConvert(ConvertArguments& arguments, CommandContext& context) {
   options.transform = product(options.transform, scaling);
   options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(options.density, arguments.cameras.cameraDensity());
+  if (arguments.is_dry_run) {
+    ConvertOptions sampled = options;
+    static_cast<ReadOptions&>(sampled) = {};
+    const SampleJob job = [&](const auto& samples, const std::string& output, Progress& progress) {
+      const Status status = convertClouds(samples, output, sampled, progress).status();
+      return status.ok() ? Result<std::uint64_t>(0) : Result<std::uint64_t>(status);
+    };
+    return sayForecast("convert", arguments.inputs, arguments.output, options,
+                       options.temporary_directory, job, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(
       const ConvertStats stats,
       convertClouds(arguments.inputs, arguments.output, options, context.progress()));
@@ -194,6 +206,7 @@ void addConvertCommand(CLI::App& app, CommandContext& context) {
   addCloudOutputOption(*command, arguments->output, "Cloud to write", true);
   addChoiceOptions(*command, *arguments);
   addPlaceOptions(*command, *arguments);
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command, {.threads = false, .works_in_place = true});
   context.addFrameOptions(*command);
   command->footer(

@@ -9,6 +9,7 @@
 #include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/normal_options.h"
 #include "tools/up_option.h"
 
@@ -18,12 +19,25 @@ namespace {
 struct NormalsArguments {
   std::string input, output;
   NormalsOptions options;
+  bool is_dry_run = false;
 };
 
 Status runNormals(NormalsArguments& arguments, CommandContext& context) {
   NormalsOptions& options = arguments.options;
   options.threads = context.common.threads;
   options.memory_bytes = context.common.memory_bytes;
+  if (arguments.is_dry_run) {
+    NormalsOptions sampled = options;
+    static_cast<ReadOptions&>(sampled) = {};
+    const SampleJob job = [&](const auto& samples, const std::string& output,
+                              Progress& progress) -> Result<std::uint64_t> {
+      SURFEIT_ASSIGN_OR_RETURN(const NormalsStats stats,
+                               estimateNormals(samples[0], output, sampled, progress));
+      return stats.temporary_bytes;
+    };
+    return sayForecast("normals", {arguments.input}, arguments.output, options,
+                       options.temporary_directory, job, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(
       const NormalsStats stats,
       estimateNormals(arguments.input, arguments.output, options, context.progress()));
@@ -65,6 +79,7 @@ void addNormalsCommand(CLI::App& app, CommandContext& context) {
   command->add_option("CLOUD", arguments->input, "Cloud of points, or a scene (.sft)")->required();
   addCloudOutputOption(*command, arguments->output, "Cloud to write, with all that CLOUD has");
   addNormalsOptions(*command, arguments->options);
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command);
   command->footer(
       "Writes nx ny nz and normal_confidence, from 0 (neighbours all around) to 1 (on a plane).\n"

@@ -10,6 +10,7 @@
 #include "surfeit/radiance.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/number_checks.h"
 #include "tools/number_list.h"
 
@@ -20,6 +21,7 @@ struct RadianceArguments {
   std::vector<std::string> photons;
   std::string output;
   RadianceOptions options;
+  bool is_dry_run = false;
 };
 
 nlohmann::json jsonOf(const glm::dvec3& rgb) { return {rgb.r, rgb.g, rgb.b}; }
@@ -29,6 +31,18 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
   options.threads = context.common.threads;
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
+  if (arguments.is_dry_run) {
+    RadianceOptions sampled = options;
+    static_cast<ReadOptions&>(sampled) = {};
+    const SampleJob job = [&](const auto& samples, const std::string& output,
+                              Progress& progress) -> Result<std::uint64_t> {
+      SURFEIT_ASSIGN_OR_RETURN(const RadianceStats stats,
+                               radianceCloud(samples, output, sampled, progress));
+      return stats.temporary_bytes;
+    };
+    return sayForecast("radiance", arguments.photons, arguments.output, options,
+                       options.temporary_directory, job, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(
       const RadianceStats stats,
       radianceCloud(arguments.photons, arguments.output, options, context.progress()));
@@ -46,6 +60,7 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
                              {"skipped_photons", stats.skipped_photons},
                              {"surfels", stats.surfels},
                              {"sparse_surfels", stats.sparse_surfels},
+                             {"bounded_surfels", stats.bounded_surfels},
                              {"area", stats.area},
                              {"power", jsonOf(stats.power)},
                              {"reflected_power", jsonOf(stats.reflected_power)},
@@ -100,6 +115,7 @@ void addRadianceCommand(CLI::App& app, CommandContext& context) {
   addChannelOptions(*command, options.channels, options.part, options.filter);
   addColorRangeOption(*command, options.color_range);
   addTemporaryOption(*command, options.temporary_directory);
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command);
   command->footer(
       "The radiosity is reflected light: albedo times the power of the nearest photons over the\n"

@@ -33,6 +33,7 @@ struct RadianceStats {
   std::uint64_t skipped_photons = 0;
   std::uint64_t surfels = 0;          // written
   std::uint64_t sparse_surfels = 0;   // surfels with too few photons within the max radius
+  std::uint64_t bounded_surfels = 0;  // of these, with a disk that photons of other surfaces bound
   double area = 0;                    // sum of the surfel areas: about the area of lit surfaces
   glm::dvec3 power{0};                // of all photons: arrives at the surfaces
   glm::dvec3 reflected_power{0};      // sum of radiosity times area: leaves the surfaces

@@ -13,6 +13,7 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "call.h"
+#include "dry_run.h"
 #include "errors.h"
 #include "options.h"
 #include "records.h"
@@ -101,7 +102,15 @@ py::dict radiance(const std::vector<std::string>& photons, const std::string& ou
   options.into("max_radius", estimating.max_radius);
   takeVector(options, "albedo", estimating.default_albedo);
   options.into("disk_overlap", estimating.disk_overlap);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return dryRun(
+        photons, output, estimating, watcher,
+        [](const auto& samples, const std::string& result, const auto& sampled,
+           Progress& progress) { return radianceCloud(samples, result, sampled, progress); });
+  }
   return record(runFor<RadianceStats>(watcher, [&](Progress& progress) {
     return radianceCloud(photons, output, estimating, progress);
   }));

@@ -13,6 +13,7 @@
 
 #include "bindings.h"
 #include "call.h"
+#include "dry_run.h"
 #include "errors.h"
 #include "options.h"
 #include "records.h"
@@ -46,7 +47,15 @@ py::dict convert(const std::vector<std::string>& inputs, const std::string& outp
   options.into("drop", converting.drop);
   options.into("assignments", converting.assignments);
   options.into("like", converting.like);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return dryRun(
+        inputs, output, converting, watcher,
+        [](const auto& samples, const std::string& result, const auto& sampled,
+           Progress& progress) { return convertClouds(samples, result, sampled, progress); });
+  }
   return record(runFor<ConvertStats>(watcher, [&](Progress& progress) {
     return convertClouds(inputs, output, converting, progress);
   }));
@@ -61,7 +70,15 @@ py::dict normals(const std::string& input, const std::string& output, const py::
   takeEstimation(options, estimating.estimation);
   takeUp(options, "up", estimating.up);
   options.into("sizes", estimating.with_sizes);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return dryRun(
+        {input}, output, estimating, watcher,
+        [](const auto& samples, const std::string& result, const auto& sampled,
+           Progress& progress) { return estimateNormals(samples[0], result, sampled, progress); });
+  }
   return record(runFor<NormalsStats>(watcher, [&](Progress& progress) {
     return estimateNormals(input, output, estimating, progress);
   }));

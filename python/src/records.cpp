@@ -242,6 +242,13 @@ py::dict record(const IndexForecast& forecast) {
                   "file_bytes"_a = forecast.file_bytes, "seconds"_a = forecast.seconds);
 }
 
+py::dict record(const SampleForecast& forecast) {
+  return py::dict("records"_a = forecast.records, "sampled_records"_a = forecast.sampled_records,
+                  "input_bytes"_a = forecast.input_bytes,
+                  "temporary_bytes"_a = forecast.temporary_bytes,
+                  "output_bytes"_a = forecast.output_bytes, "seconds"_a = forecast.seconds);
+}
+
 py::dict record(const ShardStats& stats) {
   py::dict dict = record(static_cast<const GatherStats&>(stats));
   dict["gathered_shards"] = stats.gathered_shards;
@@ -277,7 +284,8 @@ py::dict record(const BrickStats& stats) {
 py::dict record(const RadianceStats& stats) {
   return py::dict(
       "photons"_a = stats.photons, "skipped_photons"_a = stats.skipped_photons,
-      "surfels"_a = stats.surfels, "sparse_surfels"_a = stats.sparse_surfels, "area"_a = stats.area,
+      "surfels"_a = stats.surfels, "sparse_surfels"_a = stats.sparse_surfels,
+      "bounded_surfels"_a = stats.bounded_surfels, "area"_a = stats.area,
       "power"_a = place(stats.power), "reflected_power"_a = place(stats.reflected_power),
       "mean_radius"_a = stats.mean_radius, "max_radius"_a = stats.max_radius,
       "temporary_bytes"_a = stats.temporary_bytes, "memory_bytes"_a = stats.memory_bytes,

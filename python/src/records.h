@@ -13,6 +13,7 @@
 #include "surfeit/cloud_info.h"
 #include "surfeit/convert.h"
 #include "surfeit/engine.h"
+#include "surfeit/forecast.h"
 #include "surfeit/generate.h"
 #include "surfeit/index.h"
 #include "surfeit/index_shards.h"
@@ -47,6 +48,7 @@ py::dict record(const TuneReport& report);
 py::dict record(const VerifyReport& report);
 py::dict record(const IndexShardStats& stats);
 py::dict record(const IndexForecast& forecast);
+py::dict record(const SampleForecast& forecast);
 py::dict record(const ShardStats& stats);
 py::dict record(const MergeStats& stats);
 py::dict record(const GatherForecast& forecast);

@@ -86,17 +86,19 @@ class BrickMap:
 
 
 def radiance(photons: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
-             progress: ProgressLike = None, **settings: "Unpack[RadianceSettings]") -> Stats:
+             dry_run: bool = False, progress: ProgressLike = None,
+             **settings: "Unpack[RadianceSettings]") -> Stats:
     """Writes surfels with the radiosity that a photon map stands for, one for each photon.
 
-    Settings: surfeit.settings.RadianceSettings.
+    Settings: surfeit.settings.RadianceSettings. dry_run: writes nothing, and returns an estimate of
+    files and time.
     """
     taken: Dict[str, Any] = dict(settings)
     if taken.get("albedo") is not None:
         taken["albedo"] = list(numbers_of(taken["albedo"], (3,), "albedo"))
     with watch(progress, settings) as watcher:
-        return _surfeit.radiance(listed(photons, "photons"), path_of(output), options_of(taken),
-                                 watcher)
+        return _surfeit.radiance(listed(photons, "photons"), path_of(output),
+                                 options_of(taken, dry_run=dry_run), watcher)
 
 
 def generate(output: PathLike, *, surfels: Union[int, str, None] = None, part: Any = None,

@@ -139,7 +139,7 @@ def convert(inputs: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
             drop: Optional[Sequence[str]] = None,
             assignments: Optional[Sequence[str]] = None, like: Optional[PathLike] = None,
             memory: Memory = None, temporary_directory: Optional[PathLike] = None,
-            strict: bool = False, progress: ProgressLike = None,
+            dry_run: bool = False, strict: bool = False, progress: ProgressLike = None,
             **settings: "Unpack[ConvertSettings]") -> Stats:
     """Writes the records of all inputs to one cloud; its name tells the format.
 
@@ -148,30 +148,32 @@ def convert(inputs: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
     (x, y, z)) of a box in the output. keep, drop: channels. assignments: channel arithmetic, such as
     "radiosity *= 0.5 where group == 3". like: a file of the output's format
     with the data that is not in rows. camera, camera_file, pixels, ...: thins for cameras
-    (surfeit.settings.CameraSettings).
+    (surfeit.settings.CameraSettings). dry_run: writes nothing, and returns an estimate of files and
+    time.
     """
     paths = listed(inputs, "inputs")
     options = options_of(with_cameras(settings), every=every, spacing=spacing,
                          transform=scaled(transform, units), up=up,
                          crop=crop, keep=keep, drop=drop, assignments=assignments, like=like,
-                         memory=memory,
+                         memory=memory, dry_run=dry_run,
                          temporary_directory=temporary_directory)
     with Watcher(progress, strict) as watcher:
         return _surfeit.convert(paths, path_of(output), options, watcher)
 
 
 def normals(cloud: PathLike, output: PathLike, *, sizes: bool = False, up: "Optional[Up]" = None,
-            progress: ProgressLike = None,
+            dry_run: bool = False, progress: ProgressLike = None,
             **settings: "Unpack[NormalsSettings]") -> Stats:
     """Writes the cloud with normals from the neighbours of every point.
 
     toward: "up" (default), "outward", "consistent", "sensor" with sensor=(x, y, z), "trajectory"
     with trajectory=path. thin: "spheres" or "two-sided", for points on no surface. sizes: writes
-    radius and area, too.
+    radius and area, too. dry_run: writes nothing, and returns an estimate of files and time.
     """
     with watch(progress, settings) as watcher:
         return _surfeit.normals(path_of(cloud), path_of(output),
-                                options_of(settings, sizes=sizes, up=up), watcher)
+                                options_of(settings, sizes=sizes, up=up, dry_run=dry_run),
+                                watcher)
 
 
 def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,

@@ -220,9 +220,14 @@ def test_meshes_and_lights(room, tmp_path, run_program):
         surfeit.sample(mesh, tmp_path / "n.ply", photons=3000, count=10)
     run_program("radiance", tmp_path / "pp.ply", "-o", tmp_path / "pr.ply",
                 "--photons-per-estimate", 30, "--albedo", ".4 .4 .4")
-    surfeit.radiance(tmp_path / "jp.ply", tmp_path / "jr.ply", photons_per_estimate=30,
-                     albedo=(0.4, 0.4, 0.4))
+    estimated = surfeit.radiance(tmp_path / "jp.ply", tmp_path / "jr.ply", photons_per_estimate=30,
+                                 albedo=(0.4, 0.4, 0.4))
     assert same_bytes(tmp_path / "pr.ply", tmp_path / "jr.ply")
+    forecast = surfeit.radiance(tmp_path / "jp.ply", tmp_path / "no.ply", photons_per_estimate=30,
+                                dry_run=True)
+    assert forecast["records"] == estimated["photons"] + estimated["skipped_photons"]
+    assert not (tmp_path / "no.ply").exists()
+    assert forecast["output_bytes"] == pytest.approx((tmp_path / "jr.ply").stat().st_size, rel=0.1)
 
 
 def test_conversions(room, tmp_path, run_program):
@@ -309,6 +314,15 @@ def test_dry_runs_write_nothing(room, tmp_path):
     assert forecast["receivers"] == 3000 and forecast["recommended_memory_bytes"] > 0
     forecast = surfeit.index(room / "room.ply", tmp_path / "a.sft", dry_run=True)
     assert forecast["records"] == 3000 and forecast["file_bytes"] > 0
+    forecast = surfeit.convert(room / "room.ply", tmp_path / "a.ply", every=3, dry_run=True)
+    assert forecast["records"] == forecast["sampled_records"] == 3000
+    third = surfeit.convert(room / "room.ply", tmp_path / "third.ply", every=3)
+    assert forecast["output_bytes"] == third["output_bytes"]
+    (tmp_path / "third.ply").unlink()
+    forecast = surfeit.normals(room / "room.ply", tmp_path / "a.ply", dry_run=True)
+    assert forecast["records"] == 3000 and forecast["output_bytes"] > 0
+    with pytest.raises(surfeit.DamagedFile, match="room.ply: .*power of every photon"):
+        surfeit.radiance(room / "room.ply", tmp_path / "a.ply", dry_run=True)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -332,8 +332,33 @@ std::vector<std::string> typedNames(const RowLayout& element, std::string_view n
   return is_otherwise ? typed : std::vector{std::string(name)};
 }
 
+namespace {
+
+// Whether properties of that name, or of a channel's, are made of others.
+bool isMade(const RowLayout& element, std::string_view name) {
+  std::vector<std::string> names = {std::string(name)};
+  const KnownChannel* const known = findKnown(name);
+  if (known != nullptr && known->components == 3) names = propertyNames(name, 3, known->kind, {});
+  return std::any_of(names.begin(), names.end(), [&](const std::string& each) {
+    const RowProperty* const property = element.find(each);
+    return property != nullptr && property->is_made;
+  });
+}
+
+}  // namespace
+
+std::string renamingOf(const RowLayout& element, std::string_view name, std::string_view to) {
+  if (isMade(element, name)) return {};
+  const std::vector<std::string> typed = typedNames(element, name);
+  if (typed.size() != 3) return fmt::format("{}={}", typed.front(), to);
+  const std::vector<std::string> names = propertyNames(to, 3, ChannelKind::kColor, {});
+  return fmt::format("{}={},{}={},{}={}", typed[0], names[0], typed[1], names[1], typed[2],
+                     names[2]);
+}
+
 std::string dropsOf(const RowLayout& element, std::string_view name) {
   std::string drops;
+  if (isMade(element, name)) return drops;
   for (const std::string& typed : typedNames(element, name)) {
     drops += fmt::format("{}{}=-", drops.empty() ? "" : ",", typed);
   }

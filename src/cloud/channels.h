@@ -50,8 +50,12 @@ Status addChannel(std::string_view name, std::size_t components, ChannelKind kin
 // their names, unless the file or the user calls them otherwise. Several where the properties of a
 // channel have names of their own.
 std::vector<std::string> typedNames(const RowLayout& element, std::string_view name);
-// The same as one that drops them: "normal=-", "NormalX=-,NormalY=-,NormalZ=-".
+// The same as one that drops them: "normal=-", "NormalX=-,NormalY=-,NormalZ=-". Empty where they
+// are made of others, so that none does.
 std::string dropsOf(const RowLayout& element, std::string_view name);
+// The same as one that reads a channel of three values as another such channel: "Cd=radiosity",
+// "r=radiosity_r,g=radiosity_g,b=radiosity_b".
+std::string renamingOf(const RowLayout& element, std::string_view name, std::string_view to);
 
 // Values of a row that belong together.
 struct RowChannel {

@@ -76,7 +76,8 @@ std::vector<std::string> notesOfComments(std::span<const std::string> comments) 
   for (const std::string& comment : comments) {
     if (statedGroupName(comment)) continue;
     if (comment.starts_with(kCrsComment)) {
-      std::string note = noteOfCrsUnits(crsUnitsOfText(comment));
+      std::string note =
+          noteOfCrsUnits(crsUnitsOfText(std::string_view(comment).substr(kCrsComment.size())));
       if (!note.empty()) notes.push_back(std::move(note));
       continue;
     }

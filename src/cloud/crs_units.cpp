@@ -43,8 +43,42 @@ CrsUnit crsUnitOfHeights(std::uint16_t code) {
   return has(kSurveyFeet) ? crsUnitOfCode(9003) : CrsUnit();
 }
 
+std::uint16_t unitCodeIn(std::string_view text, std::string_view words) {
+  for (std::size_t at = text.find(words); at != text.npos; at = text.find(words, at + 1)) {
+    const std::string_view before = text.substr(0, at);
+    if (words == kUnitWords && (before.ends_with(" vertical") || before.ends_with(" angular"))) {
+      continue;
+    }
+    std::uint16_t code = 0;
+    const char* const end = text.data() + text.size();
+    const auto [behind, error] = std::from_chars(text.data() + at + words.size(), end, code);
+    if (error == std::errc() && (behind == end || *behind == ' ')) return code;
+  }
+  return 0;
+}
+
+namespace {
+
+// "EPSG:2992+5703 vertical unit 9003 unit 9002"; what is stated goes before what codes mean.
+CrsUnits crsUnitsOfKeys(std::string_view text) {
+  constexpr std::string_view kEpsg = "EPSG:";
+  const char* const end = text.data() + text.size();
+  std::uint16_t code = 0, vertical_code = 0;
+  if (text.starts_with(kEpsg)) {
+    const char* const behind = std::from_chars(text.data() + kEpsg.size(), end, code).ptr;
+    if (behind != end && *behind == '+') std::from_chars(behind + 1, end, vertical_code);
+  }
+  const std::uint16_t unit = unitCodeIn(text, kUnitWords);
+  const std::uint16_t vertical_unit = unitCodeIn(text, kVerticalUnitWords);
+  return {unit != 0 ? crsUnitOfCode(unit) : crsUnitOfProjected(code),
+          vertical_unit != 0 ? crsUnitOfCode(vertical_unit) : crsUnitOfHeights(vertical_code)};
+}
+
+}  // namespace
+
 // [LENGTH]UNIT["name", metres, ...]
 CrsUnits crsUnitsOfText(std::string_view text) {
+  if (text.find('[') == text.npos) return crsUnitsOfKeys(text);
   CrsUnits units;
   constexpr std::string_view kWord = "UNIT[\"";
   for (std::size_t at = text.find(kWord); at != text.npos; at = text.find(kWord, at + 1)) {

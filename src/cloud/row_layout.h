@@ -78,6 +78,7 @@ struct RowProperty {
   WideInteger wide = WideInteger::kNone;  // in the file, where the type is float64
   // What --channels must call it, where that is not the name: the file's, or the user's renaming.
   std::string typed = {};
+  bool is_made = false;  // of several values of the file: --channels does not reach it
 };
 
 struct RowLayout {

@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
@@ -15,6 +16,7 @@
 #include "core/crs_comment.h"
 #include "core/guard.h"
 #include "index/cloud_density.h"
+#include "index/radius_note.h"
 #include "index/stray_note.h"
 #include "octree/read/scene_file.h"
 #include "storage/byte_input.h"
@@ -23,7 +25,7 @@
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kBatchSurfels = 16384;
+constexpr std::size_t kBatchSurfels = 16384, kSizeSample = 4096;
 
 Result<RowReaderOptions> rowOptions(const ReadOptions& options) {
   RowReaderOptions reading;
@@ -50,13 +52,16 @@ struct CloudScan {
   Bounds3d bounds;
   std::uint64_t spheres = 0;
   PlaceSample sample;
+  std::vector<Surfel> surfels;  // some from all over, for their sizes
 };
 
 // Reads all surfels, which are counted from `origin`.
 Result<CloudScan> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Progress& progress) {
   SURFEIT_RETURN_IF_ERROR(source.rewind());
   source.setOrigin(origin);
-  CloudScan scan{origin, {}, 0, PlaceSample(source.recordCount())};
+  CloudScan scan{origin, {}, 0, PlaceSample(source.recordCount()), {}};
+  const std::uint64_t step = source.recordCount() / kSizeSample + 1;
+  std::uint64_t record = 0;
   std::vector<Surfel> batch(kBatchSurfels);
   progress.beginPhase("scan", source.recordCount(), "surfels");
   for (;;) {
@@ -66,6 +71,7 @@ Result<CloudScan> scanSurfels(SurfelSource& source, const glm::dvec3& origin, Pr
     for (const Surfel& surfel : std::span(batch).first(count)) {
       scan.bounds.add(glm::dvec3(surfel.position) + origin);
       scan.spheres += surfel.isSphere() ? 1 : 0;
+      if (record++ % step == 0) scan.surfels.push_back(surfel);
     }
     scan.sample.add(std::span(batch).first(count));
     progress.advance(count);
@@ -103,6 +109,8 @@ Status addSurfels(const std::string& path, const RowReaderOptions& options, Clou
     const std::string strays =
         strayNote({places.begin(), places.end()}, scan.sample.bounds(), scan.origin);
     if (!strays.empty()) info.notes.push_back(strays);
+    std::string radii = noteOfRadii(scan.surfels, surfels.count, (*source)->sizeNames());
+    if (!radii.empty()) info.notes.push_back(std::move(radii));
     if (statedCrs((*source)->comments()).empty() && !places.empty()) {
       std::vector<glm::vec3> sample(places.begin(), places.end());
       Bounds3d usual = usualBounds(sample);

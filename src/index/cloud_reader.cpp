@@ -172,6 +172,12 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     if (!reader.up_) reader.up_ = up;
     std::string other_crs = reader.crs_.compare(source->path(), source->comments());
     if (!other_crs.empty()) reader.notes_.push_back(std::move(other_crs));
+    std::vector<std::string>& advice = reader.albedo_advice_;
+    if (std::string text = source->albedoAdvice();
+        !text.empty() && std::find(advice.begin(), advice.end(), text) == advice.end()) {
+      advice.push_back(std::move(text));
+    }
+    if (reader.size_names_.property.empty()) reader.size_names_ = source->sizeNames();
     const CloudChannels channels = source->channels();
     reader.lacks_sizes_ =
         reader.lacks_sizes_ || (!channels.radius && !channels.area) || source->hasCoverage();
@@ -196,6 +202,15 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
 
 std::string CloudReader::crs() const {
   return crs_.crs().size() <= kMostCrsBytes ? crs_.crs() : std::string();
+}
+
+std::string CloudReader::albedoAdvice() const {
+  constexpr std::size_t kMost = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(albedo_advice_.size(), kMost); ++i) {
+    text += albedo_advice_[i] + "; ";
+  }
+  return text;
 }
 
 std::vector<MixedCloud> CloudReader::clouds() const {

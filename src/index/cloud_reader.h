@@ -86,6 +86,10 @@ class CloudReader {
 
   // Of inputs whose positions are floats, where these are coarse beside the spacing of all.
   std::vector<std::string> notesOfFloats(const CloudTotals& totals) const;
+  // How --channels keeps albedos of the inputs from being read, each way once.
+  std::string albedoAdvice() const;
+  // Of the first input that states sizes.
+  const SizeNames& sizeNames() const { return size_names_; }
   // What is to be told of the inputs, with their paths.
   const std::vector<std::string>& notes() const { return notes_; }
 
@@ -136,6 +140,8 @@ class CloudReader {
   std::optional<UpAxis> up_;
   FirstCrs crs_;
   std::vector<std::string> float_inputs_;
+  std::vector<std::string> albedo_advice_;
+  SizeNames size_names_;
   std::size_t read_bytes_ = 0;
   std::uint64_t record_count_ = 0;
   std::uint64_t file_bytes_ = 0;

@@ -1,5 +1,3 @@
-#include <stdlib.h>
-
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -14,6 +12,7 @@
 #include "index/index_neighbours.h"
 #include "index/index_plan.h"
 #include "index/scene_rows.h"
+#include "index/scratch_folder.h"
 #include "octree/neighbours/repeated_surfels.h"
 #include "storage/output_target.h"
 #include "surfeit/index.h"
@@ -21,39 +20,6 @@
 
 namespace surfeit {
 namespace {
-
-// A folder of its own, removed with what is in it.
-class ScratchFolder {
- public:
-  static Result<ScratchFolder> create(const std::string& directory) {
-    std::string name = directory + "/surfeit-forecast-XXXXXX";
-    if (mkdtemp(name.data()) == nullptr) {
-      return Status::ioError(directory + ": cannot make a temporary folder");
-    }
-    return ScratchFolder(std::move(name));
-  }
-  ScratchFolder(ScratchFolder&& other) noexcept : path_(std::exchange(other.path_, {})) {}
-  ScratchFolder& operator=(ScratchFolder&&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
-  }
-  std::string file(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  explicit ScratchFolder(std::string path) : path_(std::move(path)) {}
-  std::string path_;
-};
-
-// Says nothing but that the user wants no more.
-class QuietProgress final : public Progress {
- public:
-  explicit QuietProgress(Progress& progress) : progress_(progress) {}
-  bool isCancelled() const override { return progress_.isCancelled(); }
-
- private:
-  Progress& progress_;
-};
 
 // Places from all over, or where that takes reading everything, the first.
 Result<std::vector<Surfel>> takeSample(const CloudReader& reader, const std::string& first_input,

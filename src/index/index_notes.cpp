@@ -8,6 +8,7 @@
 
 #include "core/bounds.h"
 #include "core/crs_comment.h"
+#include "index/radius_note.h"
 #include "index/stray_note.h"
 
 namespace surfeit {
@@ -52,15 +53,15 @@ void noteSmallness(const CloudTotals& totals, Progress& progress) {
 }
 
 // A quantized scene has an albedo of 1 at most.
-void noteBrightness(const CloudTotals& totals, bool full_precision, Progress& progress) {
+void noteBrightness(const CloudTotals& totals, const CloudReader& reader, bool full_precision,
+                    Progress& progress) {
   if (totals.bright == 0) return;
   progress.note(fmt::format(
       "{} of {} surfels have an albedo above 1, up to {:.4g}, and so would reflect more light than "
-      "they get: {}. Where colors are light, --channels color=radiosity reads them as such alone "
-      "(color as the file calls it: Cd, _albedo ...); "
-      "else convert --set \"albedo = min(albedo, 1)\"",
+      "they get: {}; {}convert --set \"albedo = min(albedo, 1)\" makes 1 the most",
       totals.bright, totals.surfels, totals.largest_albedo,
-      full_precision ? "it is kept (--precision full)" : "it is 1 in the scene"));
+      full_precision ? "it is kept (--precision full)" : "it is 1 in the scene",
+      reader.albedoAdvice()));
 }
 
 void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
@@ -69,7 +70,11 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
   if (reader.crs().empty()) noteLikelyDegrees(totals, reader.origin(), progress);
   noteStrays(totals, reader.origin(), true, progress);
   noteSmallness(totals, progress);
-  noteBrightness(totals, options.full_precision, progress);
+  if (std::string radii = noteOfRadii(totals.sample, totals.surfels, reader.sizeNames());
+      !radii.empty()) {
+    progress.note(radii);
+  }
+  noteBrightness(totals, reader, options.full_precision, progress);
   if (totals.missing_both > 0) {
     progress.note(
         fmt::format("{} surfels have neither radius nor area: both follow from the "

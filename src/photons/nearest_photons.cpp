@@ -164,7 +164,7 @@ void NearestPhotons::test(const Block& block, Centre& centre) const {
   for (std::size_t i = 0; i < block.photons.size(); ++i) {
     if (!(distance_sq[i] < centre.limit_sq)) continue;
     const Surfel& photon = block.photons[i];
-    if (glm::dot(photon.normal, n) < search_.min_cosine) continue;
+    if ((glm::dot(photon.normal, n) < search_.min_cosine) != search_.takes_others) continue;
     const glm::vec3 d = photon.position - c;
     centre.photons[centre.found++] = {
         distance_sq[i],

@@ -32,6 +32,7 @@ struct NearestPhotonSearch {
   float max_distance = std::numeric_limits<float>::infinity();
   // Photons whose normals differ by more belong to another wall, or the other side of this one.
   float min_cosine = 0.5f;
+  bool takes_others = false;  // those that belong to another, instead
   // Distances along the normal count this many times: of two sheets with the same normal, the other
   // one is far away (the compressed disk of Jensen 1996).
   float stretch = 4;

@@ -47,6 +47,7 @@ constexpr std::uint32_t kLeafCapacity = 16;
 // Estimates reach at most this many times as far as the median one: over densities of 1 : 256.
 constexpr float kFarthestReach = 16;
 constexpr std::uint32_t kSamplePages = 64;
+constexpr std::size_t kOthers = 32;
 // Buffers of the file being written.
 constexpr std::uint64_t kStreamBytes = std::uint64_t{6} << 20;
 // Stack and allocator of a thread, and the pages that it has under way.
@@ -82,8 +83,18 @@ NearestPhotonSearch searchFor(const RadianceOptions& options) {
   return {.count = options.photons_per_estimate};
 }
 
+// Photons of other surfaces, few of which tell where a disk must end.
+NearestPhotonSearch searchForOthers(const NearestPhotonSearch& search) {
+  return {.count = kOthers,
+          .max_distance = search.max_distance,
+          .min_cosine = search.min_cosine,
+          .takes_others = true,
+          .stretch = kOthersStretch};
+}
+
 std::uint64_t threadBytes(const RadianceOptions& options) {
   return kThreadBytes + NearestPhotons::memoryBytes(searchFor(options)) +
+         NearestPhotons::memoryBytes(searchForOthers({})) +
          (2 * std::uint64_t{options.photons_per_estimate} + 3) * sizeof(glm::dvec2);
 }
 
@@ -120,16 +131,16 @@ class RadianceJob {
   // What a thread estimates with.
   struct Worker {
     Worker(PagedOctree& octree, const NearestPhotonSearch& search)
-        : reader(octree), nearest(search), estimator(search) {}
+        : reader(octree), nearest(search), others(searchForOthers(search)), estimator(search) {}
     PagedOctree::Reader reader;
-    NearestPhotons nearest;
+    NearestPhotons nearest, others;
     RadianceEstimator estimator;
   };
   // A page under way, and what the statistics want to know of it.
   struct PageWork {
     std::uint32_t page = 0;
     std::vector<Surfel> surfels;
-    std::uint64_t sparse = 0;
+    std::uint64_t sparse = 0, bounded = 0;
     double radius_sum = 0;
   };
 
@@ -141,6 +152,7 @@ class RadianceJob {
   Result<float> medianRadius(PagedOctree& octree) const;
   Status estimateAll(PagedOctree& octree, SurfelWriter& writer);
   Status estimatePage(Worker& worker, PageWork& work) const;
+  Status boundDisk(Worker& worker, Surfel& surfel, PageWork& work) const;
   Status writePage(const PageWork& work, SurfelWriter& writer);
   std::unique_ptr<Worker> takeWorker(PagedOctree& octree);
   void giveBack(std::unique_ptr<Worker> worker);
@@ -345,7 +357,7 @@ Status RadianceJob::estimatePage(Worker& worker, PageWork& work) const {
       const std::span<const Surfel> photons,
       worker.reader.surfels(work.page, 0, std::numeric_limits<std::uint64_t>::max()));
   work.surfels.assign(photons.begin(), photons.end());
-  work.sparse = 0;
+  work.sparse = work.bounded = 0;
   work.radius_sum = 0;
   for (std::size_t begin = 0; begin < work.surfels.size(); begin += capacity) {
     const std::span<Surfel> run =
@@ -356,6 +368,7 @@ Status RadianceJob::estimatePage(Worker& worker, PageWork& work) const {
       run[i].area = estimate.area;
       run[i].radius = std::sqrt(options_.disk_overlap * estimate.area / kPi);
       run[i].radiosity = run[i].albedo * estimate.irradiance;
+      if (estimate.is_sparse) SURFEIT_RETURN_IF_ERROR(boundDisk(worker, run[i], work));
       work.sparse += estimate.is_sparse ? 1 : 0;
       work.radius_sum += double(estimate.radius);
     }
@@ -364,10 +377,29 @@ Status RadianceJob::estimatePage(Worker& worker, PageWork& work) const {
   return {};
 }
 
+// Of a photon with few neighbours on its own surface: a disk that would stick out of it, or through
+// others, hides what lies behind. Its power stays.
+Status RadianceJob::boundDisk(Worker& worker, Surfel& surfel, PageWork& work) const {
+  SURFEIT_RETURN_IF_ERROR(worker.others.find({&surfel, 1}, worker.reader));
+  // Not below the disk of a photon at the median density
+  const float usual = search_.max_distance / kFarthestReach *
+                      std::sqrt(options_.disk_overlap / float(search_.count));
+  const float most = std::max(distanceToOthers(worker.others.nearest(0)), usual);
+  if (surfel.radius <= most) return {};
+  ++work.bounded;
+  surfel.radius = most;
+  const float most_area = kPi * most * most;
+  if (surfel.area <= most_area) return {};
+  surfel.radiosity *= surfel.area / most_area;
+  surfel.area = most_area;
+  return {};
+}
+
 Status RadianceJob::writePage(const PageWork& work, SurfelWriter& writer) {
   SURFEIT_RETURN_IF_ERROR(writer.write(work.surfels));
   stats_.surfels += work.surfels.size();
   stats_.sparse_surfels += work.sparse;
+  stats_.bounded_surfels += work.bounded;
   stats_.mean_radius += work.radius_sum;
   for (const Surfel& surfel : work.surfels) {
     stats_.area += double(surfel.area);

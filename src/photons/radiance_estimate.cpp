@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 
 #include "core/assert.h"
 #include "core/spherical_harmonics.h"
@@ -62,6 +63,19 @@ void removeInnerPoints(std::vector<glm::dvec2>& points) {
 }
 
 }  // namespace
+
+float distanceToOthers(std::span<const NearestPhoton> others) {
+  constexpr float kNone = std::numeric_limits<float>::infinity();
+  float nearest_sq = kNone, second_sq = kNone;
+  for (const NearestPhoton& other : others) {
+    const float along_sq = glm::dot(other.offset, other.offset);
+    const float height_sq = (other.distance_sq - along_sq) / (kOthersStretch * kOthersStretch);
+    if (4 * height_sq > along_sq) continue;
+    second_sq = std::min(second_sq, std::max(along_sq, nearest_sq));
+    nearest_sq = std::min(nearest_sq, along_sq);
+  }
+  return std::sqrt(second_sq);
+}
 
 double convexArea(std::vector<glm::dvec2>& points, std::vector<glm::dvec2>& hull) {
   const double count = double(points.size());

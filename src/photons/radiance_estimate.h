@@ -35,6 +35,14 @@ class RadianceEstimator {
   std::vector<glm::dvec2> points_, hull_;
 };
 
+// How far the disk of a photon may reach that has few neighbours on its own surface: to where
+// photons of others show that its surface ends, or that another one runs through its plane. Those
+// are photons that lie farther along the plane than twice as far from it; of `others`, found with
+// kOthersStretch, the second nearest counts, so that one astray does not. Infinite where there are
+// none.
+float distanceToOthers(std::span<const NearestPhoton> others);
+inline constexpr float kOthersStretch = 2;
+
 // Area of a convex piece of a plane, of which all that is known are points scattered over it at
 // random: the area of their convex hull, but for what the hull misses. Given the hull, the points
 // within it lie anywhere in it with equal probability, so that their number tells the density; the

@@ -1,6 +1,6 @@
-// Strands from the curves of Houdini's geometry: open polygons of .bgeo since Houdini 12
-// (cloud/houdini/bgeo_curves.h). Point attributes: width, the diameter, or else pscale, the radius;
-// Cd, the albedo, linear.
+// Strands from the curves of Houdini's geometry (cloud/houdini/bgeo_curves.h): open polygons, and
+// points along NURBS and Bezier curves (sample/spline.h). Point attributes: width, the diameter, or
+// else pscale, the radius; Cd, the albedo, linear.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,12 +14,15 @@
 #include <string_view>
 #include <vector>
 
+#include "cloud/houdini/bgeo_ascii_reader.h"
 #include "cloud/houdini/bgeo_curves.h"
 #include "cloud/houdini/bgeo_json_cursor.h"
 #include "cloud/houdini/bgeo_json_reader.h"
+#include "cloud/houdini/bgeo_reader.h"
 #include "core/resident_limit.h"
 #include "sample/curves.h"
 #include "sample/mesh_builder.h"
+#include "sample/spline.h"
 #include "storage/byte_input.h"
 
 namespace surfeit {
@@ -27,14 +30,32 @@ namespace {
 
 constexpr std::size_t kRowsAtOnce = 4096;
 
+Result<std::string> firstBytes(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
+  std::string bytes(12, '\0');
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                           input.readSome(0, std::as_writable_bytes(std::span(bytes))));
+  bytes.resize(size);
+  return bytes;
+}
+
+// Points as the file has them: no rule for colors.
+Result<std::unique_ptr<RowReader>> openPoints(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(const std::string first, firstBytes(path));
+  if (recognisesBgeo(first)) return openBgeo(path, {});
+  if (recognisesBgeoAscii(first)) return openBgeoAscii(path, {});
+  return openBgeoJson(path, {});
+}
+
 // The points that curves have, each once, in the order of the file.
 class PointTable {
  public:
-  // `points` refer to rows of the file before, to the table after.
+  // The points of `curves` refer to rows of the file before, to the table after.
   static Result<PointTable> read(const std::string& path, const CurveOptions& options,
-                                 const glm::vec3& default_albedo,
-                                 std::vector<std::uint32_t>& points, Progress& progress) {
+                                 const glm::vec3& default_albedo, HoudiniCurves& curves,
+                                 Progress& progress) {
     PointTable table;
+    std::vector<std::uint32_t>& points = curves.points;
     std::vector<std::uint32_t> used = points;
     std::sort(used.begin(), used.end());
     used.erase(std::unique(used.begin(), used.end()), used.end());
@@ -42,11 +63,14 @@ class PointTable {
       point = static_cast<std::uint32_t>(std::lower_bound(used.begin(), used.end(), point) -
                                          used.begin());
     }
-    SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, openBgeoJson(path, {}));
+    SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowReader> reader, openPoints(path));
     SURFEIT_RETURN_IF_ERROR(table.findProperties(reader->element(), path, options));
     SURFEIT_RETURN_IF_ERROR(checkResidentBytes(path, used.size() * sizeof(CurvePoint)));
     table.points_.reserve(used.size());
     SURFEIT_RETURN_IF_ERROR(table.readRows(*reader, used, options, default_albedo, progress));
+    if (table.weights_.empty() && !curves.weights.empty()) {
+      for (const std::uint32_t point : used) table.weights_.push_back(curves.weights[point]);
+    }
     const std::uint64_t left_out = reader->element().count - used.size();
     if (left_out > 0) {
       progress.note(fmt::format("{}: {} points that no curve has are left out", path, left_out));
@@ -55,6 +79,8 @@ class PointTable {
   }
 
   const CurvePoint& operator[](std::size_t i) const { return points_[i]; }
+  // Of points in NURBS and Bezier curves; none: all are 1.
+  const std::vector<float>& weights() const { return weights_; }
 
  private:
   Status findProperties(const RowLayout& element, const std::string& path,
@@ -74,6 +100,7 @@ class PointTable {
     if (place_[0] == nullptr || place_[1] == nullptr || place_[2] == nullptr) {
       return Status::corruption(path + ": points have no attribute P of three values");
     }
+    weight_ = find("Pw");
     width_ = find("width");
     if (width_ == nullptr) {
       width_ = find("radius");
@@ -106,6 +133,9 @@ class PointTable {
         const std::byte* const at =
             rows.data() + static_cast<std::size_t>(used[points_.size()] - row) * row_bytes;
         points_.push_back(pointOf(at, options, default_albedo));
+        if (weight_ != nullptr) {
+          weights_.push_back(float(rowValue(at + weight_->offset, weight_->type)));
+        }
       }
       row += count;
     }
@@ -130,36 +160,32 @@ class PointTable {
   }
 
   std::array<const RowProperty*, 3> place_{}, color_{};  // while rows are read
-  const RowProperty* width_ = nullptr;
+  const RowProperty *width_ = nullptr, *weight_ = nullptr;
   double width_scale_ = 1;
   std::vector<CurvePoint> points_;
+  std::vector<float> weights_;
 };
 
 // What else Houdini saves under these names.
 Status checkFormat(const std::string& path) {
-  SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
-  std::array<char, 8> begin{};
-  SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
-                           input.readSome(0, std::as_writable_bytes(std::span(begin))));
-  const std::string_view first(begin.data(), count);
-  if (startsBinaryJson(first)) return {};
-  const bool is_classic = first.starts_with("Bgeo") || first.starts_with("PGEOMETR");
+  SURFEIT_ASSIGN_OR_RETURN(const std::string first, firstBytes(path));
+  if (startsBinaryJson(first) || recognisesBgeo(first) || recognisesBgeoAscii(first)) return {};
   const bool is_text = first.starts_with("[") || first.starts_with("{");
   return Status::corruption(
-      fmt::format("{}: found {}, expected binary .bgeo of Houdini 12 or later: save it as that, "
+      fmt::format("{}: found {}, expected binary .bgeo, or geometry of version 5: save it as that, "
                   "plain or compressed by gzip or zstd",
                   path,
-                  is_classic ? "geometry of version 5"
-                  : is_text  ? "geometry as text (.geo)"
-                             : "no geometry of Houdini (.bgeo.sc is not read)"));
+                  is_text ? "geometry of Houdini 12 or later as text (.geo)"
+                          : "no geometry of Houdini (.bgeo.sc is not read)"));
 }
 
 void noteOthers(const std::string& path, const HoudiniCurves& curves, Progress& progress) {
   if (curves.closed_polygons > 0) {
-    progress.note(fmt::format(
-        "{}: {} closed polygons are left out: curves alone are read of Houdini's files (faces are "
-        "read from OBJ and PLY)",
-        path, curves.closed_polygons));
+    progress.note(
+        fmt::format("{}: {} closed polygons and curves are left out: open curves alone are read of "
+                    "Houdini's files (faces are "
+                    "read from OBJ and PLY)",
+                    path, curves.closed_polygons));
   }
   std::string types;
   for (const auto& [type, count] : curves.others) {
@@ -170,6 +196,17 @@ void noteOthers(const std::string& path, const HoudiniCurves& curves, Progress& 
   }
 }
 
+void noteSplines(const std::string& path, const HoudiniCurves& curves, Progress& progress) {
+  const auto count =
+      std::count_if(curves.basis_of.begin(), curves.basis_of.end(), [&](std::uint32_t basis) {
+        return curves.bases[basis].kind != HoudiniBasis::Kind::kPolygon;
+      });
+  if (count == 0) return;
+  progress.inform(fmt::format(
+      "{}: {} NURBS and Bezier curves become polygons of {} points for each span between knots",
+      path, count, kSplineSteps));
+}
+
 }  // namespace
 
 Status loadHoudiniMesh(const std::string& path, const glm::vec3& default_albedo,
@@ -178,20 +215,29 @@ Status loadHoudiniMesh(const std::string& path, const glm::vec3& default_albedo,
   SURFEIT_ASSIGN_OR_RETURN(HoudiniCurves curves, readHoudiniCurves(path));
   noteOthers(path, curves, progress);
   if (curves.corners.empty()) {
-    return Status::corruption(
-        path +
-        ": found no curves, expected open polygons (points alone are a cloud: surfeit index)");
+    return Status::corruption(path +
+                              ": found no open curves, expected polygons, NURBS or Bezier curves "
+                              "(points alone are a cloud: surfeit index)");
   }
-  SURFEIT_ASSIGN_OR_RETURN(const PointTable table, PointTable::read(path, options, default_albedo,
-                                                                    curves.points, progress));
-  std::vector<CurvePoint> points;
+  SURFEIT_ASSIGN_OR_RETURN(const PointTable table,
+                           PointTable::read(path, options, default_albedo, curves, progress));
+  noteSplines(path, curves, progress);
+  std::vector<CurvePoint> points, control;
+  std::vector<float> weights;
   const auto for_each = [&](const StrandVisit& visit) -> Status {
     std::size_t corner = 0;
     for (std::size_t strand = 0; strand < curves.corners.size(); ++strand) {
       if (strand % 4096 == 0 && progress.isCancelled()) return Status::interrupted();
-      points.clear();
-      for (std::uint32_t k = 0; k < curves.corners[strand]; ++k) {
-        points.push_back(table[curves.points[corner++]]);
+      control.clear();
+      weights.clear();
+      for (std::uint32_t k = 0; k < curves.corners[strand]; ++k, ++corner) {
+        control.push_back(table[curves.points[corner]]);
+        if (!table.weights().empty()) weights.push_back(table.weights()[curves.points[corner]]);
+      }
+      const Status status =
+          evaluateSpline(curves.bases[curves.basis_of[strand]], control, weights, points);
+      if (!status.ok()) {
+        return Status::corruption(fmt::format("{}: curve {}: {}", path, strand, status.message()));
       }
       SURFEIT_RETURN_IF_ERROR(visit(strand, points));
     }

@@ -18,6 +18,7 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 void ObjVertexColors::addVertex(std::span<const double> numbers) {
   const std::uint64_t vertex = vertices_++;
   const bool has_color = numbers.size() >= 6;
+  if (numbers.size() == 4 && numbers[3] != 1) ++weighted_;
   if (!has_color && colors_.empty()) return;
   colors_.resize(vertex, glm::vec3(kNone));  // of those before the first that has one
   if (!has_color) {
@@ -57,6 +58,12 @@ std::vector<std::string> ObjVertexColors::notes() const {
         "{} lines with colors of ZBrush (#MRGB) are not read: save the colors with the vertices (v "
         "x y z r g b), or the mesh as PLY",
         zbrush_lines_));
+  }
+  if (weighted_ > 0) {
+    notes.push_back(
+        fmt::format("{} vertices have a fourth number other than 1, a weight of free-form curves "
+                    "and surfaces, which is not used: places stand as they are",
+                    weighted_));
   }
   if (colored_ == 0) return notes;
   if (white() > 1) {

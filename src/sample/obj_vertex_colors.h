@@ -31,7 +31,8 @@ class ObjVertexColors {
   double white() const;
 
   std::vector<glm::vec3> colors_;  // as written; x is NaN where there is none
-  std::uint64_t vertices_ = 0, colored_ = 0, below_0_ = 0, with_alpha_ = 0, zbrush_lines_ = 0;
+  std::uint64_t vertices_ = 0, colored_ = 0, below_0_ = 0, with_alpha_ = 0, zbrush_lines_ = 0,
+                weighted_ = 0;
   double largest_ = 0, least_alpha_ = std::numeric_limits<double>::infinity();
   bool are_wholes_ = true;
 };

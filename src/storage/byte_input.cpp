@@ -62,9 +62,23 @@ struct ByteInput::State {
         SURFEIT_RETURN_IF_ERROR(refill(has_ended));
         if (has_ended) break;
       }
+      SURFEIT_RETURN_IF_ERROR(checkNextPart());
       SURFEIT_RETURN_IF_ERROR(decodeSome(bytes));
     }
     return all.size() - bytes.size();
+  }
+
+  // Behind a member or frame comes another one, or the end of the file.
+  Status checkNextPart() {
+    const std::uint64_t at = packed_offset - packed.size();
+    if (at == 0 || !decompressor->isBetweenParts()) return {};
+    std::array<std::byte, 4> magic;
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t size, file.readSome(at, magic));
+    if (compressionOf(Bytes(magic).first(size)) == compression) return {};
+    return Status::corruption(fmt::format(
+        "{}: {} bytes behind the {} data, from byte {} on, are none: head -c {} FILE > OUT writes "
+        "the file without them",
+        file.path(), file.size() - std::min(file.size(), at), nameOf(compression), at, at));
   }
 
   Status decodeSome(std::span<std::byte>& bytes) {

@@ -33,12 +33,13 @@ Result<std::string> noteOfDarkColors(RowReader& reader) {
   const bool is_flag = seen.type == ValueType::kUint8 && seen.largest == 1;
   if (seen.hasLight() && !is_flag) return std::string();
   if (seen.largest != 0 && !is_flag) return std::string();  // not a number
+  const std::string drops = dropsOf(element, "color");
   return fmt::format(
-      "colors are {}{}: surfels are {}black{}; --channels {} leaves the colors out",
+      "colors are {}{}: surfels are {}black{}; {} leaves the colors out",
       is_flag ? "0 or 1 in uchar, of 255" : "all 0", is_whole ? "" : " in a sample",
       is_flag ? "all but " : "",
       is_flag ? ", and `convert --set \"red = red * 255\"` (green, blue) makes 1 white" : "",
-      dropsOf(element, "color"));
+      drops.empty() ? "convert --drop color" : "--channels " + drops);
 }
 
 }  // namespace surfeit

@@ -105,17 +105,24 @@ std::string SurfelDefects::describeKinds() const {
 
 std::string SurfelDefects::wayOut() const {
   std::vector<std::string> drops;
-  bool lacks_place = false;
+  bool lacks_place = false, is_made = false;
   for (const KindName& row : kKindNames) {
     const Kind& kind = this->*row.kind;
-    const bool has_property = kind.count > 0 && kind.property[0] != '\0';
-    lacks_place = lacks_place || (has_property && kind.drops.empty());
+    const bool has_property = kind.count > 0 && kind.property[0] != '\0' && kind.drops.empty();
+    const bool is_place = channelToDrop(kind.property).empty();
+    lacks_place = lacks_place || (has_property && is_place);
+    is_made = is_made || (has_property && !is_place);
     const bool is_known = std::find(drops.begin(), drops.end(), kind.drops) != drops.end();
     if (!kind.drops.empty() && !is_known) drops.push_back(kind.drops);
   }
   if (drops.empty()) {
-    return lacks_place ? "; a record without a place is no surfel: --filter leaves such records out"
-                       : "";
+    if (lacks_place) {
+      return "; a record without a place is no surfel: --filter leaves such records out";
+    }
+    return is_made
+               ? "; such values follow from others, which --channels cannot leave out: --filter "
+                 "leaves such records out"
+               : "";
   }
   return fmt::format("; --channels {} reads such records without {}, convert --set changes values",
                      fmt::join(drops, ","), drops.size() > 1 ? "these" : "it");

@@ -65,6 +65,30 @@ class RowSurfelSource final : public SurfelSource {
     return notes;
   }
 
+  std::string albedoAdvice() const override {
+    const RowLayout& element = reader_->element();
+    if (element.find(kAlbedoNames[0]) != nullptr) {
+      const std::string drops = dropsOf(element, "albedo");
+      return drops.empty() ? "" : fmt::format("--channels {} leaves the albedo out", drops);
+    }
+    const std::string renaming = renamingOf(element, "color", "radiosity");
+    if (element.find(kColorNames[0]) == nullptr || renaming.empty()) return {};
+    return fmt::format("where colors are light, --channels {} reads them as such alone", renaming);
+  }
+
+  SizeNames sizeNames() const override {
+    const RowLayout& element = reader_->element();
+    SizeNames names;
+    names.has_area = element.find("area") != nullptr;
+    for (const char* name : {kRadiusNames[0], kRadiusNames[1], kRadiusNames[2], "area"}) {
+      if (element.find(name) == nullptr) continue;
+      if (names.property.empty()) names.property = name;
+      const std::string drops = dropsOf(element, name);
+      names.drops += (names.drops.empty() || drops.empty() ? "" : ",") + drops;
+    }
+    return names;
+  }
+
   std::size_t rowBytes() const override { return mapping_.rowBytes(); }
   bool isSeekable() const override { return reader_->isSeekable(); }
 
@@ -142,7 +166,9 @@ class RowSurfelSource final : public SurfelSource {
     const CloudChannels& has = mapping_.channels();
     const bool has_one = element.find("opacity") != nullptr;
     const bool has_tint = element.find(kOpacityNames[0]) != nullptr;
-    if (!has.opacity && (has_one || has_tint) && element.find("f_dc_0") == nullptr) {
+    const RowProperty* const coverage = element.find("coverage");
+    const bool is_made = coverage != nullptr && coverage->is_made;  // of the same opacity
+    if (!has.opacity && !is_made && (has_one || has_tint) && element.find("f_dc_0") == nullptr) {
       notes.push_back(
           fmt::format("opacity is not used beside coverage: --channels {} leaves that out",
                       dropsOf(element, "coverage")));

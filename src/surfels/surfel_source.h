@@ -19,6 +19,13 @@
 
 namespace surfeit {
 
+// The sizes that a cloud states: the property of rows with the first of them, and what --channels
+// takes so that none is read. Empty where it states none.
+struct SizeNames {
+  std::string property, drops;
+  bool has_area = false;
+};
+
 // A cloud that can be read several times. One thread at a time, but for decodeRows and what only
 // tells about the cloud: those are safe from any thread at any time.
 //
@@ -45,6 +52,11 @@ class SurfelSource {
 
   // What the file has that surfels do not, and rules by which values were read, one sentence each.
   virtual std::vector<std::string> notes() const { return {}; }
+
+  // How --channels keeps the albedo from being read as it is; empty where it does not.
+  virtual std::string albedoAdvice() const { return {}; }
+
+  virtual SizeNames sizeNames() const { return {}; }
 
   // Whether surfels come with a coverage: then their area is minus that (surfels/surfel_mapping.h).
   virtual bool hasCoverage() const { return false; }

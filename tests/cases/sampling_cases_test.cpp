@@ -10,6 +10,7 @@
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
 #include "surfeit/bake.h"
+#include "surfeit/convert.h"
 #include "surfeit/index.h"
 #include "surfeit/scene.h"
 
@@ -38,10 +39,31 @@ TEST_F(SamplingCasesTest, GridsOccludeAsTheirExactAreas) {
     const std::vector<double> found = occlusion(name, "lines/receivers.ply");
     for (std::size_t i = 0; i < right.size(); ++i) EXPECT_NEAR(found[i], right[i], .01) << name;
   }
-  // Disks that reach the next row hide a little less between them: up to .04 is missing, where .22
-  // was
+  // Disks that reach the next row hide a little less between them, and at the foot of the wall: up
+  // to .03 is missing, where .22 was
   const std::vector<double> rows = occlusion("lines/ratio_10.ply", "lines/receivers.ply");
-  for (std::size_t i = 0; i < right.size(); ++i) EXPECT_NEAR(rows[i], right[i], .045);
+  for (std::size_t i = 0; i < right.size(); ++i) EXPECT_NEAR(rows[i], right[i], .03);
+}
+
+// Cells of a wall end at the floor, not half-way to its points.
+TEST_F(SamplingCasesTest, SurfacesThatMeetHaveTheirAreas) {
+  struct Meeting {
+    const char* cloud;
+    double floor, wall;  // points times steps
+  };
+  for (const Meeting& row :
+       {Meeting{"lines/grid.ply", 98.01, 29.7}, Meeting{"lines/ratio_1.ply", 98.01, 29.7},
+        Meeting{"lines/ratio_10.ply", 99.225, 28.35}}) {
+    Progress quiet;
+    ASSERT_TRUE(indexClouds({sharedCase(row.cloud)}, path("scene.sft"), {}, quiet).ok());
+    ASSERT_TRUE(convertClouds({path("scene.sft")}, path("scene.ply"), {}, quiet).ok());
+    const std::vector<double> nz = columnOf(path("scene.ply"), "nz");
+    const std::vector<double> area = columnOf(path("scene.ply"), "area");
+    double floor = 0, wall = 0;
+    for (std::size_t i = 0; i < area.size(); ++i) (nz[i] > .5 ? floor : wall) += area[i];
+    EXPECT_NEAR(floor, row.floor, .01) << row.cloud;
+    EXPECT_NEAR(wall, row.wall, .01) << row.cloud;
+  }
 }
 
 TEST_F(SamplingCasesTest, PointsThatComeTwiceOccludeOnce) {
@@ -57,10 +79,13 @@ TEST_F(SamplingCasesTest, PointsThatComeTwiceOccludeOnce) {
     }
     return std::pair(floor / on_floor, wall / double(int(z.size()) - on_floor));
   };
+  // The floor is 10 x 10, the wall 10 x 3 across its middle: by the form factors of rectangles the
+  // floor hides .3047 of what these points of the wall see, and the wall, whose back hides nothing,
+  // .0914 of what the floor sees. (The table of cases has .285 and .092, of an earlier gather.)
   for (const char* cloud : {"dups/clean.ply", "dups/twice.ply"}) {
     const auto [floor, wall] = meansOf(cloud);
-    EXPECT_NEAR(floor, .092, .01) << cloud;
-    EXPECT_NEAR(wall, .285, .015) << cloud;
+    EXPECT_NEAR(floor, .0914, .007) << cloud;
+    EXPECT_NEAR(wall, .3047, .007) << cloud;
   }
 }
 

@@ -332,6 +332,33 @@ TEST_F(Radiance, FewPhotonsGiveFiniteSurfels) {
   expectSound(53);
 }
 
+// A few photons on a wall, and one astray, beside a bright floor: their disks end where photons
+// show that the floor is. (Without that, they have a radius of .12.)
+TEST_F(Radiance, DisksOfStrayPhotonsEndAtOtherSurfaces) {
+  PhotonTable photons;
+  photons.addRectangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 40000, 1);
+  const std::vector<float> heights = {0.02f, 0.05f, 0.3f};
+  const double power = 1. / 40000;
+  for (const float height : heights) photons.add({1, 0.5f, height}, {-1, 0, 0}, power);
+  photons.add({0.5f, 0.5f, 0}, {1, 0, 0}, power);
+  std::vector<Surfel> strays =
+      where(surfelsOf(photons.table), [](const Surfel& s) { return std::abs(s.normal.x) > 0.5f; });
+  ASSERT_EQ(strays.size(), 4u);
+  EXPECT_EQ(stats_.bounded_surfels, 3u);
+  std::sort(strays.begin(), strays.end(),
+            [](const Surfel& a, const Surfel& b) { return a.position.z < b.position.z; });
+  EXPECT_LT(strays[0].radius, 0.02f);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_LT(strays[i + 1].radius, heights[i] + 0.01f);
+    EXPECT_GT(strays[i + 1].radius, heights[i] - 0.01f);
+  }
+  EXPECT_GT(strays[3].radius, 0.1f);  // no other surface is near
+  // Power stays
+  for (const Surfel& stray : strays) {
+    EXPECT_NEAR(double(stray.area) * redOf(stray), power / 2, 1e-3 * power);
+  }
+}
+
 TEST_F(Radiance, ManyPhotonsAtOnePositionDoNoHarm) {
   PhotonTable photons;
   photons.addRectangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 4000, 1);

@@ -91,7 +91,7 @@ TEST_F(LasLossTest, MovedPointsLoseTheirCoordinateReferenceSystem) {
       }
       for (const ConvertOptions& kept : {all(), cropped}) {
         EXPECT_TRUE(hasCrs(input, output, kept));
-        EXPECT_THAT(notes_, Not(Contains(HasSubstr("reference system"))));
+        EXPECT_THAT(notes_, Not(Contains(HasSubstr("is not kept"))));
       }
     }
   }
@@ -139,7 +139,7 @@ TEST_F(LasLossTest, UnitsThatAreNotMetresAreTold) {
     if (vertical_unit != 0) words.insert(words.end(), {4099, 0, 1, vertical_unit});
     return notesOf(34735, {reinterpret_cast<const char*>(words.data()), 2 * words.size()});
   };
-  EXPECT_THAT(ofKeys(0, 0), testing::IsEmpty());
+  EXPECT_THAT(ofKeys(0, 0), ElementsAre(HasSubstr("convert --units ft:m")));  // as 2992 is
   EXPECT_THAT(ofKeys(9001, 9001), testing::IsEmpty());
   EXPECT_THAT(ofKeys(9002, 0),
               ElementsAre(AllOf(HasSubstr("positions are in 'feet'"), HasSubstr("ft:m"))));
@@ -173,12 +173,52 @@ TEST_F(LasLossTest, UnitsOfHeightsFollowFromTheirSystem) {
                                {reinterpret_cast<const char*>(words.data()), 2 * words.size()})}));
     const auto reader = openLas(path("a.las"), {});
     EXPECT_TRUE(reader.ok());
-    return reader.ok() ? (*reader)->notes() : std::vector<std::string>();
+    return reader.ok() ? notesOfComments((*reader)->comments()) : std::vector<std::string>();
   };
   EXPECT_THAT(notesOf(6360, 0), ElementsAre(HasSubstr("heights are in 'US survey feet'")));
   EXPECT_THAT(notesOf(8228, 0), ElementsAre(HasSubstr("heights are in 'feet'")));
   EXPECT_THAT(notesOf(5703, 0), testing::IsEmpty());
   EXPECT_THAT(notesOf(6360, 9001), testing::IsEmpty());  // what is stated goes before
+}
+
+// Most files of state planes have the code alone (key 3072), and so do comments of other formats.
+TEST_F(LasLossTest, UnitsFollowFromTheCodeOfTheSystem) {
+  struct Row {
+    std::uint16_t code;
+    const char* told;
+  };
+  for (const Row& row : {Row{2992, "--units ft:m"}, Row{2225, "--units us-ft:m"}, Row{6339, ""},
+                         Row{26910, ""}, Row{32618, ""}, Row{2263, "--units us-ft:m"},
+                         Row{2267, "--units us-ft:m"}, Row{6868, "--units ft:m"},
+                         Row{6880, "--units us-ft:m"}, Row{29377, "German legal"}, Row{3857, ""}}) {
+    const std::vector<std::uint16_t> words = {1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, row.code};
+    write(
+        "a.las",
+        withRecords(makeLas(4, 6, 3),
+                    {lasRecord("LASF_Projection", 34735,
+                               {reinterpret_cast<const char*>(words.data()), 2 * words.size()})}));
+    convertOk({"a.las"}, "b.ply");
+    convertOk({"b.ply"}, "c.las");
+    for (const char* name : {"a.las", "b.ply", "c.las"}) {
+      const auto reader = openRowReader(path(name));
+      ASSERT_TRUE(reader.ok());
+      const std::vector<std::string> notes = notesOfComments((*reader)->comments());
+      if (row.told[0] == 0) {
+        EXPECT_THAT(notes, testing::IsEmpty()) << row.code << name;
+      } else {
+        EXPECT_THAT(notes, ElementsAre(HasSubstr(row.told))) << row.code << name;
+      }
+    }
+  }
+  // A unit that is stated goes before, also behind a PLY
+  EXPECT_THAT(notesOfComments(std::vector<std::string>{"crs EPSG:2992 unit 9001"}),
+              testing::IsEmpty());
+  EXPECT_THAT(notesOfComments(std::vector<std::string>{"crs a local grid unit 9003"}),
+              ElementsAre(HasSubstr("--units us-ft:m")));
+  EXPECT_THAT(notesOfComments(std::vector<std::string>{
+                  "crs PROJCS[\"a\",GEOGCS[\"b\",UNIT[\"degree\",0.017]],UNIT[\"US survey "
+                  "foot\",0.304800609601219]]"}),
+              ElementsAre(HasSubstr("--units us-ft:m")));
 }
 
 // Keys say what the angles are, from LAS to PLY and back.

@@ -330,7 +330,7 @@ TEST_F(PtcFiles, EveryTruncationIsFound) {
 TEST_F(PtcFiles, BytesAfterTheLastPointAreNoted) {
   writePtc("a.ptc", properties({"x", "y", "z", "radius"}), floatRows(3, 4));
   write("b.ptc", contents("a.ptc") + "abc");
-  EXPECT_THAT(openGood("b.ptc")->notes(), ElementsAre(HasSubstr("3 bytes after the last point")));
+  EXPECT_THAT(openGood("b.ptc")->notes(), ElementsAre(HasSubstr("3 bytes behind the last point")));
 }
 
 TEST_F(PtcFiles, DamagedHeadersAreRefused) {

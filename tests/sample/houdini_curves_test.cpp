@@ -202,7 +202,7 @@ TEST_F(HoudiniCurvesMesh, WhatIsNoCurveIsTold) {
   ASSERT_TRUE(
       loadMeshes({write("a.bgeo", geometryOf(json, hair, others))}, glm::vec3(0.5f), notes_).ok());
   ASSERT_EQ(notes_.notes.size(), 3u);
-  EXPECT_THAT(notes_.notes[0], HasSubstr("3 closed polygons are left out"));
+  EXPECT_THAT(notes_.notes[0], HasSubstr("3 closed polygons and curves are left out"));
   EXPECT_THAT(notes_.notes[1], HasSubstr("other primitives are left out: 1 Sphere"));
   EXPECT_THAT(notes_.notes[2], HasSubstr("points that no curve has"));
 }
@@ -213,13 +213,24 @@ TEST_F(HoudiniCurvesMesh, WhatCannotBeReadIsRefused) {
   const auto refusal = [&](const std::string& primitives) {
     return messageOf(geometryOf(json, hair, primitives));
   };
-  for (const char* type : {"NURBCurve", "BezierCurve"}) {
-    EXPECT_THAT(
-        refusal(bgeoPrimitive(json, type, json.list(json.text("vertex"), json.integers({0, 1})))),
-        AllOf(HasSubstr(type), HasSubstr("Resample")));
-  }
-  EXPECT_THAT(refusal(""), HasSubstr("found no curves"));
-  EXPECT_THAT(refusal(bgeoRun(json, "Polygon_run", 1, {4})), HasSubstr("found no curves"));
+  const auto spline = [&](const char* type, int order, const std::vector<std::int32_t>& vertices,
+                          const std::vector<float>& knots) {
+    return bgeoPrimitive(json, type,
+                         json.list(json.text("vertex"), json.integers(vertices),
+                                   json.text("closed"), std::string("\x30"), json.text("basis"),
+                                   json.list(json.text("order"), json.integer(order),
+                                             json.text("knots"), json.floats(knots))));
+  };
+  EXPECT_THAT(refusal(spline("NURBCurve", 4, {0, 1}, {})), HasSubstr("curve 0: 2 vertices"));
+  EXPECT_THAT(refusal(spline("NURBCurve", 3, {0, 1, 2}, {0, 1, 2, 3, 4, 5, 6})),
+              HasSubstr("7 knots, expected 6"));
+  EXPECT_THAT(refusal(spline("NURBCurve", 3, {0, 1, 2}, {0, 0, 0, 1, 1, .5f})),
+              HasSubstr("do not rise"));
+  EXPECT_THAT(refusal(spline("BezierCurve", 4, {0, 1, 2, 3, 4}, {})),
+              HasSubstr("expected a multiple of 3"));
+  EXPECT_THAT(refusal(spline("NURBCurve", 99, {0, 1, 2}, {})), HasSubstr("order 99"));
+  EXPECT_THAT(refusal(""), HasSubstr("found no open curves"));
+  EXPECT_THAT(refusal(bgeoRun(json, "Polygon_run", 1, {4})), HasSubstr("found no open curves"));
   EXPECT_THAT(refusal(bgeoRun(json, "PolygonCurve_run", 2, {4})), HasSubstr("a run of 2 curves"));
   EXPECT_THAT(refusal(bgeoRun(json, "PolygonCurve_run", 1, {9999})), HasSubstr("9999 vertices"));
   EXPECT_THAT(refusal(bgeoRun(json, "PolygonCurve_run", 1, {0, 1 << 30}, "nvertices_rle")),
@@ -233,8 +244,8 @@ TEST_F(HoudiniCurvesMesh, WhatCannotBeReadIsRefused) {
                                       bgeoTopology(json, {0, 2}),
                                       bgeoRun(json, "PolygonCurve_run", 1, {2}))),
               HasSubstr("point 2, expected less than 2"));
-  EXPECT_THAT(messageOf("BgeoV\0\0\0\5", "old.bgeo"), HasSubstr("geometry of version 5"));
-  EXPECT_THAT(messageOf("PGEOMETRY V5\n", "old.geo"), HasSubstr("geometry of version 5"));
+  EXPECT_THAT(messageOf("BgeoV\0\0\0\5", "old.bgeo"), HasSubstr("file ends early"));
+  EXPECT_THAT(messageOf("PGEOMETRY V5\n", "old.geo"), HasSubstr("expected 'NPoints'"));
   EXPECT_THAT(messageOf("[\n\t\"fileversion\"", "text.geo"), HasSubstr("as text"));
   EXPECT_THAT(messageOf("scf1", "a.bgeo.sc"), HasSubstr(".bgeo.sc is not read"));
 }

@@ -209,7 +209,45 @@ Status checkPart(const Imf::Header& header, const InputFile& file) {
   return {};
 }
 
+// Sizes of the levels of tiles, from `size` down to 1.
+std::vector<std::uint64_t> levelSizes(std::uint64_t size, std::uint64_t longest,
+                                      const Imf::TileDescription& tiles) {
+  std::vector<std::uint64_t> sizes;
+  const bool rounds_up = tiles.roundingMode == Imf::ROUND_UP;
+  const auto at = [rounds_up](std::uint64_t whole, unsigned level) {
+    return std::max<std::uint64_t>(
+        1, (whole + (rounds_up ? (std::uint64_t{1} << level) - 1 : 0)) >> level);
+  };
+  for (unsigned level = 0; level < 32; ++level) {
+    sizes.push_back(at(size, level));
+    if (at(longest, level) == 1) break;
+  }
+  return sizes;
+}
+
 }  // namespace
+
+std::uint64_t exrChunkCount(const Imf::Header& header) {
+  if (header.hasChunkCount()) return std::uint64_t(std::max(header.chunkCount(), 0));
+  const auto [width, height] = windowSize(header);
+  if (!hasTiles(header)) return (height + blockRows(header) - 1) / blockRows(header);
+  const Imf::TileDescription& tiles = header.tileDescription();
+  const auto chunksOf = [&tiles](std::uint64_t columns, std::uint64_t rows) {
+    return ((columns - 1) / tiles.xSize + 1) * ((rows - 1) / tiles.ySize + 1);
+  };
+  if (tiles.mode == Imf::ONE_LEVEL) return chunksOf(width, height);
+  const bool is_ripmap = tiles.mode == Imf::RIPMAP_LEVELS;
+  const std::uint64_t longest = std::max(width, height);
+  const std::vector<std::uint64_t> columns = levelSizes(width, is_ripmap ? width : longest, tiles);
+  const std::vector<std::uint64_t> rows = levelSizes(height, is_ripmap ? height : longest, tiles);
+  std::uint64_t chunks = 0;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    for (std::size_t k = is_ripmap ? 0 : i; k < (is_ripmap ? rows.size() : i + 1); ++k) {
+      chunks += chunksOf(columns[i], rows[k]);
+    }
+  }
+  return chunks;
+}
 
 bool isDeepExr(const Imf::Header& header) {
   return header.hasType() && Imf::isDeepData(header.type());

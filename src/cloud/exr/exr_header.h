@@ -19,7 +19,14 @@ inline constexpr std::uint64_t kMaxExrHeaderBytes = 16 << 20;
 // The headers of all parts. When it succeeds, OpenEXR may open the file: attributes end within it,
 // and it has room for the offset tables of all parts. kCorruption otherwise, also for a flat part
 // with more pixels than its compression can put into a file of this size.
+// The stream is behind them then.
 Result<std::vector<Imf::Header>> readExrHeaders(ExrInputStream& stream);
+
+// How many blocks of scan lines or tiles a part has, those of its smaller levels too.
+std::uint64_t exrChunkCount(const Imf::Header& header);
+// Bytes behind the pixels of a file whose headers those are; 0 when its offset tables were never
+// completed. Takes the stream anywhere; may throw what OpenEXR throws.
+std::uint64_t exrBytesBehind(ExrInputStream& stream, const std::vector<Imf::Header>& headers);
 
 // Whether pixels hold lists of samples. All parts that readExrHeaders returns have a type.
 bool isDeepExr(const Imf::Header& header);

@@ -19,6 +19,7 @@
 #include "cloud/exr/exr_layout.h"
 #include "cloud/exr/exr_positions.h"
 #include "cloud/exr/exr_stream.h"
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/counted_row_reader.h"
 
 namespace surfeit {
@@ -36,6 +37,7 @@ class ExrReader final : public CountedRowReader {
 
   Status open(const RowReaderOptions& options) {
     SURFEIT_ASSIGN_OR_RETURN(headers_, readExrHeaders(stream_));
+    SURFEIT_RETURN_IF_ERROR(noteBytesBehind());
     SURFEIT_RETURN_IF_ERROR(choosePart(options));
     SURFEIT_RETURN_IF_ERROR(layOut(options));
     return guardExr(stream_, StatusCode::kCorruption, path_, "header", [&] {
@@ -93,6 +95,14 @@ class ExrReader final : public CountedRowReader {
                          i.channel().type == Imf::UINT, i.channel().type == Imf::HALF});
     }
     return sources;
+  }
+
+  Status noteBytesBehind() {
+    return guardExr(stream_, StatusCode::kCorruption, path_, "offset tables", [&] {
+      std::string note = noteOfBytesBehind(exrBytesBehind(stream_, headers_), "pixel");
+      if (!note.empty()) notes_.push_back(std::move(note));
+      return Status();
+    });
   }
 
   // The part with the positions.

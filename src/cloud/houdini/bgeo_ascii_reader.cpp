@@ -6,6 +6,8 @@
 #include <cstring>
 #include <utility>
 
+#include "cloud/houdini/geo_notes.h"
+#include "cloud/houdini/geo_words.h"
 #include "cloud/parts/counted_row_reader.h"
 #include "cloud/parts/stored_values.h"
 #include "cloud/ply/ply_number.h"
@@ -15,87 +17,24 @@ namespace surfeit {
 namespace {
 
 constexpr std::string_view kMagic = "PGEOMETRY V5";
-constexpr std::size_t kBufferBytes = 256 << 10;
 constexpr std::size_t kMaxAttributes = 1024, kMaxComponents = 256, kMaxStrings = 1 << 20;
-constexpr std::size_t kMaxWordBytes = 4096, kMaxRowBytes = 16 << 10;
-
-bool isBlank(char letter) {
-  return letter == ' ' || letter == '\t' || letter == '\n' || letter == '\r';
-}
-
-// Words of a file, parentheses being words of their own.
-class Words {
- public:
-  explicit Words(ByteInput input) : input_(std::move(input)) {}
-
-  const ByteInput& input() const { return input_; }
-  // Of the word that next() gave last.
-  std::uint64_t offset() const { return word_offset_; }
-  std::uint64_t nextOffset() const { return buffer_offset_ + begin_; }
-  void moveTo(std::uint64_t offset) {
-    buffer_offset_ = offset;
-    begin_ = end_ = 0;
-    has_ended_ = false;
-  }
-
-  // The next word, empty at the end of the file; at most kMaxWordBytes of it. The view lasts until
-  // the next call.
-  Status next(std::string_view& word) {
-    while (true) {
-      while (begin_ < end_ && isBlank(buffer_[begin_])) ++begin_;
-      if (begin_ < end_) break;
-      SURFEIT_RETURN_IF_ERROR(refill());
-      if (begin_ == end_) break;
-    }
-    if (end_ - begin_ < kMaxWordBytes) SURFEIT_RETURN_IF_ERROR(refill());
-
-    word_offset_ = nextOffset();
-    std::size_t size = 0;
-    const std::size_t most = std::min(end_ - begin_, kMaxWordBytes);
-    while (size < most && !isBlank(buffer_[begin_ + size]) && !isParenthesis(begin_ + size)) ++size;
-    if (size == 0 && most > 0) size = 1;  // a parenthesis
-    word = std::string_view(buffer_.data() + begin_, size);
-    begin_ += size;
-    return {};
-  }
-
- private:
-  bool isParenthesis(std::size_t at) const { return buffer_[at] == '(' || buffer_[at] == ')'; }
-
-  // Moves what is left to the front and reads on behind it.
-  Status refill() {
-    if (has_ended_ || end_ - begin_ == buffer_.size()) return {};
-    std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
-    buffer_offset_ += begin_;
-    end_ -= begin_;
-    begin_ = 0;
-    const auto room = std::as_writable_bytes(std::span(buffer_)).subspan(end_);
-    SURFEIT_ASSIGN_OR_RETURN(const std::size_t got, input_.readSome(buffer_offset_ + end_, room));
-    end_ += got;
-    has_ended_ = got == 0;
-    return {};
-  }
-
-  ByteInput input_;
-  std::vector<char> buffer_ = std::vector<char>(kBufferBytes);
-  std::size_t begin_ = 0, end_ = 0;
-  std::uint64_t buffer_offset_ = 0, word_offset_ = 0;
-  bool has_ended_ = false;  // the file has nothing behind the buffer
-};
+constexpr std::size_t kMaxRowBytes = 16 << 10;
 
 class BgeoAsciiReader final : public CountedRowReader {
  public:
-  explicit BgeoAsciiReader(ByteInput input) : words_(std::move(input)) {
+  explicit BgeoAsciiReader(ByteInput input) : words_(std::move(input), "()") {
     path_ = words_.input().path();
     element_.name = "vertex";
     format_name_ = "GEO 5 (text)";
   }
 
   Status open(const RowReaderOptions& options) {
-    std::uint64_t unused = 0, attributes = 0;
+    std::uint64_t unused = 0, attributes = 0, primitives = 0;
     words_.moveTo(kMagic.size());
     SURFEIT_RETURN_IF_ERROR(readNamed("NPoints", element_.count));
-    for (const char* name : {"NPrims", "NPointGroups", "NPrimGroups"}) {
+    SURFEIT_RETURN_IF_ERROR(readNamed("NPrims", primitives));
+    if (std::string note = noteOfGeoPrimitives(primitives); !note.empty()) notes_.push_back(note);
+    for (const char* name : {"NPointGroups", "NPrimGroups"}) {
       SURFEIT_RETURN_IF_ERROR(readNamed(name, unused));
     }
     SURFEIT_RETURN_IF_ERROR(readNamed("NPointAttrib", attributes));
@@ -236,7 +175,7 @@ class BgeoAsciiReader final : public CountedRowReader {
 
   Status checkEnd() override { return words_.input().checkUnchanged(); }
 
-  Words words_;
+  GeoWords words_;
   std::string_view word_;
   std::vector<Value> values_;
   bool has_attributes_ = false;

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <string_view>
 #include <utility>
 
 #include "cloud/houdini/bgeo_json_walk.h"
+#include "cloud/houdini/geo_curves.h"
 
 namespace surfeit {
 namespace {
@@ -20,6 +22,7 @@ struct PolygonRun {
   bool is_closed = true, is_listed = false, is_rle = false;
   std::uint64_t start = 0, count = 0;
   std::vector<std::uint32_t> numbers;  // of vertices of each; with times; or the vertices
+  HoudiniBasis basis;
 };
 
 // What stands in front of a primitive.
@@ -27,10 +30,14 @@ struct PrimitiveHead {
   std::string type, run_type;
   std::vector<std::string> varying;
   bool is_closed = true;  // of a run of Houdini 12, where it is the same for all
+  HoudiniBasis basis;     // likewise
 };
 
-bool isSpline(std::string_view type) {
-  return type.starts_with("NURBCurve") || type.starts_with("BezierCurve");
+constexpr std::uint32_t kMostOrder = 32;
+
+HoudiniBasis::Kind kindOf(std::string_view type) {
+  if (type == "NURBCurve") return HoudiniBasis::Kind::kNurbs;
+  return type == "BezierCurve" ? HoudiniBasis::Kind::kBezier : HoudiniBasis::Kind::kPolygon;
 }
 
 class CurveReader : private BgeoJsonWalk {
@@ -114,20 +121,16 @@ class CurveReader : private BgeoJsonWalk {
     PrimitiveHead head;
     SURFEIT_RETURN_IF_ERROR(readHead(head));
     const std::string& type = head.type == "run" ? head.run_type : head.type;
-    if (isSpline(type)) {
-      return Status::corruption(
-          fmt::format("{}: found a primitive of type {}, expected polygon curves: a node Resample "
-                      "or Convert of Houdini makes them of NURBS and Bezier curves",
-                      path_, type));
-    }
+    const bool is_face = type == "Poly" || kindOf(type) != HoudiniBasis::Kind::kPolygon;
     if (type == "PolygonCurve_run" || type == "c_r") {
       SURFEIT_RETURN_IF_ERROR(readRun(false));
     } else if (type == "Polygon_run" || type == "p_r") {
       SURFEIT_RETURN_IF_ERROR(readRun(true));
-    } else if (type == "Poly" && head.type == "run") {
+    } else if (is_face && head.type == "run") {
+      head.basis.kind = kindOf(type);
       SURFEIT_RETURN_IF_ERROR(readOldRun(head));
-    } else if (type == "Poly") {
-      SURFEIT_RETURN_IF_ERROR(readPolygon());
+    } else if (is_face) {
+      SURFEIT_RETURN_IF_ERROR(readPolygon(kindOf(type)));
     } else {
       ++curves_.others[type.substr(0, 64)];
       if (curves_.others.size() > 256) return cursor_.damaged("too many types of primitives");
@@ -144,7 +147,8 @@ class CurveReader : private BgeoJsonWalk {
       if (key == "type") return readText(head.type);
       if (key == "runtype") return readText(head.run_type);
       if (key == "uniformfields") {
-        return readPairs([&](const std::string& field) {
+        return readPairs([&](const std::string& field) -> Status {
+          if (field == "basis") return readBasis(head.basis);
           return field == "closed" ? readBool(head.is_closed) : skipValue();
         });
       }
@@ -178,11 +182,62 @@ class CurveReader : private BgeoJsonWalk {
     return {};
   }
 
-  Status readPolygon() {
+  Status readBasis(HoudiniBasis& basis) {
+    JsonToken token;
+    SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
+    return readBasisFrom(token, basis);
+  }
+
+  // Its kind stays.
+  Status readBasisFrom(const JsonToken& begin, HoudiniBasis& basis) {
+    return readPairsFrom(begin, [&](const std::string& key) -> Status {
+      if (key == "endinterpolation") return readBool(basis.has_ends);
+      if (key == "knots") return readKnots(basis.knots);
+      if (key != "order") return skipValue();
+      std::uint64_t order = 0;
+      SURFEIT_RETURN_IF_ERROR(readCount(order));
+      if (order < 2 || order > kMostOrder) {
+        return cursor_.damaged(
+            fmt::format("a curve of order {}, expected 2 to {}", order, kMostOrder));
+      }
+      basis.order = static_cast<std::uint32_t>(order);
+      return {};
+    });
+  }
+
+  Status readKnots(std::vector<float>& knots) {
+    knots.clear();
+    JsonToken token;
+    SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
+    if (token.kind == Kind::kUniformArray) {
+      std::vector<double> numbers;
+      JsonToken part = token;
+      for (std::uint64_t done = 0; done < token.length; done += part.length) {
+        part.length = std::min(kMostNumbers, token.length - done);
+        SURFEIT_RETURN_IF_ERROR(cursor_.readNumbers(part, numbers));
+        knots.insert(knots.end(), numbers.begin(), numbers.end());
+        part.offset += part.length * (token.type ? storedBytes(*token.type) : 0);
+      }
+      return {};
+    }
+    if (token.kind != Kind::kArrayBegin) return cursor_.damaged("expected knots");
+    while (true) {
+      SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
+      if (token.kind == Kind::kArrayEnd) return {};
+      if (token.kind != Kind::kInteger && token.kind != Kind::kReal) {
+        return cursor_.damaged("expected a knot");
+      }
+      knots.push_back(static_cast<float>(token.real));
+    }
+  }
+
+  Status readPolygon(HoudiniBasis::Kind kind) {
     PolygonRun run;
     run.is_listed = true;
+    run.basis.kind = kind;
     SURFEIT_RETURN_IF_ERROR(readPairs([&](const std::string& key) -> Status {
       if (key == "vertex") return readIndices(run.numbers);
+      if (key == "basis") return readBasis(run.basis);
       return key == "closed" ? readBool(run.is_closed) : skipValue();
     }));
     runs_.push_back(std::move(run));
@@ -196,6 +251,7 @@ class CurveReader : private BgeoJsonWalk {
       PolygonRun run;
       run.is_listed = true;
       run.is_closed = head.is_closed;
+      run.basis = head.basis;
       JsonToken token;
       for (std::size_t field = 0;; ++field) {
         SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
@@ -205,6 +261,8 @@ class CurveReader : private BgeoJsonWalk {
                                                              : "";
         if (name == "vertex") {
           SURFEIT_RETURN_IF_ERROR(readIndicesFrom(token, run.numbers));
+        } else if (name == "basis" && token.kind != Kind::kUniformArray) {
+          SURFEIT_RETURN_IF_ERROR(readBasisFrom(token, run.basis));
         } else if (name == "closed" && token.kind == Kind::kBool) {
           run.is_closed = token.integer != 0;
         } else {
@@ -226,6 +284,7 @@ class CurveReader : private BgeoJsonWalk {
     if (run.is_listed) {
       for (const std::uint32_t vertex : run.numbers) SURFEIT_RETURN_IF_ERROR(addVertex(vertex));
       curves_.corners.push_back(static_cast<std::uint32_t>(run.numbers.size()));
+      curves_.addBasis(run.basis);
       return {};
     }
     std::uint64_t vertex = run.start, count = 0;
@@ -242,6 +301,7 @@ class CurveReader : private BgeoJsonWalk {
           SURFEIT_RETURN_IF_ERROR(addVertex(vertex + v));
         }
         curves_.corners.push_back(corners);
+        curves_.addBasis(run.basis);
       }
     }
     if (count == run.count) return {};
@@ -276,6 +336,13 @@ class CurveReader : private BgeoJsonWalk {
 }  // namespace
 
 Result<HoudiniCurves> readHoudiniCurves(const std::string& path) {
+  std::array<char, 12> begin{};
+  SURFEIT_ASSIGN_OR_RETURN(ByteInput bytes, ByteInput::open(path));
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t size,
+                           bytes.readSome(0, std::as_writable_bytes(std::span(begin))));
+  const std::string_view first(begin.data(), size);
+  if (first.starts_with("BgeoV")) return readGeoCurves(path);
+  if (first.starts_with("PGEOMETRY V5")) return readGeoTextCurves(path);
   SURFEIT_ASSIGN_OR_RETURN(SpooledInput input, SpooledInput::open(path, Access::kCached));
   return CurveReader(input).read();
 }

@@ -65,6 +65,8 @@ class BgeoJsonCursor {
   // The next token; the values of uniform arrays are passed over. kCorruption, naming the byte,
   // for what is no token or does not fit in the file.
   Status next(JsonToken& token);
+  // Of the next token.
+  std::uint64_t offset() const { return offset_; }
   // Passes over the rest of the value that begins with `token`.
   Status skip(const JsonToken& token);
 

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "cloud/houdini/bgeo_json_walk.h"
+#include "cloud/houdini/geo_notes.h"
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/column_rows.h"
 
 namespace surfeit {
@@ -54,12 +56,17 @@ class BgeoJsonReader final : public ColumnRowReader, private BgeoJsonWalk {
         has_count = true;
         return readCount(element_.count);
       }
+      if (key == "primitivecount") return readPrimitiveCount();
       if (key != "attributes") return skipValue();
       has_attributes = true;
       return readPairs([&](const std::string& kind) {
         return kind == "pointattributes" ? readAttributes() : skipValue();
       });
     }));
+    if (std::string note = noteOfBytesBehind(input_.size() - cursor_.offset(), "value");
+        !note.empty()) {
+      notes_.push_back(std::move(note));
+    }
     if (!has_count || !has_attributes) {
       return Status::corruption(path_ + ": no pointcount or no attributes, expected geometry");
     }
@@ -73,6 +80,14 @@ class BgeoJsonReader final : public ColumnRowReader, private BgeoJsonWalk {
   }
 
  private:
+  Status readPrimitiveCount() {
+    std::uint64_t primitives = 0;
+    SURFEIT_RETURN_IF_ERROR(readCount(primitives));
+    std::string note = noteOfGeoPrimitives(primitives);
+    if (!note.empty()) notes_.push_back(std::move(note));
+    return {};
+  }
+
   // --- Attributes ---
 
   Status readAttributes() {

@@ -29,6 +29,11 @@ class BgeoJsonWalk {
   Status readPairs(Visit visit) {
     JsonToken token;
     SURFEIT_RETURN_IF_ERROR(cursor_.next(token));
+    return readPairsFrom(token, visit);
+  }
+  // Behind the token that begins them.
+  template <typename Visit>
+  Status readPairsFrom(JsonToken token, Visit visit) {
     if (token.kind != Kind::kArrayBegin && token.kind != Kind::kMapBegin) {
       return cursor_.damaged("expected keys and values");
     }

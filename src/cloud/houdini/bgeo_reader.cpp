@@ -7,6 +7,8 @@
 #include <bit>
 #include <utility>
 
+#include "cloud/houdini/geo_notes.h"
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/counted_row_reader.h"
 #include "cloud/parts/stored_values.h"
 #include "storage/byte_input.h"
@@ -15,7 +17,7 @@ namespace surfeit {
 namespace {
 
 constexpr std::string_view kMagic = "BgeoV";
-constexpr std::size_t kHeaderBytes = 41, kWordBytes = 4;
+constexpr std::size_t kHeaderBytes = 41, kWordBytes = 4, kEndBytes = 2;
 constexpr std::int32_t kVersion = 5;
 constexpr std::int32_t kMaxAttributes = 1024, kMaxStrings = 1 << 20;
 // Real points have a few hundred bytes
@@ -49,7 +51,13 @@ class BgeoReader final : public CountedRowReader {
     SURFEIT_RETURN_IF_ERROR(addAttribute("P", 3, ValueType::kFloat32, options));
     record_bytes_ += kWordBytes;  // w
     for (std::int32_t i = 0; i < attributes; ++i) SURFEIT_RETURN_IF_ERROR(readAttribute(options));
-    return checkCount();
+    SURFEIT_RETURN_IF_ERROR(checkCount());
+    if (has_points_alone_ && input_.size()) {
+      std::string note =
+          noteOfBytesBehind(*input_.size() - std::min(*input_.size(), endOfPoints()), "point");
+      if (!note.empty()) notes_.push_back(std::move(note));
+    }
+    return {};
   }
 
   bool isSeekable() const override { return !input_.isCompressed(); }
@@ -71,6 +79,12 @@ class BgeoReader final : public CountedRowReader {
     const auto version = bigEndian<std::int32_t>(&bytes[5]);
     const auto points = bigEndian<std::int32_t>(&bytes[9]);
     attributes = bigEndian<std::int32_t>(&bytes[25]);
+    has_points_alone_ = true;
+    for (const std::size_t at : {13, 17, 21, 29, 33, 37}) {
+      has_points_alone_ = has_points_alone_ && bigEndian<std::int32_t>(&bytes[at]) == 0;
+    }
+    const auto primitives = bigEndian<std::uint32_t>(&bytes[13]);
+    if (std::string note = noteOfGeoPrimitives(primitives); !note.empty()) notes_.push_back(note);
     if (version != kVersion) {
       return damagedAt(5, fmt::format("version {}, expected {}", version, kVersion));
     }
@@ -159,6 +173,11 @@ class BgeoReader final : public CountedRowReader {
     return {};
   }
 
+  // And two bytes that end files.
+  std::uint64_t endOfPoints() const {
+    return data_begin_ + element_.count * record_bytes_ + kEndBytes;
+  }
+
   Status checkCount() const {
     const std::optional<std::uint64_t> size = input_.size();
     if (!size) return {};
@@ -195,10 +214,16 @@ class BgeoReader final : public CountedRowReader {
     }
   }
 
-  Status checkEnd() override { return input_.checkUnchanged(); }
+  Status checkEnd() override {
+    if (has_points_alone_) {
+      SURFEIT_RETURN_IF_ERROR(checkNothingBehind(input_, endOfPoints(), "point"));
+    }
+    return input_.checkUnchanged();
+  }
 
   ByteInput input_;
   std::uint64_t data_begin_ = 0;
+  bool has_points_alone_ = true;  // no primitives, groups and other attributes behind them
   std::size_t record_bytes_ = 0;
   std::vector<WordRun> runs_;
   AlignedBuffer buffer_;

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/column_rows.h"
 
 namespace surfeit {
@@ -42,6 +43,8 @@ class PdbReader final : public ColumnRowReader {
     for (std::uint32_t i = 0; i < attributes; ++i) {
       SURFEIT_RETURN_IF_ERROR(readAttribute(at, options));
     }
+    std::string behind = noteOfBytesBehind(input_.size() - at, "attribute");
+    if (!behind.empty()) notes_.push_back(std::move(behind));
     return {};
   }
 

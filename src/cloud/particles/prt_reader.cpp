@@ -231,6 +231,16 @@ class PrtReader final : public CountedRowReader {
     if (got > 0) {
       return damagedRow(element_.count, "more data, expected the end of particles");
     }
+    SURFEIT_ASSIGN_OR_RETURN(const std::size_t behind,
+                             input_.readSome(stream_->offset(), {&more, 1}));
+    if (behind > 0) {
+      return damagedAt(
+          stream_->offset(),
+          fmt::format("bytes behind the particles, expected the end of the file: if "
+                      "files were joined, make one of each; head -c {} FILE (unpacked, "
+                      "if it is compressed) writes the file without them",
+                      stream_->offset()));
+    }
     return input_.checkUnchanged();
   }
 

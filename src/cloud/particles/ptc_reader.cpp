@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/fixed_record_reader.h"
 
 namespace surfeit {
@@ -45,6 +46,7 @@ class PtcReader : public FixedRecordReader {
     SURFEIT_ASSIGN_OR_RETURN(const bool lacks_radii, lacksRadii(input, header));
     auto reader = std::unique_ptr<PtcReader>(new PtcReader(std::move(input), std::move(header)));
     reader->lacks_radii_ = lacks_radii;
+    reader->refuseBytesBehind();
     SURFEIT_RETURN_IF_ERROR(reader->addChannels(options.channels));
     SURFEIT_RETURN_IF_ERROR(
         reader->setRecords(reader->header_.data_offset, reader->header_.recordBytes()));
@@ -59,7 +61,7 @@ class PtcReader : public FixedRecordReader {
     std::vector<std::string> notes;
     if (lacks_radii_) notes.emplace_back("all radii are 0: the points are read without sizes");
     if (trailingBytes() > 0) {
-      notes.push_back(fmt::format("{} bytes after the last point are not read", trailingBytes()));
+      notes.push_back(noteOfBytesBehind(trailingBytes(), "point"));
     }
     return notes;
   }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/counted_row_reader.h"
 #include "core/assert.h"
 
@@ -72,8 +73,16 @@ Result<Bytes> FixedRecordReader::readNext(std::size_t max_rows, AlignedBuffer& b
     }
     rows = Bytes(buffer.data(), size);
   }
-  if (next_row_ == element_.count) SURFEIT_RETURN_IF_ERROR(input_.checkUnchanged());
+  if (next_row_ == element_.count) SURFEIT_RETURN_IF_ERROR(checkEnd());
   return rows;
+}
+
+Status FixedRecordReader::checkEnd() {
+  if (refuses_bytes_behind_) {
+    const std::uint64_t end = data_offset_ + element_.count * record_bytes_;
+    SURFEIT_RETURN_IF_ERROR(checkNothingBehind(input_, end, "point"));
+  }
+  return input_.checkUnchanged();
 }
 
 Result<Bytes> FixedRecordReader::readRecords(std::size_t count, AlignedBuffer& buffer) {

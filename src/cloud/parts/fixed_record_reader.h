@@ -31,6 +31,9 @@ class FixedRecordReader : public RowReader {
   Status setRecords(std::uint64_t data_offset, std::size_t record_bytes);
   // Bytes behind the last record; 0 when the file is compressed.
   std::uint64_t trailingBytes() const;
+  // From now on, bytes behind the last record of a compressed file are refused when it is reached:
+  // only then they show.
+  void refuseBytesBehind() { refuses_bytes_behind_ = true; }
   // Turns `count` records into rows of element_.
   virtual void decodeRecords(const std::byte* records, std::size_t count,
                              std::byte* rows) const = 0;
@@ -42,12 +45,14 @@ class FixedRecordReader : public RowReader {
 
  private:
   Result<Bytes> readNext(std::size_t max_rows, AlignedBuffer& buffer);
+  Status checkEnd();
   // A view of the next records, all of them.
   Result<Bytes> readRecords(std::size_t count, AlignedBuffer& buffer);
 
   std::uint64_t data_offset_ = 0;
   std::size_t record_bytes_ = 1;
   std::uint64_t next_row_ = 0;
+  bool refuses_bytes_behind_ = false;
   Status failure_;  // of the last read, until the next seek
   AlignedBuffer records_;
 };

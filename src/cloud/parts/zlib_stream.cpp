@@ -91,6 +91,8 @@ Status ZlibStream::rewind() {
 
 Result<std::size_t> ZlibStream::read(std::span<std::byte> bytes) { return state_->read(bytes); }
 
+std::uint64_t ZlibStream::offset() const { return state_->next - state_->zlib.avail_in; }
+
 bool inflateWhole(Bytes packed, std::span<std::byte> bytes) {
   if (packed.size() > kMaxStep || bytes.size() > kMaxStep) return false;
   z_stream zlib{};

@@ -28,6 +28,8 @@ class ZlibStream {
   // Decodes up to bytes.size() bytes; fewer only where the stream ends. kCorruption, naming the
   // byte of the file, when the stream is damaged or the file ends inside it.
   Result<std::size_t> read(std::span<std::byte> bytes);
+  // The byte of the file behind those that were decoded so far.
+  std::uint64_t offset() const;
 
  private:
   struct State;

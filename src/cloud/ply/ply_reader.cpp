@@ -241,10 +241,13 @@ struct PlyReader::State {
   }
 
   Status notTheEnd(std::string_view found, std::uint64_t offset) const {
-    return Status::corruption(
-        fmt::format("{}: {} at {} after the last element, expected the end of the file: the header "
-                    "counts fewer rows",
-                    file().path(), found, offset));
+    return Status::corruption(fmt::format(
+        "{}: {} at {} after the last element, expected the end of the file: the header "
+        "counts fewer rows{}",
+        file().path(), found, offset,
+        isAscii() ? ""
+                  : ", or it was written or copied in text mode, which puts a byte 13 in "
+                    "front of each byte 10: save or copy it in binary mode"));
   }
 
   // What the file can hold bounds every count before anyone uses it; sums cannot overflow later.

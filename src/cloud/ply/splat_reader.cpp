@@ -84,6 +84,9 @@ class SplatReader final : public RowReader {
     }
     for (const char* name : kFloats) element_.properties.push_back({name, ValueType::kFloat32});
     element_.properties.push_back({kTwoSided, ValueType::kUint8});
+    for (std::size_t i = copies_.size(); i < element_.properties.size(); ++i) {
+      element_.properties[i].is_made = true;
+    }
     packRow(element_);
     has_codes_ = hasCodes(from);
     for (std::size_t i = 0; i < std::size(kNeeded); ++i) {

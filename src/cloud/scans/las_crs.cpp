@@ -22,7 +22,7 @@ constexpr std::uint16_t kModelType = 1024, kCitation = 1026, kGeographic = 2048,
                         kProjectedCitation = 3073, kProjectedUnit = 3076, kVertical = 4096,
                         kVerticalUnit = 4099, kUserDefined = 32767;
 constexpr std::uint16_t kProjectedModel = 1, kGeographicModel = 2, kGeocentricModel = 3;
-constexpr std::string_view kEpsg = "EPSG:", kUnitWords = " vertical unit ";
+constexpr std::string_view kEpsg = "EPSG:";
 constexpr std::uint16_t kDegrees = 9102, kDegreesToo = 9122;  // angles
 constexpr std::size_t kMostData = 65535;                      // of a record before the points
 
@@ -101,6 +101,22 @@ bool isOtherAngle(const Keys& keys) {
          keys.angular_unit != kDegrees && keys.angular_unit != kDegreesToo;
 }
 
+// As words behind the system, where they do not follow from its codes.
+std::string unitsOf(const Keys& keys) {
+  std::string text;
+  if (keys.vertical_unit != 0) {
+    text += fmt::format("{}{}", kVerticalUnitWords, keys.vertical_unit);
+  }
+  const double metres = crsUnitOfCode(keys.unit).metres;
+  const CrsUnit usual = crsUnitOfProjected(keys.projected);
+  const bool is_usual = usual.name.empty() ? metres == 1 : metres == usual.metres;
+  if (keys.unit != 0 && keys.unit != kUserDefined && !is_usual) {
+    text += fmt::format("{}{}", kUnitWords, keys.unit);
+  }
+  if (isOtherAngle(keys)) text += fmt::format("{}{}", kAngularUnitWords, keys.angular_unit);
+  return text;
+}
+
 // The number behind `words`, where these end what stands before the first blank of `text`; else 0.
 std::uint16_t numberBehind(std::string_view text, std::string_view words) {
   const std::size_t at = text.find(words);
@@ -129,7 +145,8 @@ std::vector<std::uint16_t> keysOf(std::string_view text) {
   put(is_geocentric || is_geographic ? kGeographic : kProjected, code);
   put(kAngularUnit, is_geographic ? angularUnitOf(text) : std::uint16_t{0});
   put(kVertical, numberBehind(text, "+"));
-  put(kVerticalUnit, numberBehind(text, kUnitWords));
+  put(kVerticalUnit, unitCodeIn(text, kVerticalUnitWords));
+  put(kProjectedUnit, unitCodeIn(text, kUnitWords));
   return words;
 }
 
@@ -152,18 +169,6 @@ std::vector<std::string> LasCrs::comments() const {
     comments.push_back(std::string(kCrsComment) + keys);
   }
   return comments;
-}
-
-std::string LasCrs::unitNote() const {
-  if (!text_.empty()) return {};
-  Keys said;
-  for (std::size_t at = 4; at + 4 <= keys_.size(); at += 4) {
-    std::uint16_t* const number = said.find(keys_[at]);
-    if (number != nullptr && keys_[at + 1] == 0) *number = keys_[at + 3];
-  }
-  const CrsUnit vertical =
-      said.vertical_unit != 0 ? crsUnitOfCode(said.vertical_unit) : crsUnitOfHeights(said.vertical);
-  return noteOfCrsUnits({crsUnitOfCode(said.unit), vertical});
 }
 
 std::string LasCrs::keysComment() const {
@@ -190,12 +195,10 @@ std::string LasCrs::keysComment() const {
     if (said.vertical != 0 && said.vertical != kUserDefined) {
       text += fmt::format("+{}", said.vertical);
     }
-    if (said.vertical_unit != 0) text += fmt::format("{}{}", kUnitWords, said.vertical_unit);
-    if (isOtherAngle(said)) text += fmt::format("{}{}", kAngularUnitWords, said.angular_unit);
+    text += unitsOf(said);
     if (!citation.empty()) text += " " + citation;
   } else {
-    text += citation.empty() ? "by GeoTIFF keys without a code" : citation;
-    if (isOtherAngle(said)) text += fmt::format("{}{}", kAngularUnitWords, said.angular_unit);
+    text += (citation.empty() ? "by GeoTIFF keys without a code" : citation) + unitsOf(said);
   }
   return text;
 }

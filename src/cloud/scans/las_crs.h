@@ -19,9 +19,6 @@ class LasCrs {
   void add(std::uint16_t record_number, Bytes data);
   // At most one for the text and one for the keys.
   std::vector<std::string> comments() const;
-  // What is to be told of units of length that keys state (cloud/crs_units.h); mostly nothing.
-  // Those of text are told with the comments (cloud/comment_notes.h).
-  std::string unitNote() const;
 
  private:
   std::string keysComment() const;

@@ -306,7 +306,6 @@ Status readRecords(ByteInput& input, LasHeader& header) {
     }
   }
   header.crs = crs.comments();
-  if (std::string note = crs.unitNote(); !note.empty()) header.notes.push_back(std::move(note));
   if (other_count > 0) {
     others.pop_back();
     header.notes.push_back(fmt::format("records of variable length are kept only by .las:{}{}",

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "cloud/number_change.h"
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/counted_row_reader.h"
 #include "cloud/parts/fixed_record_reader.h"
 #include "cloud/parts/property_renames.h"
@@ -261,6 +262,7 @@ class PcdBinaryReader final : public FixedRecordReader {
     element_.name = "vertex";
     element_.count = header_.count;
     SURFEIT_ASSIGN_OR_RETURN(layout_, PcdLayout::create(header_, renames, path(), element_));
+    refuseBytesBehind();
     return setRecords(header_.data_offset, layout_.recordBytes());
   }
 
@@ -396,6 +398,8 @@ class PcdCompressedReader final : public CountedRowReader {
       return Status::corruption(fmt::format("{}: file ends early: {} bytes, expected {} at {}",
                                             path_, *input_.size(), sizes[0], begin));
     }
+    if (input_.size()) addNote(noteOfBytesBehind(*input_.size() - begin - sizes[0], "point"));
+    SURFEIT_RETURN_IF_ERROR(checkNothingBehind(input_, begin + sizes[0], "point"));
     SURFEIT_ASSIGN_OR_RETURN(TemporaryFile spool, TemporaryFile::create(spoolDirectory()));
     spool_.emplace(std::move(spool));
     return decodeLzf(input_, begin, sizes[0], sizes[1], *spool_);

@@ -117,11 +117,26 @@ Status severalReadings(std::size_t first, std::size_t count, const std::vector<N
                   first + 1, first + count, text, choice));
 }
 
+// Seconds since 1970, or thousandths, millionths, billionths of them: no map has such places.
+bool areTimes(const XyzColumn& column) {
+  constexpr double kLeast = 1e9, kLargest = 4e9;
+  for (const double scale : {1., 1e3, 1e6, 1e9}) {
+    if (column.least >= kLeast * scale && column.largest <= kLargest * scale) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 // Places on a line of a grid are whole numbers along all axes.
 Status checkFirstXyzColumn(const XyzTable& table) {
   const std::span<const XyzColumn> columns = table.columns;
+  if (columns.size() > 3 && table.row_count > 0 && columns[0].are_numbers && areTimes(columns[0])) {
+    return Status::corruption(fmt::format(
+        "column 1 has no name and runs from {:.15g} to {:.15g}: it may be a time, or x; say which: "
+        "--channels 1=gps_time,2=x,3=y,4=z or --channels 1=x,2=y,3=z",
+        columns[0].least, columns[0].largest));
+  }
   const bool may_count = columns.size() > 3 && table.row_count >= kLeastNumbered &&
                          columns[0].are_wholes && columns[0].counts_rows &&
                          std::any_of(columns.begin() + 1, columns.begin() + 4,

@@ -50,8 +50,8 @@ struct XyzTable {
 Result<XyzTable> scanXyz(LineSource& source, std::span<const TextColumn> columns, TextExtras extras,
                          std::uint64_t pts_count);
 
-// Surveys number their points: 1 x y z. kCorruption, with both readings, when the first of four
-// columns or more may do so.
+// Surveys number their points: 1 x y z, and robots stamp them with a time. kCorruption, with both
+// readings, when the first of four columns or more may be so.
 Status checkFirstXyzColumn(const XyzTable& table);
 
 // Names of columns that no header names: x y z, then from left to right

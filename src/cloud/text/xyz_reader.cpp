@@ -13,6 +13,7 @@
 #include "cloud/text/xyz_decimals.h"
 #include "cloud/text/xyz_head.h"
 #include "cloud/text/xyz_layout.h"
+#include "cloud/text/xyz_units.h"
 #include "core/assert.h"
 
 namespace surfeit {
@@ -30,6 +31,11 @@ bool hasCommasInAndOutOfQuotes(std::string_view line) {
   }
   return has_inner && has_outer;
 }
+
+constexpr const char* kAnglesAdvice =
+    ", which are angles, expected lengths: reproject them first, to UTM for example; or, where "
+    "they "
+    "are no angles, name the columns (--channels 1=x,2=y,3=z)";
 
 bool isPlaceColumn(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
 
@@ -94,6 +100,7 @@ class XyzReader final : public CountedRowReader {
             path_, source_.lineNumber(), quoteText(line), adviceFor(line)));
       }
       if (kind == XyzHead::Line::kData) {
+        if (renames_.empty() && hasAngles(line)) return angles(line);
         data_offset_ = source_.offset();
         data_line_ = source_.lineNumber();
         extras_.has_counts = head_.hasCount();
@@ -103,11 +110,20 @@ class XyzReader final : public CountedRowReader {
     }
   }
 
+  Status angles(std::string_view line) const {
+    return Status::corruption(fmt::format("{}: line {}: found {}{}", path_, source_.lineNumber(),
+                                          quoteText(line), kAnglesAdvice));
+  }
+
   // How a line that is neither of the head nor a row can be read after all.
   static std::string adviceFor(std::string_view line) {
+    if (hasAngles(line)) return kAnglesAdvice;
     if (std::any_of(line.begin(), line.end(), [](char c) { return (c & 0x80) != 0; })) {
       return ": it has characters that are not ASCII, such as blanks that do not break or other "
              "signs for minus: replace them";
+    }
+    if (line.find('\'') != line.npos) {
+      return ": numbers have no apostrophes between thousands: leave them out (tr -d \"'\")";
     }
     const std::vector<std::string_view> words = wordsOf(line, kMaxXyzColumns);
     if (words.size() < 3 && std::all_of(words.begin(), words.end(), isTextNumber)) {

@@ -80,6 +80,45 @@ bool isAngularUnit(std::string_view unit) {
   return isIn(kAngles, lowerOf(unit));
 }
 
+bool hasAngles(std::string_view line) {
+  // Of UTF-8, and of Latin-1 where no UTF-8 is
+  for (std::size_t at = 1; at < line.size(); ++at) {
+    const bool is_behind_digit = std::isdigit(static_cast<unsigned char>(line[at - 1])) != 0;
+    const std::string_view rest = line.substr(at);
+    const bool is_degree = rest.starts_with("\xC2\xB0") || rest.starts_with("\xC2\xBA") ||
+                           rest[0] == '\xB0' || rest[0] == '\xBA';
+    if (is_behind_digit && is_degree) return true;
+  }
+  // Of words: digits, a sign, digits, a sign, and so on; or a number and a letter
+  std::size_t angles = 0, east = 0, north = 0;
+  for (std::size_t at = 0; at < line.size();) {
+    const std::size_t end = std::min(line.find_first_of(" ,;\t|", at), line.size());
+    std::string_view word = line.substr(at, end - at);
+    at = end + 1;
+    if (word.empty()) continue;
+    const char last = word.back();
+    const bool is_compass = last == 'E' || last == 'W' || last == 'N' || last == 'S';
+    if (is_compass) {
+      (last == 'E' || last == 'W' ? east : north) += 1;
+      word.remove_suffix(1);
+      if (word.empty()) continue;
+    }
+    std::size_t signs = 0;
+    bool has_degrees = false;  // 2'600'000 is a number with thousands
+    bool is_angle = std::isdigit(static_cast<unsigned char>(word.front())) != 0 ||
+                    word.front() == '-' || word.front() == '+';
+    for (const char c : word.substr(std::min<std::size_t>(1, word.size()))) {
+      const bool is_sign = std::string_view("dms:'\"").find(c) != std::string_view::npos;
+      signs += is_sign ? 1 : 0;
+      has_degrees = has_degrees || c == 'd' || c == ':';
+      is_angle = is_angle && (is_sign || c == '.' || std::isdigit(static_cast<unsigned char>(c)));
+    }
+    if (is_compass && !is_angle) return false;  // words
+    angles += is_angle && signs >= 2 && has_degrees ? 1 : 0;
+  }
+  return angles >= 2 || (east == 1 && north == 1);
+}
+
 NameWithUnit splitUnit(std::string_view word) {
   word = trimmedLine(word);
   const std::size_t bracket = word.find_first_of("([");

@@ -18,6 +18,10 @@ NameWithUnit splitUnit(std::string_view word);
 bool isKnownUnit(std::string_view unit);
 bool isAngularUnit(std::string_view unit);
 
+// Whether a line has angles in degrees, minutes and seconds (7°30'12", 7d30m12s, 7:30:12), or
+// numbers with a point of the compass (7.5E, 46 30 12 N).
+bool hasAngles(std::string_view line);
+
 // What the units of lengths mean, one sentence: numbers stay as the file has them. Empty where all
 // are metres or nothing is said. `names` are ours, `file_names` those of the file, column by
 // column.

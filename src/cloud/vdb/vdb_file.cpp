@@ -206,7 +206,7 @@ std::string VdbGrid::text(std::string_view metadata_name) const {
 
 Result<std::shared_ptr<const VdbFile>> VdbFile::open(const std::string& path, Access access) {
   SURFEIT_ASSIGN_OR_RETURN(InputFile opened, InputFile::open(path, access));
-  auto file = std::make_shared<VdbFile>(VdbFile{std::move(opened), 0, {}, {}});
+  auto file = std::make_shared<VdbFile>(VdbFile{std::move(opened), 0, {}, {}, 0});
   const InputFile& input = file->input;
   VdbCursor cursor(input, 0, input.size());
   SURFEIT_RETURN_IF_ERROR(readHeader(cursor, file->version));
@@ -227,6 +227,7 @@ Result<std::shared_ptr<const VdbFile>> VdbFile::open(const std::string& path, Ac
     file->grids.push_back(std::move(grid));
     descriptors.push_back(std::move(descriptor));
   }
+  file->bytes_behind = cursor.left();
   for (std::size_t i = 0; i < file->grids.size(); ++i) {
     if (descriptors[i].instance_of.empty()) continue;
     SURFEIT_RETURN_IF_ERROR(shareTree(cursor, file->grids, descriptors, i, file->grids[i]));

@@ -70,6 +70,7 @@ struct VdbFile {
   std::uint32_t version = 0;
   std::vector<VdbMetadata> metadata;
   std::vector<VdbGrid> grids;
+  std::uint64_t bytes_behind = 0;  // the last grid
 };
 
 // The first bytes of every file.

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/vdb/vdb_coding.h"
 #include "cloud/vdb/vdb_points_layout.h"
 #include "cloud/vdb/vdb_tree.h"
@@ -107,6 +108,9 @@ Status VdbPointsReader::declareAttribute(std::size_t index, const RowReaderOptio
 Status VdbPointsReader::declare(const RowReaderOptions& options) {
   element_.name = "vertex";
   element_.count = layout_.point_count;
+  if (std::string note = noteOfBytesBehind(file_->bytes_behind, "grid"); !note.empty()) {
+    notes_.push_back(std::move(note));
+  }
   const auto& attributes = layout_.attributes;
   const auto position = std::find_if(attributes.begin(), attributes.end(), [](const auto& a) {
     return a.name == "P" && a.type.has_value() && a.type->components * a.stride == 3;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "cloud/parts/bytes_behind.h"
 #include "cloud/vdb/vdb_attribute.h"
 #include "cloud/vdb/vdb_points_reader.h"
 
@@ -121,6 +122,9 @@ Status VdbVolumeReader::declareVolume(const VdbGrid& grid, const std::string& na
 
 Status VdbVolumeReader::declare(const RowReaderOptions& options) {
   element_.name = "vertex";
+  if (std::string note = noteOfBytesBehind(file_->bytes_behind, "grid"); !note.empty()) {
+    notes_.push_back(std::move(note));
+  }
   SURFEIT_RETURN_IF_ERROR(countVoxels(element_.count, position_type_));
   const auto add = [&](const char* name, std::size_t components, ChannelKind kind, ValueType type,
                        std::size_t& offset, bool& is_there) {

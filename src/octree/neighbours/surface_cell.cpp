@@ -27,6 +27,9 @@ constexpr float kCoincident = 1e-3f;
 
 // Of a slope from the place to a neighbour that is another sheet's, not its own.
 constexpr float kSteep = 0.7f;
+// Neighbours whose normals differ by more than 60 degrees are of another surface, which meets this
+// one at an edge (as of photons, photons/nearest_photons.h).
+constexpr float kLeastCosine = 0.5f;
 // At the edge of a surface cells are closed by other places of the edge, far outside: they reach
 // farther than this, in distances of the places that cut them.
 constexpr float kSpike = 2;
@@ -171,7 +174,11 @@ struct SurfaceCells::Scratch {
             0};
   }
   // Not on the other side of something thin.
-  bool mayShareSheet(const Neighbour& n) const { return glm::dot(n.normal, own_normal) >= 0; }
+  // Not around an edge: there the surface ends, whatever lies beyond.
+  bool mayShareSheet(const Neighbour& n) const {
+    const bool are_known = own_normal != glm::vec3(0) && n.normal != glm::vec3(0);
+    return !are_known || glm::dot(n.normal, own_normal) >= kLeastCosine;
+  }
   bool isLine() const { return fits.is_line[lane] > 0; }
 
   void begin(std::size_t of_lane);

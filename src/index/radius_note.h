@@ -1,0 +1,20 @@
+// Sizes that seem to be in another unit than the places.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "surfeit/surfel.h"
+#include "surfels/surfel_source.h"
+
+namespace surfeit {
+
+// A sentence with both lengths and the way out, when half of the radii of `sample`, surfels from
+// all over a cloud of `count`, are a hundred times as large as the spacing of neighbours, or a
+// hundredth of it; else nothing. The sample alone tells the spacing: on surfaces it is as many
+// times closer as the root of how many surfels one of the sample stands for. `names`: of the cloud.
+std::string noteOfRadii(std::span<const Surfel> sample, std::uint64_t count,
+                        const SizeNames& names);
+
+}  // namespace surfeit
