@@ -46,11 +46,11 @@ constexpr Golden kGoldens[] = {
     {"v1.sft", 12531938469041694647ull, 8557694847862354260ull, false, false, 1},
     {"v1_groups.sft", 12687918996693723113ull, 11431106272069044126ull, true, false, 1},
     {"v1_long_sides.sft", 16580172462110769372ull, 8557694847862354260ull, false, true, 1},
-    {"v2.sft", 12531938469041694647ull, 3774583152376164457ull, false, false},
-    {"v2_groups.sft", 12687918996693723113ull, 6009126428172456815ull, true, false},
-    {"v2_long_sides.sft", 16580172462110769372ull, 3774583152376164457ull, false, true},
-    {"v3_opacity.sft", 7818277089028598686ull, 16727090283409600907ull, false, false, 3},
-    {"v3_tints.sft", 12228443692316353389ull, 11119776789287335687ull, false, false, 3, true},
+    {"v2.sft", 10165443847327975324ull, 10635611144192050852ull, false, false},
+    {"v2_groups.sft", 7556546971573103548ull, 8745109394357566767ull, true, false},
+    {"v2_long_sides.sft", 4948871309053789868ull, 10635611144192050852ull, false, true},
+    {"v3_opacity.sft", 16512291345908579062ull, 1344501436108119218ull, false, false, 3},
+    {"v3_tints.sft", 12548118409062889291ull, 12700620869807740578ull, false, false, 3, true},
 };
 // The zstd that compressed them: another one may store the same payloads in other bytes.
 constexpr unsigned kZstdVersion = 10504;
