@@ -13,7 +13,7 @@ namespace {
 
 // Roots of the area of a surfel within which its neighbours are: on a plane, some 19 of its size.
 constexpr float kReach = 2.5f;
-// One surfel of so many is asked. It is odd, lest rows of a grid are left out.
+// One disk of so many is asked. It is odd, lest rows of a grid are left out.
 constexpr std::size_t kAskedApart = 3;
 // Fewer that were asked do not decide.
 constexpr std::size_t kFewestVotes = 4;
@@ -28,9 +28,9 @@ constexpr float kRidgeReach = 0.5f, kOffRidge = 0.72f;
 constexpr int kFewestBeside = 3;
 // Spheres with fewer neighbours do not touch them: half of a plane has 9.
 constexpr std::size_t kFewestAround = 5;
-// Spheres around which others fill more of a volume (volumePart) lie in one. Samples of a plane
-// with noise of half a spacing come to .5, samples of a volume to .87.
-constexpr float kVolume = 0.6f;
+// Spheres around which others fill more of a volume (volumePart) lie in one: three in four of those
+// that lie anywhere, one in ten of a plane with noise of .4 spacings.
+constexpr float kVolume = 0.5f;
 
 bool mayBeLoose(const Surfel& surfel) { return surfel.isSphere() || surfel.isTwoSided(); }
 
@@ -104,19 +104,11 @@ void LooseSurfels::ask(std::span<const Surfel> cell, bool spheres, const Bounds3
     return a.position.x != b.position.x ? a.position.x < b.position.x : a.surfel < b.surfel;
   });
   for (const Place& place : places_) {
-    if (place.surfel % kAskedApart != 0) continue;
+    if (!spheres && place.surfel % kAskedApart != 0) continue;
     const float reach = kReach * std::sqrt(cell[place.surfel].area);
     Vote& vote = votes_[place.surfel];
-    if (spheres) {
-      const glm::vec3 margin(reach);
-      if (!contains(known, place.position - margin) || !contains(known, place.position + margin)) {
-        continue;
-      }
-      vote = voteOfSphere(place, reach);
-    } else {
-      vote = voteOfDisk(cell, place, reach, known);
-    }
-    all_.add(vote);
+    vote = spheres ? voteOfSphere(place, reach, known) : voteOfDisk(cell, place, reach, known);
+    all_[spheres].add(vote);
   }
 }
 
@@ -134,7 +126,9 @@ void LooseSurfels::visitAround(const Place& place, float reach, const Visit& vis
   }
 }
 
-LooseSurfels::Vote LooseSurfels::voteOfSphere(const Place& place, float reach) const {
+// At the border of the cell a part of a plane is a plane, and of a volume a volume.
+LooseSurfels::Vote LooseSurfels::voteOfSphere(const Place& place, float reach,
+                                              const Bounds3& known) const {
   std::size_t count = 1;  // itself
   glm::vec3 sum(0);
   SymmetricMatrix squares{};
@@ -145,7 +139,10 @@ LooseSurfels::Vote LooseSurfels::voteOfSphere(const Place& place, float reach) c
       squares.entries[i] += offset[SymmetricMatrix::kRow[i]] * offset[SymmetricMatrix::kColumn[i]];
     }
   });
-  if (count <= kFewestAround) return Vote::kLone;
+  if (count <= kFewestAround) {
+    const glm::vec3 &p = place.position, margin(reach);
+    return contains(known, p - margin) && contains(known, p + margin) ? Vote::kLone : Vote::kNone;
+  }
   for (std::size_t i = 0; i < squares.entries.size(); ++i) {
     squares.entries[i] -=
         sum[SymmetricMatrix::kRow[i]] * sum[SymmetricMatrix::kColumn[i]] / float(count);
@@ -180,14 +177,19 @@ LooseSurfels::Vote LooseSurfels::voteOfDisk(std::span<const Surfel> cell, const 
 }
 
 void LooseSurfels::mark(std::size_t begin, std::span<Surfel> part) const {
-  Votes votes;
-  for (std::size_t i = begin; i < begin + part.size(); ++i) votes.add(votes_[i]);
-  if (votes.count() < kFewestVotes) votes = all_;
-  if (votes.pieces + votes.lone <= votes.tiles) return;
-  std::uint16_t marks = kSurfelLoose;
-  if (votes.lone > votes.pieces) marks |= kSurfelLone;
-  for (Surfel& surfel : part) {
-    if (mayBeLoose(surfel)) surfel.flags |= marks;
+  std::array<Votes, 2> votes;
+  for (std::size_t i = 0; i < part.size(); ++i) votes[part[i].isSphere()].add(votes_[begin + i]);
+  for (std::size_t kind = 0; kind < 2; ++kind) {
+    if (votes[kind].count() < kFewestVotes) votes[kind] = all_[kind];
+  }
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    Surfel& surfel = part[i];
+    const Vote own = votes_[begin + i];
+    const bool knows = surfel.isSphere() && own != Vote::kNone;
+    const Vote vote = knows ? own : votes[surfel.isSphere()].most();
+    if (!mayBeLoose(surfel) || vote == Vote::kTile) continue;
+    surfel.flags |= kSurfelLoose;
+    if (vote == Vote::kLone) surfel.flags |= kSurfelLone;
   }
 }
 

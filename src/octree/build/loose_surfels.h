@@ -3,6 +3,7 @@
 // them tells.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -19,12 +20,13 @@ inline constexpr std::size_t kLooseCell = 1024, kLoosePart = 64;
 // What the surfels of a cell tell of themselves; then its parts are marked.
 class LooseSurfels {
  public:
-  // Asks some surfels of the cell `cube`. Of what lies outside, nothing is known, but that nothing
-  // lies outside `all`. False: it has only one-sided disks.
+  // Asks the spheres and some disks of the cell `cube`. Of what lies outside, nothing is known, but
+  // that nothing lies outside `all`. False: it has only one-sided disks.
   bool look(std::span<const Surfel> cell, const Bounds3& cube, const Bounds3& all);
-  // Sets kSurfelLoose and kSurfelLone of the spheres and two-sided surfels of a part of the cell,
-  // if most of those that were asked are so: of the part, where it has enough, else of the cell.
-  // `begin`: number of the part's first surfel in the cell.
+  // Sets kSurfelLoose and kSurfelLone of the spheres and two-sided surfels of a part of the cell:
+  // spheres know by themselves. Of others, and of spheres at the border, most of those that were
+  // asked tell: of the part, where it has enough, else of the cell. `begin`: number of the part's
+  // first surfel in the cell.
   void mark(std::size_t begin, std::span<Surfel> part) const;
 
  private:
@@ -41,10 +43,14 @@ class LooseSurfels {
       lone += vote == Vote::kLone;
     }
     std::size_t count() const { return tiles + pieces + lone; }
+    Vote most() const {
+      if (pieces + lone <= tiles) return Vote::kTile;
+      return lone > pieces ? Vote::kLone : Vote::kPiece;
+    }
   };
 
   void ask(std::span<const Surfel> cell, bool spheres, const Bounds3& known);
-  Vote voteOfSphere(const Place& place, float reach) const;
+  Vote voteOfSphere(const Place& place, float reach, const Bounds3& known) const;
   Vote voteOfDisk(std::span<const Surfel> cell, const Place& place, float reach,
                   const Bounds3& known) const;
   template <typename Visit>
@@ -52,7 +58,7 @@ class LooseSurfels {
 
   std::vector<Vote> votes_;
   std::vector<Place> places_;  // of one kind, along x
-  Votes all_;
+  std::array<Votes, 2> all_;   // of disks, of spheres
 };
 
 }  // namespace surfeit
