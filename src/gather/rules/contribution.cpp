@@ -142,7 +142,8 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
   const float each = node.opacity(color);
   const float opacity = layersOpacity(each, shown / surface);
   if (!(thicket > 0 && outline > 0)) return {surface, opacity, most};
-  const float hidden = outline * thicketOpacity(each * std::min(shown, node.area), outline);
+  const float hidden = outline * thicketOpacity(each * std::min(shown, node.area), outline,
+                                                float(node.surfel_count));
   const float area = surface + thicket * (outline - surface), solid = opacity * surface;
   return {area, (solid + thicket * (hidden - solid)) / area, std::max(area, most)};
 }

@@ -38,8 +38,11 @@ inline float inverseLayerGap(float reach) {
 inline constexpr int kHullSide = 4;  // samples along a pixel
 inline constexpr std::uint32_t kHullSamples = 0xffff;
 
-// What things of this area hide of an outline, spread in it at random (Beer and Lambert).
-inline float thicketOpacity(float area, float outline) { return 1 - std::exp(-area / outline); }
+// What so many pieces, of this area together, hide of an outline, spread in it at random: all that
+// one covers, and of many as Beer and Lambert say.
+inline float thicketOpacity(float area, float outline, float pieces) {
+  return 1 - std::pow(1 - std::min(1.f, area / (outline * pieces)), pieces);
+}
 
 // What so many layers of this opacity hide together where each covers all; `depth` below 1: one.
 inline float layersOpacity(float opacity, float depth) {
