@@ -430,6 +430,13 @@ TEST(RoughNode, OfAThicketCoversItsOutlineInPart) {
   node.covariance = {{.2f, .2f, .2f, 0, 0, 0}};
   const glm::vec3 direction = {0, 0, 1};
   for (const float shown : {.1f, 1.f, 10.f}) {
+    node.surfel_count = 1;
+    const float alone = roughCover(node, direction, shown, 1).opacity;
+    EXPECT_NEAR(alone, std::min(1.f, shown / kPi), .01f);
+    node.surfel_count = 2;
+    const float missed = std::max(0.f, 1 - shown / (2 * kPi));
+    EXPECT_NEAR(roughCover(node, direction, shown, 1).opacity, 1 - missed * missed, .01f);
+    node.surfel_count = 1000;
     const RoughCover leaves = roughCover(node, direction, shown, 1);
     EXPECT_NEAR(leaves.area, kPi, .02f);
     EXPECT_NEAR(leaves.opacity, 1 - std::exp(-shown / kPi), .01f);
