@@ -39,6 +39,11 @@ bool contains(const Bounds3& box, const glm::vec3& p) {
          p.y <= box.max.y && p.z <= box.max.z;
 }
 
+// Whether all within `reach` of p lies in it.
+bool holdsAround(const Bounds3& box, const glm::vec3& p, float reach) {
+  return contains(box, p - glm::vec3(reach)) && contains(box, p + glm::vec3(reach));
+}
+
 // Directions on a plane, in 16 sectors.
 class Sectors {
  public:
@@ -140,8 +145,7 @@ LooseSurfels::Vote LooseSurfels::voteOfSphere(const Place& place, float reach,
     }
   });
   if (count <= kFewestAround) {
-    const glm::vec3 &p = place.position, margin(reach);
-    return contains(known, p - margin) && contains(known, p + margin) ? Vote::kLone : Vote::kNone;
+    return holdsAround(known, place.position, reach) ? Vote::kLone : Vote::kNone;
   }
   for (std::size_t i = 0; i < squares.entries.size(); ++i) {
     squares.entries[i] -=
@@ -156,9 +160,11 @@ LooseSurfels::Vote LooseSurfels::voteOfDisk(std::span<const Surfel> cell, const 
                                             float reach, const Bounds3& known) const {
   const glm::vec3& normal = cell[place.surfel].normal;
   Sectors around(normal), beside(normal);
-  for (int i = 0; i < 8; ++i) {
-    if (!contains(known, place.position + reach * around.direction(float(i) / 8)))
+  const bool is_inside = holdsAround(known, place.position, reach);  // mostly: no direction needed
+  for (int i = 0; i < 8 && !is_inside; ++i) {
+    if (!contains(known, place.position + reach * around.direction(float(i) / 8))) {
       return Vote::kNone;
+    }
   }
   visitAround(place, reach, [&](const glm::vec3& offset, const Place& other) {
     const glm::vec3& facing = cell[other.surfel].normal;
