@@ -25,6 +25,8 @@ SceneHeader SceneDescription::header(bool full_precision) const {
   header.cube = cubeAsked(options, totals.bounds, origin);
   header.channels = totals.channels;
   header.channels.normal = header.channels.normal || normals != nullptr;
+  // Sizes from neighbours may tell the shape
+  header.channels.long_side = header.channels.long_side || totals.missing_both > 0;
   header.format_version = formatVersionFor(header.channels);
   header.full_precision = full_precision;
   return header;

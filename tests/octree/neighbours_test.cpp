@@ -266,15 +266,59 @@ TEST(SurfaceCells, MeasuredTogetherAreThoseCutOneByOne) {
   together.fit(given.places, false);
   together.measure();
   alone.fit(given.places, false);
-  std::size_t settled = 0;
+  std::size_t settled = 0, long_cells = 0;
   for (std::size_t lane = 0; lane < given.places.size(); ++lane) {
     const SurfaceCell expected = alone.cellOf(lane), found = together.cellOf(lane);
     settled += expected.is_settled ? 1 : 0;
     EXPECT_EQ(found.is_settled, expected.is_settled);
     EXPECT_NEAR(found.area, expected.area, 1e-5f * expected.area);
     EXPECT_NEAR(found.radius, expected.radius, 1e-5f * expected.radius);
+    // Either way round
+    const glm::vec3 a = found.long_side, b = expected.long_side;
+    EXPECT_LT(std::min(glm::length(a - b), glm::length(a + b)), 1e-3f * expected.radius);
+    long_cells += glm::length(b) > 0 ? 1 : 0;
   }
+  EXPECT_GT(long_cells, 0u);
   EXPECT_GT(settled, given.places.size() / 4);
+}
+
+// Neighbours on a lattice of rows: the place's cell is a rectangle.
+std::vector<Neighbour> latticeAround(const glm::vec3& along, const glm::vec3& across) {
+  std::vector<Neighbour> neighbours;
+  for (int i = -9; i <= 9; ++i) {
+    for (int j = -2; j <= 2; ++j) {
+      if (i != 0 || j != 0) neighbours.push_back({float(i) * along + float(j) * across, {}, 0});
+    }
+  }
+  std::sort(neighbours.begin(), neighbours.end(), isBefore);
+  return neighbours;
+}
+
+TEST(SurfaceCells, OfRowsAreRectangles) {
+  const glm::vec3 along = glm::normalize(glm::vec3(1, 2, 0)), across(-along.y, along.x, 0);
+  const auto sideOf = [](std::vector<Neighbour> neighbours, bool together) {
+    const CellPlace place{neighbours, glm::length(neighbours.back().offset), glm::vec3(0)};
+    SurfaceCells cells;
+    cells.fit({&place, 1}, false);
+    if (together) cells.measure();
+    return cells.cellOf(0).long_side;
+  };
+  for (const bool together : {false, true}) {
+    for (const float rows : {2.5f, 4.f, 9.f}) {
+      const glm::vec3 side = sideOf(latticeAround(along, rows * across), together);
+      EXPECT_NEAR(std::abs(glm::dot(side, across)), rows, 1e-3f * rows);
+      EXPECT_NEAR(glm::dot(side, along), 0, 1e-3f * rows);
+    }
+    EXPECT_EQ(sideOf(latticeAround(along, 1.5f * across), together), glm::vec3(0));
+    // A pair: its cells are halves of one, beside their places
+    std::vector<Neighbour> pair = latticeAround(along, across);
+    pair.insert(pair.begin(), {0.02f * along, {}, 0});
+    EXPECT_EQ(sideOf(pair, together), glm::vec3(0));
+    // Places that share a cell
+    std::vector<Neighbour> shared = latticeAround(along, 4.f * across);
+    shared.insert(shared.begin(), {1e-6f * along, {}, 0});
+    EXPECT_EQ(sideOf(shared, together), glm::vec3(0));
+  }
 }
 
 // Two scans of one surface, or a place that comes twice: one has the side, not both

@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "core/long_side.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {
@@ -91,6 +92,25 @@ TEST(NodeSums, ADiskLargerThanItsRadiusSpreadsNoFartherThanThat) {
   const Node node = sums.toNode(1, 1);
   EXPECT_FLOAT_EQ(node.covariance(0, 0), 1);
   EXPECT_FLOAT_EQ(node.covariance(2, 2), 0);
+}
+
+TEST(NodeSums, WhatHasALongSideSpreadsAsARectangle) {
+  for (const bool is_two_sided : {false, true}) {
+    Surfel surfel;
+    surfel.normal = glm::normalize(glm::vec3(1, 0, 2));
+    surfel.area = 4;
+    surfel.radius = 3;
+    if (is_two_sided) surfel.flags |= kSurfelTwoSided;
+    setLongSide({0, 6, 0}, surfel);
+    NodeSums sums;
+    sums.add(surfel);
+    const SymmetricMatrix found = sums.toNode(1, 3).covariance;
+    const glm::vec3 across = glm::cross(surfel.normal, glm::vec3(0, 1, 0));
+    // By the codes of a direction and an elongation
+    EXPECT_NEAR(quadraticForm(found, {0, 1, 0}), 36.f / 12, .05f);
+    EXPECT_NEAR(quadraticForm(found, across), 4.f / 9 / 12, .005f);
+    EXPECT_NEAR(quadraticForm(found, surfel.normal), 0, 1e-4f);
+  }
 }
 
 TEST(NodeSums, Band4GivesTheFourthMomentOfTheNormals) {

@@ -49,7 +49,7 @@ inline Status rewriteScene(const std::string& from, const std::string& to, const
 inline std::vector<LevelNode> levelNodes(const SceneHeader& header, std::span<const Node> nodes) {
   std::vector<LevelNode> level_nodes;
   for (const Node& node : nodes) {
-    LevelNode level_node{node, 0, std::acos(node.normal_cosine)};
+    LevelNode level_node{.node = node, .normal_angle = std::acos(node.normal_cosine)};
     if (!node.isLeaf()) {
       while (header.level_first_page[level_node.child_level + 1] <= node.page) {
         ++level_node.child_level;

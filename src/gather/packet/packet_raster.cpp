@@ -12,9 +12,9 @@
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
 #include "gather/rules/coverage_rules.h"
+#include "gather/rules/drawn_radius.h"
 #include "gather/rules/layers.h"
 #include "gather/rules/lobe_light.h"
-#include "gather/rules/ribbon.h"
 #include "octree/node/hidden_layers.h"
 
 namespace surfeit {

@@ -13,7 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include "gather/packet/packet_lanes-inl.h"
-#include "gather/rules/ribbon.h"
+#include "core/ribbon.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {

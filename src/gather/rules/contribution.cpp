@@ -6,9 +6,9 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "core/ribbon.h"
 #include "gather/rules/coverage_rules.h"
 #include "gather/rules/fidelity.h"
-#include "gather/rules/ribbon.h"
 
 namespace surfeit {
 float shownArea(const FacingAreas& facing, GatherSides sides) {

@@ -68,7 +68,9 @@ class SceneWriter : public SiblingSink {
   };
 
   SceneWriter(PageFileWriter file, const SceneHeader& header)
-      : file_(std::move(file)), header_(header) {}
+      : file_(std::move(file)), header_(header) {
+    header_.has_rectangles = header.channels.long_side;
+  }
   void closePage(int level);
   void completeHeader();
 

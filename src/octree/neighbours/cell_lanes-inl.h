@@ -28,7 +28,10 @@ class CellLanes {
     for (std::size_t k = 0; k < sides_; ++k) addSide(k);
     const V area = hn::Mul(Splat(0.5f), twice_area_);
     Put(area, at_.cell_area + lane_);
-    Put(hn::Div(squares_, hn::Mul(Splat(12), area)), at_.cell_mean_square + lane_);
+    const V twelve = hn::Mul(Splat(12), area);
+    Put(hn::Div(squares_, twelve), at_.cell_square + lane_);
+    Put(hn::Div(differences_, twelve), at_.cell_difference + lane_);
+    Put(hn::Div(products_, twelve), at_.cell_product + lane_);
     Put(reach_sq_, at_.cell_reach_sq + lane_);
     Put(sharers_, at_.cell_sharers + lane_);
     Put(is_cut_, at_.cell_is_cut + lane_);
@@ -67,21 +70,34 @@ class CellLanes {
     const V less = hn::Mul(Splat(1e-7f), half_sq_[k]);
     cutBy(0, k, k, less, low, high);
     cutBy(k + 1, sides_, k, hn::Neg(less), low, high);
-    const V length = hn::Sub(high, low);
-    const M is_side = hn::Gt(length, hn::Zero(D()));
+    const M is_side = hn::Gt(high, low);
     if (hn::AllFalse(D(), is_side)) return;
+    low = hn::IfThenElseZero(is_side, low), high = hn::IfThenElseZero(is_side, high);
 
     // Twice the triangle from the place to its two ends, and the squared lengths to these
-    const V half_sq = half_sq_[k], twice = hn::Mul(half_sq, length);
+    const V half_sq = half_sq_[k];
+    const V twice = hn::IfThenElseZero(is_side, hn::Mul(half_sq, hn::Sub(high, low)));
     const V low_sq = hn::Mul(low, low), high_sq = hn::Mul(high, high);
     const V most_sq = hn::Max(low_sq, high_sq);
     const V ends = hn::Add(hn::Add(low_sq, hn::Mul(low, high)), high_sq);
     const V squares = hn::Mul(half_sq, hn::Add(Splat(1.5f), hn::Mul(Splat(2), ends)));
     const V far_sq = hn::Mul(half_sq, hn::Add(Splat(0.5f), hn::Mul(Splat(2), most_sq)));
-    twice_area_ = hn::Add(twice_area_, hn::IfThenElseZero(is_side, twice));
-    squares_ = hn::Add(squares_, hn::IfThenElseZero(is_side, hn::Mul(twice, squares)));
+    twice_area_ = hn::Add(twice_area_, twice);
+    squares_ = hn::Add(squares_, hn::Mul(twice, squares));
+    addShape(k, twice, hn::Add(low, high), ends);
     reach_sq_ = hn::Max(reach_sq_, hn::IfThenElseZero(is_side, far_sq));
     if (k >= kFrame) is_cut_ = hn::IfThenElse(is_side, Splat(1), is_cut_);
+  }
+
+  // What the triangle of `twice` the area adds to the other moments: its ends are at t that have
+  // this sum, and squares with their product that add up to `ends`.
+  void addShape(std::size_t k, V twice, V sum, V ends) {
+    const V u = u_[k], v = v_[k], rest = hn::Sub(Splat(0.75f), ends);
+    const V u_v = hn::Mul(u, v), squares = hn::Sub(hn::Mul(u, u), hn::Mul(v, v));
+    const V difference = hn::Sub(hn::Mul(squares, rest), hn::Mul(Splat(3), hn::Mul(u_v, sum)));
+    const V product = hn::Add(hn::Mul(u_v, rest), hn::Mul(Splat(0.75f), hn::Mul(squares, sum)));
+    differences_ = hn::Add(differences_, hn::Mul(twice, difference));
+    products_ = hn::Add(products_, hn::Mul(twice, product));
   }
 
   // Keeps the part of the line of `k` that is nearer to the place than to others.
@@ -107,6 +123,7 @@ class CellLanes {
   V u_[kFrame + SurfaceFitLanes::kMostNeighbours], v_[kFrame + SurfaceFitLanes::kMostNeighbours];
   V half_sq_[kFrame + SurfaceFitLanes::kMostNeighbours];
   V twice_area_ = hn::Zero(D()), squares_ = hn::Zero(D()), reach_sq_ = hn::Zero(D());
+  V differences_ = hn::Zero(D()), products_ = hn::Zero(D());
   V sharers_ = Splat(1), is_cut_ = hn::Zero(D());
 };
 

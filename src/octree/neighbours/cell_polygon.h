@@ -10,6 +10,13 @@
 
 namespace surfeit {
 
+// Means over a cell, of places (u, v) from its place.
+struct CellMoments {
+  float square = 0;      // u^2 + v^2
+  float difference = 0;  // u^2 - v^2
+  float product = 0;     // u v
+};
+
 // Around the origin, cut by the lines halfway to neighbours.
 class CellPolygon {
  public:
@@ -62,14 +69,19 @@ class CellPolygon {
     }
     return 0.5f * twice;
   }
-  // The mean squared distance from the place.
-  float meanSquare() const {
-    float sum = 0;
+  CellMoments moments() const {
+    float square = 0, difference = 0, product = 0;
     for (std::size_t i = 0; i < count_; ++i) {
       const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
-      sum += (a.x * b.y - a.y * b.x) * (glm::dot(a, a) + glm::dot(a, b) + glm::dot(b, b));
+      const float cross = a.x * b.y - a.y * b.x;
+      const float xx = a.x * a.x + a.x * b.x + b.x * b.x;
+      const float yy = a.y * a.y + a.y * b.y + b.y * b.y;
+      square += cross * (xx + yy);
+      difference += cross * (xx - yy);
+      product += cross * (a.x * a.y + 0.5f * (a.x * b.y + b.x * a.y) + b.x * b.y);
     }
-    return sum / (12 * area());
+    const float scale = 1 / (12 * area());
+    return {scale * square, scale * difference, scale * product};
   }
   // Its width along a direction of unit length.
   float width(const glm::vec2& direction) const {

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "core/long_side.h"
 #include "octree/page/page_limits.h"
 
 namespace surfeit {
@@ -143,8 +144,11 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
       },
       [&](std::size_t i, const SurfaceAt& surface) {
         Surfel& surfel = surfels_[i];
+        const bool is_bare = needsSize(surfel) && surfel.radius <= kPlaceholderSize;
         if (needsSize(surfel)) applySize(surfel, surface);
         if (needsNormal(surfel)) applyNormal(surfel, surface);
+        // Spheres have no sides
+        if (is_bare && !surfel.isSphere()) setLongSide(surface.long_side, surfel);
       },
       progress_));
 

@@ -37,6 +37,15 @@ constexpr float kSpike = 2;
 constexpr float kLooseSlope = 0.3f;
 constexpr float kOpen = SurfaceFitLanes::kOpen;
 
+// A cell so many times as long as wide is a rectangle. Disks along the line of a scan would
+// overlap, and leave gaps between the lines.
+constexpr float kLongCell = 2;
+// The roots of a cell's two moments, multiplied, are its area / 12 if it is a parallelogram about
+// its place, and area / (4 pi) if an ellipse. They are more if the place lies at a side, as that of
+// two places close together: a rectangle about it would lie beside its cell. This many times area /
+// 12 is off by .38 of the half width.
+constexpr float kCentred = 1.2f;
+
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // A neighbour in the plane: beside the place, and above it.
@@ -185,6 +194,8 @@ struct SurfaceCells::Scratch {
   void flattenAll(std::span<const Neighbour> neighbours);
   float usualCutter();
   SurfaceCell cell() const;
+  SurfaceCell cell(float area, const CellMoments& moments) const;
+  glm::vec3 longSide(float area, const CellMoments& moments) const;
   void dropOthers();
   bool isSettled(float reach_sq) const {
     const float reach = places[lane].reach / unit;  // beyond which places are not known
@@ -298,9 +309,10 @@ SurfaceCell SurfaceCells::cellOf(std::size_t lane) {
   if (at.has_measures && at.fits.cell_is_cut[lane] > 0 &&
       at.isSettled(at.fits.cell_reach_sq[lane])) {
     const SurfaceFitLanes& fits = at.fits;
-    SurfaceCell cell;
-    cell.area = fits.cell_area[lane] / fits.cell_sharers[lane] * at.unit * at.unit;
-    cell.radius = std::sqrt(2 * fits.cell_mean_square[lane]) * at.unit;
+    at.sharers = fits.cell_sharers[lane];
+    SurfaceCell cell =
+        at.cell(fits.cell_area[lane],
+                {fits.cell_square[lane], fits.cell_difference[lane], fits.cell_product[lane]});
     cell.is_settled = true;
     return cell;
   }
@@ -376,18 +388,35 @@ float SurfaceCells::Scratch::usualCutter() {
 }
 
 SurfaceCell SurfaceCells::Scratch::cell() const {
-  SurfaceCell cell;
-  if (cutters.empty()) return cell;
+  if (cutters.empty()) return {};
   // Of a line all that is known is a width: the piece is a square of it
-  const bool is_strip = isLine() && polygon.touches(kOpen);
-  const float width = is_strip ? polygon.width(glm::normalize(cutters[0])) : 0;
-  const float area = is_strip ? width * width : polygon.area();
+  if (isLine() && polygon.touches(kOpen)) {
+    const float width = polygon.width(glm::normalize(cutters[0]));
+    return cell(width * width, {.square = width * width / 6});
+  }
+  return cell(polygon.area(), polygon.moments());
+}
+
+SurfaceCell SurfaceCells::Scratch::cell(float area, const CellMoments& moments) const {
+  SurfaceCell cell;
   cell.area = area / sharers * unit * unit;
-  // A disk's mean squared distance from its middle is half of its radius squared, a square's a
-  // sixth of its side squared
-  const float mean_square = is_strip ? width * width / 6 : polygon.meanSquare();
-  cell.radius = std::sqrt(2 * mean_square) * unit;
+  // A disk's mean squared distance from its middle is half of its radius squared
+  cell.radius = std::sqrt(2 * moments.square) * unit;
+  cell.long_side = longSide(area, moments);
   return cell;
+}
+
+// Of the rectangle with this area and these moments; zero of what shares it.
+glm::vec3 SurfaceCells::Scratch::longSide(float area, const CellMoments& moments) const {
+  const float apart = std::hypot(moments.difference, 2 * moments.product);
+  const float along = std::sqrt(0.5f * std::max(moments.square + apart, 0.f));
+  const float across = std::sqrt(0.5f * std::max(moments.square - apart, 0.f));
+  const bool is_long = along > kLongCell * across && across > 0;
+  if (!is_long || sharers > 1 || 12 * along * across > kCentred * area) return glm::vec3(0);
+  const float angle = 0.5f * std::atan2(2 * moments.product, moments.difference);
+  const TangentFrame plane(normal);
+  return std::sqrt(along / across * area) * unit *
+         (std::cos(angle) * plane.tangent + std::sin(angle) * plane.bitangent);
 }
 
 }  // namespace surfeit

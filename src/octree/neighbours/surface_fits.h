@@ -46,10 +46,11 @@ struct SurfaceFitLanes {
   Lanes half_sq[kMostNeighbours];
   Lanes coincident_half_sq;
   // Found
-  Lanes cell_area, cell_mean_square;  // of the distance from the place
-  Lanes cell_reach_sq;                // of the farthest corner
-  Lanes cell_sharers;                 // the place, and neighbours that share the cell
-  Lanes cell_is_cut;                  // 1: by any neighbour
+  Lanes cell_area;
+  Lanes cell_square, cell_difference, cell_product;  // CellMoments
+  Lanes cell_reach_sq;                               // of the farthest corner
+  Lanes cell_sharers;  // the place, and neighbours that share the cell
+  Lanes cell_is_cut;   // 1: by any neighbour
 };
 
 struct SurfaceFitKernel {

@@ -157,6 +157,8 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
   limit(cell, is_sparse, surface.thickness);
   surface.area = cell.area / float(std::max<std::uint64_t>(place.coincident, 1));
   surface.radius = cell.radius;
+  // Rectangles on each other would cover the area of one
+  if (place.coincident <= 1) surface.long_side = cell.long_side;
   take(place.spot.index, surface);
   return {};
 }
@@ -168,8 +170,10 @@ void SurfaceSearch::limit(SurfaceCell& cell, bool is_sparse, float thickness) co
   if (!cell.is_settled) largest = kOpenLimit * cell.neighbour_spacing;
   if (is_sparse) largest = std::min(largest, largest_sparse_radius_);
   if (thickness > kLooseThickness) largest = std::min(largest, largest_loose_radius_);
-  cell.radius = std::min(cell.radius, largest);
+  if (cell.radius <= largest) return;
+  cell.radius = largest;
   cell.area = std::min(cell.area, kPi * largest * largest);
+  cell.long_side = glm::vec3(0);  // cut off at both ends
 }
 
 // Cuts the open cell by what lies beyond its neighbours: the other rows of a scan, what is sparse

@@ -1,24 +1,42 @@
 #include "octree/node/area_sums.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "core/ribbon.h"
 #include "core/spherical_harmonics.h"
 
 namespace surfeit {
 namespace {
 
-// The mean of x x^T over a disk of area A around the origin is A / (4 pi) (I - n n^T); over the
-// disk that a sphere looks like, the same without a normal.
-double diskSpread(const Surfel& surfel) {
+// The mean of x x^T over a surfel, from its middle, within its radius. Over a disk of area A it is
+// A / (4 pi) (I - n n^T); over the disk that a sphere looks like, the same without a normal.
+std::array<double, SymmetricMatrix::kEntries> spreadOf(const Surfel& surfel) {
+  std::array<double, SymmetricMatrix::kEntries> spread{};
   const double radius = double(surfel.radius);
-  return std::min(double(surfel.area) / (4 * double(kPi)), radius * radius / 4);
+  const Ribbon ribbon = Ribbon::of(surfel);
+  if (!ribbon.isEmpty()) {
+    const double within = std::min(1.0, radius / double(ribbon.radius()));
+    for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+      spread[i] = within * within * double(ribbon.spread().entries[i]);
+    }
+    return spread;
+  }
+  const double scale = std::min(double(surfel.area) / (4 * double(kPi)), radius * radius / 4);
+  const glm::dvec3 n = surfel.isSphere() ? glm::dvec3(0) : glm::dvec3(surfel.normal);
+  for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
+    const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
+    spread[i] = scale * ((row == column ? 1 : 0) - n[row] * n[column]);
+  }
+  return spread;
 }
 
 }  // namespace
 
 AreaSums::AreaSums(const Surfel& surfel, const double (&origin)[3]) {
-  const double a = double(surfel.area), spread = diskSpread(surfel);
+  const double a = double(surfel.area);
+  const auto spread = spreadOf(surfel);
   area = a;
   double x[3], n[3];
   for (int axis = 0; axis < 3; ++axis) {
@@ -34,8 +52,7 @@ AreaSums::AreaSums(const Surfel& surfel, const double (&origin)[3]) {
   }
   for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
     const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
-    const double identity = row == column ? 1 : 0;
-    second_moment[i] = a * (x[row] * x[column] + spread * (identity - n[row] * n[column]));
+    second_moment[i] = a * (x[row] * x[column] + spread[i]);
   }
 }
 

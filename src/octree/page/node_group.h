@@ -21,13 +21,17 @@ inline constexpr float kUnknownAngle = kPi;
 
 // A node on its way to a page: its `page` counts within the level of its children, because where
 // that level's pages begin is known only when all are written.
+// Without padding, for shards store it as it is.
 struct LevelNode {
   Node node;
   std::uint8_t child_level = 0;  // of an interior node; 0 for a leaf
+  std::uint8_t reserved[3] = {};
   // Of Node::normal_cosine, of which nothing is known as yet: a cosine says little of small angles.
   float normal_angle = kUnknownAngle;
   std::uint16_t marks = 0;  // kSurfelMarks of the surfels below
+  std::uint16_t reserved_end[3] = {};
 };
+static_assert(sizeof(LevelNode) == sizeof(Node) + 16);
 
 // What references of a group may point at; from the header.
 struct NodeLimits {

@@ -32,7 +32,8 @@ enum FeatureBits : std::uint32_t {
   kHasLobes = 2,
   kHasLayers = 4,
   kHasLoose = 8,
-  kAllFeatures = 15
+  kHasRectangles = 16,
+  kAllFeatures = 31
 };
 
 // Largest groups that a reader accepts: they bound what a page can make it allocate.
@@ -139,7 +140,8 @@ std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
   std::vector<std::byte> bytes;
   ByteWriter writer(bytes);
   writer.put((header.full_precision ? kFullPrecision : 0u) | (header.has_lobes ? kHasLobes : 0u) |
-             (header.has_layers ? kHasLayers : 0u) | (header.has_loose ? kHasLoose : 0u));
+             (header.has_layers ? kHasLayers : 0u) | (header.has_loose ? kHasLoose : 0u) |
+             (header.has_rectangles ? kHasRectangles : 0u));
   writer.put(channelBits(header.channels));
   writer.put(header.surfel_count);
   writer.put(header.node_count);
@@ -171,6 +173,7 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
   header.has_lobes = (features & kHasLobes) != 0;
   header.has_layers = (features & kHasLayers) != 0;
   header.has_loose = (features & kHasLoose) != 0;
+  header.has_rectangles = (features & kHasRectangles) != 0;
   const std::uint32_t channels = reader.get<std::uint32_t>();
   if ((channels & ~kAllChannels) != 0) {
     return wrongField("channel bits", fmt::format("{:#x}", channels), "known channels");

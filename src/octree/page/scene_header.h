@@ -45,6 +45,8 @@ struct SceneHeader {
   bool has_lobes = false;       // surfels and nodes have lobes (octree/node/lobe.h)
   bool has_layers = false;      // some have hidden sides (octree/node/hidden_layers.h)
   bool has_loose = false;       // some are kSurfelLoose
+  // Covariances take surfels with a long side for rectangles, not for disks. Set by SceneWriter.
+  bool has_rectangles = false;
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 

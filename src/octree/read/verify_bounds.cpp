@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/first_failure.h"
+#include "core/long_side.h"
 #include "core/worker_threads.h"
 #include "octree/read/verify_sums.h"
 
@@ -112,6 +113,7 @@ class BoundsWalk {
              const std::function<void(const std::string&)>& report)
       : octree_(octree),
         has_bounds_(octree.file().header().pageForm().has_bounds),
+        has_rectangles_(octree.file().header().has_rectangles),
         tolerance_{octree.file().header().full_precision, octree.file().header().flatness_limit,
                    brightest},
         progress_(progress),
@@ -137,11 +139,12 @@ class BoundsWalk {
   Status walk(PagedOctree::Reader& reader, const NodeRange& range, std::vector<Claim>& path,
               SumsBelow& sums);
   Status meetLeaf(PagedOctree::Reader& reader, std::vector<Claim>& path);
+  Surfel asSummed(Surfel surfel) const;
   void sumUpTop();
   void report(const Claim& claim);
 
   PagedOctree& octree_;
-  const bool has_bounds_;
+  const bool has_bounds_, has_rectangles_;
   const SumsTolerance tolerance_;
   Progress& progress_;
   const std::function<void(const std::string&)>& report_;
@@ -213,6 +216,12 @@ Status BoundsWalk::walk(PagedOctree::Reader& reader, const NodeRange& range,
   return {};
 }
 
+// As the nodes of this scene take it.
+Surfel BoundsWalk::asSummed(Surfel surfel) const {
+  if (!has_rectangles_) surfel.long_side = kNoLongSide;
+  return surfel;
+}
+
 // The last of the path.
 Status BoundsWalk::meetLeaf(PagedOctree::Reader& reader, std::vector<Claim>& path) {
   const Node leaf = path.back().node;
@@ -220,7 +229,7 @@ Status BoundsWalk::meetLeaf(PagedOctree::Reader& reader, std::vector<Claim>& pat
     for (const Surfel& surfel : surfels) {
       const Shape shape(surfel);
       for (Claim& claim : path) claim.meet(shape);
-      path.back().sums.add(surfel);
+      path.back().sums.add(asSummed(surfel));
     }
     return progress_.isCancelled() ? Status::interrupted() : Status();
   }));

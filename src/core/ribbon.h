@@ -1,5 +1,5 @@
-// Pieces of ribbons: hair, grass, fibres. Their disks would cover, thinly, several times their
-// width.
+// The rectangles that surfels stand for of which the longer side is known: pieces of hair and
+// grass, places on the lines of a scan. Their disks would cover, thinly, several times their width.
 #pragma once
 
 #include <algorithm>
@@ -9,13 +9,10 @@
 
 #include "core/long_side.h"
 #include "core/symmetric_matrix.h"
-#include "gather/rules/coverage_rules.h"
-#include "gather/rules/fidelity.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
 
-// The rectangle that a two-sided surfel stands for of which the longer side is known.
 struct Ribbon {
   glm::vec3 along{0}, across{0};  // unit, in the plane of the surfel
   float length = 0, width = 0;    // 0: the surfel is a disk
@@ -23,7 +20,7 @@ struct Ribbon {
 
   static Ribbon of(const Surfel& surfel) {
     Ribbon ribbon;
-    if (surfel.long_side == kNoLongSide || !surfel.isTwoSided() || surfel.isSphere()) return ribbon;
+    if (surfel.long_side == kNoLongSide || surfel.isSphere()) return ribbon;
     const glm::vec3 side = directionOf(surfel.long_side);
     const glm::vec3 in_plane = side - glm::dot(side, surfel.normal) * surfel.normal;
     const float cosine = glm::length(in_plane);
@@ -56,6 +53,9 @@ struct Ribbon {
     return sum;
   }
 
+  // The mean of x x^T over it, from its middle.
+  SymmetricMatrix spread() const { return ((length * length + width * width) / 24) * shape(); }
+
   // The same, of the shape, the area and the width.
   static Ribbon ofShape(const SymmetricMatrix& shape, const glm::vec3& normal, float area,
                         float width) {
@@ -77,19 +77,9 @@ struct Ribbon {
   }
 
  private:
-  // Against rounding: a side that is a normal says nothing, and squares have no axes.
-  static constexpr float kLeastInPlane = 1e-3f, kLeastElongation = 1.01f;
+  // A side that is nearly the normal says nothing, by a code of half a degree; squares have no
+  // axes.
+  static constexpr float kLeastInPlane = 0.1f, kLeastElongation = 1.01f;
 };
-
-// Of the circle that a surfel is drawn within, as the ribbon that it is, if it is one.
-inline float drawnRadius(const Surfel& surfel, const Ribbon& ribbon) {
-  if (ribbon.isEmpty()) return effectiveRadius(surfel.radius, surfel.area);
-  return std::max(surfel.radius, ribbon.radius());
-}
-
-// Closer than this, for each radius of the near field, it is ray traced.
-inline float nearFieldSize(float drawn_radius, const Ribbon& ribbon) {
-  return ribbon.isEmpty() ? drawn_radius : kFidelity.ribbon_radius * ribbon.length;
-}
 
 }  // namespace surfeit
