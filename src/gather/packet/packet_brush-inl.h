@@ -157,13 +157,32 @@ class Brush {
   }
 
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  static V ReachOf(const Patch& patch, const Sight& sight) {
+    const V least = Splat(patch.reach.least);
+    if (patch.reach.spread_sq == 0) return least;
+    const auto& [xx, yy, zz, xy, xz, yz] = patch.shape.entries;
+    const V3& to = sight.offset;
+    const V x =
+        hn::MulAdd(Splat(2 * xy), to.y, hn::MulAdd(Splat(2 * xz), to.z, hn::Mul(Splat(xx), to.x)));
+    const V y = hn::MulAdd(Splat(2 * yz), to.z, hn::Mul(Splat(yy), to.y));
+    const V spread =
+        hn::MulAdd(x, to.x, hn::MulAdd(y, to.y, hn::Mul(hn::Mul(Splat(zz), to.z), to.z)));
+    const V distance_sq = hn::Max(sight.distance_sq, Splat(std::numeric_limits<float>::min()));
+    const V square = hn::Div(hn::Mul(Splat(patch.reach.spread_sq), spread), distance_sq);
+    return hn::Max(least, hn::Sqrt(hn::Max(square, hn::Zero(D()))));
+  }
+
   // Of this part of it.
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
-    const V reach = Splat(patch.isDrop() ? -kInfinity : patch.reach);
+    const V reach = ReachOf(patch, sight);
+    const V range = patch.isDrop() ? Splat(-kInfinity) : reach;
     Cover cover;
-    cover.depth_begin = hn::Sub(distance, reach);
-    cover.depth_end = hn::Add(distance, reach);
-    cover.inverse_gap = inverseLayerGap(patch.reach);
+    cover.depth_begin = hn::Sub(distance, range);
+    cover.depth_end = hn::Add(distance, range);
+    // In part where the gap is narrow beside the reach: else results would step from one receiver
+    // to the next
+    cover.inverse_gap =
+        Reciprocal(hn::Max(hn::Mul(Splat(kFidelity.layer_gap), reach), Splat(1e-30f)));
     cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
     cover.overlap = patch.overlap;
     cover.has_hull = patch.thicket == 0 && !patch.lets_through;

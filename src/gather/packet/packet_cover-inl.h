@@ -31,7 +31,7 @@ namespace {
 // How some of the receivers' pixels are covered.
 struct Cover {
   V depth_begin, depth_end;
-  float inverse_gap;  // inverseLayerGap
+  V inverse_gap;  // one over the gap in depth that is all new
   M is_lit;
   bool is_all_lit;
   float overlap, nested;
@@ -86,7 +86,7 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
   V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
 
   // A gap in depth begins a new layer, by and by
-  const V gap = hn::Mul(hn::Sub(cover.depth_begin, end), Splat(cover.inverse_gap));
+  const V gap = hn::Mul(hn::Sub(cover.depth_begin, end), cover.inverse_gap);
   const V is_new = hn::IfThenElseZero(is_drawn, hn::Min(one, hn::Max(zero, gap)));
   const M ends = hn::And(is_drawn, hn::Ge(gap, one));
   if (!hn::AllFalse(d, hn::Gt(is_new, zero))) {

@@ -65,12 +65,14 @@ struct alignas(64) Patch {
   std::uint32_t lights = 0;  // place in PacketCanvas::lights; 0: it sends evenly
   glm::vec3 radiosity{0};    // in all directions together
   float near_distance = 0;   // closer than this it is ray traced; 0: a node, which never is
-  float reach = 0;           // how far before and behind its middle it meets others of its layer
-  float soft_peak = 0;       // of the ray traced disk, softDiskPeak
-  float ribbon_width = 0;    // of the ray traced ribbon
+  LayerReach reach;          // how far before and behind its middle it meets others of its layer
+  union {                    // as it is ray traced:
+    float soft_peak = 0;     // of a disk, softDiskPeak
+    float ribbon_width;      // of a ribbon
+  };
 
   // What is in a volume, as of smoke, hides behind its own layer as behind others: it is one alone.
-  bool isDrop() const { return lets_through && reach == 0; }
+  bool isDrop() const { return lets_through && reach.isNone(); }
   bool isRound() const { return disk_area == 0; }
   // Outlines of surfaces on the same ground rise from the same side of a pixel, and the smaller
   // lies behind the larger: how much of the patch does so.

@@ -133,7 +133,10 @@ void PacketRaster::bringToWorld(Patch& patch) const {
   for (float* area : {&patch.area, &patch.disk_area, &patch.round_area, &patch.most_area}) {
     *area *= square;
   }
-  for (float* length : {&patch.radius, &patch.near_distance, &patch.reach}) *length *= scale;
+  patch.reach.spread_sq *= square;
+  for (float* length : {&patch.radius, &patch.near_distance, &patch.reach.least}) {
+    *length *= scale;
+  }
   patch.ribbon_width *= scale;
 }
 
@@ -297,7 +300,7 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.position = facet.position;
   patch.radius = facet.radius;
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
-  patch.reach = reachOf(facet, direction);
+  patch.reach = reachOf(facet);
   patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
   patch.lets_through = facet.opacity[color_] < 1;
   if (patch.lets_through) patch.opacity = facetOpacity(facet, color_);
@@ -339,7 +342,7 @@ void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
   patch.normal = node.flatness * node.normal;
   patch.lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
   if (!patch.lets_through) {
-    patch.reach = layerReach(node.radius, quadraticForm(node.covariance, direction));
+    patch.reach = LayerReach::of(node.radius, node.covariance.trace());
   }
   patch.shape = shapeOf(node.covariance);
   patch.thicket = thicketPart(node);
@@ -398,17 +401,14 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
                  : surfel.isTwoSided()                        ? Patch::Seen::kBoth
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
-    const glm::vec3 to_surfel = surfel.position - local_centre_;
-    const float distance_sq =
-        std::max(glm::dot(to_surfel, to_surfel), std::numeric_limits<float>::min());
-    patch.reach = reachOf(surfel, ribbon, patch.radius, to_surfel / std::sqrt(distance_sq));
+    patch.reach = reachOf(surfel, ribbon, patch.radius);
     patch.opacity = surfel.opacity(color_);
     patch.lets_through = lets_through;
-    if (patch.lets_through && surfel.isSphere()) patch.reach = 0;
+    if (patch.lets_through && surfel.isSphere()) patch.reach = {};
     patch.thicket = thicketPart(surfel);
     if (surfel.isLone() && patch.thicket == 0) {
       patch.overlap = patch.thicket = 1;
-      patch.reach = 0;
+      patch.reach = {};
     }
     patch.is_solid = !surfel.isSphere() && !surfel.isLoose();
     // Positive, for a surfel may be at a receiver; then it is near at any setting

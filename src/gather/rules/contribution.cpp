@@ -181,10 +181,10 @@ float facetOpacity(const Facet& facet, int color) {
   return layersOpacity(facet.opacity[color], depth) / depth;
 }
 
-float reachOf(const Facet& facet, const glm::vec3& direction) {
+LayerReach reachOf(const Facet& facet) {
   // What overlaps hides behind its own layer as behind others: it needs none
-  if (facet.is_thicket) return 0;
-  return layerReach(facet.radius, quadraticForm(facet.covariance, direction));
+  if (facet.is_thicket) return {};
+  return LayerReach::of(facet.radius, facet.covariance.trace());
 }
 
 float thicketPart(const Surfel& surfel) {
@@ -195,11 +195,10 @@ float thicketPart(const Surfel& surfel) {
   return is_ribbon ? 1 : 0;
 }
 
-float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius,
-              const glm::vec3& direction) {
-  if (!ribbon.isEmpty()) return ribbon.halfExtent(direction);
-  if (thicketPart(surfel) > 0) return 0.25f * surfel.area / radius;  // half its width
-  return layerReachOfDisk(radius, glm::dot(direction, surfel.normal));
+LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius) {
+  if (!ribbon.isEmpty()) return {0, ribbon.spread().trace() * 1.5f};
+  if (thicketPart(surfel) > 0) return {0.25f * surfel.area / radius, 0};  // half its width
+  return LayerReach::ofDisk(radius);
 }
 
 // Codes round: what is about none is none.

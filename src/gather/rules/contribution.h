@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 
 #include "core/symmetric_matrix.h"
+#include "gather/rules/coverage_rules.h"
 #include "gather/rules/fidelity.h"
 #include "octree/node/node.h"
 #include "surfeit/gather.h"
@@ -68,11 +69,9 @@ struct RoughCover {
 RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket,
                       int color = 0);
 
-// How far before and behind its middle a facet meets others of its layer, seen in this direction.
-float reachOf(const Facet& facet, const glm::vec3& direction);
-// How far before and behind its middle a surfel meets others of its layer, seen in this direction.
+LayerReach reachOf(const Facet& facet);
 // `radius`: drawnRadius.
-float reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius, const glm::vec3& direction);
+LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius);
 // How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
 float thicketPart(const Surfel& surfel);
 // How much of a rough node is leaves, hair or particles, 0..1: of a loose one, what is two-sided or

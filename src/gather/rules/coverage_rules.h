@@ -14,20 +14,20 @@ namespace surfeit {
 
 // How far before and behind its middle a contribution meets others of its layer: hardly more than
 // it extends, by its variance along the direction, so that tiles of one surface meet whether they
-// are seen head-on or aslant, and no rounding decides; and at least a part of its radius.
-inline float layerReach(float radius, float variance) {
-  return std::max(kFidelity.least_reach * radius, std::sqrt(std::max(0.f, 3 * variance)));
-}
-// Of a disk, seen at an angle with this cosine; of a sphere that of a disk along the direction.
-inline float layerReachOfDisk(float radius, float cosine) {
-  return layerReach(radius, 0.25f * radius * radius * (1 - cosine * cosine));
-}
+// are seen head-on or aslant, and no rounding decides; and at least a part of its radius. Every
+// receiver has its own direction.
+struct LayerReach {
+  float least = 0;
+  float spread_sq = 0;  // its square is this times the spread along the direction (Patch::shape)
 
-// What begins farther than its layer ends begins a new one, in part where the gap is narrow beside
-// its reach: else results would step from one receiver to the next.
-inline float inverseLayerGap(float reach) {
-  return 1 / std::max(kFidelity.layer_gap * reach, 1e-30f);
-}
+  // Of what has a radius and a covariance with this trace: three times the variance.
+  static LayerReach of(float radius, float trace) {
+    return {kFidelity.least_reach * radius, 1.5f * trace};
+  }
+  // A sphere is as a disk along the direction.
+  static LayerReach ofDisk(float radius) { return of(radius, 0.5f * radius * radius); }
+  bool isNone() const { return least == 0 && spread_sq == 0; }
+};
 
 // What hides, hides: patches have exact areas, and these scatter around what a pixel of a surface
 // holds, so sums alone would let through what lies behind. So a pixel also knows which of its 4 by
