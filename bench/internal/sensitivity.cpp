@@ -46,6 +46,7 @@ const std::vector<Number>& allNumbers() {
       {"fading", &F::fading, 1e-4f},
       {"most_node_pixels", &F::most_node_pixels, kNever},
       {"least_visible_part", &F::least_visible_part, 0},
+      {"shared_look", &F::shared_look, 0},
       {"filled_outline", &F::filled_outline, kNever},
       {"most_turn", &F::most_turn, 0},
       {"overlap_gain", &F::overlap_gain, 0},

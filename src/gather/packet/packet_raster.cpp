@@ -225,7 +225,7 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
   const std::uint32_t parts = keepParts(lane_parts);
   const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
   gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
-  if (node.isRough()) return addRoughNode(node, parts);
+  if (node.isRough()) return addRoughNode(node, lane_parts, parts);
   const bool has_hidden = rules_.groups == kAllGroups && hasHiddenPieces(node);
   const auto add = [&](std::size_t i, const Facet& facet) {
     std::uint32_t seen = parts;
@@ -327,10 +327,25 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   orderLastPatch(facesThatSee(patch));
 }
 
-void PacketRaster::addRoughNode(const Node& node, std::uint32_t parts) {
+// As seen from the centre, or, where receivers see it from too different directions, by each.
+void PacketRaster::addRoughNode(const Node& node, const LaneParts* lane_parts,
+                                std::uint32_t parts) {
+  if (local_radius_ <= kFidelity.shared_look * glm::distance(node.position, local_centre_)) {
+    return addRoughNode(node, local_centre_, parts);
+  }
+  for (std::size_t i = 0; i < receiver_count_; ++i) {
+    LaneParts own{};
+    own[i] = lane_parts != nullptr ? (*lane_parts)[i] : 1;
+    if (own[i] == 0) continue;
+    const glm::vec3 eye(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
+    addRoughNode(node, frame_ != nullptr ? frame_->toLocal(eye) : eye, keepParts(&own));
+  }
+}
+
+void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts) {
   RoughSight seen;
   const GatherSides sides = rules_.quality.sides;
-  const glm::vec3 to_node = node.position - local_centre_, direction = glm::normalize(to_node);
+  const glm::vec3 to_node = node.position - eye, direction = glm::normalize(to_node);
   kernel_.seeRoughNode(node, direction, seen);
   const float round_area = shownArea(seen.facing, sides);
   if (!(round_area > kFidelity.least_visible_part * node.area)) return;

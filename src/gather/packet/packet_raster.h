@@ -122,7 +122,8 @@ class PacketRaster {
   std::uint32_t addFacetHull(const Node& node, const Facet& facet, const LaneParts* parts,
                              std::uint32_t lanes);
   void addLobe(const Lobe& lobe, const glm::vec3& normal);
-  void addRoughNode(const Node& node, std::uint32_t parts);
+  void addRoughNode(const Node& node, const LaneParts* lane_parts, std::uint32_t parts);
+  void addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts);
   std::uint32_t facesThatSee(const Patch& patch) const;
   std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
   glm::vec3 toWorld(const glm::vec3& place) const {
