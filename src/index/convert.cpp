@@ -176,6 +176,8 @@ class Converter {
     if (progress_.isCancelled()) return Status::interrupted();  // before it has a name
     progress_.beginPhase("finish", 0, "records");
     SURFEIT_RETURN_IF_ERROR(writer_->finish());
+    stats_.temporary_bytes = writer_->temporaryBytes();
+    stats_.memory_bytes = options_.memory_bytes;
     noteOfWriter();
     SURFEIT_ASSIGN_OR_RETURN(const OutputTarget target, resolveOutput(output_));
     if (!target.is_stream) {
