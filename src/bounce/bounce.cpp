@@ -401,8 +401,7 @@ Status Bouncer::writeSample(SampleForecast& forecast) {
   const std::string result = folder.file("result.sft");
   BounceOptions once = options_;
   once.bounces = 1;
-  once.surfels_per_receiver = kMostSurfelsPerReceiver;
-  once.spare_last = true;
+  once.spare_last = true;  // within the memory of the job
   SilentProgress silent(progress_);
   SURFEIT_ASSIGN_OR_RETURN(const BounceStats stats,
                            Bouncer(sample.path, result, once, silent).run());

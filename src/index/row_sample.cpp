@@ -11,6 +11,7 @@
 
 #include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
+#include "core/resident_limit.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
 #include "surfels/surfel_writer.h"
@@ -119,6 +120,8 @@ Result<SceneSample> sampleScene(const std::string& path, const ScratchFolder& fo
   sample.path = folder.file("sample.sft");
   SilentProgress silent(progress);
   SURFEIT_RETURN_IF_ERROR(indexClouds({cloud}, sample.path, options, silent).status());
+  surfels = {};
+  beginResidentStep();
   sample.sampled_bytes = fileBytesOf(sample.path);
   sample.bytes = fileBytesOf(path);
   return sample;
