@@ -34,7 +34,7 @@ class BounceCrew {
     const GlossOfGroup* gloss = nullptr;  // null: nothing is glossy
     int surfels_per_receiver = 1;
     int threads = 1;
-    std::uint32_t stride = 1;  // one of so many stretches is gathered: 1 all, more a sample
+    std::uint32_t stride = 1;    // one of so many stretches is gathered: 1 all, more a sample
     BounceRadiosity& radiosity;  // gets B_k
     PagingController& controller;
     Progress& progress;

@@ -100,7 +100,7 @@ Result<SceneSample> sampleScene(const std::string& path, const ScratchFolder& fo
   sample.surfels = header.surfel_count;
   const std::uint64_t pages = scene.surfelPageCount();
   const std::uint64_t capacity = std::max<std::uint64_t>(1, header.surfel_group_capacity);
-  const std::uint64_t wanted = std::min(pages, (kMostSampledRows + capacity - 1) / capacity);
+  const std::uint64_t wanted = std::min(pages, (kMostSampledSurfels + capacity - 1) / capacity);
   std::vector<Surfel> surfels(capacity);
   SceneFile::Scratch scratch;
   for (std::uint64_t i = 0; i < wanted; ++i) {

@@ -13,6 +13,8 @@
 namespace surfeit {
 
 inline constexpr std::uint64_t kMostSampledRows = 65536;
+// Of a scene, which is indexed within the least memory that a bounce takes.
+inline constexpr std::uint64_t kMostSampledSurfels = 16384;
 
 // Writes `most` rows from all over to a PLY file, or of what cannot be sought in the first. Returns
 // how many.
