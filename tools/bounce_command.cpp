@@ -9,6 +9,7 @@
 #include "surfeit/process.h"
 #include "tools/cache_report.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/gather_options.h"
 #include "tools/look_options.h"
 
@@ -19,6 +20,7 @@ struct BounceArguments {
   std::string scene, result;
   BounceOptions options;
   GroupLookArguments of_groups;
+  bool is_dry_run = false;
 };
 
 nlohmann::json passJson(const BouncePass& pass) {
@@ -56,6 +58,12 @@ Status runBounce(BounceArguments& arguments, CommandContext& context) {
   SURFEIT_ASSIGN_OR_RETURN(options.group_corrections,
                            arguments.of_groups.corrections(arguments.scene));
   SURFEIT_ASSIGN_OR_RETURN(options.glossy, arguments.of_groups.gloss(arguments.scene));
+  if (arguments.is_dry_run) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastBounce(arguments.scene, arguments.result, options, context.progress()));
+    return sayForecast("bounce", "surfels", arguments.result, forecast, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(const BounceStats stats, bounceScene(arguments.scene, arguments.result,
                                                                 options, context.progress()));
   std::string lines;
@@ -118,6 +126,7 @@ void addBounceCommand(CLI::App& app, CommandContext& context) {
   addGroupLookOptions(*command, arguments->of_groups);
   addCacheOptions(*command, options.cache_split, options.direct_io);
   addTemporaryOption(*command, options.temporary_directory)->group("Paging");
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command);
   context.addFrameOptions(*command);
   command->footer(

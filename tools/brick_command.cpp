@@ -11,6 +11,7 @@
 #include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/number_checks.h"
 
 namespace surfeit {
@@ -21,6 +22,7 @@ struct BrickArguments {
   std::string output;
   std::vector<std::string> unused;  // words of brickmake without a meaning here
   BrickOptions options;
+  bool is_dry_run = false;
 };
 
 Status runBrick(BrickArguments& arguments, CommandContext& context) {
@@ -29,6 +31,12 @@ Status runBrick(BrickArguments& arguments, CommandContext& context) {
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
   for (const std::string& word : arguments.unused) context.progress().note(word);
+  if (arguments.is_dry_run) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastBrick(arguments.clouds, arguments.output, options, context.progress()));
+    return sayForecast("brick", "points", arguments.output, forecast, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(const BrickStats stats, brickClouds(arguments.clouds, arguments.output,
                                                                options, context.progress()));
   const double seconds = std::max(context.wallSeconds(), 1e-9);
@@ -117,6 +125,7 @@ void addBrickCommand(CLI::App& app, CommandContext& context) {
       ->required();
   addMapOption(*command, arguments->output, "Brick map to write (.vdb)");
   addBrickOptions(*command, arguments->options);
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command);
   command->footer(
       "Values are looked up by position and normal: in programs with surfeit/brick.h, in pictures\n"
@@ -147,6 +156,7 @@ void addBrickmakeCommand(CLI::App& app, CommandContext& context) {
                 "the finest voxels follow from the points (brick --voxel-size)", arguments->unused);
   addUnusedWord(*command, "radiusscale", "points count by their areas", arguments->unused);
   addTemporaryOption(*command, arguments->options.temporary_directory);
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command);
   command->footer(
       "Options have one dash or two, and the output is the last word; docs/renderman.md has the\n"

@@ -82,12 +82,15 @@ Status runConvert(ConvertArguments& arguments, CommandContext& context) {
   if (arguments.is_dry_run) {
     ConvertOptions sampled = options;
     static_cast<ReadOptions&>(sampled) = {};
-    const SampleJob job = [&](const auto& samples, const std::string& output, Progress& progress) {
-      const Status status = convertClouds(samples, output, sampled, progress).status();
-      return status.ok() ? Result<std::uint64_t>(0) : Result<std::uint64_t>(status);
-    };
-    return sayForecast("convert", arguments.inputs, arguments.output, options,
-                       options.temporary_directory, job, context);
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastOf(
+            arguments.inputs, arguments.output, options, options.temporary_directory,
+            [&](const auto& samples, const auto& output, Progress& progress) {
+              return convertClouds(samples, output, sampled, progress);
+            },
+            context));
+    return sayForecast("convert", "records", arguments.output, forecast, context);
   }
   SURFEIT_ASSIGN_OR_RETURN(
       const ConvertStats stats,

@@ -1,4 +1,4 @@
-// --dry-run of commands from clouds to a cloud.
+// --dry-run of the commands.
 #pragma once
 
 #include <string>
@@ -11,10 +11,30 @@ namespace surfeit {
 
 void addDryRunOption(CLI::App& command, bool& is_dry_run);
 
-// Does `job` with a sample of the inputs and says what all of it needs.
-Status sayForecast(const std::string& command, const std::vector<std::string>& inputs,
-                   const std::string& output, const ReadOptions& reading,
-                   const std::string& temporary_directory, const SampleJob& job,
+// Says what a job needs by its forecast; `records` is what it counts: "points".
+Status sayForecast(const std::string& command, const std::string& records,
+                   const std::string& output, const SampleForecast& forecast,
                    CommandContext& context);
+
+// A job with a sample of clouds, as SampleJob, whose statistics have memory_bytes and
+// temporary_bytes. Returns what all of it needs.
+template <typename Run>
+Result<SampleForecast> forecastOf(const std::vector<std::string>& inputs, const std::string& output,
+                                  const ReadOptions& reading,
+                                  const std::string& temporary_directory, const Run& run,
+                                  CommandContext& context) {
+  std::uint64_t memory_bytes = 0;
+  const SampleJob job = [&](const auto& samples, const std::string& result,
+                            Progress& progress) -> Result<std::uint64_t> {
+    SURFEIT_ASSIGN_OR_RETURN(const auto stats, run(samples, result, progress));
+    memory_bytes = stats.memory_bytes;
+    return stats.temporary_bytes;
+  };
+  SURFEIT_ASSIGN_OR_RETURN(
+      SampleForecast forecast,
+      forecastBySample(inputs, output, reading, temporary_directory, job, context.progress()));
+  forecast.memory_bytes = memory_bytes;
+  return forecast;
+}
 
 }  // namespace surfeit

@@ -9,6 +9,7 @@
 #include "surfeit/process.h"
 #include "tools/channel_options.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/gather_options.h"
 #include "tools/matrix_option.h"
 #include "tools/number_checks.h"
@@ -19,6 +20,7 @@ namespace {
 struct LookupArguments {
   std::string map, receivers, result;
   LookupOptions options;
+  bool is_dry_run = false;
 };
 
 Status runLookup(LookupArguments& arguments, CommandContext& context) {
@@ -26,6 +28,12 @@ Status runLookup(LookupArguments& arguments, CommandContext& context) {
   options.threads = context.common.threads;
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
+  if (arguments.is_dry_run) {
+    SURFEIT_ASSIGN_OR_RETURN(const SampleForecast forecast,
+                             forecastLookup(arguments.map, arguments.receivers, arguments.result,
+                                            options, context.progress()));
+    return sayForecast("lookup", "receivers", arguments.result, forecast, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(const LookupStats stats,
                            lookupCloud(arguments.map, arguments.receivers, arguments.result,
                                        options, context.progress()));
@@ -147,6 +155,7 @@ void addLookupCommand(CLI::App& app, CommandContext& context) {
   addChannelOptions(*command, options.channels, options.part, options.filter);
   addColorRangeOption(*command, options.color_range);
   addTemporaryOption(*command, options.temporary_directory);
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command);
   command->footer(
       "The result holds the receivers in their order with all their properties, and the values.\n"

@@ -29,14 +29,15 @@ Status runNormals(NormalsArguments& arguments, CommandContext& context) {
   if (arguments.is_dry_run) {
     NormalsOptions sampled = options;
     static_cast<ReadOptions&>(sampled) = {};
-    const SampleJob job = [&](const auto& samples, const std::string& output,
-                              Progress& progress) -> Result<std::uint64_t> {
-      SURFEIT_ASSIGN_OR_RETURN(const NormalsStats stats,
-                               estimateNormals(samples[0], output, sampled, progress));
-      return stats.temporary_bytes;
-    };
-    return sayForecast("normals", {arguments.input}, arguments.output, options,
-                       options.temporary_directory, job, context);
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastOf(
+            {arguments.input}, arguments.output, options, options.temporary_directory,
+            [&](const auto& samples, const auto& output, Progress& progress) {
+              return estimateNormals(samples[0], output, sampled, progress);
+            },
+            context));
+    return sayForecast("normals", "points", arguments.output, forecast, context);
   }
   SURFEIT_ASSIGN_OR_RETURN(
       const NormalsStats stats,

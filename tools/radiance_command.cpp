@@ -34,14 +34,15 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
   if (arguments.is_dry_run) {
     RadianceOptions sampled = options;
     static_cast<ReadOptions&>(sampled) = {};
-    const SampleJob job = [&](const auto& samples, const std::string& output,
-                              Progress& progress) -> Result<std::uint64_t> {
-      SURFEIT_ASSIGN_OR_RETURN(const RadianceStats stats,
-                               radianceCloud(samples, output, sampled, progress));
-      return stats.temporary_bytes;
-    };
-    return sayForecast("radiance", arguments.photons, arguments.output, options,
-                       options.temporary_directory, job, context);
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastOf(
+            arguments.photons, arguments.output, options, options.temporary_directory,
+            [&](const auto& samples, const auto& output, Progress& progress) {
+              return radianceCloud(samples, output, sampled, progress);
+            },
+            context));
+    return sayForecast("radiance", "photons", arguments.output, forecast, context);
   }
   SURFEIT_ASSIGN_OR_RETURN(
       const RadianceStats stats,

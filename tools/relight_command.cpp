@@ -12,6 +12,7 @@
 #include "surfeit/process.h"
 #include "surfeit/relight.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/number_checks.h"
 #include "tools/sample_options.h"
 
@@ -22,6 +23,7 @@ struct RelightArguments {
   std::string scene, result, gain = "1";
   LightNames names;
   RelightOptions options;
+  bool is_dry_run = false;
 };
 
 constexpr double kMostGain = 1e6;
@@ -95,6 +97,12 @@ Status runRelight(const RelightArguments& arguments, CommandContext& context) {
   RelightOptions options = arguments.options;
   SURFEIT_RETURN_IF_ERROR(readGain(arguments, options));
   options.threads = context.threads();
+  if (arguments.is_dry_run) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastRelight(arguments.scene, arguments.result, options, context.progress()));
+    return sayForecast("relight", "surfels", arguments.result, forecast, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(const RelightStats stats, relightScene(arguments.scene, arguments.result,
                                                                   options, context.progress()));
   const glm::dvec3& mean = stats.mean_radiosity;
@@ -176,6 +184,7 @@ void addRelightCommand(CLI::App& app, CommandContext& context) {
       ->check(CLI::IsMember({"x", "y", "z"}))
       ->type_name("AXIS")
       ->group("Ground");
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command);
   context.addFrameOptions(*command);
   command->footer(

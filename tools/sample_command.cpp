@@ -6,6 +6,7 @@
 
 #include "surfeit/sample.h"
 #include "tools/command.h"
+#include "tools/dry_run.h"
 #include "tools/sample_options.h"
 
 namespace surfeit {
@@ -20,6 +21,12 @@ Status runPhotons(const SampleArguments& arguments, CommandContext& context) {
   options.seed = arguments.photon_seed;
   options.caustic_output = arguments.caustic_output;
   options.threads = context.threads();
+  if (arguments.is_dry_run) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastPhotons(arguments.meshes, arguments.output, options, context.progress()));
+    return sayForecast("sample", "photons", arguments.output, forecast, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(
       const PhotonTracingStats stats,
       tracePhotons(arguments.meshes, arguments.output, options, context.progress()));
@@ -58,6 +65,12 @@ Status runSample(SampleArguments& arguments, CommandContext& context) {
   if (arguments.photons > 0) return runPhotons(arguments, context);
   arguments.options.threads = context.threads();
   SURFEIT_ASSIGN_OR_RETURN(arguments.options.density, arguments.cameras.cameraDensity());
+  if (arguments.is_dry_run) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        const SampleForecast forecast,
+        forecastSample(arguments.meshes, arguments.output, arguments.options, context.progress()));
+    return sayForecast("sample", "surfels", arguments.output, forecast, context);
+  }
   SURFEIT_ASSIGN_OR_RETURN(
       const SampleStats stats,
       sampleMeshes(arguments.meshes, arguments.output, arguments.options, context.progress()));
@@ -88,6 +101,7 @@ void addSampleCommand(CLI::App& app, CommandContext& context) {
       app.add_subcommand("sample", "Turn triangle meshes into surfels with direct light");
   const auto arguments = std::make_shared<SampleArguments>();
   addSampleOptions(*command, *arguments);
+  addDryRunOption(*command, arguments->is_dry_run);
   context.addCommonOptions(*command, {.threads = true, .stats = true});
   context.addFrameOptions(*command);
   command->footer(

@@ -35,6 +35,7 @@ struct SampleArguments {
   std::uint64_t photons = 0;      // > 0: a photon map instead of surfels
   std::uint64_t photon_seed = 0;  // of PhotonTracingOptions
   std::string caustic_output;     // likewise
+  bool is_dry_run = false;
 };
 
 // Adds MESH..., -o, --count, --spacing, cameras or --photons, and the options above. Parsing fills

@@ -23,6 +23,7 @@
 
 #include "surfeit/api.h"
 #include "surfeit/bounce_look.h"
+#include "surfeit/forecast.h"
 #include "surfeit/gather.h"
 #include "surfeit/job.h"
 #include "surfeit/progress.h"
@@ -104,5 +105,12 @@ struct BounceStats {
 SURFEIT_API Result<BounceStats> bounceScene(const std::string& scene_path,
                                             const std::string& result_path,
                                             const BounceOptions& options, Progress& progress);
+
+// What bounceScene takes: gathers at some of the surfels, in the scene itself and in the budget,
+// and bounces a scene of others to see how long the file is and takes to be written. Records are
+// surfels. Writes nothing but temporary files. Errors: as bounceScene.
+SURFEIT_API Result<SampleForecast> forecastBounce(const std::string& scene_path,
+                                                  const std::string& result_path,
+                                                  const BounceOptions& options, Progress& progress);
 
 }  // namespace surfeit

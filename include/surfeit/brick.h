@@ -13,6 +13,7 @@
 
 #include "surfeit/api.h"
 #include "surfeit/color_range.h"
+#include "surfeit/forecast.h"
 #include "surfeit/job.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -63,6 +64,13 @@ struct BrickStats {
 SURFEIT_API Result<BrickStats> brickClouds(const std::vector<std::string>& inputs,
                                            const std::string& output, const BrickOptions& options,
                                            Progress& progress);
+
+// What brickClouds takes, by the points in some blocks of 16 voxels along each axis: reads the
+// clouds twice, or three times, and makes a brick map of those points in a temporary folder.
+// Writes nothing else. Errors: as brickClouds.
+SURFEIT_API Result<SampleForecast> forecastBrick(const std::vector<std::string>& inputs,
+                                                 const std::string& output,
+                                                 const BrickOptions& options, Progress& progress);
 
 // A channel of a brick map.
 struct BrickChannel {

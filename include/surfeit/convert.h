@@ -84,7 +84,9 @@ struct ConvertStats {
   std::uint64_t placeless_records = 0;              // of the thinned: without a finite position
   std::uint64_t written_records = 0;                // handed to the writer
   std::uint64_t input_bytes = 0, output_bytes = 0;  // of the files
-  std::vector<std::string> properties;              // of a written record: "float x"
+  std::vector<std::string> properties{};            // of a written record: "float x"
+  std::uint64_t memory_bytes = 0;                   // the budget
+  std::uint64_t temporary_bytes = 0;                // of rows that waited for the end (LAS, PDB)
 };
 
 // Writes `output` from the records of all inputs, one input after the other. The name of `output`

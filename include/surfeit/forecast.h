@@ -1,5 +1,7 @@
-// What a job from clouds to a cloud needs, by a sample: the job itself is done with some of the
-// records, in a temporary folder.
+// What a job needs, by a sample: the job itself is done with some of the records, in a temporary
+// folder. Jobs that are not from clouds to a cloud have forecasts of their own beside them
+// (forecastIndex, forecastGather, forecastSample, forecastPhotons, forecastRelight, forecastBounce,
+// forecastBrick, forecastLookup).
 #pragma once
 
 #include <cstdint>
@@ -15,8 +17,11 @@
 namespace surfeit {
 
 struct SampleForecast {
-  std::uint64_t records = 0, sampled_records = 0;
+  std::uint64_t records = 0, sampled_records = 0;  // points, photons, receivers or surfels
   std::uint64_t input_bytes = 0;
+  // The budget; of jobs without one, which hold meshes, the most that this process had until now,
+  // which is more where it had done other work before. 0: not known (forecastBySample).
+  std::uint64_t memory_bytes = 0;
   std::uint64_t temporary_bytes = 0;  // estimates, of all records
   std::uint64_t output_bytes = 0;
   double seconds = 0;  // without the time to read the inputs

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "surfeit/api.h"
+#include "surfeit/forecast.h"
 #include "surfeit/job.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -86,5 +87,12 @@ struct LookupStats {
 SURFEIT_API Result<LookupStats> lookupCloud(const std::string& map, const std::string& receivers,
                                             const std::string& result, const LookupOptions& options,
                                             Progress& progress);
+
+// What lookupCloud takes, by some of the receivers, and of a baked cloud by some of the points.
+// Records are receivers. Writes nothing but in a temporary folder. Errors: as lookupCloud.
+SURFEIT_API Result<SampleForecast> forecastLookup(const std::string& map,
+                                                  const std::string& receivers,
+                                                  const std::string& result,
+                                                  const LookupOptions& options, Progress& progress);
 
 }  // namespace surfeit

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "surfeit/api.h"
+#include "surfeit/forecast.h"
 #include "surfeit/progress.h"
 #include "surfeit/sample.h"
 #include "surfeit/status.h"
@@ -68,5 +69,12 @@ struct RelightStats {
 SURFEIT_API Result<RelightStats> relightScene(const std::string& scene_path,
                                               const std::string& result_path,
                                               const RelightOptions& options, Progress& progress);
+
+// What relightScene takes, by a scene of some of the surfels, and all of the meshes. Writes nothing
+// but in a temporary folder. Errors: as relightScene.
+SURFEIT_API Result<SampleForecast> forecastRelight(const std::string& scene_path,
+                                                   const std::string& result_path,
+                                                   const RelightOptions& options,
+                                                   Progress& progress);
 
 }  // namespace surfeit

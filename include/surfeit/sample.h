@@ -17,6 +17,7 @@
 #include "surfeit/api.h"
 #include "surfeit/camera_density.h"
 #include "surfeit/cube.h"
+#include "surfeit/forecast.h"
 #include "surfeit/gather.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
@@ -114,13 +115,14 @@ struct SampleOptions {
 struct SampleStats {
   std::uint64_t triangles = 0;
   std::uint64_t degenerate_faces = 0;
-  std::uint64_t surfels = 0;         // written
-  std::uint64_t sliver_surfels = 0;  // beyond the count asked for, from cutting slivers
-  std::uint64_t clear_surfels = 0;   // not written: nothing of them is there (d, Tr, map_d)
-  double area = 0;                   // of the meshes
-  double surfel_area = 0;            // of the surfels
-  double disk_area = 0;              // sum of pi r^2: over `area`, how often disks overlap
-  double spacing = 0;                // root of the area per surfel
+  std::uint64_t surfels = 0;          // written
+  std::uint64_t sliver_surfels = 0;   // beyond the count asked for, from cutting slivers
+  std::uint64_t clear_surfels = 0;    // not written: nothing of them is there (d, Tr, map_d)
+  double area = 0;                    // of the meshes
+  double surfel_area = 0;             // of the surfels
+  double disk_area = 0;               // sum of pi r^2: over `area`, how often disks overlap
+  double spacing = 0;                 // root of the area per surfel
+  std::uint64_t temporary_bytes = 0;  // of surfels that waited for the end (LAS, PDB)
   double load_seconds = 0, build_seconds = 0, sample_seconds = 0;
   int threads = 0;
 };
@@ -133,6 +135,12 @@ struct SampleStats {
 SURFEIT_API Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes,
                                              const std::string& output,
                                              const SampleOptions& options, Progress& progress);
+
+// What sampleMeshes takes, by some of the surfels: of records, surfels. The meshes are loaded, and
+// their hierarchy is built. Writes nothing but in a temporary folder. Errors: as sampleMeshes.
+SURFEIT_API Result<SampleForecast> forecastSample(const std::vector<std::string>& meshes,
+                                                  const std::string& output,
+                                                  const SampleOptions& options, Progress& progress);
 
 struct PhotonTracingOptions {
   Surroundings surroundings;
@@ -150,12 +158,13 @@ struct PhotonTracingStats {
   std::uint64_t emitted = 0;
   // One per surface that a photon meets, and two per translucent surface, for its two sides.
   std::uint64_t stored = 0;
-  std::uint64_t caustic = 0;        // stored in the map of caustics
-  std::uint64_t escaped = 0;        // photons that left the scene in the end
-  std::uint64_t lost_at_backs = 0;  // photons that met the back of a surface, which is black
-  glm::dvec3 emitted_power{0};      // of all lights
-  glm::dvec3 stored_power{0};       // arrives at surfaces, those of later bounces included
-  glm::dvec3 caustic_power{0};      // the same of the map of caustics
+  std::uint64_t caustic = 0;          // stored in the map of caustics
+  std::uint64_t escaped = 0;          // photons that left the scene in the end
+  std::uint64_t lost_at_backs = 0;    // photons that met the back of a surface, which is black
+  glm::dvec3 emitted_power{0};        // of all lights
+  glm::dvec3 stored_power{0};         // arrives at surfaces, those of later bounces included
+  glm::dvec3 caustic_power{0};        // the same of the map of caustics
+  std::uint64_t temporary_bytes = 0;  // of photons that waited for the end (LAS, PDB)
   double load_seconds = 0, build_seconds = 0, trace_seconds = 0;
   int threads = 0;
 };
@@ -176,6 +185,13 @@ SURFEIT_API Result<PhotonTracingStats> tracePhotons(const std::vector<std::strin
                                                     const std::string& output,
                                                     const PhotonTracingOptions& options,
                                                     Progress& progress);
+
+// What tracePhotons takes, by some of the photons: of records, photons that are sent. The output
+// has the bytes of both maps together. As forecastSample.
+SURFEIT_API Result<SampleForecast> forecastPhotons(const std::vector<std::string>& meshes,
+                                                   const std::string& output,
+                                                   const PhotonTracingOptions& options,
+                                                   Progress& progress);
 
 struct TracedCubeOptions {
   int rays = 8;  // along an edge of a pixel, at least 1

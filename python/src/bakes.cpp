@@ -38,7 +38,14 @@ py::dict brick(const std::vector<std::string>& clouds, const std::string& output
   options.into("voxel_size", bricking.voxel_size);
   options.into("filter", bricking.filter);
   takeColorRange(options, bricking.color_range);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return record(runFor<SampleForecast>(watcher, [&](Progress& progress) {
+      return forecastBrick(clouds, output, bricking, progress);
+    }));
+  }
   return record(runFor<BrickStats>(watcher, [&](Progress& progress) {
     return brickClouds(clouds, output, bricking, progress);
   }));

@@ -18,19 +18,19 @@ py::dict dryRun(const std::vector<std::string>& inputs, const std::string& outpu
                 const Options& options, const py::object& watcher, const Run& run) {
   Options sampled = options;
   static_cast<ReadOptions&>(sampled) = {};  // the samples are read by these already
+  std::uint64_t memory_bytes = 0;
   const SampleJob job = [&](const auto& samples, const std::string& result,
                             Progress& progress) -> Result<std::uint64_t> {
     const auto stats = run(samples, result, sampled, progress);
     if (!stats.ok()) return stats.status();
-    if constexpr (requires { stats->temporary_bytes; }) {
-      return std::uint64_t(stats->temporary_bytes);
-    } else {
-      return std::uint64_t(0);
-    }
+    memory_bytes = stats->memory_bytes;
+    return std::uint64_t(stats->temporary_bytes);
   };
-  return record(runFor<SampleForecast>(watcher, [&](Progress& progress) {
+  SampleForecast forecast = runFor<SampleForecast>(watcher, [&](Progress& progress) {
     return forecastBySample(inputs, output, options, options.temporary_directory, job, progress);
-  }));
+  });
+  forecast.memory_bytes = memory_bytes;
+  return record(forecast);
 }
 
 }  // namespace surfeit::python

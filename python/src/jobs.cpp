@@ -103,7 +103,14 @@ py::dict bounce(const std::string& scene, const std::string& result, const py::d
   }
   options.into("cache_split", bouncing.cache_split);
   options.into("direct_io", bouncing.direct_io);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return record(runFor<SampleForecast>(watcher, [&](Progress& progress) {
+      return forecastBounce(scene, result, bouncing, progress);
+    }));
+  }
   return record(runFor<BounceStats>(
       watcher, [&](Progress& progress) { return bounceScene(scene, result, bouncing, progress); }));
 }
@@ -127,7 +134,14 @@ py::dict lookup(const std::string& map, const std::string& receivers, const std:
   options.into("to_space", looking.to_space);
   options.into("pref", looking.reference_positions);
   options.into("nref", looking.reference_normals);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return record(runFor<SampleForecast>(watcher, [&](Progress& progress) {
+      return forecastLookup(map, receivers, result, looking, progress);
+    }));
+  }
   return record(runFor<LookupStats>(watcher, [&](Progress& progress) {
     return lookupCloud(map, receivers, result, looking, progress);
   }));

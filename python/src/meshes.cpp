@@ -96,7 +96,14 @@ py::dict sample(const std::vector<std::string>& meshes, const std::string& outpu
   options.into("spacing", sampling.spacing);
   options.into("two_sided", sampling.is_two_sided);
   options.into("threads", sampling.threads);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return record(runFor<SampleForecast>(watcher, [&](Progress& progress) {
+      return forecastSample(meshes, output, sampling, progress);
+    }));
+  }
   const auto stats = runFor<SampleStats>(watcher, [&](Progress& progress) {
     return sampleMeshes(meshes, output, sampling, progress);
   });
@@ -118,7 +125,14 @@ py::dict photons(const std::vector<std::string>& meshes, const std::string& outp
   options.into("seed", tracing.seed);
   options.into("caustic_photons", tracing.caustic_output);
   options.into("threads", tracing.threads);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return record(runFor<SampleForecast>(watcher, [&](Progress& progress) {
+      return forecastPhotons(meshes, output, tracing, progress);
+    }));
+  }
   const auto stats = runFor<PhotonTracingStats>(
       watcher, [&](Progress& progress) { return tracePhotons(meshes, output, tracing, progress); });
   return py::dict(
@@ -143,7 +157,14 @@ py::dict relight(const std::string& scene, const std::string& result, const py::
   options.into("add", lighting.adds);
   options.into("shadow_bias", lighting.shadow_bias);
   options.into("threads", lighting.threads);
+  bool is_dry_run = false;
+  options.into("dry_run", is_dry_run);
   options.finish();
+  if (is_dry_run) {
+    return record(runFor<SampleForecast>(watcher, [&](Progress& progress) {
+      return forecastRelight(scene, result, lighting, progress);
+    }));
+  }
   const auto stats = runFor<RelightStats>(
       watcher, [&](Progress& progress) { return relightScene(scene, result, lighting, progress); });
   return py::dict("surfels"_a = stats.surfels, "lit_surfels"_a = stats.lit_surfels,

@@ -244,7 +244,7 @@ py::dict record(const IndexForecast& forecast) {
 
 py::dict record(const SampleForecast& forecast) {
   return py::dict("records"_a = forecast.records, "sampled_records"_a = forecast.sampled_records,
-                  "input_bytes"_a = forecast.input_bytes,
+                  "input_bytes"_a = forecast.input_bytes, "memory_bytes"_a = forecast.memory_bytes,
                   "temporary_bytes"_a = forecast.temporary_bytes,
                   "output_bytes"_a = forecast.output_bytes, "seconds"_a = forecast.seconds);
 }

@@ -25,16 +25,19 @@ Stats = Dict[str, Any]
 
 
 def brick(clouds: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
-          progress: ProgressLike = None, **settings: "Unpack[BrickSettings]") -> Stats:
+          dry_run: bool = False, progress: ProgressLike = None,
+          **settings: "Unpack[BrickSettings]") -> Stats:
     """Writes baked values of clouds into a brick map (.vdb), for surfeit.BrickMap and `lookup`.
 
-    Settings: surfeit.settings.BrickSettings.
+    Settings: surfeit.settings.BrickSettings. dry_run: writes nothing, and returns an estimate of
+    memory, files and time.
     """
     taken: Dict[str, Any] = dict(settings)
     if isinstance(taken.get("channel"), str):
         taken["channel"] = taken["channel"].split(",")
     with watch(progress, settings) as watcher:
-        return _surfeit.brick(listed(clouds, "clouds"), path_of(output), options_of(taken), watcher)
+        return _surfeit.brick(listed(clouds, "clouds"), path_of(output),
+                              options_of(taken, dry_run=dry_run), watcher)
 
 
 class BrickMap:
@@ -91,7 +94,7 @@ def radiance(photons: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
     """Writes surfels with the radiosity that a photon map stands for, one for each photon.
 
     Settings: surfeit.settings.RadianceSettings. dry_run: writes nothing, and returns an estimate of
-    files and time.
+    memory, files and time.
     """
     taken: Dict[str, Any] = dict(settings)
     if taken.get("albedo") is not None:

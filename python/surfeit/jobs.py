@@ -179,7 +179,8 @@ def normals(cloud: PathLike, output: PathLike, *, sizes: bool = False, up: "Opti
 def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
            surfels_per_receiver: Optional[int] = None, spare_last: bool = False, groups: Any = None,
            group_gain: Any = None, group_saturation: Any = None, group_tint: Any = None,
-           glossy: Any = None, progress: ProgressLike = None, **settings: "Unpack[BounceSettings]") -> Stats:
+           glossy: Any = None, dry_run: bool = False, progress: ProgressLike = None,
+           **settings: "Unpack[BounceSettings]") -> Stats:
     """Writes the scene with the radiosity after 1 to 100 bounces of light.
 
     surfels_per_receiver: all bounces but the last are gathered at one surfel of so many, 1 to 64,
@@ -190,13 +191,14 @@ def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
     glossy: the part of it, 0 to 1, that goes into a lobe around the mirror direction, and the
     roughness of the lobe, .05 to 1: {"floor": (.8, .2)}, or {"floor": .8} of roughness .2.
     bounce_gain, bounce_filter, ...: surfeit.settings.LookSettings.
+    dry_run: writes nothing, and returns an estimate of memory, files and time.
     """
     if spare_last and surfels_per_receiver is None:
         raise ValueError("spare_last: found without surfels_per_receiver, by which the last bounce is "
                          "spared")
     path = scene_path(scene)
     options = options_of(settings, bounces=bounces, surfels_per_receiver=surfels_per_receiver,
-                         spare_last=spare_last, groups=groups)
+                         spare_last=spare_last, groups=groups, dry_run=dry_run)
     options = with_numbers(options, lambda: names_of_scene(path))
     corrections = group_corrections(path, group_gain=group_gain, group_saturation=group_saturation,
                                     group_tint=group_tint)
@@ -209,15 +211,17 @@ def bounce(scene: Union[PathLike, Scene], output: PathLike, bounces: int = 1, *,
 
 
 def lookup(map: PathLike, receivers: PathLike, output: PathLike, *,
-           progress: ProgressLike = None, **settings: "Unpack[LookupSettings]") -> Stats:
+           dry_run: bool = False, progress: ProgressLike = None,
+           **settings: "Unpack[LookupSettings]") -> Stats:
     """Writes the receivers with the values that the baked cloud or brick map has at their places.
 
     Only values count whose surface faces as the receiver does. Returns counts, among them
     "missing_receivers", which found none. Settings: surfeit.settings.LookupSettings.
+    dry_run: writes nothing, and returns an estimate of memory, files and time.
     """
     with watch(progress, settings) as watcher:
         return _surfeit.lookup(path_of(map), path_of(receivers), path_of(output),
-                               options_of(settings), watcher)
+                               options_of(settings, dry_run=dry_run), watcher)
 
 
 def verify(scene: Union[PathLike, Scene], *, memory: Memory = None, threads: Optional[int] = None,

@@ -28,12 +28,13 @@ _OF_PHOTONS = ("seed", "caustic_photons")
 
 
 def sample(meshes: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
-           photons: Optional[int] = None, progress: ProgressLike = None,
+           photons: Optional[int] = None, dry_run: bool = False, progress: ProgressLike = None,
            **settings: "Unpack[SampleSettings]") -> Stats:
     """Writes a cloud of surfels of triangle meshes with direct light, or a photon map.
 
     photons: number of photons to send from the lights; the output is where they arrive, for
         surfeit.radiance, instead of surfels.
+    dry_run: writes nothing, and returns an estimate of memory, files and time.
     settings: count or spacing or camera, light_point, ...: surfeit.settings.SampleSettings.
     """
     wrong = _OF_PHOTONS if photons is None else _OF_SURFELS
@@ -49,7 +50,7 @@ def sample(meshes: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
     strict = {"strict": taken.pop("strict", False)}
     if "crop" in taken:
         taken["camera_crop"] = taken.pop("crop")
-    options = options_of(with_cameras(with_lights(taken)), photons=photons)
+    options = options_of(with_cameras(with_lights(taken)), photons=photons, dry_run=dry_run)
     function = "sample" if photons is None else "photons"
     with watch(progress, strict) as watcher:
         return component("sample", function)(listed(meshes, "meshes"), path_of(output), options,
@@ -57,7 +58,8 @@ def sample(meshes: Union[PathLike, Sequence[PathLike]], output: PathLike, *,
 
 
 def relight(scene: Union[PathLike, Scene], output: PathLike, *, mesh: Any = None, gain: Any = None,
-            add: bool = False, mesh_light: bool = True, progress: ProgressLike = None,
+            add: bool = False, mesh_light: bool = True, dry_run: bool = False,
+            progress: ProgressLike = None,
             **settings: "Unpack[RelightSettings]") -> Stats:
     """Writes the scene with other direct light at its surfels, or with one light more.
 
@@ -66,11 +68,12 @@ def relight(scene: Union[PathLike, Scene], output: PathLike, *, mesh: Any = None
     gain: factor of the new light, or of lights by name: {"key": 2, "fill": .5} with
         light_point={"key": (x, y, z, r, g, b)}.
     add: adds to the light of the scene instead of taking its place: lights in layers.
+    dry_run: writes nothing, and returns an estimate of memory, files and time.
     settings: light_point, light_directional, ...: surfeit.settings.RelightSettings.
     """
     taken: Dict[str, Any] = dict(settings)
     strict = {"strict": taken.pop("strict", False)}
-    options = options_of(with_lights(taken, gain), add=add, mesh_light=mesh_light,
+    options = options_of(with_lights(taken, gain), add=add, mesh_light=mesh_light, dry_run=dry_run,
                          mesh=None if mesh is None else listed(mesh, "mesh"))
     with watch(progress, strict) as watcher:
         return component("sample", "relight")(scene_path(scene), path_of(output), options, watcher)

@@ -323,6 +323,19 @@ def test_dry_runs_write_nothing(room, tmp_path):
     assert forecast["records"] == 3000 and forecast["output_bytes"] > 0
     with pytest.raises(surfeit.DamagedFile, match="room.ply: .*power of every photon"):
         surfeit.radiance(room / "room.ply", tmp_path / "a.ply", dry_run=True)
+    forecast = surfeit.bounce(room / "room.sft", tmp_path / "a.sft", quality="draft", dry_run=True)
+    assert forecast["records"] == 3000 and forecast["output_bytes"] > 0
+    for forecast in (surfeit.sample(room / "room.obj", tmp_path / "a.ply", count=3000, dry_run=True),
+                     surfeit.sample(room / "room.obj", tmp_path / "a.ply", photons=3000, dry_run=True,
+                                    light_point=(0.5, 0.9, 0.5, 2, 2, 1)),
+                     surfeit.relight(room / "room.sft", tmp_path / "a.sft", dry_run=True,
+                                     light_point=(0.5, 0.9, 0.5, 2, 2, 1))):
+        assert forecast["records"] == 3000 and forecast["output_bytes"] > 0
+    forecast = surfeit.brick(room / "room.ply", tmp_path / "a.vdb", channel="radiosity", dry_run=True)
+    assert forecast["records"] == 3000 and forecast["memory_bytes"] > 0
+    forecast = surfeit.lookup(room / "room.ply", room / "room.ply", tmp_path / "a.ply",
+                              values=["radiosity"], dry_run=True)
+    assert forecast["records"] == 3000 and forecast["output_bytes"] > 0
     assert list(tmp_path.iterdir()) == []
 
 

@@ -25,6 +25,8 @@
 namespace surfeit {
 namespace {
 
+constexpr int kLeastRasterResolution = 2;  // of GatherQuality
+
 class ShardMerge {
  public:
   ShardMerge(std::string result_path, int count, Progress& progress)
@@ -215,6 +217,8 @@ Result<MergeStats> merge(const std::string& scene_path, const std::string& recei
   SURFEIT_ASSIGN_OR_RETURN(GatherOptions options, optionsOfJob(shards.job().job));
   static_cast<JobOptions&>(options) = merging;
   options = withDefaults(options);
+  options.quality.raster_resolution = kLeastRasterResolution;  // nothing is gathered here
+  options.prefetch = false;
   SURFEIT_ASSIGN_OR_RETURN(const SceneFile scene, openSceneBeside(scene_path, result_path));
   SURFEIT_ASSIGN_OR_RETURN(
       GatherJob job, GatherJob::openToMerge(receivers_path, result_path, options, scene, progress));

@@ -30,6 +30,7 @@
 #include "core/guard.h"
 #include "core/parallel.h"
 #include "core/seconds_since.h"
+#include "index/row_sample.h"
 #include "octree/read/group_set.h"
 #include "octree/read/scene_file.h"
 #include "octree/read/scene_light.h"
@@ -37,6 +38,7 @@
 #include "storage/block_writer.h"
 #include "storage/file.h"
 #include "storage/output_target.h"
+#include "storage/scratch_folder.h"
 
 namespace surfeit {
 namespace {
@@ -45,6 +47,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kMostBounces = 100;
 constexpr int kMostSurfelsPerReceiver = 64;
+// Of a forecast, about.
+constexpr std::uint64_t kSampledReceivers = 50'000;
 // What a bounced scene's provenance holds its bounces under.
 constexpr const char* kProvenanceKey = "bounce";
 
@@ -98,8 +102,12 @@ class Bouncer {
         temporary_directory_(temporaryDirectory(options.temporary_directory, result_path)) {}
 
   Result<BounceStats> run();
+  Result<SampleForecast> forecast();
 
  private:
+  Status open();
+  Status gatherSample(int bounce, int times, SampleForecast& forecast);
+  Status writeSample(SampleForecast& forecast);
   Status checkScene() const;
   Status checkGroupsOfOptions() const;
   Status checkGlossyScene() const;
@@ -126,24 +134,30 @@ class Bouncer {
   const bool is_glossy_ = isGlossy(options_);
   const GlossOfGroup gloss_ = glossByGroup(options_.glossy);
   std::optional<SceneFile> scene_;
+  std::uint32_t stride_ = 1;          // as BounceCrew has it
   std::uint64_t without_mirror_ = 0;  // of the last bounce
+  std::uint64_t gathered_surfels_ = 0;
   BounceStats stats_;
 };
 
-Result<BounceStats> Bouncer::run() {
+Status Bouncer::open() {
   SURFEIT_RETURN_IF_ERROR(checkReplacesNot(result_path_, scene_path_, "scene"));
   noteSceneName(result_path_, progress_);
   SURFEIT_ASSIGN_OR_RETURN(scene_, SceneFile::open(scene_path_, sceneAccess(gather_options_)));
   SURFEIT_RETURN_IF_ERROR(checkScene());
   SURFEIT_RETURN_IF_ERROR(checkMemory());
-  SURFEIT_RETURN_IF_ERROR(noteDarkness(*scene_, progress_));
+  stats_.surfels = scene_->header().surfel_count;
+  stats_.threads = gather_options_.threads;
+  stats_.memory_bytes = gather_options_.memory_bytes;
+  return noteDarkness(*scene_, progress_);
+}
+
+Result<BounceStats> Bouncer::run() {
+  SURFEIT_RETURN_IF_ERROR(open());
   {
     // A result that cannot be written should not take hours to be refused
     SURFEIT_ASSIGN_OR_RETURN(const AtomicFile probe, AtomicFile::create(result_path_));
   }
-  stats_.surfels = scene_->header().surfel_count;
-  stats_.threads = gather_options_.threads;
-  stats_.memory_bytes = gather_options_.memory_bytes;
 
   SURFEIT_ASSIGN_OR_RETURN(SceneFile before,
                            SceneFile::open(scene_path_, sceneAccess(gather_options_)));
@@ -313,6 +327,7 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
                    .gloss = is_glossy_ ? &gloss_ : nullptr,
                    .surfels_per_receiver = surfelsPerReceiver(bounce),
                    .threads = gather_options_.threads,
+                   .stride = stride_,
                    .radiosity = radiosity,
                    .controller = controller,
                    .progress = progress_});
@@ -320,6 +335,7 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
   controller.finish();
   without_mirror_ = crew.withoutMirror();
   pass.receivers = crew.receivers();
+  gathered_surfels_ = crew.surfels();
   pass.largest_change = crew.largestChange();
   pass.gather_seconds = secondsSince(begin);
   pass.node_cache = controller.nodeStats();
@@ -357,6 +373,60 @@ Result<SceneFile> Bouncer::write(int bounce, BounceRadiosity& radiosity, BounceP
   SURFEIT_ASSIGN_OR_RETURN(PageFile pages, writer.finishUnnamed(fields, text));
   pass.write_seconds = secondsSince(begin);
   return SceneFile::open(std::move(pages));
+}
+
+// A bounce of `times` that are alike, by some of the surfels.
+Status Bouncer::gatherSample(int bounce, int times, SampleForecast& forecast) {
+  const auto spared = std::uint64_t(surfelsPerReceiver(bounce));
+  const std::uint64_t receivers = stats_.surfels / spared;
+  stride_ = std::uint32_t(std::max<std::uint64_t>(1, receivers / kSampledReceivers));
+  SURFEIT_ASSIGN_OR_RETURN(SceneFile scene,
+                           SceneFile::open(scene_path_, sceneAccess(gather_options_)));
+  SURFEIT_ASSIGN_OR_RETURN(
+      BounceRadiosity radiosity,
+      BounceRadiosity::create(temporary_directory_, scene_->surfelPageCount(), is_glossy_));
+  BouncePass pass;
+  SURFEIT_RETURN_IF_ERROR(gather(bounce, std::move(scene), radiosity, pass));
+  const double scale = double(stats_.surfels) / double(gathered_surfels_);
+  forecast.sampled_records = std::max(forecast.sampled_records, gathered_surfels_);
+  forecast.seconds += times * scale * pass.gather_seconds;
+  forecast.temporary_bytes = std::uint64_t(scale * double(radiosity.fileBytes()));
+  return {};
+}
+
+// What it takes to write the scene, by a scene of some surfels.
+Status Bouncer::writeSample(SampleForecast& forecast) {
+  SURFEIT_ASSIGN_OR_RETURN(const ScratchFolder folder, ScratchFolder::create(temporary_directory_));
+  SURFEIT_ASSIGN_OR_RETURN(const SceneSample sample, sampleScene(scene_path_, folder, progress_));
+  const std::string result = folder.file("result.sft");
+  BounceOptions once = options_;
+  once.bounces = 1;
+  once.spare_last = true;  // within the memory of the job
+  SilentProgress silent(progress_);
+  SURFEIT_ASSIGN_OR_RETURN(const BounceStats stats,
+                           Bouncer(sample.path, result, once, silent).run());
+  forecast.seconds += options_.bounces * sample.times() * stats.passes[0].write_seconds;
+  forecast.output_bytes =
+      std::uint64_t(double(sample.bytes) * double(stats.file_bytes) / double(sample.sampled_bytes));
+  if (options_.bounces > 1) forecast.temporary_bytes += forecast.output_bytes;
+  return {};
+}
+
+Result<SampleForecast> Bouncer::forecast() {
+  SURFEIT_RETURN_IF_ERROR(open());
+  SampleForecast forecast;
+  forecast.records = stats_.surfels;
+  forecast.input_bytes = scene_->fileBytes();
+  forecast.memory_bytes = stats_.memory_bytes;
+  const int last = options_.bounces;
+  if (surfelsPerReceiver(1) == surfelsPerReceiver(last)) {
+    SURFEIT_RETURN_IF_ERROR(gatherSample(last, last, forecast));
+  } else {
+    SURFEIT_RETURN_IF_ERROR(gatherSample(1, last - 1, forecast));
+    SURFEIT_RETURN_IF_ERROR(gatherSample(last, 1, forecast));
+  }
+  SURFEIT_RETURN_IF_ERROR(writeSample(forecast));
+  return forecast;
 }
 
 // What the scene's says, and what decides about the bounces.
@@ -397,6 +467,14 @@ Result<BounceStats> bounceScene(const std::string& scene_path, const std::string
   return guarded(result_path, [&]() -> Result<BounceStats> {
     SURFEIT_RETURN_IF_ERROR(checkOptions(options));
     return Bouncer(scene_path, result_path, options, progress).run();
+  });
+}
+
+Result<SampleForecast> forecastBounce(const std::string& scene_path, const std::string& result_path,
+                                      const BounceOptions& options, Progress& progress) {
+  return guarded(result_path, [&]() -> Result<SampleForecast> {
+    SURFEIT_RETURN_IF_ERROR(checkOptions(options));
+    return Bouncer(scene_path, result_path, options, progress).forecast();
   });
 }
 

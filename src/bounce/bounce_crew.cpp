@@ -60,7 +60,7 @@ Status BounceCrew::gatherStretches() {
   Stretch& stretch = *stretch_memory;
   const std::uint32_t pages = pagesOfStretch(setup_.surfels_per_receiver);
   while (!failure_.happened()) {
-    const std::uint32_t first_page = next_page_.fetch_add(pages);
+    const std::uint32_t first_page = next_page_.fetch_add(pages * setup_.stride);
     if (first_page >= setup_.scene.surfelPageCount()) return {};
     SURFEIT_RETURN_IF_ERROR(load(first_page, reader, stretch));
     stretch.receivers.choose(stretch.surfels);
@@ -171,6 +171,7 @@ Status BounceCrew::handIn(std::uint32_t first_page, Stretch& stretch) {
   }
   noteChange(largest_change);
   receivers_ += stretch.receivers.receivers().size();
+  surfels_ += stretch.surfels.size();
   setup_.progress.advance(stretch.surfels.size());
   setup_.controller.advance(stretch.receivers.receivers().size());
   return {};

@@ -34,6 +34,7 @@ class BounceCrew {
     const GlossOfGroup* gloss = nullptr;  // null: nothing is glossy
     int surfels_per_receiver = 1;
     int threads = 1;
+    std::uint32_t stride = 1;    // one of so many stretches is gathered: 1 all, more a sample
     BounceRadiosity& radiosity;  // gets B_k
     PagingController& controller;
     Progress& progress;
@@ -46,6 +47,7 @@ class BounceCrew {
 
   // After run().
   std::uint64_t receivers() const { return receivers_; }
+  std::uint64_t surfels() const { return surfels_; }
   // Surfels of glossy groups that send evenly: two-sided ones and spheres.
   std::uint64_t withoutMirror() const { return without_mirror_; }
   double largestChange() const { return double(largest_change_.load()); }
@@ -69,7 +71,7 @@ class BounceCrew {
   const Setup setup_;
   FirstFailure failure_;
   std::atomic<std::uint32_t> next_page_{0};
-  std::atomic<std::uint64_t> receivers_{0}, without_mirror_{0};
+  std::atomic<std::uint64_t> receivers_{0}, surfels_{0}, without_mirror_{0};
   std::atomic<float> largest_change_{0};
 };
 

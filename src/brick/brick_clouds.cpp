@@ -16,8 +16,11 @@
 #include "core/guard.h"
 #include "core/job_limits.h"
 #include "core/parallel.h"
+#include "core/split_mix.h"
 #include "storage/external_sorter.h"
+#include "storage/held_bytes.h"
 #include "storage/output_target.h"
+#include "storage/scratch_folder.h"
 #include "surfeit/brick.h"
 
 namespace surfeit {
@@ -29,6 +32,9 @@ constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;
 constexpr std::uint64_t kFixedMemory = std::uint64_t{32} << 20;
 // Edge of the finest voxels over the spacing of the points: 4 points of a surface in each.
 constexpr double kVoxelsPerSpacing = 2;
+// Of a sample: blocks of 2^4 voxels along each axis, and about so many points.
+constexpr int kSampledLevel = 4;
+constexpr std::uint64_t kSampledPoints = 1 << 18;
 
 // Where voxels lie: level l has edges of voxel_size * 2^l, and voxel (0, 0, 0) begins at the
 // origin, so that maps of parts of a scene fit each other.
@@ -95,6 +101,18 @@ class BrickBuild {
     return std::move(stats_);
   }
 
+  // Of the points, those in some blocks of voxels: about `most`.
+  void takeSample(std::uint64_t most) { most_points_ = most; }
+  std::uint64_t takenPoints() const { return taken_points_; }
+  std::uint64_t validPoints() const { return extent_.points; }
+  // Of the file, however few points there are: masks of the two upper nodes of every grid.
+  std::uint64_t bytesOfGrids() const {
+    constexpr std::uint64_t kMasks = 2 * (32 * 32 * 32 + 16 * 16 * 16) / 8;
+    std::uint64_t groups = 0;
+    for (const BrickGroup& group : groups_) groups += group.voxels > 0 ? 1 : 0;
+    return groups * (channels_.size() + 1) * kMasks;
+  }
+
  private:
   template <typename Work>
   Status phase(const char* name, Work work) {
@@ -112,6 +130,7 @@ class BrickBuild {
   Status forEach(const char* phase_name,
                  const std::function<Status(const BrickInputPoint&)>& visit);
   Status sortPoints();
+  bool isTaken(std::uint64_t morton) const;
   int levelOf(double area) const;
   Status sweep();
   Status write();
@@ -130,6 +149,8 @@ class BrickBuild {
   Lattice lattice_;
   std::optional<ExternalSorter> points_, voxels_;
   std::vector<BrickGroup> groups_;
+  std::uint64_t most_points_ = 0;  // 0: all
+  std::uint64_t taken_points_ = 0;
 };
 
 // Opens every input to see that it holds what is wanted.
@@ -251,6 +272,14 @@ int BrickBuild::levelOf(double area) const {
   return static_cast<int>(std::clamp(level, 0.0, static_cast<double>(lattice_.top_level)));
 }
 
+// Blocks that are voxels of a coarser level, and whole leaves of the file: what is in one of them
+// is as it is among all others.
+bool BrickBuild::isTaken(std::uint64_t morton) const {
+  if (most_points_ == 0 || most_points_ >= extent_.points) return true;
+  const double part = double(most_points_) / double(extent_.points);
+  return double(splitMix(morton >> (3 * kSampledLevel))) < 0x1p64 * part;
+}
+
 // Records of points: [Morton cell : 64 | level : 32, area : 32 | normal : 96 | values : 32 each].
 Status BrickBuild::sortPoints() {
   const std::size_t bytes = kRecordKeyBytes + 4 * (3 + value_count_);
@@ -268,6 +297,8 @@ Status BrickBuild::sortPoints() {
       cell[at] = static_cast<std::uint32_t>(place);
     }
     const std::uint64_t morton = brickMorton(cell);
+    if (!isTaken(morton)) return Status();
+    ++taken_points_;
     const std::uint64_t level = has_sizes_ ? static_cast<std::uint64_t>(levelOf(point.area)) : 0;
     const float area = has_sizes_ ? static_cast<float>(point.area) : 1;
     const std::uint64_t second = level << 32 | std::bit_cast<std::uint32_t>(area);
@@ -371,6 +402,65 @@ Result<BrickStats> brickClouds(const std::vector<std::string>& inputs, const std
       (*result)->memory_bytes = options.memory_bytes;
     }
     return std::move(*result);
+  });
+}
+
+namespace {
+
+double secondsOf(const BrickStats& stats, const std::string& phase) {
+  for (const auto& [name, seconds] : stats.phase_seconds) {
+    if (name == phase) return seconds;
+  }
+  return 0;
+}
+
+Result<SampleForecast> forecast(const std::vector<std::string>& inputs, const std::string& output,
+                                const BrickOptions& options, Progress& progress) {
+  SURFEIT_ASSIGN_OR_RETURN(const ScratchFolder folder, ScratchFolder::create(temporaryDirectory(
+                                                           options.temporary_directory, output)));
+  const std::string sample = folder.file("sample.vdb");
+  SilentProgress silent(progress);
+  SampleForecast forecast;
+  BrickStats stats;
+  double times = 1;
+  std::uint64_t fixed = 0;
+  // A few blocks that hold all may all have been left out
+  for (const std::uint64_t most : {kSampledPoints, std::uint64_t{0}}) {
+    const HeldBytesLog held;
+    BrickBuild build(inputs, sample, options, silent);
+    build.takeSample(most);
+    SURFEIT_ASSIGN_OR_RETURN(stats, build.run());
+    forecast.sampled_records = build.takenPoints();
+    if (forecast.sampled_records == 0) continue;
+    times = double(build.validPoints()) / double(forecast.sampled_records);
+    forecast.temporary_bytes = held.spilledOf(times);
+    fixed = std::min(build.bytesOfGrids(), stats.file_bytes);
+    break;
+  }
+  forecast.records = stats.points;
+  for (const std::string& input : inputs) forecast.input_bytes += fileBytesOf(input);
+  forecast.memory_bytes = options.memory_bytes;
+  forecast.output_bytes = fixed + std::uint64_t(double(stats.file_bytes - fixed) * times);
+  // All is read to sort it as it is to scan it
+  const double reading = secondsOf(stats, "scan");
+  forecast.seconds = 2 * reading + times * (std::max(0., secondsOf(stats, "sort") - reading) +
+                                            secondsOf(stats, "sweep") + secondsOf(stats, "write"));
+  return forecast;
+}
+
+}  // namespace
+
+Result<SampleForecast> forecastBrick(const std::vector<std::string>& inputs,
+                                     const std::string& output, const BrickOptions& given,
+                                     Progress& progress) {
+  return guarded(output, [&]() -> Result<SampleForecast> {
+    BrickOptions options = given;
+    if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
+    SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
+    const int threads = options.threads > 0 ? options.threads : defaultThreadCount();
+    Result<SampleForecast> result = Status::failed("brick: no forecast");
+    withThreads(threads, [&] { result = forecast(inputs, output, options, progress); });
+    return result;
   });
 }
 

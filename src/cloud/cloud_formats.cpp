@@ -139,12 +139,13 @@ constexpr OtherFormat kOtherFormats[] = {
     {"\xFD\x37zXZ"sv, "xz", "unpack it first; gzip and zstd are read as they are"},
 };
 
+constexpr std::string_view kSplatAdvice =
+    "convert it to the PLY of Gaussian splats, for example with SuperSplat";
+
 // Those that only their names tell.
 constexpr OtherFormat kOtherExtensions[] = {
-    {".splat"sv, "Gaussian splats of a viewer (.splat)",
-     "convert it to the PLY of Gaussian splats"},
-    {".ksplat"sv, "Gaussian splats of a viewer (.ksplat)",
-     "convert it to the PLY of Gaussian splats"},
+    {".splat"sv, "Gaussian splats of a viewer (.splat)", kSplatAdvice},
+    {".ksplat"sv, "Gaussian splats of a viewer (.ksplat)", kSplatAdvice},
     {".stl"sv, "STL", kMeshAdvice},
     {".dxf"sv, "DXF", kTableAdvice},
     {".fls"sv, "a scan of FARO (.fls)", kScannerAdvice},
@@ -208,20 +209,28 @@ bool isTextName(std::string_view path) {
   return hasExtension(withoutCompression(path), ".xyz .txt .asc .csv .pts");
 }
 
-Status unknownFormat(const std::string& path, std::string_view first_bytes) {
-  const auto notRead = [&path](const OtherFormat& other) {
-    return Status::corruption(fmt::format("{}: found {}, which is not read as a cloud: {}", path,
-                                          other.name, other.advice));
-  };
-  if (hasEnding(path, ".xlsx")) {
-    return notRead({{}, "a spreadsheet (.xlsx)", "save it as CSV"});
+// Of a file that is of no format that is read; nullopt: not known.
+std::optional<OtherFormat> otherFormatOf(const std::string& path, std::string_view first_bytes) {
+  if (hasEnding(path, ".xlsx")) return OtherFormat{{}, "a spreadsheet (.xlsx)", "save it as CSV"};
+  if (hasEnding(path, ".sog")) {
+    return OtherFormat{{}, "Gaussian splats of SuperSplat (.sog)", kSplatAdvice};
   }
   for (const OtherFormat& other : kOtherFormats) {
-    if (first_bytes.starts_with(other.magic)) return notRead(other);
+    if (first_bytes.starts_with(other.magic)) return other;
   }
-  if (isUtf16(first_bytes)) return notRead({{}, "text in UTF-16", "save it as UTF-8 or ASCII"});
+  if (isUtf16(first_bytes)) {
+    return OtherFormat{{}, "text in UTF-16", "save it as UTF-8 or ASCII"};
+  }
   for (const OtherFormat& other : kOtherExtensions) {
-    if (hasEnding(path, other.magic)) return notRead(other);
+    if (hasEnding(path, other.magic)) return other;
+  }
+  return std::nullopt;
+}
+
+Status unknownFormat(const std::string& path, std::string_view first_bytes) {
+  if (const std::optional<OtherFormat> other = otherFormatOf(path, first_bytes)) {
+    return Status::corruption(fmt::format("{}: found {}, which is not read as a cloud: {}", path,
+                                          other->name, other->advice));
   }
   if (first_bytes.empty()) {
     return Status::corruption(path + ": the file is empty, expected a cloud");
@@ -288,6 +297,11 @@ Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,
     return reader;
   }
   return unknownFormat(path, first_bytes);
+}
+
+std::string nameOfOtherFormat(const std::string& path, std::string_view first_bytes) {
+  const std::optional<OtherFormat> other = otherFormatOf(path, first_bytes);
+  return other ? std::string(other->name) : std::string();
 }
 
 Result<std::optional<ColorRange>> colorRangeFor(std::span<const std::string> inputs,

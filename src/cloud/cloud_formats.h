@@ -51,6 +51,10 @@ std::span<const CloudFormat> cloudFormats();
 // Whether these are the first bytes of a Surfeit scene (docs/format.md), which is no cloud.
 bool isSceneFile(std::string_view first_bytes);
 
+// The format of a file that is known but not read, by its first bytes and its name: "STL". Empty:
+// not known.
+std::string nameOfOtherFormat(const std::string& path, std::string_view first_bytes);
+
 // Opens a cloud by its first bytes. kCorruption when they are of no known format, with those that
 // are read and, for known ones that are not read (LAZ, E57, SPRT, ...), what to do instead.
 Result<std::unique_ptr<RowReader>> openRowReader(const std::string& path,

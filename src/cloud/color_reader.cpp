@@ -376,6 +376,9 @@ class ColorPlan {
         "{} is a color packed into {} of type {}: read as{}", packed.name,
         is_number || !isFloatType(packed.type) ? "whole numbers" : "the bits of numbers",
         valueTypeName(packed.type), fmt::format(" {}", fmt::join(names, " "))));
+    if (is_number && sample.digits.areLost()) {
+      notes_.push_back(sample.digits.describe(packed.name, "write the color as whole numbers"));
+    }
     if (is_number || sample.no_colors == 0) return;
     notes_.push_back(fmt::format(
         "{} is nan in {} of {} records looked at, which is no color and becomes black: texts lose "

@@ -33,6 +33,7 @@ void addValues(const std::byte* rows, std::size_t count, std::size_t row_bytes,
           continue;
         }
         sample.are_wholes = sample.are_wholes && value == std::floor(value);
+        sample.digits.add(value);
       }
       sample.least = std::min(sample.least, value);
       sample.largest = std::max(sample.largest, value);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cloud/packed_colors.h"
 #include "cloud/row_layout.h"
 #include "cloud/row_reader.h"
 #include "surfeit/status.h"
@@ -32,6 +33,7 @@ struct ColorSample {
   bool has_non_finite = false;
   std::uint64_t seen = 0, no_colors = 0;  // values; reals among them whose bits are kNoPackedColor
   double largest_alpha = 0;
+  LostDigits digits = {};  // of one packed number
 
   bool isOpacity() const { return channel == kOpacity; }
   bool isPacked() const { return properties.size() == 1 && !isOpacity(); }

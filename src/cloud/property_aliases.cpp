@@ -41,6 +41,8 @@ constexpr std::string_view kTransparencies[] = {"transparency", "transparence"};
 
 // What CloudCompare writes in front of the names of its scalar fields.
 constexpr std::string_view kScalarPrefix = "scalar_";
+// What stands there when a converter of splats wrote the names that CloudCompare shows.
+constexpr std::string_view kSplatPrefixes[] = {"scalar_scal_", kScalarPrefix};
 // Those of Gaussian splats, which stay together.
 constexpr std::string_view kSplatStems[] = {"f_dc_", "f_rest_", "scale_", "rot_"};
 
@@ -156,11 +158,16 @@ class Namer {
   }
 
   void nameSplats() {
-    if (!has("scalar_f_dc_0") || has("f_dc_0")) return;
+    for (const std::string_view prefix : kSplatPrefixes) {
+      if (has("f_dc_0")) return;
+      if (has(std::string(prefix) + "f_dc_0")) nameSplatsBehind(prefix);
+    }
+  }
+  void nameSplatsBehind(std::string_view prefix) {
     for (std::size_t i = 0; i < names_.size(); ++i) {
       const std::string_view name = element_.properties[i].name;
-      if (element_.properties[i].is_list || !name.starts_with(kScalarPrefix)) continue;
-      const std::string_view rest = name.substr(kScalarPrefix.size());
+      if (element_.properties[i].is_list || !name.starts_with(prefix)) continue;
+      const std::string_view rest = name.substr(prefix.size());
       const bool is_of_splat =
           rest == "opacity" ||
           std::any_of(std::begin(kSplatStems), std::end(kSplatStems),

@@ -57,6 +57,8 @@ class RowWriter {
   virtual Status writeRows(std::span<const std::byte> rows) = 0;
   // Completes, syncs and renames.
   virtual Status finish() = 0;
+  // Rows that wait in a temporary file until the end, where a format needs that.
+  virtual std::uint64_t temporaryBytes() const { return 0; }
 };
 
 }  // namespace surfeit

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <atomic>
@@ -15,6 +18,9 @@ namespace {
 // The parts of a step from which the rest can be foreseen roughly, and well.
 constexpr double kRoughlyForeseen = 0.1, kForeseen = 0.5;
 constexpr double kRoughness = 1.5;
+// Before that, so much is too little to foresee anything from: what would do shows a little later,
+// also where the budget has no room for it.
+constexpr std::uint64_t kUnforeseenBytes = std::uint64_t{8} << 20;
 
 std::atomic<std::uint64_t> limit{0}, resident_at_first{0};
 
@@ -34,6 +40,13 @@ void limitResidentBytes(std::uint64_t bytes) {
   limit = bytes;
 }
 
+void beginResidentStep() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+  if (limit != 0) resident_at_first = residentBytes();
+}
+
 ResidentRoom residentRoom() {
   const std::uint64_t most = limit;
   if (most == 0) return {0, std::numeric_limits<std::uint64_t>::max()};
@@ -46,6 +59,7 @@ Status checkResidentBytes(const std::string& what, std::uint64_t more_bytes, dou
   const std::uint64_t most = limit;
   if (most == 0) return {};
   const std::uint64_t resident = residentBytes(), base = resident_at_first;
+  if (more_bytes == 0 && part < kRoughlyForeseen && resident < base + kUnforeseenBytes) return {};
   const double held = double(resident - std::min(resident, base)) / std::clamp(part, .01, 1.);
   const double needed = double(base) + times * held + double(more_bytes);
   const bool is_foreseen = (part >= kForeseen && needed > double(most)) ||

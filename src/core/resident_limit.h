@@ -20,6 +20,10 @@ void limitResidentBytes(std::uint64_t bytes);
 Status checkResidentBytes(const std::string& what, std::uint64_t more_bytes, double part = 1,
                           double times = 1);
 
+// Between two jobs in one process: gives back what the first one freed. What is left of it is not
+// taken for the beginning of what a step of the second one holds.
+void beginResidentStep();
+
 // What this process has, and how much more the limit lets it take: all that there is without one.
 struct ResidentRoom {
   std::uint64_t resident_bytes = 0, free_bytes = 0;

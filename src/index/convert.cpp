@@ -176,6 +176,7 @@ class Converter {
     if (progress_.isCancelled()) return Status::interrupted();  // before it has a name
     progress_.beginPhase("finish", 0, "records");
     SURFEIT_RETURN_IF_ERROR(writer_->finish());
+    stats_.temporary_bytes = writer_->temporaryBytes();
     noteOfWriter();
     SURFEIT_ASSIGN_OR_RETURN(const OutputTarget target, resolveOutput(output_));
     if (!target.is_stream) {
@@ -455,7 +456,7 @@ class Converter {
   bool is_measuring_ = false;  // all records for the thinner, nothing is written
   AlignedBuffer buffer_;
   std::vector<std::byte> rows_;
-  ConvertStats stats_;
+  ConvertStats stats_{.memory_bytes = options_.memory_bytes};
 };
 
 Status checkOptions(const std::vector<std::string>& inputs, const ConvertOptions& options) {

@@ -12,9 +12,9 @@
 #include "index/index_neighbours.h"
 #include "index/index_plan.h"
 #include "index/scene_rows.h"
-#include "index/scratch_folder.h"
 #include "octree/neighbours/repeated_surfels.h"
 #include "storage/output_target.h"
+#include "storage/scratch_folder.h"
 #include "surfeit/index.h"
 #include "surfels/surfel_writer.h"
 
@@ -63,7 +63,7 @@ Result<IndexForecast> forecast(const std::vector<std::string>& inputs, const std
   indexing.cube.reset();
   indexing.named.clear();
   indexing.strict = false;
-  QuietProgress quiet(progress);
+  SilentProgress quiet(progress);
   const auto start = std::chrono::steady_clock::now();
   SURFEIT_ASSIGN_OR_RETURN(
       const IndexStats stats,

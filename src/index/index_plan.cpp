@@ -14,6 +14,7 @@
 #include "octree/build/bucket_stream.h"
 #include "octree/build/surfel_block.h"
 #include "octree/neighbours/normal_rule.h"
+#include "storage/held_bytes.h"
 
 namespace surfeit {
 namespace {
@@ -173,6 +174,8 @@ Result<IndexPlan> planIndex(const IndexTask& task) {
   const std::uint64_t bucket_bytes = bucket * surfel_bytes;
   plan.spills = packed + bucket_bytes > std::min(reading, building);
   if (!plan.spills) {
+    noteHeldBytes(static_cast<std::uint64_t>(double(task.records) * task.packed_bytes),
+                  std::min(reading, building) - bucket_bytes);
     plan.block_memory = packed;
     plan.spare_memory = std::min(reading, building) - packed - bucket_bytes;
     plan.bucket_capacity = static_cast<std::size_t>(bucket);

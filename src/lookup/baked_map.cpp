@@ -19,8 +19,8 @@ namespace {
 // the surface.
 constexpr double kReach = 8;
 
-// Whether it is an OpenVDB file whose grids say that they are a brick map. A file that does not
-// open is none: whoever reads it as a cloud tells the reason.
+}  // namespace
+
 bool isBrickMap(const std::string& path) {
   const Result<InputFile> input = InputFile::open(path);
   std::array<std::byte, sizeof kVdbMagic> first{};
@@ -31,8 +31,6 @@ bool isBrickMap(const std::string& path) {
          std::any_of((*file)->grids.begin(), (*file)->grids.end(),
                      [](const VdbGrid& grid) { return !grid.text(kBrickVersionName).empty(); });
 }
-
-}  // namespace
 
 Result<BakedMap> BakedMap::open(const std::string& path, const LookupOptions& options,
                                 const BakedMapMemory& memory, Progress& progress) {

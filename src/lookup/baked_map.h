@@ -18,6 +18,10 @@
 
 namespace surfeit {
 
+// Whether it is an OpenVDB file whose grids say that they are a brick map. A file that does not
+// open is none: whoever reads it as a cloud tells the reason.
+bool isBrickMap(const std::string& path);
+
 // What a map may take.
 struct BakedMapMemory {
   std::uint64_t open_bytes = 0, hold_bytes = 0;  // while it is opened, and afterwards

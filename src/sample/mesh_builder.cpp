@@ -12,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "cloud/cloud_formats.h"
 #include "cloud/houdini/bgeo_json_cursor.h"
 #include "core/surfel_limits.h"
 #include "core/text_case.h"
@@ -80,6 +81,18 @@ Result<MeshFormat> recogniseMesh(const std::string& path) {
   return MeshFormat::kUnknown;
 }
 
+Status unknownMesh(const std::string& path) {
+  SURFEIT_ASSIGN_OR_RETURN(const InputFile file, InputFile::open(path));
+  char first[64] = {};
+  SURFEIT_ASSIGN_OR_RETURN(const std::size_t count,
+                           file.readSome(0, std::as_writable_bytes(std::span(first))));
+  const std::string other = nameOfOtherFormat(path, {first, count});
+  return Status::corruption(fmt::format(
+      "{}: found {}, expected PLY, OBJ (by its name), hair or curves of Houdini (.bgeo): save the "
+      "mesh as OBJ or PLY, for example with Blender or MeshLab",
+      path, other.empty() ? "no mesh that we read" : other));
+}
+
 Status loadFile(const std::string& path, const glm::vec3& default_albedo,
                 const CurveOptions& curves, MeshBuilder& builder, Progress& progress) {
   const std::size_t triangles_before = builder.mesh.triangle.size();
@@ -101,10 +114,7 @@ Status loadFile(const std::string& path, const glm::vec3& default_albedo,
       SURFEIT_RETURN_IF_ERROR(loadHoudiniMesh(path, default_albedo, curves, builder, progress));
       break;
     case MeshFormat::kUnknown:
-      return Status::corruption(fmt::format(
-          "{}: not a mesh that we read: expected PLY, hair, curves of Houdini (.bgeo) or a name "
-          "ending in .obj",
-          path));
+      return unknownMesh(path);
   }
   const bool has_own_groups = format == MeshFormat::kObj && builder.groups != SampleGroups::kFile;
   if (builder.groups != SampleGroups::kNone && !has_own_groups) {

@@ -37,9 +37,22 @@ struct ParsedObj {
   std::vector<std::string> comments;
 };
 
-Status parseObj(const std::string& path, ParsedObj& parsed) {
+// What the parser says, in words that say what to do.
+std::string describeErrors(std::string errors) {
+  while (!errors.empty() && errors.back() == '\n') errors.pop_back();
+  const std::size_t line = errors.rfind("line ");
+  if (errors.find("zero value for face index") == errors.npos || line == errors.npos) return errors;
+  const std::string number =
+      errors.substr(line + 5, errors.find_first_not_of("0123456789", line + 5) - line - 5);
+  return fmt::format(
+      "line {}: found index 0, expected 1 or more, for OBJ counts from 1: add 1 to all indices",
+      number);
+}
+
+// `libraries`: statements that name material files, in front of all others.
+Status parseObj(const std::string& path, ParsedObj& parsed, const std::string& libraries = {}) {
   SURFEIT_ASSIGN_OR_RETURN(ByteInput input, ByteInput::open(path));
-  ObjLines lines(std::move(input));
+  ObjLines lines(std::move(input), libraries);
   std::istream stream(&lines);
   MaterialFiles material_files(directoryOf(path));
   std::string errors;
@@ -55,6 +68,11 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   }
   SURFEIT_RETURN_IF_ERROR(lines.status());
   SURFEIT_RETURN_IF_ERROR(material_files.status());
+  if (libraries.empty() && !lines.lateLibraries().empty()) {
+    // The parser knows materials only behind the file that has them
+    parsed = {};
+    return parseObj(path, parsed, lines.lateLibraries());
+  }
   parsed.free_form_statements = lines.freeFormStatements();
   parsed.comments = lines.comments();
   parsed.other_comments = lines.otherComments();
@@ -62,8 +80,7 @@ Status parseObj(const std::string& path, ParsedObj& parsed) {
   parsed.sources = material_files.sources();
   parsed.notes = material_files.notes();
   if (ok) return {};
-  while (!errors.empty() && errors.back() == '\n') errors.pop_back();
-  return Status::corruption(fmt::format("{}: {}", path, errors));
+  return Status::corruption(fmt::format("{}: {}", path, describeErrors(std::move(errors))));
 }
 
 // What the parser warns of, in one line.
@@ -164,6 +181,7 @@ class ObjImporter {
       if (index != faces.indices.size()) return tooManyCorners();
     }
     materials_.noteFacesWithoutUv();
+    noteUnusedMaterials();
     return {};
   }
 
@@ -209,10 +227,21 @@ class ObjImporter {
   }
 
  private:
+  // Names that are not there are told by the parser.
+  void noteUnusedMaterials() const {
+    if (has_material_ || parsed_.materials.empty() || !parsed_.warnings.empty()) return;
+    progress_.note(
+        fmt::format("{}: no face uses any of the {} materials (\"{}\", ...): usemtl in front of "
+                    "the faces names "
+                    "the one that they have",
+                    path_, parsed_.materials.size(), shown(parsed_.materials.front().name)));
+  }
+
   // The material of a face with that id. Groups by object have copies of materials, one for each
   // object that they are on.
   Result<std::uint32_t> materialOf(const std::string& object, int id, bool has_uv) {
     const std::uint32_t material = materials_.ofFace(id, has_uv);
+    has_material_ = has_material_ || materials_.has(id);
     const bool is_by_material = builder_.groups == SampleGroups::kMaterial;
     if (!is_by_material && builder_.groups != SampleGroups::kObject) return material;
     std::string name = object;
@@ -315,6 +344,7 @@ class ObjImporter {
   Mesh& mesh_;
   Progress& progress_;
   bool has_normals_, has_uvs_, has_colors_;
+  bool has_material_ = false;  // any face
   std::uint64_t vertex_begin_;
   ObjMaterials materials_;
   std::map<std::pair<std::uint32_t, std::uint8_t>, std::uint32_t> grouped_;  // copies of materials

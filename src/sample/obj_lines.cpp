@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <span>
+#include <utility>
 
 #include "core/resident_limit.h"
 #include "core/text_case.h"
@@ -222,6 +223,11 @@ void ObjLines::rewriteLine() {
     const bool is_material = word == "newmtl";
     line_ = std::string(word) + " " + name;
     if (is_material) noteMaterial("newmtl", name);
+    if (word == "usemtl") has_early_use_ = has_early_use_ || !has_library_;
+    if (word == "mtllib") {
+      has_library_ = true;
+      if (has_early_use_) late_libraries_ += line_ + "\n";
+    }
   } else if (isOneOf(word, kPictureStatements)) {
     line_ = std::string(word) + " " + withAllValues(rest);
   } else if (word == "Pm") {
@@ -329,6 +335,11 @@ bool ObjLines::checkNumbers(std::string_view numbers) {
 }
 
 ObjLines::int_type ObjLines::underflow() {
+  if (!first_lines_.empty()) {
+    line_ = std::exchange(first_lines_, {});
+    setg(line_.data(), line_.data(), line_.data() + line_.size());
+    return traits_type::to_int_type(line_[0]);
+  }
   if (!status_.ok() || !readLine()) return traits_type::eof();
   setg(line_.data(), line_.data(), line_.data() + line_.size());
   return traits_type::to_int_type(line_[0]);

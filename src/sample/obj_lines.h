@@ -27,13 +27,17 @@ inline constexpr char kNameBlank = '\x01';
 // and line, and reading ends there, as it does when the file cannot be read.
 class ObjLines final : public std::streambuf {
  public:
-  explicit ObjLines(ByteInput input) : input_(std::move(input)) {}
+  // `first_lines` come in front of the file's.
+  explicit ObjLines(ByteInput input, std::string first_lines = {})
+      : input_(std::move(input)), first_lines_(std::move(first_lines)) {}
 
   const Status& status() const { return status_; }
   std::uint64_t freeFormStatements() const { return free_form_; }
   // In front of the first statement, at most 64; and how many others there are.
   const std::vector<std::string>& comments() const { return comments_; }
   std::uint64_t otherComments() const { return other_comments_; }
+  // Material files that are named behind the first use of a material, as statements.
+  const std::string& lateLibraries() const { return late_libraries_; }
   ObjVertexColors takeColors() { return std::move(colors_); }
   // Materials that the file defines, and whether they have a Kd; of several of one name the first.
   const std::map<std::string, bool>& materials() const { return materials_; }
@@ -73,6 +77,8 @@ class ObjLines final : public std::streambuf {
   std::map<std::string, bool> materials_;
   std::set<std::string> repeated_;
   bool* has_kd_ = nullptr;  // of the material that is being defined
+  std::string first_lines_, late_libraries_;
+  bool has_library_ = false, has_early_use_ = false;
   bool is_at_end_ = false;
 };
 

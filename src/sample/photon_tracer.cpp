@@ -293,6 +293,12 @@ class PhotonFiles {
     return writeRows(caustic, origin, *files_[1].writer);
   }
 
+  std::uint64_t temporaryBytes() const {
+    std::uint64_t bytes = 0;
+    for (const File& file : files_) bytes += file.writer->temporaryBytes();
+    return bytes;
+  }
+
   Status finish() {
     for (File& file : files_) {
       SURFEIT_RETURN_IF_ERROR(file.writer->finish());
@@ -441,6 +447,7 @@ Result<PhotonTracingStats> tracePhotons(const std::vector<std::string>& meshes,
           options.caustic_output));
     }
     SURFEIT_RETURN_IF_ERROR(files.finish());
+    stats.temporary_bytes = files.temporaryBytes();
     stats.trace_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

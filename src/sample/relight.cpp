@@ -143,6 +143,7 @@ class Relighter {
  private:
   Status openScene();
   Status loadShadows();
+  Status checkMemory() const;
   Status write(RelitRadiosity& radiosity);
   std::uint64_t meshContent() const;
   std::uint64_t lightContent() const;
@@ -163,6 +164,7 @@ Result<RelightStats> Relighter::run() {
   requireThreads(stats_.threads);
   SURFEIT_RETURN_IF_ERROR(openScene());
   SURFEIT_RETURN_IF_ERROR(loadShadows());
+  SURFEIT_RETURN_IF_ERROR(checkMemory());
   const DirectLight light =
       rays_ ? DirectLight(mesh_, *rays_, options_.lights) : DirectLight(mesh_, options_.lights);
   if (!light.hasLight()) {
@@ -204,6 +206,11 @@ Status Relighter::openScene() {
         "evenly",
         result_path_, scene_path_));
   }
+  return {};
+}
+
+// Behind the meshes, so that what it names has room for both.
+Status Relighter::checkMemory() const {
   return checkResidentBytes(
       fmt::format("{}: pages of {} threads", scene_path_, stats_.threads),
       rewriteRadiosityBytes(scene_, stats_.threads) + scene_.pages().memoryBytes());

@@ -254,6 +254,7 @@ Result<SampleStats> sampleMeshes(const std::vector<std::string>& meshes, const s
                       output, stats.clear_surfels));
     }
     SURFEIT_RETURN_IF_ERROR(writer.finish());
+    stats.temporary_bytes = writer.temporaryBytes();
     stats.sample_seconds = secondsSince(start);
   } catch (const std::bad_alloc&) {
     return Status::failed(fmt::format("{}: out of memory", output));

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "storage/block_writer.h"
+#include "storage/held_bytes.h"
 
 namespace surfeit {
 namespace {
@@ -350,6 +351,7 @@ Status ExternalSorter::finish() {
     // Fewer may have come than were told
     if (runs_.empty() && filled_ <= most_kept_) {
       sortRecords(memory_.data(), filled_, unit_.record_bytes);
+      noteHeldBytes(filled_ * unit_.record_bytes, most_kept_ * unit_.record_bytes);
     } else {
       SURFEIT_RETURN_IF_ERROR(spill());
       memory_ = {};

@@ -173,6 +173,10 @@ std::vector<Column> columnsOf(const RowLayout& element) {
     const bool is_signed = isFloatType(property.type) || property.type == ValueType::kInt16 ||
                            property.type == ValueType::kInt32;
     if (property.is_list || !is_signed || columns.size() == kMostProperties) continue;
+    // The largest code of a normal is a direction
+    const bool is_normal = std::find(std::begin(kNormalNames), std::end(kNormalNames),
+                                     property.name) != std::end(kNormalNames);
+    if (is_normal && !isFloatType(property.type)) continue;
     columns.emplace_back(property, element.row_bytes);
   }
   return columns;

@@ -35,6 +35,21 @@ const std::array<float, 256>& linearFromSrgb8() {
 // Whether a float can hold the value; false for NaN too.
 bool fitsFloat(double value) { return std::abs(value) <= std::numeric_limits<float>::max(); }
 
+// A property whose name differs by a letter or two that changed places; empty: none.
+std::string misspeltAs(const RowLayout& element, std::string_view name) {
+  for (const RowProperty& property : element.properties) {
+    if (property.is_list || property.name.size() != name.size() || name.size() < 4) continue;
+    std::size_t others = 0;
+    for (std::size_t i = 0; i < name.size(); ++i) others += property.name[i] != name[i] ? 1 : 0;
+    if (others == 1) return property.name;
+    std::string ours(name), theirs(property.name);
+    std::sort(ours.begin(), ours.end());
+    std::sort(theirs.begin(), theirs.end());
+    if (others == 2 && ours == theirs) return property.name;
+  }
+  return {};
+}
+
 }  // namespace
 
 // The property of that name, absent when the element has none. `name` must outlive the mapping.
@@ -67,9 +82,12 @@ Result<bool> SurfelMapping::findTriple(const RowLayout& element, const char* con
     drops += fmt::format("{}{}", drops.empty() ? "" : ",", dropsOf(element, names[i]));
   }
   if (found != nullptr && missing != nullptr) {
-    const std::string advice = std::string_view(names[0]) == kPositionNames[0]
-                                   ? ""
-                                   : fmt::format(": --channels {} leaves out what there is", drops);
+    std::string advice = std::string_view(names[0]) == kPositionNames[0]
+                             ? ""
+                             : fmt::format(": --channels {} leaves out what there is", drops);
+    if (const std::string misspelt = misspeltAs(element, missing); !misspelt.empty()) {
+      advice = fmt::format(": --channels {}={} takes {} for it", misspelt, missing, misspelt);
+    }
     return Status::corruption(fmt::format("{}: element {}: found property {} without {}{}", path,
                                           element.name, found, missing, advice));
   }

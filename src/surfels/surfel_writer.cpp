@@ -70,6 +70,8 @@ Status SurfelWriter::write(std::span<const Surfel> surfels) {
   return {};
 }
 
+std::uint64_t SurfelWriter::temporaryBytes() const { return state_->file->temporaryBytes(); }
+
 Status SurfelWriter::finish() {
   SURFEIT_RETURN_IF_ERROR(state_->file->finish());
   state_->note();

@@ -27,6 +27,8 @@ class SurfelWriter {
   ~SurfelWriter();
   Status write(std::span<const Surfel> surfels);
   Status finish();
+  // As RowWriter has it.
+  std::uint64_t temporaryBytes() const;
 
  private:
   struct State;

@@ -206,35 +206,6 @@ badOptionsAreUsageErrors() {
   leavesNothing none
 }
 
-# Of what a command would do, by a sample: its figures are those of the command but for chance.
-dryRunsWriteNothing() {
-  local command output
-  generate city.ply --surfels 200k
-  "$cornell_scene" .
-  run 0 sample cornell.obj -o photons.ply --photons 100k --quiet
-  mkdir scratch
-  for command in "convert city.ply -o none.ptc" "convert city.ply -o none.ply.gz --every 2" \
-    "normals city.ply -o none.csv" "radiance photons.ply -o none.ply"; do
-    # shellcheck disable=SC2086
-    run 0 $command --dry-run --temp scratch --stats dry.json
-    says "Nothing was written"
-    [[ -z $(ls scratch) && ! -e ${command##* } ]] || fail "a dry run left something: $command"
-    leavesNothing none
-    jsonHas dry.json command dry_run records sampled_records input_bytes temporary_bytes \
-      output_bytes seconds
-    forecast=$(python3 -c 'import json; print(json.load(open("dry.json"))["output_bytes"])')
-    # shellcheck disable=SC2086
-    run 0 $command --quiet
-    output=$(find . -maxdepth 1 -name "none.*")
-    python3 -c 'import sys; a, b = map(float, sys.argv[1:]); sys.exit(not .8 < a / b < 1.25)' \
-      "$forecast" "$(stat -c %s "$output")" || fail "$command: forecast $forecast of $(stat -c %s "$output")"
-    rm "$output"
-  done
-  run 74 normals no_such_file.ply -o none.ply --dry-run
-  run 3 radiance city.ply -o none.ply --dry-run
-  says "city.ply: element vertex"
-}
-
 interruptLeavesNothing() {
   local name
   generate city.ply --surfels 1M

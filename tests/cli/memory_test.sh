@@ -37,7 +37,35 @@ commands=(
   "index points.ply -o pass.sft --normals estimate --pass sizes --shard 2/2"
   "index points.ply -o sided.sft --normals estimate --orient consistent --pass merge --shards 2"
   "plan scene.sft receivers.ply -o out.ply --quality draft --shards 2 --slurm"
+  "sample cornell.obj -o out.ply --count 100000 --two-sided"
+  "sample cornell.obj -o out.las --spacing 0.01"
+  "sample cornell.obj -o out.ply --photons 100000"
+  "generate -o out.ply --surfels 200k"
+  "generate -o out.vdb --surfels 50k"
+  "relight scene.sft -o out.sft --mesh cornell.obj --light-directional 0,-1,0,1,1,1 --add"
+  "cube scene.sft --at 0.5,0.1,0.5 --normal 0,1,0 -o out.png --reference cornell.obj --rays 2"
+  "gather scene.sft passes.exr -o out.exr --quality draft --mode bleeding"
+  "gather scene.sft receivers.ply -o out.ply --quality draft --resume"
+  "gather scene.sft receivers.ply -o out.ply --quality draft --environment light.exr"
+  "view scene.sft --size 400x300 --passes out.exr"
+  "view cloud.ply --brick map.vdb -o out.png --size 200x150"
+  "convert scene.sft -o out.prt"
+  "convert cloud.ply -o out.csv.gz"
+  "index scene.sft -o out.sft"
+  "ptfilter cloud.ply -o out.ply --filter occlusion"
+  "ptfilter bright.ply -o out.ply --filter colorbleeding --bounces 2"
+  "ptfilter photons.ply -o out.ply --filter photonmap --nphotons 20"
+  "brickmake brick.ply -o out.vdb --maxerror 0.01"
 )
+# Those that forecast take no more than what they forecast.
+for forecast in "index cloud.ply -o out.sft" "normals points.ply -o out.ply" \
+  "gather scene.sft receivers.ply -o out.ply --quality draft" "radiance photons.ply -o out.ply" \
+  "bounce scene.sft -o out.sft --quality draft" "brick cloud.ply --channel radiosity -o out.vdb" \
+  "relight scene.sft -o out.sft --mesh cornell.obj --light-directional 0,-1,0,1,1,1" \
+  "lookup cloud.ply receivers.ply -o out.ply --channel radiosity" "convert cloud.ply -o out.vdb" \
+  "sample cornell.obj -o out.ply --count 100000" "sample cornell.obj -o out.ply --photons 100000"; do
+  commands+=("$forecast --dry-run")
+done
 
 skipWhereSanitized() {
   [[ -z ${SURFEIT_SANITIZED:-} ]] || { echo "skipped: sanitizers take memory"; exit 77; }
@@ -53,6 +81,8 @@ makeInputs() {
   run 0 convert cloud.ply -o receivers.ply --every 100 --quiet
   run 0 sample cornell.obj -o photons.ply --photons 50000 --quiet
   run 0 brick cloud.ply --channel radiosity -o map.vdb --quiet
+  run 0 convert cloud.ply -o bright.ply --every 50 --quiet
+  run 0 convert cloud.ply -o brick.ply --keep position,normal,area,radiosity --quiet
   local shard pass
   for pass in count distribute build places sizes; do
     for shard in 1/2 2/2; do
@@ -65,7 +95,7 @@ makeInputs() {
   for shard in 1/2 2/2; do
     run 0 gather scene.sft receivers.ply -o shards.ply --quality draft --shard $shard --quiet
   done
-  run 0 view scene.sft --size 200x150 --passes passes.exr --quiet
+  run 0 view scene.sft --size 200x100 --passes passes.exr --quiet
   run 0 gather scene.sft passes.exr -o light.exr --quality draft --mode bleeding --quiet
 }
 
@@ -77,7 +107,8 @@ peakIsAtMost() {
   ((peak <= $1 << 20)) || fail "peak of $peak bytes with $1 MiB: $2"
 }
 
-# withPeak PROGRAM ARGUMENT...: writes the one statistic that counts here. Of plan, which has none.
+# withPeak PROGRAM ARGUMENT...: writes the one statistic that counts here. Of plan and info, which have
+# none.
 withPeak() {
   python3 -c '
 import resource, subprocess, sys
@@ -90,7 +121,7 @@ sys.exit(status)' "$@"
 # runWithin MEBIBYTES COMMAND OPTION...: succeeds below that, or says what would do.
 runWithin() {
   local command=$2 status=0 start=("$surfeit") stats=(--stats stats.json)
-  [[ $command != plan* ]] || start=(withPeak "$surfeit") stats=()
+  [[ $command != plan* && $command != info* ]] || start=(withPeak "$surfeit") stats=()
   rm -f out.* pass.sft.sized-* stats.json
   # shellcheck disable=SC2086 # a list of words
   said=$("${start[@]}" $command "${stats[@]}" --progress none "${@:3}" 2>&1) || status=$?
@@ -204,6 +235,15 @@ jobsLimitEveryCommand() {
   export SLURM_MEM_PER_CPU=64 SLURM_CPUS_ON_NODE=2
   for command in "${commands[@]}"; do
     runWithin 96 "$command" || echo "$least MiB would do: $command"
+  done
+  # What has no budget
+  for command in "info cloud.ply" "info points.ply --json" "info photons.ply" "info scene.sft" \
+    "info passes.exr" "info map.vdb"; do
+    runWithin 64 "$command" || fail "refused: $command"
+  done
+  # Nothing that can be asked for is without a test
+  for command in $("$surfeit" --help | sed -n '/^Subcommands:/,$s/^  \([a-z]\+\) .*/\1/p'); do
+    [[ " info ${commands[*]%% *} " == *" $command "* ]] || fail "no test of the memory of $command"
   done
   run 33 gather scene.sft receivers.ply -o out.ply --memory 5%
   says "a memory budget of 6.4 MiB"

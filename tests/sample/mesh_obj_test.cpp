@@ -147,7 +147,8 @@ TEST_F(ObjFiles, OptionsOfPicturesMayLeaveOutValues) {
       load(write("m.obj", std::string("mtllib m.mtl\n") + "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"))
           .ok());
   EXPECT_THAT(notes_.notes, testing::ElementsAre(HasSubstr("-s and -o of texture my t.ppm"),
-                                                 HasSubstr("-mm and -clamp of texture my t.ppm")));
+                                                 HasSubstr("-mm and -clamp of texture my t.ppm"),
+                                                 HasSubstr("no face uses any of the 2 materials")));
 }
 
 TEST_F(ObjFiles, PicturesLieBesideTheObjOrTheMaterialFile) {

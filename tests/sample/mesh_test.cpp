@@ -95,7 +95,7 @@ TEST_F(MeshFiles, BadMeshesAreRefusedNamingFileAndFace) {
                           "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty "
                           "float y\nproperty float z\nend_header\n0 0 0\n")),
               HasSubstr("no element face"));
-  EXPECT_THAT(error(write("what.stl", "solid")), HasSubstr("not a mesh that we read"));
+  EXPECT_THAT(error(write("what.stl", "solid")), HasSubstr("found STL, expected PLY, OBJ"));
   EXPECT_EQ(load({path("missing.ply")}).status().code(), StatusCode::kIoError);
   EXPECT_EQ(load({}).status().code(), StatusCode::kInvalidArgument);
 }

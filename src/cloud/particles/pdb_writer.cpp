@@ -42,6 +42,8 @@ class PdbWriter final : public RowWriter {
     packRow(element_);
   }
 
+  std::uint64_t temporaryBytes() const override { return blocks_.size(); }
+
   Status open(const RowWriterOptions& options) {
     const std::vector<PlannedChannel> plan = planChannels(element_, kNames, notes_);
     if (findChannel(plan, "position") == nullptr) {

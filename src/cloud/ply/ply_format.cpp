@@ -220,10 +220,14 @@ std::optional<std::size_t> PlyHeader::findElement(std::string_view element) cons
 }
 
 Result<std::size_t> findSurfelElement(const PlyHeader& header, const std::string& path) {
-  for (const char* name : kElementNames) {
-    if (const std::optional<std::size_t> index = header.findElement(name)) return *index;
-  }
   const std::vector<RowLayout>& elements = header.elements;
+  std::optional<std::size_t> empty;
+  for (const char* name : kElementNames) {
+    const std::optional<std::size_t> index = header.findElement(name);
+    if (index && elements[*index].count > 0) return *index;
+    if (!empty) empty = index;
+  }
+  if (empty) return *empty;
   return Status::corruption(fmt::format(
       "{}: found {} elements, first {}, expected one named vertex, point, points or surfel{}", path,
       elements.size(), elements.empty() ? "none" : elements.front().name,

@@ -72,7 +72,9 @@ class PlyRowReader final : public RowReader {
           fmt::join(missing, " "), dropsOf(element_, "opacity")));
     }
     for (std::size_t i = 0; i < elements.size(); ++i) {
-      if (i != index_) notes.push_back(fmt::format("element {} is not kept", elements[i].name));
+      // An element without rows has nothing to keep
+      if (i != index_ && elements[i].count > 0)
+        notes.push_back(fmt::format("element {} is not kept", elements[i].name));
     }
     return notes;
   }

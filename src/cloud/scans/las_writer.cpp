@@ -84,6 +84,8 @@ class LasWriter final : public RowWriter {
 
   const RowLayout& element() const override { return element_; }
 
+  std::uint64_t temporaryBytes() const override { return rows_ ? rows_->size() : 0; }
+
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = notes_;
     if (!encoder_) return notes;

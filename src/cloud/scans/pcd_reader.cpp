@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "cloud/number_change.h"
+#include "cloud/packed_colors.h"
 #include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/counted_row_reader.h"
 #include "cloud/parts/fixed_record_reader.h"
@@ -73,6 +73,7 @@ class PcdLayout {
   // Whether colors stand in floats, and how many that were decoded were nan: no color, and black.
   bool hasPackedReals() const { return !packed_.empty(); }
   std::uint64_t lostColors() const { return lost_colors_; }
+  const LostDigits& digits() const { return digits_; }
 
   // What a text has for packed colors becomes their four bytes.
   void packColors(std::byte* records, std::size_t count) const {
@@ -81,6 +82,7 @@ class PcdLayout {
       for (std::size_t i = 0; i < count; ++i, at += record_bytes_) {
         double value;
         std::memcpy(&value, at, sizeof value);
+        digits_.add(value);
         const std::uint32_t bits = packedBits(value);
         std::memcpy(at, &bits, sizeof bits);
       }
@@ -104,19 +106,6 @@ class PcdLayout {
     StoredType type = StoredType::kFloat32;
     std::size_t from = 0, to = 0, components = 1;
   };
-
-  // A number in a field of floats is the color itself, or a float that has its bits: these are
-  // below 1e-30 or above 2^32.
-  static std::uint32_t packedBits(double value) {
-    if (std::abs(value) >= 1 && value == std::floor(value)) {
-      if (value > 0 && value <= 4294967295.0) return static_cast<std::uint32_t>(value);
-      if (value < 0 && value >= -2147483648.0) {
-        return static_cast<std::uint32_t>(static_cast<std::int32_t>(value));
-      }
-    }
-    return std::isnan(value) ? kNoPackedColor
-                             : std::bit_cast<std::uint32_t>(static_cast<float>(value));
-  }
 
   struct PackedReal {             // a color in a float
     std::size_t offset = 0;       // of a record
@@ -215,6 +204,7 @@ class PcdLayout {
   std::vector<std::size_t> packed_reals_;  // where doubles stand in records that code colors
   std::vector<PackedReal> packed_;
   mutable std::uint64_t lost_colors_ = 0;
+  mutable LostDigits digits_;
 };
 
 std::string nameOfFormat(const PcdHeader& header) {
@@ -462,7 +452,11 @@ Result<std::string> noteOfLostColors(Reader& reader) {
     seen += rows->size() / reader.element().row_bytes;
   }
   const std::uint64_t lost = reader.layout().lostColors();
+  const LostDigits digits = reader.layout().digits();
   SURFEIT_RETURN_IF_ERROR(reader.rewind());
+  if (digits.areLost()) {
+    return digits.describe("the color", "write PCD with DATA binary, or TYPE U");
+  }
   if (lost == 0) return std::string();
   return fmt::format(
       "the color is nan in {} of {} points looked at, which is none and becomes black: texts lose "

@@ -37,6 +37,7 @@ struct XyzTable {
   // Lines of one whole number: the counts of scans
   std::uint64_t scan_count = 0;
   std::uint64_t commented_rows = 0;  // with a comment behind the values
+  std::uint64_t colored_rows = 0;    // with one that looks like a color: #ff8800
   std::uint64_t comment_lines = 0;   // among rows or behind them
   std::string count_note;            // of the first count that is not that of the rows behind it
   // The first line that is not as the columns say: what to answer, and whether it has a comma

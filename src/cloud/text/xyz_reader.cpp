@@ -374,6 +374,12 @@ class XyzReader final : public CountedRowReader {
       notes_.push_back(fmt::format("comments behind the values of {} of {} rows are not kept",
                                    table.commented_rows, table.row_count));
     }
+    if (table.colored_rows > 0) {
+      notes_.push_back(fmt::format(
+          "{} of these comments look like colors (#ff8800), which are not read: write red, green "
+          "and blue as three columns",
+          table.colored_rows));
+    }
     if (table.comment_lines > 0) {
       notes_.push_back(
           fmt::format("{} lines of comments among the rows are not kept", table.comment_lines));

@@ -13,6 +13,12 @@
 namespace surfeit {
 namespace {
 
+bool isHexColor(std::string_view comment) {
+  constexpr std::string_view kDigits = "0123456789abcdefABCDEF";
+  return (comment.size() == 7 || comment.size() == 9) && comment.front() == '#' &&
+         comment.find_first_not_of(kDigits, 1) == comment.npos;
+}
+
 constexpr int kFloatDigits = 6;    // so many are given back by every float
 constexpr int kDoubleDigits = 15;  // and by every double
 
@@ -68,6 +74,7 @@ class XyzScanner {
       if (at == line.data() || !isTextComment(rest)) return false;
       if (!isTextBlank(at[-1]) && !isTextComma(at[-1])) return false;
       ++table_.commented_rows;
+      table_.colored_rows += isHexColor(rest) ? 1 : 0;
     }
     takeVectors();
     ++table_.row_count;
