@@ -8,9 +8,8 @@
 namespace surfeit {
 namespace {
 
-// Walking to a patch and preparing it costs as much as drawing this many pixels. (60 instead of 25:
-// .96 and .90 of the time at one surfel of 8 and of 32 in a Cornell box, .97 at all; 120 the same.)
-constexpr float kPatchPixels = 60;
+// Walking to a patch and preparing it costs as much as drawing this many pixels.
+constexpr float kPatchPixels = 25;
 
 // Pixels along a patch of a packet without width.
 constexpr float kPatchSide = 2.7f;
