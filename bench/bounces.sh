@@ -26,7 +26,7 @@ gather=$(awk -v a="$one" -v b="$two" 'BEGIN { print b - a }')
 printf 'a gather at every surfel: %.2f s\n' "$gather"
 rows box.sft box.csv
 rows all.sft all.csv
-for n in 8 16 32; do
+for n in 8 16 24 32; do
   spared=$(seconds bounce "spared.sft" --surfels-per-receiver $n --spare-last)
   rows spared.sft spared.csv
   paste -d, box.csv all.csv spared.csv | awk -F, -v n=$n -v each="$spared" -v gather="$gather" '

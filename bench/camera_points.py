@@ -53,6 +53,8 @@ class Bench:
         self.work = arguments.work
         self.size = arguments.size
         self.threads = str(arguments.threads)
+        self.memory = ["--memory", arguments.memory] if arguments.memory else []
+        self.finest = arguments.finest
         os.makedirs(self.work, exist_ok=True)
 
     def path(self, name):
@@ -85,7 +87,8 @@ class Bench:
 
     def make_receivers(self):
         """Every so many pixels that see something."""
-        self.sample("finest", *self.camera(), "--pixels", 0.5, "--max-solid-angle", 0.01)
+        made = self.sample("finest", *self.camera(), "--pixels", self.finest, "--max-solid-angle", 0.01)
+        print(f"finest for the camera: {made['surfels']} surfels for {self.finest} pixels, .01 sr")
         view = ["--eye", " ".join(map(str, self.eye)), "--look-at", " ".join(map(str, self.look)),
                 "--up", "z", "--fov", 50, "--size", self.size]
         stats = self.run("view", self.path("finest.ply"), "--passes", self.path("passes.exr"),
@@ -99,29 +102,31 @@ class Bench:
         sampled = self.run("sample", self.mesh, "-o", self.path(name + ".ply"), "--up", "z",
                            "--threads", self.threads, *self.lights, *options)
         indexed = self.run("index", self.path(name + ".ply"), "-o", self.path(name + ".sft"),
-                           "--threads", self.threads)
+                           "--threads", self.threads, *self.memory)
         return {"surfels": sampled["surfels"],
                 "sample": sampled["cpu_seconds"], "index": indexed["cpu_seconds"],
                 "bytes": os.path.getsize(self.path(name + ".sft")), "area": sampled["surfel_area"]}
 
     def gather(self, name, columns, receivers="receivers.ply", mode="occlusion"):
         stats = self.run("gather", self.path(name + ".sft"), self.path(receivers), "-o",
-                         self.path("baked.ply"), "--mode", mode, "--threads", self.threads)
+                         self.path("baked.ply"), "--mode", mode, "--threads", self.threads,
+                         *self.memory)
         return read_ply(self.path("baked.ply"), columns), stats
 
-    def errors(self):
+    def errors(self, even_count, pixels, counts):
         (truth,), _ = self.gather("finest", ["occlusion"])
-        self.sample("some", "--count", 16_000_000)
+        self.sample("some", "--count", even_count)
         (even_truth,), _ = self.gather("some", ["occlusion"])
         between = rms([a - b for a, b in zip(truth, even_truth)])
-        print(f"RMSE between the finest for the camera and 16 M at one density: {between:.4f}")
+        even = f"{even_count / 1e6:g} M"
+        print(f"RMSE between the finest for the camera and {even} at one density: {between:.4f}")
         print(f"{'surfels for':24} {'surfels':>10} {'scene MB':>9} {'sample s':>9} {'index s':>8} "
-              f"{'gather s':>9} {'peak MB':>8} {'RMSE':>8} {'of 16 M':>8}")
+              f"{'gather s':>9} {'peak MB':>8} {'RMSE':>8} {'of ' + even:>8}", flush=True)
         rows = [(f"camera, {p} pixels, {w} sr",
                  [*self.camera(), "--pixels", p, "--max-solid-angle", w])
-                for p, w in [(3, 0.1), (3, 0.03), (1.5, 0.1), (1.5, 0.03), (1, 0.03)]]
+                for p, w in pixels]
         rows += [(f"uniform, {n / 1e6:g} M", ["--count", n])
-                 for n in (500_000, 1_000_000, 2_000_000, 4_000_000, 8_000_000)]
+                 for n in counts]
         for name, options in rows:
             made = self.sample("some", *options)
             (occlusion,), stats = self.gather("some", ["occlusion"])
@@ -132,7 +137,7 @@ class Bench:
                   f"{stats['peak_resident_bytes'] / 1e6:8.0f} {error:8.4f} "
                   f"{even_error:8.4f}", flush=True)
 
-    def flicker(self, frames):
+    def flicker(self, frames, count_of_first):
         """Second differences at receivers that stay, of a camera that goes 10 cm a frame."""
         self.run("convert", self.path("receivers.ply"), "-o", self.path("few.ply"), "--every", 8)
         for name in self.kinds:
@@ -142,7 +147,7 @@ class Bench:
                 if name == "camera":
                     options = [*self.camera(0.1 * frame), "--pixels", 1.5]
                 else:
-                    options = ["--count", round(1_000_000 * 1.01 ** frame)]
+                    options = ["--count", round(count_of_first * 1.01 ** frame)]
                 count = self.sample("frame", *options)["surfels"]
                 (occlusion, *rgb), _ = self.gather(
                     "frame", ["occlusion", "irradiance_r", "irradiance_g", "irradiance_b"],
@@ -166,7 +171,16 @@ def main():
     parser.add_argument("--work", default="out/camera_points")
     parser.add_argument("--size", default="512x256")
     parser.add_argument("--every", type=int, default=4, help="pixels per receiver")
+    parser.add_argument("--memory", help="budget of indexing and gathering")
+    parser.add_argument("--finest", type=float, default=0.5, help="pixels, for the reference")
+    parser.add_argument("--even-finest", type=int, default=16, help="M, of the other reference")
+    parser.add_argument("--pixels", nargs="+", default=["3,0.1", "3,0.03", "1.5,0.1", "1.5,0.03", "1,0.03"],
+                        help="for the camera: pixels and greatest solid angle")
+    parser.add_argument("--uniform", nargs="+", type=float, default=[0.5, 1, 2, 4, 8],
+                        help="M, at one density")
     parser.add_argument("--frames", type=int, default=24)
+    parser.add_argument("--frames-uniform", type=float, default=1,
+                        help="M at one density, in the first frame")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--only", choices=["errors", "flicker"])
     parser.add_argument("--kinds", nargs="+", default=["camera", "uniform"], help="of the frames")
@@ -178,9 +192,11 @@ def main():
     bench.make_city()
     bench.make_receivers()
     if arguments.only != "flicker":
-        bench.errors()
+        bench.errors(arguments.even_finest * 1_000_000,
+                     [tuple(map(float, row.split(","))) for row in arguments.pixels],
+                     [round(millions * 1e6) for millions in arguments.uniform])
     if arguments.only != "errors":
-        bench.flicker(arguments.frames)
+        bench.flicker(arguments.frames, round(arguments.frames_uniform * 1e6))
     return 0
 
 

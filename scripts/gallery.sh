@@ -313,8 +313,11 @@ hair() {
     printf '%s\n' "usemtl floor" "v -5 0 5" "v 5 0 5" "v 5 0 -5" "v -5 0 -5" "f -4 -3 -2 -1"
   } > skin.obj
   sample skin.obj fur.hair -o furry.ply --count 250000 "${sun[@]}"
-  draw hair furry.ply --channel radiosity --radius-scale 0.75 --eye "0 2.4 5.6" --look-at "0 1.15 0" --fov 34 \
-    --size 420x420
+  local view=(--radius-scale 0.75 --eye "0 2.4 5.6" --look-at "0 1.15 0" --fov 34 --size 420x420)
+  draw hair furry.ply --channel radiosity "${view[@]}"
+  index furry.ply -o furry.sft
+  gather furry.sft furry.ply -o fur_occlusion.ply
+  draw hair_occlusion fur_occlusion.ply --channel ao "${view[@]}"
 }
 
 screen() {

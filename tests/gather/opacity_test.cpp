@@ -39,6 +39,34 @@ void addPane(double z, double opacity, double light, int side, Table& table) {
   }
 }
 
+constexpr std::size_t kOpacity = 8;  // its column
+
+// Of side 20, of surfels a tenth as far apart.
+void addFinePane(double z, double opacity, double light, Table& table) {
+  Table pane = emptyTranslucent();
+  addPane(5 * z, opacity, light, 200, pane);
+  for (std::vector<double>& row : pane.rows) {
+    for (const std::size_t length : {0, 1, 2, 6}) row[length] /= 5;
+    row[7] /= 25;
+    table.rows.push_back(row);
+  }
+}
+
+// The shares of cosine-weighted directions from the ground that meet two fine panes at these
+// heights. What meets the second meets the first as well, where that is lower.
+struct SeenPanes {
+  double first = 0, second = 0;
+};
+SeenPanes seenFinePanes(double first, double second) {
+  // From the middle of a square of side 2 a at height h: (4 / pi) x / sqrt(1 + x^2) atan(x / sqrt(1
+  // + x^2)) with x = a / h
+  const auto seen = [](double height) {
+    const double x = 10 / height, root = std::sqrt(1 + x * x);
+    return 4 / 3.14159265 * x / root * std::atan(x / root);
+  };
+  return {seen(first), seen(second)};
+}
+
 class Opacity : public testing::Test {
  protected:
   struct Means {
@@ -110,6 +138,49 @@ TEST_F(Opacity, PanesBehindEachOtherMultiply) {
   const Means found = gather(cloud, bleeding());
   EXPECT_NEAR(found.occlusion, 1 - .7 * .5, .01);
   EXPECT_NEAR(found.red, .3 * 1 + .7 * .5 * 2, .015);
+}
+
+// Nodes hold both panes, for these are closer to each other than nodes are wide: what they let
+// through multiplies, unless they differ by much more (docs/algorithm.md, "Translucent surfels").
+TEST_F(Opacity, PanesInOneNodeMultiply) {
+  struct Pair {
+    double first, second;
+  };
+  const SeenPanes seen = seenFinePanes(3, 3.4);
+  for (const Pair& pair : {Pair{.5, .1}, {.1, .5}, {.3, .6}, {.4, .4}}) {
+    Table cloud = emptyTranslucent();
+    addFinePane(3, pair.first, 1, cloud);
+    addFinePane(3.4, pair.second, 2, cloud);
+    const double behind = seen.second * (1 - pair.first) * pair.second;
+    const double covered = seen.first * pair.first + behind;
+    const double light = seen.first * pair.first + behind * 2;
+    for (const float max_solid_angle : {0.03f, 0.1f}) {
+      const Means found = gather(cloud, bleeding(max_solid_angle));
+      EXPECT_NEAR(found.occlusion, covered, .03) << pair.first << ' ' << max_solid_angle;
+      EXPECT_NEAR(found.red, light, .12) << pair.first << ' ' << max_solid_angle;
+    }
+  }
+}
+
+// Side by side they add up: a pane whose surfels are of one opacity or another by chance.
+TEST_F(Opacity, APaneOfMixedOpacitiesCoversTheirMean) {
+  const double seen = seenFinePanes(3, 4).first;
+  for (const bool has_two : {false, true}) {
+    Table cloud = emptyTranslucent();
+    addFinePane(3, .5, 1, cloud);
+    std::mt19937 random(3);
+    double mean = 0;
+    for (std::vector<double>& row : cloud.rows) {
+      const double any = double(random() % 1000) / 1000;
+      row[kOpacity] = has_two ? (any < .5 ? .05 : .9) : .05 + .85 * any;
+      mean += row[kOpacity] / double(cloud.rows.size());
+    }
+    for (const float max_solid_angle : {0.f, 0.1f}) {
+      const Means found = gather(cloud, bleeding(max_solid_angle));
+      EXPECT_NEAR(found.occlusion, mean * seen, .03) << max_solid_angle;
+      EXPECT_NEAR(found.red, mean * seen, .03) << max_solid_angle;
+    }
+  }
 }
 
 TEST_F(Opacity, AWallShowsThroughAPane) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "gather/environment_pictures.h"
 #include "gather/packet_clouds.h"
 #include "gather/test_clouds.h"
 #include "gather/test_scene.h"
@@ -26,6 +27,7 @@ namespace {
 using Color = std::array<double, 3>;
 constexpr const char* kTints[] = {"opacity_r", "opacity_g", "opacity_b"};
 constexpr const char* kIrradiance[] = {"irradiance_r", "irradiance_g", "irradiance_b"};
+constexpr const char* kEnvironment[] = {"environment_r", "environment_g", "environment_b"};
 constexpr std::size_t kFirstTint = 8;  // column of opacity_r
 
 Table emptyTinted() {
@@ -267,18 +269,20 @@ TEST_F(Tint, SmokeFollowsBeerAndLambertInEachColor) {
   }
 }
 
-// Three filters above a floor, and a bright ceiling, against rays through squares.
-TEST_F(Tint, FiltersLetThroughWhatRaysSay) {
-  struct Square {
-    glm::dvec3 middle;
-    double half;
-    Color opacity;
-    double light;
-  };
-  const std::vector<Square> squares = {{{-.5, .3, .5}, .9, {.9, .05, .05}, 0},
-                                       {{.5, .3, .9}, .9, {.05, .9, .05}, 0},
-                                       {{0, -.5, 1.3}, .9, {.05, .05, .9}, 0},
-                                       {{0, 0, 4}, 6, {1, 1, 1}, 2}};
+// A square above the floor, facing down.
+struct Square {
+  glm::dvec3 middle;
+  double half;
+  Color opacity;
+  double light;
+};
+const std::vector<Square>& filters() {
+  static const std::vector<Square> filters = {{{-.5, .3, .5}, .9, {.9, .05, .05}, 0},
+                                              {{.5, .3, .9}, .9, {.05, .9, .05}, 0},
+                                              {{0, -.5, 1.3}, .9, {.05, .05, .9}, 0}};
+  return filters;
+}
+Table surfelsOf(const std::vector<Square>& squares) {
   Table cloud = emptyTinted();
   for (const Square& square : squares) {
     constexpr int kSide = 150;
@@ -291,37 +295,97 @@ TEST_F(Tint, FiltersLetThroughWhatRaysSay) {
                             square.light, square.light});
     }
   }
-  receivers_.rows.clear();
-  for (const auto& [x, y] : {std::pair(-.5, .3), {.5, .3}, {0., -.5}, {.9, .3}, {0., 0.}}) {
-    receivers_.rows.push_back({x, y, 0, 0, 0, 1});
+  return cloud;
+}
+bool meets(const Square& square, const glm::dvec3& from, const glm::dvec3& ray) {
+  const glm::dvec3 offset = from + (square.middle.z - from.z) / ray.z * ray - square.middle;
+  return std::max(std::abs(offset.x), std::abs(offset.y)) <= square.half;
+}
+// Calls visit(ray) for cosine-weighted directions of a floor.
+template <typename Visit>
+void forEachRay(int rays, const Visit& visit) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int i = 0; i < rays; ++i) {
+    const double u = unit(random), phi = 6.283185307 * unit(random), s = std::sqrt(u);
+    visit(glm::dvec3(s * std::cos(phi), s * std::sin(phi), std::sqrt(1 - u)));
   }
+}
+constexpr int kRays = 200000;
+
+class Filters : public Tint {
+ protected:
+  Filters() {
+    receivers_.rows.clear();
+    for (const auto& [x, y] : {std::pair(-.5, .3), {.5, .3}, {0., -.5}, {.9, .3}, {0., 0.}}) {
+      receivers_.rows.push_back({x, y, 0, 0, 0, 1});
+    }
+  }
+  glm::dvec3 place(std::size_t i) const {
+    return {receivers_.rows[i][0], receivers_.rows[i][1], receivers_.rows[i][2]};
+  }
+};
+
+// Three filters above a floor, and a bright ceiling, against rays through squares.
+TEST_F(Filters, LetThroughWhatRaysSay) {
+  std::vector<Square> squares = filters();
+  squares.push_back({{0, 0, 4}, 6, {1, 1, 1}, 2});
+  const Table cloud = surfelsOf(squares);
   for (const float max_solid_angle : {0.f, .1f}) {
     const Table found = gatherTable(cloud, bleeding(max_solid_angle));
-    std::mt19937 random(2);
-    std::uniform_real_distribution<double> unit(0, 1);
     for (std::size_t at = 0; at < receivers_.rows.size(); ++at) {
-      constexpr int kRays = 200000;
       Color light{};
       double covered = 0;
-      for (int i = 0; i < kRays; ++i) {
-        const double u = unit(random), phi = 6.283185307 * unit(random), s = std::sqrt(u);
-        const glm::dvec3 ray(s * std::cos(phi), s * std::sin(phi), std::sqrt(1 - u));
+      forEachRay(kRays, [&](const glm::dvec3& ray) {
         Color open = {1, 1, 1};
         for (const Square& square : squares) {
-          const glm::dvec3 offset = receivers_.rows[at][0] * glm::dvec3(1, 0, 0) +
-                                    receivers_.rows[at][1] * glm::dvec3(0, 1, 0) +
-                                    square.middle.z / ray.z * ray - square.middle;
-          if (std::max(std::abs(offset.x), std::abs(offset.y)) > square.half) continue;
+          if (!meets(square, place(at), ray)) continue;
           for (std::size_t c = 0; c < 3; ++c) {
             light[c] += open[c] * square.opacity[c] * square.light / kRays;
             open[c] *= 1 - square.opacity[c];
           }
         }
         covered += (1 - (open[0] + open[1] + open[2]) / 3) / kRays;
-      }
+      });
       EXPECT_NEAR(found.column("occlusion")[at], covered, .02) << at;
       for (std::size_t c = 0; c < 3; ++c) {
         EXPECT_NEAR(found.column(kIrradiance[c])[at], light[c], .06) << at << ' ' << c;
+      }
+    }
+  }
+}
+
+// The same filters below a sky that differs from direction to direction and from color to color.
+TEST_F(Filters, LetThroughTheSkyAsRaysSay) {
+  const TestPicture sky(64, 32, [](int column, int) {
+    const float turn = 6.2831853f * (float(column) + .5f) / 64;
+    return glm::vec3(1 + std::sin(turn), 2, 1 - std::sin(turn));
+  });
+  writeExr(sky, file("sky.exr"));
+  const Table cloud = surfelsOf(filters());
+  for (const float max_solid_angle : {0.f, .1f}) {
+    GatherOptions options = bleeding(max_solid_angle);
+    options.outputs = kOutputEnvironment;
+    options.environment.path = file("sky.exr");
+    options.environment.up = UpAxis::kZ;
+    const Table found = gatherTable(cloud, options);
+    for (std::size_t at = 0; at < receivers_.rows.size(); ++at) {
+      Color light{}, unfiltered{};
+      forEachRay(kRays, [&](const glm::dvec3& ray) {
+        const glm::vec3 radiance = sky.lookup(ray, 0);
+        for (int c = 0; c < 3; ++c) {
+          double open = 1;
+          for (const Square& square : filters()) {
+            if (meets(square, place(at), ray)) open *= 1 - square.opacity[std::size_t(c)];
+          }
+          light[std::size_t(c)] += 3.14159265 * open * double(radiance[c]) / kRays;
+          unfiltered[std::size_t(c)] += 3.14159265 * double(radiance[c]) / kRays;
+        }
+      });
+      for (std::size_t c = 0; c < 3; ++c) {
+        EXPECT_NEAR(found.column(kEnvironment[c])[at], light[c], .02 * unfiltered[c])
+            << at << ' ' << c << " at " << max_solid_angle;
+        EXPECT_LT(light[c], .9 * unfiltered[c]);
       }
     }
   }

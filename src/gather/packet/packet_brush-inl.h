@@ -68,15 +68,21 @@ class Brush {
   // The lanes that may see some of it, as bits.
   std::uint32_t LanesThatSee(const Patch& patch) const {
     const Sight sight = See(canvas_, patch, receivers_);
-    return LaneBits(hn::Or(sight.traced, SeenAsPatch(patch, receivers_, sight)));
+    const M seen = hn::Or(sight.traced, SeenAsPatch(patch, receivers_, sight));
+    return LaneBits(patch.parts == 0 ? seen : hn::And(seen, Counts(patch)));
   }
 
  private:
+  // Where it counts in part at least.
+  M Counts(const Patch& patch) const {
+    return hn::Gt(LoadLanes(canvas_.parts[patch.parts].of, lane_), hn::Zero(D()));
+  }
+
   HWY_INLINE void DrawSeen(const Patch& patch, Sight sight, M lanes) {
     M seen = hn::And(lanes, SeenAsPatch(patch, receivers_, sight));
     sight.traced = hn::And(lanes, sight.traced);
     if (patch.parts != 0) {
-      const M counts = hn::Gt(LoadLanes(canvas_.parts[patch.parts].of, lane_), hn::Zero(D()));
+      const M counts = Counts(patch);
       seen = hn::And(seen, counts);
       sight.traced = hn::And(sight.traced, counts);
     }
