@@ -69,20 +69,15 @@ class Brush {
   std::uint32_t LanesThatSee(const Patch& patch) const {
     const Sight sight = See(canvas_, patch, receivers_);
     const M seen = hn::Or(sight.traced, SeenAsPatch(patch, receivers_, sight));
-    return LaneBits(patch.parts == 0 ? seen : hn::And(seen, Counts(patch)));
+    return LaneBits(hn::And(seen, hn::Gt(PartsOf(canvas_, patch, lane_), hn::Zero(D()))));
   }
 
  private:
-  // Where it counts in part at least.
-  M Counts(const Patch& patch) const {
-    return hn::Gt(LoadLanes(canvas_.parts[patch.parts].of, lane_), hn::Zero(D()));
-  }
-
   HWY_INLINE void DrawSeen(const Patch& patch, Sight sight, M lanes) {
     M seen = hn::And(lanes, SeenAsPatch(patch, receivers_, sight));
     sight.traced = hn::And(lanes, sight.traced);
     if (patch.parts != 0) {
-      const M counts = Counts(patch);
+      const M counts = hn::Gt(PartsOf(canvas_, patch, lane_), hn::Zero(D()));
       seen = hn::And(seen, counts);
       sight.traced = hn::And(sight.traced, counts);
     }
@@ -163,21 +158,6 @@ class Brush {
   }
 
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  static V ReachOf(const Patch& patch, const Sight& sight) {
-    const V least = Splat(patch.reach.least);
-    if (patch.reach.spread_sq == 0) return least;
-    const auto& [xx, yy, zz, xy, xz, yz] = patch.shape.entries;
-    const V3& to = sight.offset;
-    const V x =
-        hn::MulAdd(Splat(2 * xy), to.y, hn::MulAdd(Splat(2 * xz), to.z, hn::Mul(Splat(xx), to.x)));
-    const V y = hn::MulAdd(Splat(2 * yz), to.z, hn::Mul(Splat(yy), to.y));
-    const V spread =
-        hn::MulAdd(x, to.x, hn::MulAdd(y, to.y, hn::Mul(hn::Mul(Splat(zz), to.z), to.z)));
-    const V distance_sq = hn::Max(sight.distance_sq, Splat(std::numeric_limits<float>::min()));
-    const V square = hn::Div(hn::Mul(Splat(patch.reach.spread_sq), spread), distance_sq);
-    return hn::Max(least, hn::Sqrt(hn::Max(square, hn::Zero(D()))));
-  }
-
   // Of this part of it.
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
     const V reach = ReachOf(patch, sight);
@@ -194,19 +174,13 @@ class Brush {
     cover.has_hull = patch.thicket == 0 && !patch.lets_through;
     cover.is_solid = patch.is_solid;
     cover.nested = patch.nested();
-    cover.opacity = hn::Mul(part, Opacity(patch));
+    cover.opacity = hn::Mul(part, hn::Mul(Splat(patch.opacity), PartsOf(canvas_, patch, lane_)));
     cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
     cover.lights = patch.lights == 0 ? nullptr : canvas_.lights[patch.lights].of(lane_);
     if constexpr (Kind::kFade) cover.fade = FadeAt(*canvas_.rules, distance);
     return cover;
-  }
-
-  // Each receiver has its own while a node fades into what is below it.
-  V Opacity(const Patch& patch) const {
-    if (patch.parts == 0) return Splat(patch.opacity);
-    return hn::Mul(Splat(patch.opacity), LoadLanes(canvas_.parts[patch.parts].of, lane_));
   }
 
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the

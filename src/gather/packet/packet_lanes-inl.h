@@ -251,6 +251,27 @@ inline V HalfSide(const Patch& patch, const glm::vec3& normal, int axis) {
   return Splat(patch.radius * std::sqrt(std::max(0.f, 1 - normal[axis] * normal[axis])));
 }
 
+// How much of it counts: each receiver has its own part while a node fades into what is below it.
+inline V PartsOf(const PacketCanvas& canvas, const Patch& patch, std::size_t lane) {
+  return patch.parts == 0 ? Splat(1) : LoadLanes(canvas.parts[patch.parts].of, lane);
+}
+
+// Of its layer, along the direction to it (LayerReach).
+inline V ReachOf(const Patch& patch, const Sight& sight) {
+  const V least = Splat(patch.reach.least);
+  if (patch.reach.spread_sq == 0) return least;
+  const auto& [xx, yy, zz, xy, xz, yz] = patch.shape.entries;
+  const V3& to = sight.offset;
+  const V x =
+      hn::MulAdd(Splat(2 * xy), to.y, hn::MulAdd(Splat(2 * xz), to.z, hn::Mul(Splat(xx), to.x)));
+  const V y = hn::MulAdd(Splat(2 * yz), to.z, hn::Mul(Splat(yy), to.y));
+  const V spread =
+      hn::MulAdd(x, to.x, hn::MulAdd(y, to.y, hn::Mul(hn::Mul(Splat(zz), to.z), to.z)));
+  const V distance_sq = hn::Max(sight.distance_sq, Splat(std::numeric_limits<float>::min()));
+  const V square = hn::Div(hn::Mul(Splat(patch.reach.spread_sq), spread), distance_sq);
+  return hn::Max(least, hn::Sqrt(hn::Max(square, hn::Zero(D()))));
+}
+
 // At the rim of a curved thing, a part of a piece faces the receiver whose mean normal does not:
 // as SeeRoughNode has it, with normals spread evenly. All times the distance.
 inline V RimCosine(V facing, V range) {

@@ -137,7 +137,7 @@ void PacketRaster::bringToWorld(Patch& patch) const {
   for (float* length : {&patch.radius, &patch.near_distance, &patch.reach.least}) {
     *length *= scale;
   }
-  patch.ribbon_width *= scale;
+  if (patch.is_ribbon) patch.ribbon_width *= scale;
 }
 
 // The faces that some receiver may see some of a node's patch on, as bits.
