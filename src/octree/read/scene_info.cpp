@@ -25,6 +25,8 @@ Result<SceneInfo> sceneInfo(const SceneFile& file) {
   info.cube = {header.origin + glm::dvec3(corner[0], corner[1], corner[2]), header.cube.size};
   info.up = header.up;
   info.channels = header.channels;
+  // Of surfels without an area, it is found with that
+  info.channels.long_side = header.channels.long_side && header.channels.area;
   info.full_precision = header.full_precision;
   info.has_lobes = header.has_lobes;
   for (int level = 0; level <= kCurveLevels; ++level) {
