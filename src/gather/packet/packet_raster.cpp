@@ -347,7 +347,7 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_node = node.position - eye, direction = glm::normalize(to_node);
   kernel_.seeRoughNode(node, direction, seen);
-  const float round_area = shownArea(seen.facing, sides);
+  const float round_area = shownArea(node, seen.facing, sides);
   if (!(round_area > kFidelity.least_visible_part * node.area)) return;
   const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
   if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(node.position + visible.middle))) return;

@@ -11,10 +11,18 @@
 #include "gather/rules/fidelity.h"
 
 namespace surfeit {
-float shownArea(const FacingAreas& facing, GatherSides sides) {
+namespace {
+// Four times band 0, over the area: 1 of one-sided disks, 2 of two-sided ones, 4 of spheres.
+float partsOfBand0(const Node& node) {
+  return 4 * kShY00 * node.rough.sh[0][kAreaKind] / node.area;
+}
+}  // namespace
+
+float shownArea(const Node& node, const FacingAreas& facing, GatherSides sides) {
   switch (sides) {
     case GatherSides::kBoth:
-      return facing.front + facing.back;
+      // Two-sided surfels and spheres are in the front and in the back
+      return (facing.front + facing.back) / (1 + std::clamp(partsOfBand0(node) - 1, 0.f, 1.f));
     case GatherSides::kBack:
       return facing.back;
     case GatherSides::kFront:
@@ -103,10 +111,6 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 }
 
 namespace {
-// Four times band 0, over the area: 1 of one-sided disks, 2 of two-sided ones, 4 of spheres.
-float partsOfBand0(const Node& node) {
-  return 4 * kShY00 * node.rough.sh[0][kAreaKind] / node.area;
-}
 // How much of a rough node is spheres, 0..1, when the rest is two-sided; one-sided disks count for
 // less.
 float spherePart(const Node& node) { return std::clamp(0.5f * (partsOfBand0(node) - 2), 0.f, 1.f); }
@@ -127,8 +131,7 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
 }  // namespace
 
 // A surface covers no more than the outline of the sphere that holds all disks, and than a part of
-// its ellipse: what exceeds that hides behind the rest. (Spheres and two-sided surfels count twice
-// in front plus back, which the limit of the area takes back head-on.)
+// its ellipse: what exceeds that hides behind the rest.
 // The outline of a thicket is that of a ball full of leaves, pi r^2, which has a covariance of r^2
 // / 5 along every axis, so an ellipse of 4 pi r^2 / 5.
 RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket,

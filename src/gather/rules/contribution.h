@@ -23,8 +23,8 @@ Surfel withSides(const Surfel& surfel, GatherSides sides);
 struct FacingAreas {
   float front, back;
 };
-// What counts of them.
-float shownArea(const FacingAreas& facing, GatherSides sides);
+// What counts of those of a node.
+float shownArea(const Node& node, const FacingAreas& facing, GatherSides sides);
 
 // With w_i the weights and x_i = d . n_i of the surfels of a node: sum w, sum w x, sum w P2(x), sum
 // w P4(x) to sum w max(x, 0) and sum w max(-x, 0). Exact when all |x| but those of 0 are alike, and
