@@ -80,16 +80,9 @@ Status runConvert(ConvertArguments& arguments, CommandContext& context) {
   options.memory_bytes = context.common.memory_bytes;
   SURFEIT_ASSIGN_OR_RETURN(options.density, arguments.cameras.cameraDensity());
   if (arguments.is_dry_run) {
-    ConvertOptions sampled = options;
-    static_cast<ReadOptions&>(sampled) = {};
     SURFEIT_ASSIGN_OR_RETURN(
         const SampleForecast forecast,
-        forecastOf(
-            arguments.inputs, arguments.output, options, options.temporary_directory,
-            [&](const auto& samples, const auto& output, Progress& progress) {
-              return convertClouds(samples, output, sampled, progress);
-            },
-            context));
+        forecastOf(arguments.inputs, arguments.output, options, convertClouds, context));
     return sayForecast("convert", "records", arguments.output, forecast, context);
   }
   SURFEIT_ASSIGN_OR_RETURN(

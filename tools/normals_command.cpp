@@ -27,16 +27,13 @@ Status runNormals(NormalsArguments& arguments, CommandContext& context) {
   options.threads = context.common.threads;
   options.memory_bytes = context.common.memory_bytes;
   if (arguments.is_dry_run) {
-    NormalsOptions sampled = options;
-    static_cast<ReadOptions&>(sampled) = {};
+    const auto run = [](const auto& samples, const auto& output, const auto& sampled,
+                        Progress& progress) {
+      return estimateNormals(samples[0], output, sampled, progress);
+    };
     SURFEIT_ASSIGN_OR_RETURN(
         const SampleForecast forecast,
-        forecastOf(
-            {arguments.input}, arguments.output, options, options.temporary_directory,
-            [&](const auto& samples, const auto& output, Progress& progress) {
-              return estimateNormals(samples[0], output, sampled, progress);
-            },
-            context));
+        forecastOf({arguments.input}, arguments.output, options, run, context));
     return sayForecast("normals", "points", arguments.output, forecast, context);
   }
   SURFEIT_ASSIGN_OR_RETURN(

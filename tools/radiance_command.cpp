@@ -32,16 +32,9 @@ Status runRadiance(RadianceArguments& arguments, CommandContext& context) {
   options.strict = context.common.strict;
   options.memory_bytes = context.common.memory_bytes;
   if (arguments.is_dry_run) {
-    RadianceOptions sampled = options;
-    static_cast<ReadOptions&>(sampled) = {};
     SURFEIT_ASSIGN_OR_RETURN(
         const SampleForecast forecast,
-        forecastOf(
-            arguments.photons, arguments.output, options, options.temporary_directory,
-            [&](const auto& samples, const auto& output, Progress& progress) {
-              return radianceCloud(samples, output, sampled, progress);
-            },
-            context));
+        forecastOf(arguments.photons, arguments.output, options, radianceCloud, context));
     return sayForecast("radiance", "photons", arguments.output, forecast, context);
   }
   SURFEIT_ASSIGN_OR_RETURN(

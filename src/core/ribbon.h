@@ -35,12 +35,6 @@ struct Ribbon {
   // Of the circle around it.
   float radius() const { return 0.5f * std::sqrt(length * length + width * width); }
 
-  // How far it extends from its middle along a unit direction.
-  float halfExtent(const glm::vec3& direction) const {
-    return 0.5f * (length * std::abs(glm::dot(direction, along)) +
-                   width * std::abs(glm::dot(direction, across)));
-  }
-
   // How it spreads, as Patch::shape.
   SymmetricMatrix shape() const {
     const float scale = 2 / (length * length + width * width);

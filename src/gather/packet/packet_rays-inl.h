@@ -12,8 +12,8 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "gather/packet/packet_lanes-inl.h"
 #include "core/ribbon.h"
+#include "gather/packet/packet_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {

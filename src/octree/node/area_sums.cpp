@@ -18,8 +18,9 @@ std::array<double, SymmetricMatrix::kEntries> spreadOf(const Surfel& surfel) {
   const Ribbon ribbon = Ribbon::of(surfel);
   if (!ribbon.isEmpty()) {
     const double within = std::min(1.0, radius / double(ribbon.radius()));
+    const SymmetricMatrix rectangle = ribbon.spread();
     for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
-      spread[i] = within * within * double(ribbon.spread().entries[i]);
+      spread[i] = within * within * double(rectangle.entries[i]);
     }
     return spread;
   }
