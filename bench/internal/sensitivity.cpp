@@ -58,8 +58,6 @@ const std::vector<Number>& allNumbers() {
       {"fill_doubt", &F::fill_doubt, 0},
       {"hull_widening", &F::hull_widening, 0},
       {"most_in_hull", &F::most_in_hull, 0},
-      {"ribbon_part", &F::ribbon_part, 0},
-      {"ribbon_elongation", &F::ribbon_elongation, kNever},
       {"ribbon_radius", &F::ribbon_radius, 0},
       {"soft_disk_area", &F::soft_disk_area, 1},
       {"whole_near", &F::whole_near, 0.999f},

@@ -440,19 +440,6 @@ TEST(SurfelContribution, IsItsProjectedArea) {
   EXPECT_NEAR(seenOf(surfel).radiosity.x, 3, 1e-3);
 }
 
-// A two-sided surfel that has little of its disk is of hair or grass.
-TEST(SurfelContribution, PiecesOfRibbonsAreThickets) {
-  Surfel surfel;
-  surfel.normal = {0, 0, -1};
-  surfel.radius = .2f;
-  surfel.area = .1f * kPi * surfel.radius * surfel.radius;
-  EXPECT_EQ(thicketPart(surfel), 0);
-  surfel.flags = kSurfelTwoSided;
-  EXPECT_EQ(thicketPart(surfel), 1);
-  surfel.area *= 2;
-  EXPECT_EQ(thicketPart(surfel), 0);
-}
-
 TEST(SurfelContribution, SphereLooksTheSameFromEverywhere) {
   Surfel surfel;
   surfel.radius = .2f;

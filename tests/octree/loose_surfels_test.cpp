@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "core/long_side.h"
 #include "octree/node/node_sums.h"
 #include "octree/page/surfel_marks.h"
 
@@ -150,6 +151,55 @@ TEST(LooseSurfels, FoldsAndCornersAreTiles) {
       folds.addSheet((float(i) - 2.5f) * step, i % 2 == 0 ? up : down, kY, 4, 24);
     }
     EXPECT_FALSE(found(folds.surfels).is_loose) << is_sphere;
+  }
+}
+
+// Rectangles: where their sides meet, far apart along one and close along the other.
+Surfel rectangleAt(const glm::vec3& position, const glm::vec3& normal, const glm::vec3& along,
+                   float length, float width) {
+  Surfel surfel = surfelAt(position, normal, false);
+  surfel.area = length * width;
+  surfel.radius = std::sqrt(.5f * surfel.area);
+  setLongSide(length * along, surfel);
+  return surfel;
+}
+
+// The lines of a scan, up to 20 times as far apart as the places along them, which lie anywhere.
+TEST(LooseSurfels, RowsOfASheetAreTiles) {
+  for (const float ratio : {1.f, 3.f, 10.f, 20.f}) {
+    for (const float noise : {0.f, .2f}) {
+      Cloud random(false);
+      const float width = 1 / std::sqrt(ratio), length = width * ratio;
+      std::vector<Surfel> cloud;
+      for (float y = .5f * length - kHalf; y < kHalf; y += length) {
+        const float phase = random.any();
+        for (float x = (phase - 1) * width - kHalf; x < kHalf; x += width) {
+          const glm::vec3 place(std::max(x, -kHalf), y, noise * random.any());
+          cloud.push_back(rectangleAt(place, kZ, kY, length, width));
+        }
+      }
+      EXPECT_FALSE(found(cloud).is_loose) << ratio << ", " << noise;
+    }
+  }
+}
+
+// Strands of pieces end to end, of one direction or of any.
+TEST(LooseSurfels, HairIsLoose) {
+  for (const bool is_combed : {false, true}) {
+    Cloud random(false);
+    std::vector<Surfel> cloud;
+    constexpr float kLength = 2, kWidth = .2f, kFar = kHalf - 5;
+    for (int strand = 0; strand < 100; ++strand) {
+      const glm::vec3 along = is_combed ? kX : random.direction();
+      const glm::vec3 normal = glm::normalize(glm::cross(along, random.direction()));
+      const glm::vec3 middle = kFar * glm::vec3(random.any(), random.any(), random.any());
+      for (int piece = -2; piece <= 2; ++piece) {
+        cloud.push_back(
+            rectangleAt(middle + float(piece) * kLength * along, normal, along, kLength, kWidth));
+      }
+    }
+    const Found is = found(cloud);
+    EXPECT_TRUE(is.is_loose && is.is_lone) << is_combed;
   }
 }
 

@@ -416,12 +416,11 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
                  : surfel.isTwoSided()                        ? Patch::Seen::kBoth
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
-    patch.reach = reachOf(surfel, ribbon, patch.radius);
+    patch.reach = reachOf(ribbon, patch.radius);
     patch.opacity = surfel.opacity(color_);
     patch.lets_through = lets_through;
     if (patch.lets_through && surfel.isSphere()) patch.reach = {};
-    patch.thicket = thicketPart(surfel);
-    if (surfel.isLone() && patch.thicket == 0) {
+    if (surfel.isLone()) {
       patch.overlap = patch.thicket = 1;
       patch.reach = {};
     }

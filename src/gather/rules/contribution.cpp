@@ -190,17 +190,8 @@ LayerReach reachOf(const Facet& facet) {
   return LayerReach::of(facet.radius, facet.covariance.trace());
 }
 
-float thicketPart(const Surfel& surfel) {
-  if (!surfel.isTwoSided()) return 0;
-  const bool is_ribbon = surfel.long_side != kNoLongSide
-                             ? elongationOf(surfel) > kFidelity.ribbon_elongation
-                             : looksLikeRibbon(surfel.radius, surfel.area);
-  return is_ribbon ? 1 : 0;
-}
-
-LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius) {
+LayerReach reachOf(const Ribbon& ribbon, float radius) {
   if (!ribbon.isEmpty()) return {0, ribbon.spread().trace() * 1.5f};
-  if (thicketPart(surfel) > 0) return {0.25f * surfel.area / radius, 0};  // half its width
   return LayerReach::ofDisk(radius);
 }
 

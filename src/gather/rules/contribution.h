@@ -70,10 +70,8 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
                       int color = 0);
 
 LayerReach reachOf(const Facet& facet);
-// `radius`: drawnRadius.
-LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius);
-// How much of a surfel is of a thicket, 0 or 1: pieces of ribbons are.
-float thicketPart(const Surfel& surfel);
+// Of a surfel; `radius`: drawnRadius.
+LayerReach reachOf(const Ribbon& ribbon, float radius);
 // How much of a rough node is leaves, hair or particles, 0..1: of a loose one, what is two-sided or
 // spheres.
 float thicketPart(const Node& node);

@@ -60,15 +60,6 @@ inline float effectiveRadius(float radius, float area) {
   return std::min(radius, kFidelity.largest_radius * std::sqrt(area));
 }
 
-// Whether a two-sided surfel without a known longer side is a piece of a ribbon, hair or grass.
-inline bool looksLikeRibbon(float radius, float area) {
-  return area < kFidelity.ribbon_part * kPi * radius * radius;
-}
-#ifndef SURFEIT_CHANGES_FIDELITY
-static_assert(kFidelity.ribbon_part * kPi * kFidelity.largest_radius * kFidelity.largest_radius > 1,
-              "effective radii tell the same");
-#endif
-
 // Coverage in the middle of a soft disk, which falls off as 1 - (distance / radius)^2 and is
 // limited to 1, such that the whole disk covers `area`, or, where gaps are worse, more.
 inline float softDiskPeak(float radius, float area, bool is_exact) {

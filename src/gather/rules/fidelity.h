@@ -116,11 +116,6 @@ struct Fidelity {
 
   // --- Hair and grass ("Ribbons") ---
 
-  // Part of a disk. A two-sided surfel without a longer side that fills less is a piece of a
-  // ribbon.
-  float ribbon_part = 0.15f;
-  // Times. One with a longer side is a piece of a ribbon from this many times as long as wide.
-  float ribbon_elongation = 3;
   // Part of its length for each radius of the near field within which it is ray traced.
   float ribbon_radius = 0.25f;
 

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "core/ribbon.h"
 #include "core/symmetric_matrix.h"
 
 namespace surfeit {
@@ -13,6 +14,9 @@ namespace {
 
 // Roots of the area of a surfel within which its neighbours are: on a plane, some 19 of its size.
 constexpr float kReach = 2.5f;
+// Of a rectangle, sides within which they are at least: on a plane, all eight around it. Within
+// 2.5 lengths of a hair a cell has ended.
+constexpr float kLeastReach = 1.5f;
 // One disk of so many is asked. It is odd, lest rows of a grid are left out.
 constexpr std::size_t kAskedApart = 3;
 // Fewer that were asked do not decide.
@@ -20,9 +24,9 @@ constexpr std::size_t kFewestVotes = 4;
 // Two-sided neighbours lie beside each other if they face alike within 60 degrees and lie within 30
 // degrees of each other's plane: of leaves that face anywhere, one in 16 does.
 constexpr float kAlike = 0.5f, kOffPlane = 0.5f;
-// Within this part of the reach they may also be beyond a ridge, right-angled or less sharp: within
-// 46 degrees of each other's plane.
-constexpr float kRidgeReach = 0.5f, kOffRidge = 0.72f;
+// Within so many roots of the area they may also be beyond a ridge, right-angled or less sharp:
+// within 46 degrees of each other's plane.
+constexpr float kRidgeReach = 1.25f, kOffRidge = 0.72f;
 // A surfel with others beside it in fewer sectors is lone; the three others of a leaf of 2 x 2 are
 // in three.
 constexpr int kFewestBeside = 3;
@@ -44,13 +48,46 @@ bool holdsAround(const Bounds3& box, const glm::vec3& p, float reach) {
   return contains(box, p - glm::vec3(reach)) && contains(box, p + glm::vec3(reach));
 }
 
+// Where others lie, measured by the sides of a surfel: a rectangle is as long as wide there, with
+// the same area.
+class Frame {
+ public:
+  explicit Frame(const Surfel& surfel)
+      : normal_(surfel.normal), ribbon_(Ribbon::of(surfel)), size_(std::sqrt(surfel.area)) {
+    if (!ribbon_.isEmpty()) longer_ = ribbon_.length / size_;
+  }
+
+  float size() const { return size_; }
+  // Within which its neighbours are, here and in the world.
+  float reach() const { return size_ * std::clamp(kReach / longer_, kLeastReach, kReach); }
+  float worldReach() const { return longer_ * reach(); }
+  glm::vec3 toFrame(const glm::vec3& offset) const { return stretched(offset, 1 / longer_); }
+  glm::vec3 toWorld(const glm::vec3& offset) const { return stretched(offset, longer_); }
+  // In the surfel's plane; half a sector beside the longer side, in which others of a strand lie.
+  glm::vec3 axis() const {
+    constexpr float kCos = 0.98078528f, kSin = 0.19509032f;
+    if (!ribbon_.isEmpty()) return kCos * ribbon_.along - kSin * ribbon_.across;
+    return glm::normalize(
+        glm::cross(normal_, std::abs(normal_.x) < 0.5f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0)));
+  }
+
+ private:
+  glm::vec3 stretched(const glm::vec3& offset, float along) const {
+    if (ribbon_.isEmpty()) return offset;
+    return offset + (along - 1) * glm::dot(offset, ribbon_.along) * ribbon_.along +
+           (1 / along - 1) * glm::dot(offset, ribbon_.across) * ribbon_.across;
+  }
+
+  glm::vec3 normal_;
+  Ribbon ribbon_;
+  float size_, longer_ = 1;
+};
+
 // Directions on a plane, in 16 sectors.
 class Sectors {
  public:
-  explicit Sectors(const glm::vec3& normal)
-      : u_(glm::normalize(glm::cross(
-            normal, std::abs(normal.x) < 0.5f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0)))),
-        v_(glm::cross(normal, u_)) {}
+  Sectors(const glm::vec3& normal, const glm::vec3& axis)
+      : u_(axis), v_(glm::cross(normal, axis)) {}
 
   void add(const glm::vec3& offset) {
     constexpr float kTanEighth = 0.41421356f;  // of 22.5 degrees
@@ -110,9 +147,9 @@ void LooseSurfels::ask(std::span<const Surfel> cell, bool spheres, const Bounds3
   });
   for (const Place& place : places_) {
     if (!spheres && place.surfel % kAskedApart != 0) continue;
-    const float reach = kReach * std::sqrt(cell[place.surfel].area);
     Vote& vote = votes_[place.surfel];
-    vote = spheres ? voteOfSphere(place, reach, known) : voteOfDisk(cell, place, reach, known);
+    const float reach = kReach * std::sqrt(cell[place.surfel].area);
+    vote = spheres ? voteOfSphere(place, reach, known) : voteOfDisk(cell, place, known);
     all_[spheres].add(vote);
   }
 }
@@ -157,24 +194,27 @@ LooseSurfels::Vote LooseSurfels::voteOfSphere(const Place& place, float reach,
 // A disk inside of a sheet has others all around on its plane. One at the edge has not, as most of
 // a leaf of a few surfels.
 LooseSurfels::Vote LooseSurfels::voteOfDisk(std::span<const Surfel> cell, const Place& place,
-                                            float reach, const Bounds3& known) const {
+                                            const Bounds3& known) const {
   const glm::vec3& normal = cell[place.surfel].normal;
-  Sectors around(normal), beside(normal);
-  const bool is_inside = holdsAround(known, place.position, reach);  // mostly: no direction needed
+  const Frame frame(cell[place.surfel]);
+  Sectors around(normal, frame.axis()), beside = around;
+  const float reach = frame.reach(), ridge = kRidgeReach * frame.size(), far = frame.worldReach();
+  const bool is_inside = holdsAround(known, place.position, far);  // mostly: no direction needed
   for (int i = 0; i < 8 && !is_inside; ++i) {
-    if (!contains(known, place.position + reach * around.direction(float(i) / 8))) {
-      return Vote::kNone;
-    }
+    const glm::vec3 offset = frame.toWorld(reach * around.direction(float(i) / 8));
+    if (!contains(known, place.position + offset)) return Vote::kNone;
   }
-  visitAround(place, reach, [&](const glm::vec3& offset, const Place& other) {
+  visitAround(place, far, [&](const glm::vec3& in_world, const Place& other) {
     const glm::vec3& facing = cell[other.surfel].normal;
+    const glm::vec3 offset = frame.toFrame(in_world);
     const float distance = glm::length(offset);
+    if (distance > reach) return;
     const float off_plane =
         std::max(std::abs(glm::dot(offset, normal)), std::abs(glm::dot(offset, facing)));
     const bool is_beside =
         std::abs(glm::dot(normal, facing)) > kAlike && off_plane < kOffPlane * distance;
     if (is_beside) beside.add(offset);
-    if (is_beside || (distance < kRidgeReach * reach && off_plane < kOffRidge * distance)) {
+    if (is_beside || (distance < ridge && off_plane < kOffRidge * distance)) {
       around.add(offset);
     }
   });

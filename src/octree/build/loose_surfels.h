@@ -51,8 +51,7 @@ class LooseSurfels {
 
   void ask(std::span<const Surfel> cell, bool spheres, const Bounds3& known);
   Vote voteOfSphere(const Place& place, float reach, const Bounds3& known) const;
-  Vote voteOfDisk(std::span<const Surfel> cell, const Place& place, float reach,
-                  const Bounds3& known) const;
+  Vote voteOfDisk(std::span<const Surfel> cell, const Place& place, const Bounds3& known) const;
   template <typename Visit>
   void visitAround(const Place& place, float reach, const Visit& visit) const;
 
