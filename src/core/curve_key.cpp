@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 
 #include "core/assert.h"
@@ -256,6 +257,19 @@ void curveKeys(const glm::vec3* position, std::size_t stride_bytes, const RootCu
       std::copy(last, last + count, keys.begin());
     }
   }
+}
+
+Bounds3 cellBounds(CurveKey key, int level, const RootCube& cube) {
+  std::uint32_t place[3];
+  curveCell(key, place[0], place[1], place[2]);
+  const double size = std::ldexp(cube.size, -level);
+  Bounds3 bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = cube.origin[axis] + size * double(place[axis] >> (kCurveLevels - level));
+    bounds.min[axis] = float(low);
+    bounds.max[axis] = float(low + size);
+  }
+  return bounds;
 }
 
 }  // namespace surfeit

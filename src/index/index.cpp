@@ -124,6 +124,7 @@ class Indexer {
   Progress& progress_;
   ToldOnce reading_progress_{progress_};  // inputs may be read again
   const std::string temporary_directory_;
+  bool keeps_places_ = false;  // of an unnamed scene, in which places are looked up
   std::optional<CloudReader> reader_;
   std::vector<Surfel> sample_;
   std::optional<PinnedCube> pinned_;
@@ -158,6 +159,7 @@ Result<IndexStats> Indexer::run() {
 }
 
 Result<SceneFile> Indexer::runUnnamed() {
+  keeps_places_ = true;
   SURFEIT_ASSIGN_OR_RETURN(auto buckets, readBuckets());
   noteStrays(totals_, reader_->origin(), false, progress_);
   freeSamples();
@@ -406,6 +408,7 @@ Status Indexer::buildWithNeighbours(std::unique_ptr<BucketStream> buckets, Scene
   how.temporary_directory = temporary_directory_;
   how.up = up();
   how.normals = normalRule();
+  how.keeps_places = keeps_places_;
   how.build_unnamed = [&](SortedSurfelStream& stream, const char* phase) {
     return buildUnnamed(stream, phase);
   };

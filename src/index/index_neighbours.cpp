@@ -20,6 +20,7 @@ Result<std::optional<SceneFile>> buildFound(SceneFile places, const NeighbourBui
                            openNeighbours(std::move(places), how.memory_bytes, how.threads,
                                           SizedSurfelStream::searcherBytes(how.threads)));
   SizedSurfelStream found(*octree, how.disk_overlap, how.normals, how.threads, progress);
+  if (how.keeps_places) found.keepPlaces();
   SURFEIT_RETURN_IF_ERROR(found.prepare());
   std::optional<SceneFile> unoriented;
   if (how.normals && how.normals->needsSides()) {

@@ -26,6 +26,7 @@ struct NeighbourBuild {
   std::string temporary_directory;
   UpAxis up = kDefaultUpAxis;
   std::optional<NormalRule> normals;  // absent: none are asked for
+  bool keeps_places = false;          // SizedSurfelStream::keepPlaces
 
   // Builds a scene without a name at full precision, or the real one, from a stream.
   std::function<Result<SceneFile>(SortedSurfelStream&, const char* phase)> build_unnamed;

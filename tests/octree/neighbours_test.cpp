@@ -273,6 +273,7 @@ TEST(SurfaceCells, MeasuredTogetherAreThoseCutOneByOne) {
     EXPECT_EQ(found.is_settled, expected.is_settled);
     EXPECT_NEAR(found.area, expected.area, 1e-5f * expected.area);
     EXPECT_NEAR(found.radius, expected.radius, 1e-5f * expected.radius);
+    EXPECT_LT(glm::length(found.middle - expected.middle), 1e-4f * expected.radius);
     // Either way round
     const glm::vec3 a = found.long_side, b = expected.long_side;
     EXPECT_LT(std::min(glm::length(a - b), glm::length(a + b)), 1e-3f * expected.radius);
@@ -304,20 +305,39 @@ TEST(SurfaceCells, OfRowsAreRectangles) {
     return cells.cellOf(0).long_side;
   };
   for (const bool together : {false, true}) {
-    for (const float rows : {2.5f, 4.f, 9.f}) {
+    for (const float rows : {2.6f, 4.f, 9.f}) {
       const glm::vec3 side = sideOf(latticeAround(along, rows * across), together);
       EXPECT_NEAR(std::abs(glm::dot(side, across)), rows, 1e-3f * rows);
       EXPECT_NEAR(glm::dot(side, along), 0, 1e-3f * rows);
     }
     EXPECT_EQ(sideOf(latticeAround(along, 1.5f * across), together), glm::vec3(0));
-    // A pair: its cells are halves of one, beside their places
-    std::vector<Neighbour> pair = latticeAround(along, across);
-    pair.insert(pair.begin(), {0.02f * along, {}, 0});
-    EXPECT_EQ(sideOf(pair, together), glm::vec3(0));
     // Places that share a cell
     std::vector<Neighbour> shared = latticeAround(along, 4.f * across);
     shared.insert(shared.begin(), {1e-6f * along, {}, 0});
     EXPECT_EQ(sideOf(shared, together), glm::vec3(0));
+  }
+}
+
+// A pair: its cells are halves of one, beside their places.
+TEST(SurfaceCells, HaveAMiddleBesideTheirPlace) {
+  const glm::vec3 along = glm::normalize(glm::vec3(1, 2, 0)), across(-along.y, along.x, 0);
+  for (const bool together : {false, true}) {
+    for (const float apart : {0.02f, 0.5f}) {
+      std::vector<Neighbour> pair = latticeAround(along, across);
+      pair.push_back({apart * along, {}, 0});
+      std::sort(pair.begin(), pair.end(), isBefore);
+      const CellPlace place{pair, glm::length(pair.back().offset), glm::vec3(0)};
+      SurfaceCells cells;
+      cells.fit({&place, 1}, false);
+      if (together) cells.measure();
+      const SurfaceCell cell = cells.cellOf(0);
+      // From -1/2 to the line half-way to the other one
+      const float width = 0.5f + 0.5f * apart, to_middle = 0.25f - 0.25f * apart;
+      EXPECT_NEAR(cell.area, width, 1e-4f);
+      EXPECT_LT(glm::length(cell.middle + to_middle * along), 1e-4f) << apart;
+      const float moment = (width * width + 1) / 12 + to_middle * to_middle;
+      EXPECT_NEAR(cell.radius, std::sqrt(2 * moment), 1e-4f);
+    }
   }
 }
 

@@ -40,14 +40,17 @@ class NormalsTest : public DirectoryTest {
   double gauss() { return std::normal_distribution<double>(0, 1)(random_); }
 
   // Points with their number, as doubles.
-  void write(const std::vector<glm::dvec3>& points, const std::string& comment = "") const {
-    std::string text = "ply\nformat ascii 1.0\n" + comment +
-                       fmt::format(
-                           "element vertex {}\nproperty double x\nproperty double y\n"
-                           "property double z\nproperty int number\nend_header\n",
-                           points.size());
+  void write(const std::vector<glm::dvec3>& points, const std::string& comment = "",
+             bool with_sizes = false) const {
+    std::string text =
+        "ply\nformat ascii 1.0\n" + comment +
+        fmt::format(
+            "element vertex {}\nproperty double x\nproperty double y\n"
+            "property double z\nproperty int number\n{}end_header\n",
+            points.size(), with_sizes ? "property float radius\nproperty float area\n" : "");
     for (std::size_t i = 0; i < points.size(); ++i) {
-      text += fmt::format("{} {} {} {}\n", points[i].x, points[i].y, points[i].z, i);
+      text += fmt::format("{} {} {} {}{}\n", points[i].x, points[i].y, points[i].z, i,
+                          with_sizes ? " .02 .0006" : "");
     }
     DirectoryTest::write("cloud.ply", text);
   }
@@ -293,7 +296,7 @@ std::map<std::array<long, 3>, glm::dvec3> normalsOfScene(const std::string& path
 TEST_F(NormalsTest, IndexFindsTheSame) {
   std::vector<glm::dvec3> points = sphere(5000, .1);
   for (int i = 0; i < 1000; ++i) points.emplace_back(4 + unit(), unit(), unit());
-  write(points);
+  write(points, "", /* with_sizes= */ true);  // they keep their places
   for (const bool is_two_sided : {false, true}) {
     NormalsOptions options;
     options.estimation = {{Toward::kOutward, {}, {}}, is_two_sided};

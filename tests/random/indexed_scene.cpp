@@ -79,9 +79,9 @@ Status indexCloud(std::span<const Surfel> cloud, const IndexedSceneOptions& opti
 
 CloudChannels channelsOf(std::span<const Surfel> cloud) {
   CloudChannels channels;
-  channels.normal = channels.radius = channels.area = channels.radiosity = true;
-  channels.albedo = true;
+  channels.normal = channels.radiosity = channels.albedo = true;
   const auto has = [cloud](auto test) { return std::any_of(cloud.begin(), cloud.end(), test); };
+  channels.radius = channels.area = has([](const Surfel& surfel) { return surfel.area > 0; });
   channels.two_sided = has([](const Surfel& surfel) { return surfel.isTwoSided(); });
   channels.group = has([](const Surfel& surfel) { return surfel.group != 0; });
   channels.long_side = has([](const Surfel& surfel) { return surfel.long_side != 0; });

@@ -181,17 +181,7 @@ SlabBuilder::Cell SlabBuilder::cellAt(std::size_t begin, std::size_t end, int bo
 }
 
 Bounds3 SlabBuilder::cubeOf(const Cell& cell) const {
-  std::uint32_t place[3];
-  curveCell(keys_[cell.begin], place[0], place[1], place[2]);
-  const double size = std::ldexp(header_.cube.size, -cell.level);
-  Bounds3 cube;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low =
-        header_.cube.origin[axis] + size * double(place[axis] >> (kCurveLevels - cell.level));
-    cube.min[axis] = float(low);
-    cube.max[axis] = float(low + size);
-  }
-  return cube;
+  return cellBounds(keys_[cell.begin], cell.level, header_.cube);
 }
 
 void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& leaf) {

@@ -28,7 +28,9 @@ class CellLanes {
     for (std::size_t k = 0; k < sides_; ++k) addSide(k);
     const V area = hn::Mul(Splat(0.5f), twice_area_);
     Put(area, at_.cell_area + lane_);
-    const V twelve = hn::Mul(Splat(12), area);
+    const V six = hn::Mul(Splat(6), area), twelve = hn::Mul(Splat(12), area);
+    Put(hn::Div(middle_u_, six), at_.cell_middle_u + lane_);
+    Put(hn::Div(middle_v_, six), at_.cell_middle_v + lane_);
     Put(hn::Div(squares_, twelve), at_.cell_square + lane_);
     Put(hn::Div(differences_, twelve), at_.cell_difference + lane_);
     Put(hn::Div(products_, twelve), at_.cell_product + lane_);
@@ -92,7 +94,10 @@ class CellLanes {
   // What the triangle of `twice` the area adds to the other moments: its ends are at t that have
   // this sum, and squares with their product that add up to `ends`.
   void addShape(std::size_t k, V twice, V sum, V ends) {
-    const V u = u_[k], v = v_[k], rest = hn::Sub(Splat(0.75f), ends);
+    const V u = u_[k], v = v_[k];
+    middle_u_ = hn::Add(middle_u_, hn::Mul(twice, hn::Sub(u, hn::Mul(v, sum))));
+    middle_v_ = hn::Add(middle_v_, hn::Mul(twice, hn::Add(v, hn::Mul(u, sum))));
+    const V rest = hn::Sub(Splat(0.75f), ends);
     const V u_v = hn::Mul(u, v), squares = hn::Sub(hn::Mul(u, u), hn::Mul(v, v));
     const V difference = hn::Sub(hn::Mul(squares, rest), hn::Mul(Splat(3), hn::Mul(u_v, sum)));
     const V product = hn::Add(hn::Mul(u_v, rest), hn::Mul(Splat(0.75f), hn::Mul(squares, sum)));
@@ -124,6 +129,7 @@ class CellLanes {
   V half_sq_[kFrame + SurfaceFitLanes::kMostNeighbours];
   V twice_area_ = hn::Zero(D()), squares_ = hn::Zero(D()), reach_sq_ = hn::Zero(D());
   V differences_ = hn::Zero(D()), products_ = hn::Zero(D());
+  V middle_u_ = hn::Zero(D()), middle_v_ = hn::Zero(D());
   V sharers_ = Splat(1), is_cut_ = hn::Zero(D());
 };
 

@@ -10,11 +10,20 @@
 
 namespace surfeit {
 
-// Means over a cell, of places (u, v) from its place.
+// Of a cell: its middle, from its place, and means over it, of places (u, v) from its middle.
 struct CellMoments {
+  glm::vec2 middle{0};
   float square = 0;      // u^2 + v^2
   float difference = 0;  // u^2 - v^2
   float product = 0;     // u v
+
+  // The same of means of places from the place.
+  static CellMoments fromPlace(const glm::vec2& middle, float square, float difference,
+                               float product) {
+    const float uu = middle.x * middle.x, vv = middle.y * middle.y;
+    return {middle, std::max(square - (uu + vv), 0.f), difference - (uu - vv),
+            product - middle.x * middle.y};
+  }
 };
 
 // Around the origin, cut by the lines halfway to neighbours.
@@ -71,17 +80,20 @@ class CellPolygon {
   }
   CellMoments moments() const {
     float square = 0, difference = 0, product = 0;
+    glm::vec2 middle(0);
     for (std::size_t i = 0; i < count_; ++i) {
       const glm::vec2 &a = corners_[i], &b = corners_[i + 1 == count_ ? 0 : i + 1];
       const float cross = a.x * b.y - a.y * b.x;
       const float xx = a.x * a.x + a.x * b.x + b.x * b.x;
       const float yy = a.y * a.y + a.y * b.y + b.y * b.y;
+      middle += cross * (a + b);
       square += cross * (xx + yy);
       difference += cross * (xx - yy);
       product += cross * (a.x * a.y + 0.5f * (a.x * b.y + b.x * a.y) + b.x * b.y);
     }
     const float scale = 1 / (12 * area());
-    return {scale * square, scale * difference, scale * product};
+    return CellMoments::fromPlace(2 * scale * middle, scale * square, scale * difference,
+                                  scale * product);
   }
   // Its width along a direction of unit length.
   float width(const glm::vec2& direction) const {

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "core/long_side.h"
+#include "octree/build/curve_sort.h"
+#include "octree/neighbours/leaf_levels.h"
 #include "octree/page/page_limits.h"
 
 namespace surfeit {
@@ -18,6 +20,31 @@ constexpr float kStrayLimit = 8, kSparseLimit = 40;
 constexpr std::size_t kSamplePages = 64, kSampleStep = 16;
 // Pages whose surfels are sized at once, for each thread: what a PlaceIndex serves best.
 constexpr std::uint32_t kThreadPages = 16;
+
+// From a place inside a box along `way`, which lies in the plane with this normal; at a face of the
+// box along that, in the plane.
+glm::vec3 wayWithin(const Bounds3& box, const glm::vec3& from, glm::vec3 way,
+                    const glm::vec3& normal) {
+  constexpr float kInside = 0.999f;  // of the way: rounding may leave the box
+  glm::vec3 place = from;
+  for (int faces = 0; faces < 3; ++faces) {
+    float part = 1;
+    int face = -1;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float room = (way[axis] > 0 ? box.max[axis] : box.min[axis]) - place[axis];
+      if (std::abs(way[axis]) * part > std::abs(room)) face = axis, part = room / way[axis];
+    }
+    place += part * way;
+    if (face < 0) break;
+    glm::vec3 across = -normal[face] * normal;
+    across[face] += 1;
+    const float across_sq = glm::dot(across, across);
+    if (!(across_sq > 1e-6f)) break;
+    way *= 1 - part;
+    way -= glm::dot(way, across) / across_sq * across;
+  }
+  return from + kInside * (place - from);
+}
 
 bool needsSize(const Surfel& surfel) { return (surfel.flags & kSurfelNeedsSize) != 0; }
 
@@ -37,9 +64,10 @@ SizedSurfelStream::SizedSurfelStream(PagedOctree& octree, float overlap,
 SizedSurfelStream::~SizedSurfelStream() = default;
 
 std::size_t SizedSurfelStream::searcherBytes(int threads) {
-  // Surfels are read, then copied into a batch with their tickets
-  constexpr std::size_t kBatchBytes =
-      kThreadPages * kDefaultSurfelGroup * (2 * sizeof(Surfel) + sizeof(Ticket));
+  // Surfels are read, then copied into a batch with their tickets, which are sorted
+  constexpr std::size_t kSurfelBytes = 2 * sizeof(Surfel) + 2 * sizeof(Ticket) + sizeof(glm::vec3) +
+                                       sizeof(CurveKey) + sizeof(std::uint8_t);
+  constexpr std::size_t kBatchBytes = kThreadPages * kDefaultSurfelGroup * kSurfelBytes;
   return std::size_t(threads) * (SurfaceSearch::memoryBytes() + kBatchBytes);
 }
 
@@ -82,8 +110,10 @@ Status SizedSurfelStream::readPages(std::uint32_t end_page) {
   const std::size_t capacity = file.header().surfel_group_capacity;
   SceneFile::Scratch scratch;
   surfels_.clear();
+  page_begins_.clear();
   for (; next_page_ < end_page; ++next_page_) {
     const std::size_t size = surfels_.size();
+    page_begins_.push_back(size);
     surfels_.resize(size + capacity);
     SURFEIT_ASSIGN_OR_RETURN(
         const std::uint32_t count,
@@ -131,12 +161,71 @@ void SizedSurfelStream::applyNormal(Surfel& surfel, const SurfaceAt& surface) {
   }
 }
 
+// Of the first or the last surfel of a page, which need not exist.
+Result<std::optional<CurveKey>> SizedSurfelStream::keyBeside(std::uint32_t page,
+                                                             bool is_first) const {
+  const SceneFile& file = octree_.file();
+  if (page >= file.surfelPageCount()) return std::optional<CurveKey>();
+  std::vector<Surfel> surfels(file.header().surfel_group_capacity);
+  SceneFile::Scratch scratch;
+  SURFEIT_ASSIGN_OR_RETURN(const std::uint32_t count, file.decodeSurfels(page, scratch, surfels));
+  const Surfel& surfel = surfels[is_first ? 0 : count - 1];
+  return std::optional(curveKey(surfel.position, file.header().cube));
+}
+
+// The surfels' keys, and the levels of their leaves.
+Status SizedSurfelStream::findLeaves() {
+  const SceneHeader& header = octree_.file().header();
+  keys_.resize(surfels_.size());
+  curveKeys(&surfels_.front().position, sizeof(Surfel), header.cube, keys_);
+  leaf_levels_.resize(surfels_.size());
+  const std::uint32_t pages = std::uint32_t(page_begins_.size());
+  std::optional<CurveKey> before;
+  if (next_page_ > pages) {
+    SURFEIT_ASSIGN_OR_RETURN(before, keyBeside(next_page_ - pages - 1, false));
+  }
+  for (std::size_t page = 0; page < pages; ++page) {
+    const bool is_last = page + 1 == pages;
+    const std::size_t begin = page_begins_[page],
+                      size = (is_last ? keys_.size() : page_begins_[page + 1]) - begin;
+    std::optional<CurveKey> after;
+    if (is_last) {
+      SURFEIT_ASSIGN_OR_RETURN(after, keyBeside(next_page_, true));
+    } else {
+      after = keys_[begin + size];
+    }
+    findLeafLevels(std::span(keys_).subspan(begin, size), before, after, header.leaf_capacity,
+                   std::span(leaf_levels_).subspan(begin, size));
+    before = keys_[begin + size - 1];
+  }
+  return {};
+}
+
+// Without leaving its leaf, so the order of leaves stays. A disk around its new place is spread out
+// as far as the cell.
+void SizedSurfelStream::moveToMiddle(std::size_t i) {
+  const glm::vec3 way = to_middle_[i];
+  if (way == glm::vec3(0)) return;
+  Surfel& surfel = surfels_[i];
+  const RootCube& cube = octree_.file().header().cube;
+  const Bounds3 leaf = cellBounds(keys_[i], leaf_levels_[i], cube);
+  const glm::vec3 place = wayWithin(leaf, surfel.position, way, surfel.normal);
+  if (firstDifferentLevel(keys_[i], curveKey(place, cube)) <= leaf_levels_[i]) return;
+  const glm::vec3 left = surfel.position + way - place;
+  const float radius_sq =
+      surfel.radius * surfel.radius + 2 * overlap_ * (glm::dot(left, left) - glm::dot(way, way));
+  if (!(radius_sq > 0)) return;
+  surfel.position = place;
+  surfel.radius = std::sqrt(radius_sq);
+}
+
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const SceneFile& file = octree_.file();
   if (next_page_ == end_page_) return std::shared_ptr<const SortedBatch>();
   const std::uint32_t pages = kThreadPages * std::uint32_t(searchers_.size());
   SURFEIT_RETURN_IF_ERROR(readPages(next_page_ + std::min(pages, end_page_ - next_page_)));
 
+  to_middle_.assign(surfels_.size(), glm::vec3(0));
   SURFEIT_RETURN_IF_ERROR(findOnThreads(
       searchers_, surfels_,
       [&](std::size_t i) {
@@ -148,9 +237,14 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
         if (needsSize(surfel)) applySize(surfel, surface);
         if (needsNormal(surfel)) applyNormal(surfel, surface);
         // Spheres have no sides
-        if (is_bare && !surfel.isSphere()) setLongSide(surface.long_side, surfel);
+        if (!is_bare || surfel.isSphere()) return;
+        setLongSide(surface.long_side, surfel);
+        if (!keeps_places_) to_middle_[i] = surface.middle;
       },
       progress_));
+
+  SURFEIT_RETURN_IF_ERROR(findLeaves());
+  for (std::size_t i = 0; i < surfels_.size(); ++i) moveToMiddle(i);
 
   const auto batch = std::make_shared<SortedBatch>();
   batch->resize(surfels_.size());
@@ -158,6 +252,8 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   for (std::size_t i = 0; i < surfels_.size(); ++i) {
     batch->tickets[i] = {curveKey(surfels_[i].position, file.header().cube), i};
   }
+  ticket_scratch_.resize(surfels_.size());
+  sortByKey(batch->tickets, ticket_scratch_);
   return std::shared_ptr<const SortedBatch>(batch);
 }
 

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "core/curve_key.h"
 #include "core/spherical_harmonics.h"
 #include "octree/build/sorted_surfels.h"
 #include "octree/neighbours/normal_rule.h"
@@ -24,8 +25,9 @@
 namespace surfeit {
 
 // The surfels of a scene in curve order, with sizes filled in, and with `normals` the normals of
-// those without. The neighbour search goes through the scene's own caches, so memory stays within
-// their budget. `overlap`: disk area over surfel area.
+// those without. Disks that had neither radius nor area stand in the middle of their cells, as far
+// as that is in their leaf of the octree. The neighbour search goes through the scene's own caches,
+// so memory stays within their budget. `overlap`: disk area over surfel area.
 class SizedSurfelStream : public SortedSurfelStream {
  public:
   SizedSurfelStream(PagedOctree& octree, float overlap, std::optional<NormalRule> normals,
@@ -40,6 +42,8 @@ class SizedSurfelStream : public SortedSurfelStream {
   // Only the surfels of some pages are handed out, `end` not included; the limit below is that of
   // all. Before next().
   void setPages(std::uint32_t begin, std::uint32_t end) { next_page_ = begin, end_page_ = end; }
+  // Nothing is moved to the middle of its cell: places are looked up afterwards. Before next().
+  void keepPlaces() { keeps_places_ = true; }
   // No radius off a surface becomes larger: strays far from everything would cover the scene.
   float largestRadius() const { return largest_radius_; }
 
@@ -52,6 +56,9 @@ class SizedSurfelStream : public SortedSurfelStream {
  private:
   float coveringArea(float coverage, float radius, float local_area) const;
   Status readPages(std::uint32_t end_page);
+  Result<std::optional<CurveKey>> keyBeside(std::uint32_t page, bool is_first) const;
+  Status findLeaves();
+  void moveToMiddle(std::size_t i);
   bool needsNormal(const Surfel& surfel) const { return normals_ && surfel.isSphere(); }
   void applySize(Surfel& surfel, const SurfaceAt& surface) const;
   void applyNormal(Surfel& surfel, const SurfaceAt& surface);
@@ -62,8 +69,15 @@ class SizedSurfelStream : public SortedSurfelStream {
   const Progress& progress_;
   std::vector<SurfaceSearch> searchers_;
   float largest_radius_ = 0;
+  bool keeps_places_ = false;
   std::uint32_t next_page_ = 0, end_page_ = 0;
-  std::vector<Surfel> surfels_;  // of the pages being sized
+  // Of the pages being sized, where each of them begins, and how far each surfel is to be moved
+  std::vector<Surfel> surfels_;
+  std::vector<std::size_t> page_begins_;
+  std::vector<glm::vec3> to_middle_;
+  std::vector<CurveKey> keys_;
+  std::vector<std::uint8_t> leaf_levels_;
+  std::vector<Ticket> ticket_scratch_;
   std::atomic<std::uint64_t> normals_found_ = 0, thin_surfels_ = 0;
 };
 

@@ -39,12 +39,7 @@ constexpr float kOpen = SurfaceFitLanes::kOpen;
 
 // A cell so many times as long as wide is a rectangle. Disks along the line of a scan would
 // overlap, and leave gaps between the lines.
-constexpr float kLongCell = 2;
-// The roots of a cell's two moments, multiplied, are its area / 12 if it is a parallelogram about
-// its place, and area / (4 pi) if an ellipse. They are more if the place lies at a side, as that of
-// two places close together: a rectangle about it would lie beside its cell. This many times area /
-// 12 is off by .38 of the half width.
-constexpr float kCentred = 1.2f;
+constexpr float kLongCell = 2.5f;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -312,7 +307,9 @@ SurfaceCell SurfaceCells::cellOf(std::size_t lane) {
     at.sharers = fits.cell_sharers[lane];
     SurfaceCell cell =
         at.cell(fits.cell_area[lane],
-                {fits.cell_square[lane], fits.cell_difference[lane], fits.cell_product[lane]});
+                CellMoments::fromPlace({fits.cell_middle_u[lane], fits.cell_middle_v[lane]},
+                                       fits.cell_square[lane], fits.cell_difference[lane],
+                                       fits.cell_product[lane]));
     cell.is_settled = true;
     return cell;
   }
@@ -401,7 +398,10 @@ SurfaceCell SurfaceCells::Scratch::cell(float area, const CellMoments& moments) 
   SurfaceCell cell;
   cell.area = area / sharers * unit * unit;
   // A disk's mean squared distance from its middle is half of its radius squared
-  cell.radius = std::sqrt(2 * moments.square) * unit;
+  const float to_middle_sq = glm::dot(moments.middle, moments.middle);
+  cell.radius = std::sqrt(2 * (moments.square + to_middle_sq)) * unit;
+  const TangentFrame plane(normal);
+  cell.middle = unit * (moments.middle.x * plane.tangent + moments.middle.y * plane.bitangent);
   cell.long_side = longSide(area, moments);
   return cell;
 }
@@ -412,7 +412,7 @@ glm::vec3 SurfaceCells::Scratch::longSide(float area, const CellMoments& moments
   const float along = std::sqrt(0.5f * std::max(moments.square + apart, 0.f));
   const float across = std::sqrt(0.5f * std::max(moments.square - apart, 0.f));
   const bool is_long = along > kLongCell * across && across > 0;
-  if (!is_long || sharers > 1 || 12 * along * across > kCentred * area) return glm::vec3(0);
+  if (!is_long || sharers > 1) return glm::vec3(0);
   const float angle = 0.5f * std::atan2(2 * moments.product, moments.difference);
   const TangentFrame plane(normal);
   return std::sqrt(along / across * area) * unit *

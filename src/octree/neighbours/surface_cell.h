@@ -34,10 +34,12 @@ struct SurfacePlane {
 };
 
 struct SurfaceCell {
-  float area = 0;    // 0: the neighbours do not tell
-  float radius = 0;  // of the disk around the place that is spread out as far: the same second
-                     // moment over its area
-  // Of the rectangle that is spread out as far, where it is much longer than wide; else zero.
+  float area = 0;       // 0: the neighbours do not tell
+  float radius = 0;     // of the disk around the place that is spread out as far: the same second
+                        // moment over its area
+  glm::vec3 middle{0};  // from the place
+  // Of the rectangle around the middle that is spread out as far, where it is much longer than
+  // wide; else zero.
   glm::vec3 long_side{0};
   // Whether places beyond the last neighbour would not change it.
   bool is_settled = false;

@@ -47,7 +47,8 @@ struct SurfaceFitLanes {
   Lanes coincident_half_sq;
   // Found
   Lanes cell_area;
-  Lanes cell_square, cell_difference, cell_product;  // CellMoments
+  Lanes cell_middle_u, cell_middle_v;
+  Lanes cell_square, cell_difference, cell_product;  // CellMoments::fromPlace
   Lanes cell_reach_sq;                               // of the farthest corner
   Lanes cell_sharers;  // the place, and neighbours that share the cell
   Lanes cell_is_cut;   // 1: by any neighbour

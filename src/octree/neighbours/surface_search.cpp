@@ -155,8 +155,12 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
   }
   SurfaceAt surface = place.surface;
   limit(cell, is_sparse, surface.thickness);
+  // There is no plane to move in
+  const bool has_plane = place.normal != glm::vec3(0) || surface.thickness <= kLooseThickness;
+  if (!has_plane) cell.middle = glm::vec3(0);
   surface.area = cell.area / float(std::max<std::uint64_t>(place.coincident, 1));
   surface.radius = cell.radius;
+  surface.middle = cell.middle;
   // Rectangles on each other would cover the area of one
   if (place.coincident <= 1) surface.long_side = cell.long_side;
   take(place.spot.index, surface);
@@ -171,6 +175,7 @@ void SurfaceSearch::limit(SurfaceCell& cell, bool is_sparse, float thickness) co
   if (is_sparse) largest = std::min(largest, largest_sparse_radius_);
   if (thickness > kLooseThickness) largest = std::min(largest, largest_loose_radius_);
   if (cell.radius <= largest) return;
+  cell.middle = glm::vec3(0);
   cell.radius = largest;
   cell.area = std::min(cell.area, kPi * largest * largest);
   cell.long_side = glm::vec3(0);  // cut off at both ends

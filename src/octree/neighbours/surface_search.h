@@ -24,6 +24,7 @@ namespace surfeit {
 struct SurfaceAt {
   float area = 0;    // per surfel at the place; 0: unknown
   float radius = 0;  // of a disk that is spread out as far as the piece of surface around the place
+  glm::vec3 middle{0};      // SurfaceCell::middle
   glm::vec3 long_side{0};   // SurfaceCell::long_side, of a surfel's area
   glm::vec3 normal{0};      // of the plane through the neighbours, unit, either way; zero: unknown
   float confidence = 0;     // 1: they lie on the plane; 0: all around (Pauly et al. 2002)
