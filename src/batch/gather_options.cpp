@@ -111,10 +111,7 @@ Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string&
 }
 
 GatherOptions withDefaults(GatherOptions options) {
-  if (options.outputs == 0) {
-    options.outputs = usualOutputs(options.mode);
-    if (!options.environment.path.empty()) options.outputs |= kOutputEnvironment;
-  }
+  options.outputs = settledOutputs(options, !options.environment.path.empty());
   if (options.threads == 0) options.threads = defaultThreadCount();
   if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes();
   return options;

@@ -14,6 +14,7 @@
 #include "core/bounds.h"
 #include "engine/gatherer_memory.h"
 #include "gather/rules/check_settings.h"
+#include "gather/rules/gather_outputs.h"
 
 namespace surfeit {
 namespace {
@@ -114,10 +115,7 @@ Result<std::shared_ptr<const World>> World::create(std::shared_ptr<EngineState> 
 
   GatherSettings local = settings;
   local.eye -= world->origin_;
-  if (local.outputs == 0) {
-    local.outputs = usualOutputs(settings.mode);
-    if (environment != nullptr) local.outputs |= kOutputEnvironment;
-  }
+  local.outputs = settledOutputs(settings, environment != nullptr);
   world->rules_ = gatherRules(local, world->environment_.get());
   std::uint64_t surfels = 0, groups = 0;
   for (const std::uint32_t scene : world->scene_of_) {
