@@ -1,7 +1,9 @@
 // The engine as callers use it, through its public headers alone:
 //
 //   engine_bench calls SCENE.sft [--receivers 20480] [--call 256] [--memory 64 ...] [--rounds 5]
-//     many small calls against one call of all: processor time and hits, in turns
+//     [--draft]
+//     many small calls against one call of all, each in an engine of its own: processor time, hits
+//     and the engine's memory, in turns
 //   engine_bench forest [--trees 10000] [--surfels 1M] [--receivers 20480] [--memory 512]
 //     instances of one tree: rate beside that of the single tree, resident memory, and the error
 //     against the same forest indexed as one scene, at a size where that can be done
@@ -80,43 +82,74 @@ std::vector<Receiver> receiversAbove(const glm::dvec3& min, const glm::dvec3& ma
   return receivers;
 }
 
+// An engine with one gatherer of a scene.
+class OneGatherer {
+ public:
+  OneGatherer(const std::string& path, std::uint64_t memory, const GatherSettings& settings)
+      : engine_(makeEngine(memory)),
+        scene_(take(engine_.open(path))),
+        gatherer_(take(engine_.gatherer(scene_, settings))) {}
+
+  const SceneInfo& info() const { return scene_.info(); }
+
+  // Gathers by calls of `size`; returns the processor time.
+  double gather(const std::vector<Receiver>& receivers, std::size_t size,
+                std::vector<GatherResult>& results) {
+    const EngineStatistics before = engine_.statistics();
+    const double begin = processorSeconds();
+    for (std::size_t i = 0; i < receivers.size(); i += size) {
+      need(gatherer_.gather(&receivers[i], std::min(size, receivers.size() - i), &results[i]));
+    }
+    const double seconds = processorSeconds() - begin;
+    const EngineStatistics now = engine_.statistics();
+    const auto grown = [&](std::uint64_t GatherCacheStats::*count) {
+      return double(now.node_cache.*count - before.node_cache.*count + now.surfel_cache.*count -
+                    before.surfel_cache.*count);
+    };
+    hits_ = 100 * grown(&GatherCacheStats::hits) / grown(&GatherCacheStats::requests);
+    return seconds;
+  }
+  double hits() const { return hits_; }  // of the last gather, in %
+
+  // What it holds, and the most that its caches have held.
+  double mebibytes() const {
+    const EngineStatistics now = engine_.statistics();
+    return double(now.held_bytes + now.node_cache.peak_bytes + now.surfel_cache.peak_bytes) /
+           (1 << 20);
+  }
+
+ private:
+  Engine engine_;
+  Scene scene_;
+  Gatherer gatherer_;
+  double hits_ = 0;
+};
+
+// An engine for either way, in turns.
 void measureCalls(const std::string& path, std::size_t count, std::size_t call,
-                  const std::vector<std::uint64_t>& budgets, int rounds) {
-  fmt::print("{:>10} {:>12} {:>12} {:>7} {:>9} {:>9} {:>9}\n", "memory", "one call /s",
-             fmt::format("of {} /s", call), "ratio", "hits %", "hits %", "peak MiB");
+                  const std::vector<std::uint64_t>& budgets, int rounds, bool is_draft) {
+  fmt::print("{:>10} {:>12} {:>12} {:>7} {:>9} {:>9} {:>9} {:>9}\n", "memory", "one call /s",
+             fmt::format("of {} /s", call), "ratio", "hits %", "hits %", "MiB", "MiB");
+  GatherSettings settings = bleeding();
+  if (is_draft) setQuality(QualityPreset::kDraft, settings.quality);
   for (const std::uint64_t memory : budgets) {
-    Engine engine = makeEngine(memory);
-    const Scene scene = take(engine.open(path));
-    const SceneInfo& info = scene.info();
+    OneGatherer one(path, memory, settings), many(path, memory, settings);
+    const SceneInfo& info = one.info();
     const std::vector<Receiver> receivers =
         receiversAbove(info.min, info.max, info.up, count, 1e-3 * glm::length(info.max - info.min));
     std::vector<GatherResult> results(receivers.size());
-    Gatherer gatherer = take(engine.gatherer(scene, bleeding()));
-    const auto measured = [&](std::size_t size, double& hits) {
-      const GatherCacheStats nodes = engine.statistics().node_cache;
-      const GatherCacheStats surfels = engine.statistics().surfel_cache;
-      const double begin = processorSeconds();
-      for (std::size_t i = 0; i < receivers.size(); i += size) {
-        need(gatherer.gather(&receivers[i], std::min(size, receivers.size() - i), &results[i]));
-      }
-      const double seconds = processorSeconds() - begin;
-      const EngineStatistics now = engine.statistics();
-      hits = 100 * double(now.node_cache.hits - nodes.hits + now.surfel_cache.hits - surfels.hits) /
-             double(now.node_cache.requests - nodes.requests + now.surfel_cache.requests -
-                    surfels.requests);
-      return seconds;
-    };
+    const std::vector<Receiver> first(receivers.begin(),
+                                      receivers.begin() + std::ptrdiff_t(std::min(count, call)));
+    for (OneGatherer* each : {&one, &many}) each->gather(first, first.size(), results);  // warm
     std::vector<double> at_once, by_calls, ratios;
-    double hits_at_once = 0, hits_by_calls = 0;
-    measured(receivers.size(), hits_at_once);  // warm
     for (int round = 0; round < rounds; ++round) {
-      at_once.push_back(measured(receivers.size(), hits_at_once));
-      by_calls.push_back(measured(call, hits_by_calls));
+      at_once.push_back(one.gather(receivers, receivers.size(), results));
+      by_calls.push_back(many.gather(receivers, call, results));
       ratios.push_back(by_calls.back() / at_once.back());
     }
-    fmt::print("{:>7} MiB {:>12.0f} {:>12.0f} {:>7.3f} {:>9.3f} {:>9.3f} {:>9.0f}\n", memory >> 20,
-               double(count) / median(at_once), double(count) / median(by_calls), median(ratios),
-               hits_at_once, hits_by_calls, peakMebibytes());
+    fmt::print("{:>7} MiB {:>12.0f} {:>12.0f} {:>7.3f} {:>9.3f} {:>9.3f} {:>9.1f} {:>9.1f}\n",
+               memory >> 20, double(count) / median(at_once), double(count) / median(by_calls),
+               median(ratios), one.hits(), many.hits(), one.mebibytes(), many.mebibytes());
   }
 }
 
@@ -350,6 +383,7 @@ int run(int argc, char** argv) {
   std::size_t receivers = 20'480, call = 256, trees = 10'000, surfels = 1'000'000;
   std::vector<std::uint64_t> budgets = {64};
   int rounds = 5;
+  bool is_draft = false;
   std::size_t forest_receivers = 20'480;
   std::uint64_t memory = 512;
   CLI::App* const calls = app.add_subcommand("calls", "Many small calls against one of all");
@@ -358,6 +392,7 @@ int run(int argc, char** argv) {
   calls->add_option("--call", call);
   calls->add_option("--memory", budgets, "MiB, several");
   calls->add_option("--rounds", rounds);
+  calls->add_flag("--draft", is_draft, "Draft quality");
   CLI::App* const forest = app.add_subcommand("forest", "Instances of a tree");
   forest->add_option("--trees", trees);
   forest->add_option("--surfels", surfels);
@@ -366,7 +401,7 @@ int run(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   if (calls->parsed()) {
     for (std::uint64_t& each : budgets) each <<= 20;
-    measureCalls(scene, receivers, call, budgets, rounds);
+    measureCalls(scene, receivers, call, budgets, rounds, is_draft);
   } else {
     measureForest(trees, surfels, forest_receivers, memory << 20);
   }

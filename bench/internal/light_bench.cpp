@@ -73,8 +73,7 @@ Result<LoadedEnvironment> loadSky(int resolution) {
   Progress quiet;
   SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, loadEnvironmentMap(environment, quiet));
   std::filesystem::remove(path);
-  EnvironmentCube cube(map, RasterGeometry(resolution));
-  return LoadedEnvironment{std::move(map), std::move(cube)};
+  return LoadedEnvironment(std::move(map), resolution);
 }
 
 struct Light {

@@ -9,21 +9,20 @@
 #include "batch/bounce_look.h"
 #include "core/seconds_since.h"
 #include "core/worker_threads.h"
-#include "gather/packet/group_gatherer.h"
+#include "engine/thread_gatherer.h"
 
 namespace surfeit {
 namespace {
 
 // Null unless pages are kept on this node, too.
-PageStage* stageOf(const PagedOctree& octree) { return octree.file().pages().stage().get(); }
+PageStage* stageOf(const World& world) { return world.file().pages().stage().get(); }
 
 }  // namespace
 
 GatherCrew::GatherCrew(const Setup& setup, Sink sink)
     : setup_(setup),
       sink_(std::move(sink)),
-      prefetcher_(setup_.octree, setup_.queue, setup_.controller, setup_.rules,
-                  setup_.prefetch_threads) {}
+      prefetcher_(*setup_.world, setup_.queue, setup_.controller, setup_.prefetch_threads) {}
 
 Status GatherCrew::run() {
   return runOnThreads(setup_.threads, failure_, "gather", [this] { return gatherRuns(); });
@@ -32,10 +31,8 @@ Status GatherCrew::run() {
 // Takes runs until none is left or some thread has failed. Runs are whole groups, so that what is
 // gathered together is a matter of the order alone.
 Status GatherCrew::gatherRuns() {
-  GroupGatherer gatherer(setup_.rules);
+  ThreadGatherer gatherer(setup_.world);
   const std::size_t group_size = gatherer.size();
-  PagedOctree::Reader reader(setup_.octree);
-  WorldReader world(reader);
   std::vector<SortedReceiver> run;
   std::vector<ResultStore::Entry> results;
   std::vector<LocalReceiver> group(group_size);
@@ -54,8 +51,8 @@ Status GatherCrew::gatherRuns() {
       if (setup_.progress.isCancelled()) return Status::interrupted();
       const std::size_t count = std::min(group_size, run.size() - begin);
       for (std::size_t i = 0; i < count; ++i) group[i] = run[begin + i].receiver;
-      SURFEIT_RETURN_IF_ERROR(gatherer.gather(std::span(group).first(count), world,
-                                              std::span(group_results).first(count)));
+      SURFEIT_RETURN_IF_ERROR(
+          gatherer.gather(std::span(group).first(count), std::span(group_results).first(count)));
       applyLook(group, std::span(group_results).first(count));
       for (std::size_t i = 0; i < count; ++i) {
         results.push_back({run[begin + i].index, group_results[i]});
@@ -101,33 +98,30 @@ SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, bool is_warm,
                            const GatherMemory& memory, const GatherOptions& options,
                            GatherStats& stats, Progress& progress,
                            const LoadedEnvironment* environment)
-    : octree_(std::move(octree)),
-      staged_read_(is_warm && stageOf(*octree_) ? stageOf(*octree_)->bytesRead() : 0),
-      staged_kept_(is_warm && stageOf(*octree_) ? stageOf(*octree_)->bytesKept() : 0),
+    : scene_(plannedScene(std::move(octree),
+                          monitoring(memory.caches, options.cache_split < 0, is_warm))),
+      world_(World::ofPlanned(scene_, gatherRules(options, environment))),
+      staged_read_(is_warm && stageOf(*world_) ? stageOf(*world_)->bytesRead() : 0),
+      staged_kept_(is_warm && stageOf(*world_) ? stageOf(*world_)->bytesKept() : 0),
       prefetch_threads_(memory.prefetch_threads),
-      rules_(gatherRules(options, environment)),
       look_(options.look),
       stats_(stats),
       progress_(progress),
-      controller_(*octree_,
+      controller_(*world_,
                   {.threads = stats.threads,
-                   .adapts_split = options.cache_split < 0,
                    .prefetches = memory.prefetch_threads != 0,
                    .is_warm = is_warm,
                    .memory_bytes = stats.memory_bytes,
                    .work = memory.work,
-                   .receivers = stats.receivers - stats.invalid_receivers,
-                   .least_node_frames = memory.caches.least_node_frames,
-                   .least_surfel_frames = memory.caches.least_surfel_frames},
+                   .receivers = stats.receivers - stats.invalid_receivers},
                   progress) {}
 
 Status SortedGather::gather(ExternalSorter& sorter, GatherCrew::Sink sink, std::uint64_t count) {
   const auto begin = std::chrono::steady_clock::now();
   ReceiverQueue queue(sorter, kQueueReceivers, count);
-  GatherCrew crew({.octree = *octree_,
+  GatherCrew crew({.world = world_,
                    .queue = queue,
                    .controller = controller_,
-                   .rules = rules_,
                    .look = &look_,
                    .threads = stats_.threads,
                    .prefetch_threads = prefetch_threads_,
@@ -142,14 +136,20 @@ Status SortedGather::gather(ExternalSorter& sorter, GatherCrew::Sink sink, std::
 // The readers of all crews are gone, so that their last counts have reached the caches.
 void SortedGather::finish() {
   controller_.finish();
-  stats_.node_cache = controller_.nodeStats();
-  stats_.surfel_cache = controller_.surfelStats();
-  stats_.windows = controller_.windows();
-  PageStage* const stage = stageOf(*octree_);
+  const CacheMonitor& monitor = world_->engine().monitor;
+  stats_.node_cache = monitor.nodeStats();
+  stats_.surfel_cache = monitor.surfelStats();
+  stats_.windows = monitor.windows();
+  PageStage* const stage = stageOf(*world_);
   if (stage == nullptr) return;
   stats_.staged_bytes_read = stage->bytesRead() - staged_read_;
   stats_.staged_bytes_kept = stage->bytesKept() - staged_kept_;
   for (const std::string& note : stage->takeNotes()) progress_.inform(note);
+}
+
+std::unique_ptr<PagedOctree> SortedGather::takeOctree() {
+  world_.reset();
+  return std::move(scene_->octree);
 }
 
 }  // namespace surfeit

@@ -15,6 +15,8 @@
 #include "batch/receiver_queue.h"
 #include "batch/result_store.h"
 #include "core/first_failure.h"
+#include "engine/planned_scene.h"
+#include "engine/world.h"
 #include "gather/light/environment_map.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/bake.h"
@@ -30,10 +32,9 @@ class GatherCrew {
 
   // All that is referred to must outlive the crew.
   struct Setup {
-    PagedOctree& octree;
+    const std::shared_ptr<const World> world;
     ReceiverQueue& queue;
     PagingController& controller;
-    GatherRules rules;
     const BounceLook* look = nullptr;  // of the irradiance, about the scene's origin
     int threads = 1;
     int prefetch_threads = 0;
@@ -59,8 +60,8 @@ class GatherCrew {
   std::atomic<std::uint64_t> interpolated_count_{0};
 };
 
-// The gather proper: caches of a scene, and a crew for each piece of the order. `threads` of the
-// statistics work, as many prefetch as the memory says. One thread at a time.
+// The gather proper: a scene in planned caches, and a crew for each piece of the order. `threads`
+// of the statistics work, as many prefetch as the memory says. One thread at a time.
 class SortedGather {
  public:
   // Opens the caches; `stats` has threads, memory and numbers of receivers. All that is referred to
@@ -82,17 +83,17 @@ class SortedGather {
   // Fills in the statistics, and tells what happened to the stage.
   void finish();
   // The octree, for another gather. The last call.
-  std::unique_ptr<PagedOctree> takeOctree() { return std::move(octree_); }
+  std::unique_ptr<PagedOctree> takeOctree();
 
  private:
   SortedGather(std::unique_ptr<PagedOctree> octree, bool is_warm, const GatherMemory& memory,
                const GatherOptions& options, GatherStats& stats, Progress& progress,
                const LoadedEnvironment* environment);
 
-  std::unique_ptr<PagedOctree> octree_;
+  const std::shared_ptr<SceneState> scene_;
+  std::shared_ptr<const World> world_;
   const std::uint64_t staged_read_, staged_kept_;  // before
   const int prefetch_threads_;
-  const GatherRules rules_;
   const BounceLook look_;
   GatherStats& stats_;
   Progress& progress_;

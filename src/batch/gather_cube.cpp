@@ -16,6 +16,7 @@
 #include "cloud/cloud_formats.h"
 #include "core/guard.h"
 #include "core/program_memory.h"
+#include "engine/gatherer_memory.h"
 #include "gather/packet/packet_gatherer.h"
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/gather_rules.h"
@@ -58,21 +59,14 @@ Result<LocalReceiver> checkedReceiver(const Receiver& given, const GatherOptions
   return receiver;
 }
 
-// Bytes beside the caches. A cut may be larger than what the raster has room for from the start:
-// at worst every surfel contributes, and vectors double as they grow.
+// Bytes beside the caches.
 std::uint64_t fixedBytes(const SceneFile& file, const GatherRules& rules,
                          const LoadedEnvironment* environment) {
-  constexpr double kLayers = 8, kPatches = 4;
-  constexpr double kBytes = 2 * (sizeof(Patch) + 4 * sizeof(std::uint64_t));
-  const double cut = kPatches * 4 * double(kPi) / double(maxSolidAngle(rules)) * kLayers;
-  const double most = std::min(double(file.header().surfel_count), cut);
-  const double more = std::max(0.0, most - double(PacketRaster::kReservedPatches));
   const std::size_t pixels = RasterGeometry::pixelCount(rules.quality.raster_resolution);
-  const std::uint64_t held =
-      environment == nullptr ? 0 : environment->map.memoryBytes() + environment->cube.memoryBytes();
+  const std::uint64_t held = environment == nullptr ? 0 : environment->memoryBytes();
   return programBytes(1) + PagedOctree::fixedBytes(file, 1) + PacketGatherer::memoryBytes(rules) +
          pixels * (PixelRecorder::kPixelBytes + sizeof(PixelContent) + sizeof(CubePixel)) + held +
-         static_cast<std::uint64_t>(more * kBytes);
+         largeCutBytes(rules, file.header().surfel_count, 4 * sizeof(std::uint64_t));
 }
 
 Result<PagedOctree::Memory> planCubeMemory(const SceneFile& file, const GatherOptions& options,
@@ -81,9 +75,7 @@ Result<PagedOctree::Memory> planCubeMemory(const SceneFile& file, const GatherOp
   const std::uint64_t fixed = fixedBytes(file, rules, environment);
   const std::uint64_t least = fixed + PagedOctree::leastCacheBytes(file, 1);
   if (options.memory_bytes < least) {
-    return Status::budgetTooSmall(
-        fmt::format("a memory budget of {:.1f} MiB is too small for {}: {} is the least that works",
-                    double(options.memory_bytes) / (1 << 20), file.path(), formatMebibytes(least)));
+    return refuseBudget(options.memory_bytes, file.path(), least);
   }
   return PagedOctree::planMemory(
       file, options.memory_bytes - fixed, 1,

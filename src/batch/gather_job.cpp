@@ -54,9 +54,7 @@ Result<GatherJob> GatherJob::openToMerge(const std::string& receivers_path,
 
 Status GatherJob::plan(const SceneFile& scene) {
   GatherWork work = gatherWork(input_.receivers(), options_);
-  if (environment_ != nullptr) {
-    work.held_bytes = environment_->map.memoryBytes() + environment_->cube.memoryBytes();
-  }
+  if (environment_ != nullptr) work.held_bytes = environment_->memoryBytes();
   SURFEIT_ASSIGN_OR_RETURN(memory_, planGatherMemory(scene, options_.memory_bytes, work));
   return {};
 }

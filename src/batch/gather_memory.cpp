@@ -113,6 +113,17 @@ std::string formatMebibytes(std::uint64_t bytes) {
   return fmt::format("{:.1f} MiB", std::ceil(double(bytes) / (1 << 20) * 10) / 10);
 }
 
+Status refuseBudget(std::uint64_t memory_bytes, const std::string& work,
+                    std::uint64_t least_bytes) {
+  return Status::budgetTooSmall(
+      fmt::format("a memory budget of {:.1f} MiB is too small for {}: {} is the least that works",
+                  double(memory_bytes) / (1 << 20), work, formatMebibytes(least_bytes)));
+}
+
+std::string describeThreads(int threads) {
+  return fmt::format("{} {}", threads, threads == 1 ? "thread" : "threads");
+}
+
 std::uint64_t leastGatherMemory(const SceneFile& file, const GatherWork& work) {
   return leastBytes(file, work, 0);
 }
@@ -126,10 +137,8 @@ Result<GatherMemory> planGatherMemory(const SceneFile& file, std::uint64_t memor
                                       const GatherWork& work) {
   const std::uint64_t least = leastGatherMemory(file, work);
   if (memory_bytes < least) {
-    return Status::budgetTooSmall(fmt::format(
-        "a memory budget of {:.1f} MiB is too small for {} with {} {}: {} is the least that works",
-        double(memory_bytes) / (1 << 20), file.path(), work.threads,
-        work.threads == 1 ? "thread" : "threads", formatMebibytes(least)));
+    return refuseBudget(
+        memory_bytes, fmt::format("{} with {}", file.path(), describeThreads(work.threads)), least);
   }
 
   GatherMemory memory;

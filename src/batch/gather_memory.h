@@ -46,6 +46,11 @@ struct GatherMemory {
 // "5.9 MiB", rounded up.
 std::string formatMebibytes(std::uint64_t bytes);
 
+// kBudgetTooSmall: so much for this work is less than the least that works.
+Status refuseBudget(std::uint64_t memory_bytes, const std::string& work, std::uint64_t least_bytes);
+// "1 thread", "4 threads".
+std::string describeThreads(int threads);
+
 // The least budget in which a gather works.
 std::uint64_t leastGatherMemory(const SceneFile& file, const GatherWork& work);
 

@@ -46,9 +46,7 @@ Status checkGatherOptions(const GatherOptions& options) {
         "look of bounce light: found no output irradiance that it changes, expected --mode "
         "bleeding or glossy, or --outputs irradiance");
   }
-  if (options.threads < 0 || options.threads > kMostThreads) {
-    return refuse("thread count", options.threads, fmt::format("0 to {}", kMostThreads));
-  }
+  SURFEIT_RETURN_IF_ERROR(checkThreadCount(options.threads));
   if (!(options.cache_split <= 1)) {
     return refuse("cache split", options.cache_split, "0 to 1, or a negative number to measure");
   }
@@ -66,8 +64,8 @@ Result<std::unique_ptr<const LoadedEnvironment>> loadEnvironment(const GatherOpt
                                 upAxisName(scene_up)));
   }
   SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map, loadEnvironmentMap(environment, progress));
-  EnvironmentCube cube(map, RasterGeometry(options.quality.raster_resolution));
-  return std::make_unique<const LoadedEnvironment>(std::move(map), std::move(cube));
+  return std::make_unique<const LoadedEnvironment>(std::move(map),
+                                                   options.quality.raster_resolution);
 }
 
 Result<SceneFile> openSceneBeside(const std::string& scene_path, const std::string& result_path,
@@ -113,10 +111,7 @@ Result<SceneFile> openSceneFor(const std::string& scene_path, const std::string&
 }
 
 GatherOptions withDefaults(GatherOptions options) {
-  if (options.outputs == 0) {
-    options.outputs = usualOutputs(options.mode);
-    if (!options.environment.path.empty()) options.outputs |= kOutputEnvironment;
-  }
+  options.outputs = settledOutputs(options, !options.environment.path.empty());
   if (options.threads == 0) options.threads = defaultThreadCount();
   if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes();
   return options;

@@ -70,10 +70,7 @@ bool limitFrames(PagedOctree& octree, const PagedOctree::Memory& plan, std::uint
                               std::min(least_nodes, most_nodes), most_nodes);
   const std::size_t surfel_frames =
       std::min<std::size_t>(surfels.pageCount(), (bytes - node_frames * node_bytes) / surfel_bytes);
-  // The one that falls goes first
-  if (node_frames < nodes.frameLimit()) nodes.setFrameLimit(node_frames);
-  surfels.setFrameLimit(surfel_frames);
-  nodes.setFrameLimit(node_frames);
+  caches.setFrameLimits(node_frames, surfel_frames);
   return true;
 }
 

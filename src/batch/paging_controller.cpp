@@ -37,14 +37,12 @@ std::string mebibytes(std::uint64_t bytes) {
 
 }  // namespace
 
-PagingController::PagingController(PagedOctree& octree, const Options& options, Progress& progress)
-    : octree_(octree),
+PagingController::PagingController(const World& world, const Options& options, Progress& progress)
+    : file_(world.file()),
+      caches_(*world.engine().caches),
+      monitor_(world.engine().monitor),
       options_(options),
-      progress_(progress),
-      monitor_(octree.caches(), {.adapts_split = options.adapts_split,
-                                 .is_warm = options.is_warm,
-                                 .least_node_frames = options.least_node_frames,
-                                 .least_surfel_frames = options.least_surfel_frames}) {
+      progress_(progress) {
   monitor_.noteRuns(run_receivers_, prefetch_receivers_);
 }
 
@@ -115,9 +113,8 @@ void PagingController::adaptPrefetch(const Tick& tick) {
         double(CacheMonitor::loads(cache) - CacheMonitor::loads(then)) / std::max(receivers, 1.0);
     return kAheadPart * double(frames) / std::max(per_receiver, 1e-9);
   };
-  const double limit =
-      std::min(most(now.nodes, before.nodes, octree_.nodeCache().frameLimit()),
-               most(now.surfels, before.surfels, octree_.surfelCache().frameLimit()));
+  const double limit = std::min(most(now.nodes, before.nodes, caches_.nodes().frameLimit()),
+                                most(now.surfels, before.surfels, caches_.surfels().frameLimit()));
   depth = std::min(depth, kMostDepth);
   if (limit < double(depth)) depth = std::uint64_t(limit);
   prefetch_receivers_ = depth;
@@ -127,12 +124,11 @@ void PagingController::adaptPrefetch(const Tick& tick) {
 void PagingController::advise() const {
   if (options_.is_warm) return;  // look-ups of all gathers are counted together; the first has told
   const CacheMonitor::Moment now = monitor_.now();
-  const SceneFile& file = octree_.file();
   if (now.nodes.repeated_loads + now.surfels.repeated_loads < kLeastMisses) return;
-  const Result<GatherMemory> plan = planGatherMemory(file, options_.memory_bytes, options_.work);
+  const Result<GatherMemory> plan = planGatherMemory(file_, options_.memory_bytes, options_.work);
   if (!plan.ok()) return;  // the frames were given, and no budget
-  const GatherLoads loads = {octree_.nodeDistances()->curve(now.nodes.requests),
-                             octree_.surfelDistances()->curve(now.surfels.requests),
+  const GatherLoads loads = {caches_.nodeDistances()->curve(now.nodes.requests),
+                             caches_.surfelDistances()->curve(now.surfels.requests),
                              secondsPerLoad(now.nodes), secondsPerLoad(now.surfels)};
 
   // All seconds are those of all threads together. Who reads ahead takes time from the others,
@@ -141,7 +137,7 @@ void PagingController::advise() const {
   const double ahead = double(now.nodes.prefetches) * loads.node_load_seconds +
                        double(now.surfels.prefetches) * loads.surfel_load_seconds;
   const double working = std::max(now.seconds * options_.threads - stalled - ahead, 0.0);
-  const std::optional<MemoryAdvice> advice = adviseMemory(file, *plan, loads, working);
+  const std::optional<MemoryAdvice> advice = adviseMemory(file_, *plan, loads, working);
   if (!advice) return;
   progress_.inform(fmt::format(
       "memory: to read pages again that were evicted takes {:.0f} % of the time with {}; --memory "

@@ -6,13 +6,13 @@
 #include <atomic>
 #include <cstdint>
 #include <mutex>
-#include <string>
-#include <vector>
 
 #include "batch/gather_memory.h"
 #include "engine/cache_monitor.h"
+#include "engine/world.h"
 #include "gather/cut/packet_cluster.h"
-#include "octree/read/paged_octree.h"
+#include "octree/read/octree_caches.h"
+#include "octree/read/scene_file.h"
 #include "surfeit/bake.h"
 #include "surfeit/progress.h"
 
@@ -23,7 +23,6 @@ class PagingController {
  public:
   struct Options {
     int threads = 1;
-    bool adapts_split = true;
     bool prefetches = true;
     bool is_warm = false;  // an earlier gather has used the caches
     // For advice: the budget of the gather, the work that it was planned for, and what the job
@@ -32,19 +31,18 @@ class PagingController {
     GatherWork work{};
     std::uint64_t beside_bytes = 0;
     std::uint64_t receivers = 0;  // that will be gathered
-    std::size_t least_node_frames = 1, least_surfel_frames = 1;
   };
 
   static constexpr std::uint64_t kLeastRun = kClusterReceivers, kFirstRun = kClusterReceivers,
                                  kMostRun = 1024;
   static constexpr std::uint64_t kMostDepth = 8192;  // receivers
 
-  // The octree has reuse distances. Both must outlive the controller.
-  PagingController(PagedOctree& octree, const Options& options, Progress& progress);
+  // The caches of the world track pages. Both must outlive the controller.
+  PagingController(const World& world, const Options& options, Progress& progress);
 
-  // Bytes that a controller takes.
+  // Bytes that a controller takes, and the monitor.
   static constexpr std::uint64_t memoryBytes() {
-    return sizeof(PagingController) - sizeof(CacheMonitor) + CacheMonitor::memoryBytes();
+    return sizeof(PagingController) + CacheMonitor::memoryBytes();
   }
 
   // Receivers that a thread takes at once.
@@ -60,11 +58,6 @@ class PagingController {
   // for only all look-ups tell what budget would do.
   void finish();
 
-  // Call after finish().
-  std::vector<GatherWindow> windows() const { return monitor_.windows(); }
-  GatherCacheStats nodeStats() const { return monitor_.nodeStats(); }
-  GatherCacheStats surfelStats() const { return monitor_.surfelStats(); }
-
  private:
   using Tick = CacheMonitor::Tick;
 
@@ -73,10 +66,11 @@ class PagingController {
   void adaptPrefetch(const Tick& tick);
   void advise() const;
 
-  PagedOctree& octree_;
+  const SceneFile& file_;
+  OctreeCaches& caches_;
+  CacheMonitor& monitor_;
   const Options options_;
   Progress& progress_;
-  CacheMonitor monitor_;
   std::atomic<std::uint64_t> run_receivers_{kFirstRun};
   std::atomic<std::uint64_t> prefetch_receivers_{0};
   std::mutex mutex_;

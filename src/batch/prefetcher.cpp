@@ -3,14 +3,16 @@
 #include <exception>
 #include <memory>
 #include <optional>
+#include <span>
 #include <system_error>
 
 #include "gather/cut/cut.h"
 
 namespace surfeit {
-Prefetcher::Prefetcher(PagedOctree& octree, ReceiverQueue& queue,
-                       const PagingController& controller, const GatherRules& rules, int threads)
-    : octree_(octree), queue_(queue), controller_(controller), rules_(rules) {
+
+Prefetcher::Prefetcher(const World& world, ReceiverQueue& queue, const PagingController& controller,
+                       int threads)
+    : world_(world), queue_(queue), controller_(controller) {
   try {
     for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
   } catch (const std::system_error&) {
@@ -39,8 +41,10 @@ void Prefetcher::notify() {
 // same.
 void Prefetcher::work() {
   try {
-    PagedOctree::Reader reader(octree_, CacheFront::Role::kPrefetch);
-    const auto cut = std::make_unique<CutWalk>(rules_);
+    // One slot: it has no use for a page but to see it loaded
+    PagedOctree::Reader reader(*world_.engine().caches, 1, CacheFront::Role::kPrefetch);
+    reader.use(*world_.octrees().front());
+    const auto cut = std::make_unique<CutWalk>(world_.rules());
     std::unique_lock lock(mutex_);
     while (!ends_) {
       const std::uint64_t moves = moves_;
@@ -48,11 +52,12 @@ void Prefetcher::work() {
       const std::optional<LocalReceiver> receiver =
           queue_.lookAhead(controller_.prefetchReceivers(), kStride);
       bool failed = false;
-      if (receiver)
-        failed =
-            !cut->walk(viewPacket({&*receiver, 1}, rules_), {&*receiver, 1}, reader, IgnoreCut{})
-                 .ok();
-      if (!receiver) reader.release();
+      if (receiver) {
+        const std::span<const LocalReceiver> one(&*receiver, 1);
+        failed = !cut->walk(viewPacket(one, world_.rules()), one, reader, IgnoreCut{}).ok();
+      } else {
+        reader.release();
+      }
       lock.lock();
       if (failed) return;
       if (!receiver) changed_.wait(lock, [&] { return ends_ || moves_ != moves; });

@@ -10,8 +10,7 @@
 
 #include "batch/paging_controller.h"
 #include "batch/receiver_queue.h"
-#include "gather/rules/gather_rules.h"
-#include "octree/read/paged_octree.h"
+#include "engine/world.h"
 #include "surfeit/gather.h"
 
 namespace surfeit {
@@ -26,8 +25,8 @@ class Prefetcher {
   static constexpr std::uint64_t kStride = 2 * kPacketReceivers;
 
   // `threads` of them; where none can be started there are fewer.
-  Prefetcher(PagedOctree& octree, ReceiverQueue& queue, const PagingController& controller,
-             const GatherRules& rules, int threads);
+  Prefetcher(const World& world, ReceiverQueue& queue, const PagingController& controller,
+             int threads);
   Prefetcher(const Prefetcher&) = delete;
   Prefetcher& operator=(const Prefetcher&) = delete;
   ~Prefetcher();
@@ -38,10 +37,9 @@ class Prefetcher {
  private:
   void work();
 
-  PagedOctree& octree_;
+  const World& world_;
   ReceiverQueue& queue_;
   const PagingController& controller_;
-  const GatherRules rules_;
   std::mutex mutex_;
   std::condition_variable changed_;  // with mutex_
   bool ends_ = false;                // guarded by mutex_

@@ -30,6 +30,8 @@
 #include "core/guard.h"
 #include "core/parallel.h"
 #include "core/seconds_since.h"
+#include "engine/planned_scene.h"
+#include "engine/world.h"
 #include "index/row_sample.h"
 #include "octree/read/group_set.h"
 #include "octree/read/scene_file.h"
@@ -61,6 +63,7 @@ GatherOptions gatherOptions(const BounceOptions& options) {
   GatherOptions gather;
   gather.mode = GatherMode::kBleeding;
   gather.quality = options.quality;
+  gather.quality.max_variation = 0;  // bounces have receivers of their own to interpolate between
   gather.groups = options.groups;
   gather.memory_bytes = options.memory_bytes;
   gather.threads = options.threads;
@@ -87,7 +90,9 @@ Status checkOptions(const BounceOptions& options) {
   SURFEIT_RETURN_IF_ERROR(checkLook(options.look));
   SURFEIT_RETURN_IF_ERROR(checkGroupCorrections(options.group_corrections));
   SURFEIT_RETURN_IF_ERROR(checkGlossy(options.glossy));
-  return checkGatherOptions(gatherOptions(options));
+  GatherOptions gather = gatherOptions(options);
+  gather.quality = options.quality;
+  return checkGatherOptions(gather);
 }
 
 class Bouncer {
@@ -290,10 +295,9 @@ Status Bouncer::checkMemory() const {
   const std::uint64_t least =
       leastGatherMemory(*scene_, gatherWork()) + bytesBesideGather() + laterGrowthBytes();
   if (gather_options_.memory_bytes >= least) return {};
-  return Status::budgetTooSmall(fmt::format(
-      "a memory budget of {:.1f} MiB is too small for {} with {} {}: {} is the least that works",
-      double(gather_options_.memory_bytes) / (1 << 20), scene_path_, gather_options_.threads,
-      gather_options_.threads == 1 ? "thread" : "threads", formatMebibytes(least)));
+  return refuseBudget(
+      gather_options_.memory_bytes,
+      fmt::format("{} with {}", scene_path_, describeThreads(gather_options_.threads)), least);
 }
 
 std::string Bouncer::phase(const char* what, int bounce) const {
@@ -304,24 +308,23 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
   SURFEIT_ASSIGN_OR_RETURN(
       const GatherMemory memory,
       planGatherMemory(before, gather_options_.memory_bytes - bytesBesideGather(), gatherWork()));
-  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<PagedOctree> octree,
-                           PagedOctree::create(std::move(before), memory.caches));
+  SURFEIT_ASSIGN_OR_RETURN(std::shared_ptr<SceneState> scene,
+                           openPlanned(std::move(before), memory.caches,
+                                       monitoring(memory.caches, options_.cache_split < 0)));
+  const std::shared_ptr<const World> world =
+      World::ofPlanned(std::move(scene), GatherRules(gather_options_));
   progress_.beginPhase(phase("bounce", bounce), stats_.surfels, "surfels");
   const Clock::time_point begin = Clock::now();
-  PagingController controller(*octree,
+  PagingController controller(*world,
                               {.threads = gather_options_.threads,
-                               .adapts_split = options_.cache_split < 0,
                                .prefetches = false,
                                .memory_bytes = gather_options_.memory_bytes - bytesBesideGather(),
                                .work = memory.work,
                                .beside_bytes = bytesBesideGather(),
-                               .receivers = stats_.surfels,
-                               .least_node_frames = memory.caches.least_node_frames,
-                               .least_surfel_frames = memory.caches.least_surfel_frames},
+                               .receivers = stats_.surfels},
                               progress_);
   BounceCrew crew({.scene = *scene_,
-                   .octree = *octree,
-                   .rules = GatherRules(gather_options_),
+                   .world = world,
                    .look = countedFrom(options_.look, scene_->header().origin),
                    .of_groups = byGroup(options_.group_corrections),
                    .gloss = is_glossy_ ? &gloss_ : nullptr,
@@ -338,8 +341,8 @@ Status Bouncer::gather(int bounce, SceneFile before, BounceRadiosity& radiosity,
   gathered_surfels_ = crew.surfels();
   pass.largest_change = crew.largestChange();
   pass.gather_seconds = secondsSince(begin);
-  pass.node_cache = controller.nodeStats();
-  pass.surfel_cache = controller.surfelStats();
+  pass.node_cache = world->engine().monitor.nodeStats();
+  pass.surfel_cache = world->engine().monitor.surfelStats();
   return {};
 }
 

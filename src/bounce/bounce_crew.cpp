@@ -54,17 +54,16 @@ Status BounceCrew::run() {
 }
 
 Status BounceCrew::gatherStretches() {
-  const auto gatherer = std::make_unique<PacketGatherer>(setup_.rules);
-  PagedOctree::Reader reader(setup_.octree);
+  ThreadGatherer gatherer(setup_.world);
   const auto stretch_memory = std::make_unique<Stretch>(setup_.surfels_per_receiver);
   Stretch& stretch = *stretch_memory;
   const std::uint32_t pages = pagesOfStretch(setup_.surfels_per_receiver);
   while (!failure_.happened()) {
     const std::uint32_t first_page = next_page_.fetch_add(pages * setup_.stride);
     if (first_page >= setup_.scene.surfelPageCount()) return {};
-    SURFEIT_RETURN_IF_ERROR(load(first_page, reader, stretch));
+    SURFEIT_RETURN_IF_ERROR(load(first_page, gatherer.reader(), stretch));
     stretch.receivers.choose(stretch.surfels);
-    SURFEIT_RETURN_IF_ERROR(gather(*gatherer, reader, stretch));
+    SURFEIT_RETURN_IF_ERROR(gather(gatherer, stretch));
     SURFEIT_RETURN_IF_ERROR(handIn(first_page, stretch));
   }
   return {};
@@ -100,8 +99,7 @@ Status BounceCrew::load(std::uint32_t first_page, PagedOctree::Reader& reader,
 }
 
 // In clusters of about the same size, the longest there may be.
-Status BounceCrew::gather(PacketGatherer& gatherer, PagedOctree::Reader& reader,
-                          Stretch& stretch) const {
+Status BounceCrew::gather(ThreadGatherer& gatherer, Stretch& stretch) const {
   const std::span<const LocalReceiver> receivers = stretch.receivers.receivers();
   stretch.irradiance.clear();
   stretch.around.clear();
@@ -112,7 +110,7 @@ Status BounceCrew::gather(PacketGatherer& gatherer, PagedOctree::Reader& reader,
     if (setup_.progress.isCancelled()) return Status::interrupted();
     const std::size_t count = receivers.size() * i / clusters - begin;
     const std::span<GatherResult> results = std::span(stretch.results).first(count);
-    SURFEIT_RETURN_IF_ERROR(gatherer.gather(receivers.subspan(begin, count), reader, results));
+    SURFEIT_RETURN_IF_ERROR(gatherer.gather(receivers.subspan(begin, count), results));
     for (const GatherResult& result : results) {
       stretch.irradiance.push_back(result.irradiance);
       if (setup_.gloss == nullptr) continue;

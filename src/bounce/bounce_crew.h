@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "batch/bounce_look.h"
@@ -12,8 +13,7 @@
 #include "bounce/bounce_receivers.h"
 #include "bounce/glossy_bounce.h"
 #include "core/first_failure.h"
-#include "gather/packet/packet_gatherer.h"
-#include "gather/rules/gather_rules.h"
+#include "engine/thread_gatherer.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/gather.h"
@@ -26,10 +26,9 @@ class BounceCrew {
  public:
   // All that is referred to must outlive the crew.
   struct Setup {
-    const SceneFile& scene;  // with B_0
-    PagedOctree& octree;     // the same scene with B_{k-1}
-    GatherRules rules;
-    BounceLook look;  // about the scene's origin
+    const SceneFile& scene;                    // with B_0
+    const std::shared_ptr<const World> world;  // the same scene with B_{k-1}
+    BounceLook look;                           // about the scene's origin
     CorrectionOfGroup of_groups{};
     const GlossOfGroup* gloss = nullptr;  // null: nothing is glossy
     int surfels_per_receiver = 1;
@@ -61,7 +60,7 @@ class BounceCrew {
 
   Status gatherStretches();
   Status load(std::uint32_t first_page, PagedOctree::Reader& reader, Stretch& stretch) const;
-  Status gather(PacketGatherer& gatherer, PagedOctree::Reader& reader, Stretch& stretch) const;
+  Status gather(ThreadGatherer& gatherer, Stretch& stretch) const;
   Status handIn(std::uint32_t first_page, Stretch& stretch);
   glm::vec3 reflected(const Surfel& surfel, const glm::vec3& irradiance) const;
   Lobe lobeOf(std::size_t i, const glm::vec3& sent, const glm::vec3& radiosity,

@@ -1,5 +1,6 @@
 #include "core/job_limits.h"
 
+#include <fmt/format.h>
 #include <sched.h>
 #include <time.h>
 #include <unistd.h>
@@ -59,6 +60,12 @@ std::uint64_t slurmMemoryBytes() {
 }
 
 }  // namespace
+
+Status checkThreadCount(int threads) {
+  if (threads >= 0 && threads <= kMostThreads) return {};
+  return Status::invalidArgument(
+      fmt::format("thread count is {}, expected 0 to {}", threads, kMostThreads));
+}
 
 int defaultThreadCount() {
   if (const std::uint64_t cpus = numberFromEnvironment("SLURM_CPUS_PER_TASK")) {

@@ -137,21 +137,13 @@ void CacheMonitor::adaptSplit(const Moment& now) {
       nodes, surfels, frame_bytes_,
       std::clamp(best.first_frames, node_frames - std::min(step, node_frames), node_frames + step));
   if (next.second_frames < options_.least_surfel_frames) return;
-  setLimits(next.first_frames, next.second_frames);
-}
-
-// The one that falls goes first, so that both together are never above the budget.
-void CacheMonitor::setLimits(std::size_t node_frames, std::size_t surfel_frames) {
-  const bool nodes_fall = node_frames < caches_.nodes().frameLimit();
-  if (nodes_fall) caches_.nodes().setFrameLimit(node_frames);
-  caches_.surfels().setFrameLimit(surfel_frames);
-  if (!nodes_fall) caches_.nodes().setFrameLimit(node_frames);
+  caches_.setFrameLimits(next.first_frames, next.second_frames);
 }
 
 void CacheMonitor::setFrames(std::size_t node_frames, std::size_t surfel_frames,
                              std::size_t least_node_frames, std::size_t least_surfel_frames) {
   const std::lock_guard lock(mutex_);
-  setLimits(node_frames, surfel_frames);
+  caches_.setFrameLimits(node_frames, surfel_frames);
   options_.least_node_frames = least_node_frames;
   options_.least_surfel_frames = least_surfel_frames;
   frame_bytes_ =

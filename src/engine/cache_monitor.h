@@ -27,7 +27,7 @@ class CacheMonitor {
     std::size_t least_node_frames = 1, least_surfel_frames = 1;
   };
 
-  // The caches track pages, and must outlive the monitor.
+  // The caches must outlive the monitor, and track pages unless it never advances.
   CacheMonitor(OctreeCaches& caches, const Options& options);
 
   static constexpr std::uint64_t memoryBytes() {
@@ -74,7 +74,6 @@ class CacheMonitor {
 
   // All below: mutex_ held
   void adaptSplit(const Moment& now);
-  void setLimits(std::size_t node_frames, std::size_t surfel_frames);
   void noteWorkingSets(bool is_whole);
 
   OctreeCaches& caches_;

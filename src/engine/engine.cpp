@@ -72,10 +72,7 @@ class StructArrays : public ReceiverArray {
 Result<Engine> Engine::create(const EngineOptions& given) {
   return guarded("engine", [&]() -> Result<Engine> {
     EngineOptions options = given;
-    if (options.threads < 0 || options.threads > kMostThreads) {
-      return Status::invalidArgument(
-          fmt::format("thread count is {}, expected 0 to {}", options.threads, kMostThreads));
-    }
+    SURFEIT_RETURN_IF_ERROR(checkThreadCount(options.threads));
     if (options.threads == 0) options.threads = defaultThreadCount();
     if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes();
     SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<OctreeCaches> caches,

@@ -9,17 +9,12 @@
 namespace surfeit {
 namespace {
 
-// Pages that a gatherer holds in front of each cache, and frames that it cannot do without: to hold
-// a page, and load another.
-constexpr std::size_t kFrontSlots = 64;
-constexpr std::size_t kLeastFrames = 2;
-
 // Tables of a frame, in its cache.
 constexpr std::size_t kFrameTables = 64;
 
 // Frames of all pages, but not fewer than gatherers need, and no more than there are.
-std::size_t leastFrames(std::size_t pages, std::size_t gatherers) {
-  return std::max<std::size_t>(1, std::min(pages, kLeastFrames * gatherers));
+std::size_t leastFrames(std::size_t pages, int gatherers) {
+  return std::max<std::size_t>(1, PagedOctree::leastFrames(pages, std::max(gatherers, 1)));
 }
 
 double mebibytes(std::uint64_t bytes) { return std::ceil(double(bytes) / (1 << 20) * 10) / 10; }
@@ -29,13 +24,18 @@ double mebibytes(std::uint64_t bytes) { return std::ceil(double(bytes) / (1 << 2
 EngineState::EngineState(const EngineOptions& given, std::unique_ptr<OctreeCaches> made)
     : options(given), caches(std::move(made)), monitor(*caches, {}) {}
 
+EngineState::EngineState(std::shared_ptr<OctreeCaches> planned, std::size_t front_slots,
+                         const CacheMonitor::Options& monitoring)
+    : caches(std::move(planned)), monitor(*caches, monitoring), planned_front_slots_(front_slots) {}
+
 std::uint64_t EngineState::leastCacheBytes(int gatherers) const {
-  const auto count = static_cast<std::size_t>(std::max(gatherers, 1));
-  return leastFrames(caches->nodePages(), count) * (caches->nodeFrameBytes() + kFrameTables) +
-         leastFrames(caches->surfelPages(), count) * (caches->surfelFrameBytes() + kFrameTables);
+  return leastFrames(caches->nodePages(), gatherers) * (caches->nodeFrameBytes() + kFrameTables) +
+         leastFrames(caches->surfelPages(), gatherers) *
+             (caches->surfelFrameBytes() + kFrameTables);
 }
 
 Status EngineState::take(std::uint64_t bytes, int more_gatherers, const std::string& what) {
+  if (planned_front_slots_) return {};
   const std::lock_guard lock(mutex);
   const std::uint64_t least = held_bytes + bytes + leastCacheBytes(gatherer_count + more_gatherers);
   if (least > options.memory_bytes) {
@@ -53,6 +53,7 @@ Status EngineState::take(std::uint64_t bytes, int more_gatherers, const std::str
 }
 
 void EngineState::giveBack(std::uint64_t bytes, int fewer_gatherers) {
+  if (planned_front_slots_) return;
   const std::lock_guard lock(mutex);
   held_bytes -= bytes;
   gatherer_count -= fewer_gatherers;
@@ -70,9 +71,8 @@ void EngineState::divideFrames() {
   const std::size_t surfel_bytes = caches->surfelFrameBytes() + kFrameTables;
   const std::size_t node_pages = std::max<std::size_t>(caches->nodePages(), 1);
   const std::size_t surfel_pages = std::max<std::size_t>(caches->surfelPages(), 1);
-  const auto gatherers = static_cast<std::size_t>(std::max(gatherer_count, 1));
-  const std::size_t least_nodes = leastFrames(node_pages, gatherers);
-  const std::size_t least_surfels = leastFrames(surfel_pages, gatherers);
+  const std::size_t least_nodes = leastFrames(node_pages, gatherer_count);
+  const std::size_t least_surfels = leastFrames(surfel_pages, gatherer_count);
   const std::uint64_t left = options.memory_bytes - std::min(held_bytes, options.memory_bytes);
 
   const double now_nodes = double(caches->nodes().frameLimit() * node_bytes);
@@ -91,17 +91,13 @@ void EngineState::divideFrames() {
                     least_nodes, least_surfels);
 }
 
-// At most half of each cache, so that least-recently-used keeps something to choose from.
 std::size_t EngineState::frontSlots() const {
+  if (planned_front_slots_) return *planned_front_slots_;
   const std::lock_guard lock(mutex);
-  const auto threads = static_cast<std::size_t>(std::max(options.threads, gatherer_count));
-  const auto slots = [&](PageCache& cache, std::size_t pages) {
-    const std::size_t frames = cache.frameLimit();
-    return frames >= pages ? kFrontSlots : frames / (2 * threads);
-  };
-  return std::clamp<std::size_t>(std::min(slots(caches->nodes(), caches->nodePages()),
-                                          slots(caches->surfels(), caches->surfelPages())),
-                                 1, kFrontSlots);
+  const int threads = std::max(options.threads, gatherer_count);
+  return std::min(
+      PagedOctree::frontSlots(caches->nodes().frameLimit(), caches->nodePages(), threads),
+      PagedOctree::frontSlots(caches->surfels().frameLimit(), caches->surfelPages(), threads));
 }
 
 SceneState::~SceneState() {

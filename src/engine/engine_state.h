@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "engine/cache_monitor.h"
 #include "octree/read/octree_caches.h"
@@ -17,6 +19,10 @@ namespace surfeit {
 
 struct EngineState {
   EngineState(const EngineOptions& given, std::unique_ptr<OctreeCaches> made);
+  // Of a job that has planned its memory (engine/planned_scene.h): the caches keep the limits that
+  // they have, until the monitor moves them, and nothing is taken off them.
+  EngineState(std::shared_ptr<OctreeCaches> planned, std::size_t front_slots,
+              const CacheMonitor::Options& monitoring);
 
   // Takes bytes off the caches for `what`, and makes room for so many more gatherers.
   // kBudgetTooSmall with the budget that would do.
@@ -41,6 +47,8 @@ struct EngineState {
   // mutex held
   std::uint64_t leastCacheBytes(int gatherers) const;
   void divideFrames();
+
+  const std::optional<std::size_t> planned_front_slots_;
 };
 
 struct SceneState {
@@ -60,6 +68,7 @@ struct SceneState {
 // For those of the library who need what is behind a handle.
 struct EngineAccess {
   static const SceneState& state(const Scene& scene) { return *scene.state_; }
+  static Scene handle(std::shared_ptr<SceneState> scene) { return Scene(std::move(scene)); }
 };
 
 }  // namespace surfeit

@@ -36,7 +36,7 @@ struct Curve {
 // curve through the receivers' bounds serves as well.
 Curve curveOf(const World& world, const ReceiverArray& receivers) {
   if (world.instances() == nullptr) {
-    return {world.octrees().front()->file().header().cube, world.origin()};
+    return {world.file().header().cube, world.origin()};
   }
   Bounds3d bounds;
   for (std::size_t i = 0; i < receivers.count(); ++i) {
@@ -104,7 +104,7 @@ class BudgetPart {
 
 // Receivers that are not valid come last: they must not change the company of the others.
 std::vector<std::uint32_t> Gatherer::State::curveOrder(const ReceiverArray& receivers) const {
-  const Curve curve = curveOf(*world, receivers);
+  const Curve curve = curveOf(world(), receivers);
   std::vector<CurveKey> keys(receivers.count(), ~CurveKey{0});
   LocalReceiver valid;
   for (std::size_t i = 0; i < keys.size(); ++i) {
@@ -128,11 +128,11 @@ Status Gatherer::gatherAll(ReceiverArray& receivers, Progress& progress, int thr
       return Status::invalidArgument(
           fmt::format("{} receivers at once, expected less than 2^32: call it for parts", count));
     }
-    if (threads <= 0) threads = state_->world->engine().options.threads;
+    if (threads <= 0) threads = state_->world().engine().options.threads;
     const std::size_t run = state_->gatherer.size();
     const std::size_t runs = (count + run - 1) / run;
     progress.beginPhase("gather", count, "receivers");
-    BudgetPart order_part(state_->world->engine());
+    BudgetPart order_part(state_->world().engine());
     const std::uint64_t key_bytes = count * sizeof(CurveKey);
     SURFEIT_RETURN_IF_ERROR(order_part.take(key_bytes + count * sizeof(std::uint32_t),
                                             fmt::format("the order of {} receivers", count)));

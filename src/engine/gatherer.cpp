@@ -32,23 +32,16 @@ GatherResult noResult(std::uint32_t outputs) {
 }  // namespace
 
 Gatherer::State::State(std::shared_ptr<const World> of)
-    : world(std::move(of)),
-      reader(*world->engine().caches, world->engine().frontSlots()),
-      view(world->instances() != nullptr
-               ? WorldReader(reader, *world->instances(), world->octrees())
-               : WorldReader(reader)),
-      no_result(noResult(world->rules().outputs)),
-      gatherer(world->rules()) {
-  if (world->instances() == nullptr) reader.use(*world->octrees().front());
+    : gatherer(std::move(of)), no_result(noResult(world().rules().outputs)) {
   local.resize(gatherer.size());
   places.resize(gatherer.size());
   found.resize(gatherer.size());
 }
 
-Gatherer::State::~State() { world->engine().giveBack(world->gathererBytes(), 1); }
+Gatherer::State::~State() { world().engine().giveBack(world().gathererBytes(), 1); }
 
 bool Gatherer::State::toLocal(const Receiver& receiver, LocalReceiver& result) const {
-  const glm::dvec3 place = receiver.position - world->origin();
+  const glm::dvec3 place = receiver.position - world().origin();
   for (int axis = 0; axis < 3; ++axis) {
     if (!(std::abs(place[axis]) <= double(kLargestLength))) return false;
   }
@@ -58,7 +51,7 @@ bool Gatherer::State::toLocal(const Receiver& receiver, LocalReceiver& result) c
   if (normalise(normal.x, normal.y, normal.z, result.normal) == NormalKind::kTooShort) return false;
   const double length = glm::length(view_direction);
   result.view = length > 0 ? glm::vec3(view_direction / length) : glm::vec3(0);
-  const GatherRules& rules = world->rules();
+  const GatherRules& rules = world().rules();
   if (!rules.isGlossy()) return true;
   return !result.isSpherical() && (length > 0 || isFinite(rules.eye));
 }
@@ -78,11 +71,11 @@ Status Gatherer::State::gatherGroup(std::span<const Receiver> receivers,
   const auto gathered = std::span(found).first(count);
   if (count > 0) {
     const auto at = std::span<const LocalReceiver>(local).first(count);
-    SURFEIT_RETURN_IF_ERROR(gatherer.gather(at, view, gathered));
+    SURFEIT_RETURN_IF_ERROR(gatherer.gather(at, gathered));
   }
   for (std::size_t i = 0; i < count; ++i) results[places[i]] = gathered[i];
   done_receivers += receivers.size();
-  world->engine().monitor.advance(receivers.size());
+  world().engine().monitor.advance(receivers.size());
   return {};
 }
 
@@ -111,13 +104,13 @@ Status Gatherer::gather(const Receiver* receivers, std::size_t count, GatherResu
   return status;
 }
 
-void Gatherer::pause() { state_->reader.release(); }
+void Gatherer::pause() { state_->gatherer.reader().release(); }
 
 std::uint64_t Gatherer::receivers() const { return state_->done_receivers; }
 std::uint64_t Gatherer::invalidReceivers() const { return state_->invalid_receivers; }
 
 Result<Gatherer> Gatherer::another() const {
-  return guarded("gatherer", [&] { return make(state_->world); });
+  return guarded("gatherer", [&] { return make(state_->gatherer.sharedWorld()); });
 }
 
 Result<Gatherer> Gatherer::make(std::shared_ptr<const World> world) {

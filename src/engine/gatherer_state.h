@@ -8,9 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/world.h"
-#include "gather/packet/group_gatherer.h"
-#include "gather/packet/world_walk.h"
+#include "engine/thread_gatherer.h"
 #include "surfeit/engine.h"
 
 namespace surfeit {
@@ -28,11 +26,10 @@ struct Gatherer::State {
   // Indices of the receivers along a curve.
   std::vector<std::uint32_t> curveOrder(const ReceiverArray& receivers) const;
 
-  const std::shared_ptr<const World> world;
-  PagedOctree::Reader reader;
-  WorldReader view;
+  const World& world() const { return gatherer.world(); }
+
+  ThreadGatherer gatherer;
   const GatherResult no_result;
-  GroupGatherer gatherer;
 
   // Of a group
   std::vector<LocalReceiver> local;

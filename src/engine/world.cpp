@@ -14,6 +14,7 @@
 #include "core/bounds.h"
 #include "engine/gatherer_memory.h"
 #include "gather/rules/check_settings.h"
+#include "gather/rules/gather_outputs.h"
 
 namespace surfeit {
 namespace {
@@ -107,17 +108,14 @@ Result<std::shared_ptr<const World>> World::create(std::shared_ptr<EngineState> 
   }
   const bool is_plain = instances.size() == 1 && isIdentity(instances.front().transform);
   if (is_plain) {
-    world->origin_ = world->octrees_.front()->file().header().origin;
+    world->origin_ = world->file().header().origin;
   } else {
     SURFEIT_RETURN_IF_ERROR(world->placeInstances(instances));
   }
 
   GatherSettings local = settings;
   local.eye -= world->origin_;
-  if (local.outputs == 0) {
-    local.outputs = usualOutputs(settings.mode);
-    if (environment != nullptr) local.outputs |= kOutputEnvironment;
-  }
+  local.outputs = settledOutputs(settings, environment != nullptr);
   world->rules_ = gatherRules(local, world->environment_.get());
   std::uint64_t surfels = 0, groups = 0;
   for (const std::uint32_t scene : world->scene_of_) {
@@ -142,6 +140,16 @@ Result<std::shared_ptr<const World>> World::create(std::shared_ptr<EngineState> 
   }
   world->gatherer_bytes_ = surfeit::gathererBytes(*world->rules_, surfels) + decoder_bytes;
   return std::shared_ptr<const World>(std::move(world));
+}
+
+std::shared_ptr<const World> World::ofPlanned(std::shared_ptr<SceneState> scene,
+                                              const GatherRules& rules) {
+  std::shared_ptr<World> world(new World(scene->engine));
+  world->scenes_.push_back(EngineAccess::handle(std::move(scene)));
+  world->octrees_.push_back(EngineAccess::state(world->scenes_.front()).octree.get());
+  world->origin_ = world->file().header().origin;
+  world->rules_ = rules;
+  return world;
 }
 
 World::~World() { engine_->giveBack(held_bytes_, 0); }
@@ -189,9 +197,9 @@ Status World::loadEnvironment(const EnvironmentPixels& given, const GatherSettin
   if (!placement.up) placement.up = scenes_.front().info().up;
   SURFEIT_ASSIGN_OR_RETURN(EnvironmentMap map,
                            EnvironmentMap::create(std::move(picture), placement, "environment"));
-  EnvironmentCube cube(map, RasterGeometry(settings.quality.raster_resolution));
-  environment_ = std::make_unique<LoadedEnvironment>(std::move(map), std::move(cube));
-  return take(environment_->map.memoryBytes() + environment_->cube.memoryBytes(), "an environment");
+  environment_ =
+      std::make_unique<LoadedEnvironment>(std::move(map), settings.quality.raster_resolution);
+  return take(environment_->memoryBytes(), "an environment");
 }
 
 Status World::placeInstances(const std::vector<Instance>& instances) {

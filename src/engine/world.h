@@ -22,6 +22,10 @@ class World {
                                                      const std::vector<Instance>& instances,
                                                      const GatherSettings& settings,
                                                      const EnvironmentPixels* environment);
+  // Of one scene in its own coordinates, for a job (engine/planned_scene.h). `rules` count from the
+  // scene's origin; their environment must outlive the world.
+  static std::shared_ptr<const World> ofPlanned(std::shared_ptr<SceneState> scene,
+                                                const GatherRules& rules);
   World(const World&) = delete;
   World& operator=(const World&) = delete;
   ~World();
@@ -33,6 +37,8 @@ class World {
   // Null for one scene in its own coordinates, which is then the only one.
   const InstanceTree* instances() const { return tree_ ? &*tree_ : nullptr; }
   const std::vector<const PagedOctree*>& octrees() const { return octrees_; }
+  // Of the first scene, which is the only one where there are no instances.
+  const SceneFile& file() const { return octrees_.front()->file(); }
   // Bytes that a gatherer takes.
   std::uint64_t gathererBytes() const { return gatherer_bytes_; }
 

@@ -73,9 +73,7 @@ Status checkOptions(const RadianceOptions& options) {
   if (!(options.disk_overlap >= 1 && options.disk_overlap <= 16)) {
     return refuse("disk overlap", options.disk_overlap, "1 to 16");
   }
-  if (options.threads < 0 || options.threads > kMostThreads) {
-    return refuse("thread count", options.threads, fmt::format("0 to {}", kMostThreads));
-  }
+  SURFEIT_RETURN_IF_ERROR(checkThreadCount(options.threads));
   return {};
 }
 

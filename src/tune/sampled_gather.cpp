@@ -8,6 +8,7 @@
 #include "batch/gather_memory.h"
 #include "batch/receiver_queue.h"
 #include "core/seconds_since.h"
+#include "engine/planned_scene.h"
 
 namespace surfeit {
 
@@ -15,20 +16,17 @@ Result<std::unique_ptr<SampledGather>> SampledGather::create(SceneFile scene,
                                                              const PagedOctree::Memory& memory,
                                                              const GatherOptions& options,
                                                              int threads, Progress& progress) {
-  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<PagedOctree> octree,
-                           PagedOctree::create(std::move(scene), memory));
-  return std::unique_ptr<SampledGather>(
-      new SampledGather(std::move(octree), options, threads, progress));
+  SURFEIT_ASSIGN_OR_RETURN(std::shared_ptr<SceneState> opened,
+                           openPlanned(std::move(scene), memory, monitoring(memory, false)));
+  return std::unique_ptr<SampledGather>(new SampledGather(
+      World::ofPlanned(std::move(opened), GatherRules(options)), threads, progress));
 }
 
-SampledGather::SampledGather(std::unique_ptr<PagedOctree> octree, const GatherOptions& options,
-                             int threads, Progress& progress)
-    : octree_(std::move(octree)),
-      options_(options),
+SampledGather::SampledGather(std::shared_ptr<const World> world, int threads, Progress& progress)
+    : world_(std::move(world)),
       threads_(threads),
       progress_(progress),
-      controller_(*octree_, {.threads = threads, .adapts_split = false, .prefetches = false},
-                  progress_) {}
+      controller_(*world_, {.threads = threads, .prefetches = false}, progress_) {}
 
 Result<double> SampledGather::gather(std::span<const SortedReceiver> receivers) {
   // They are few enough to stay in memory
@@ -44,10 +42,9 @@ Result<double> SampledGather::gather(std::span<const SortedReceiver> receivers) 
 
   const auto begin = std::chrono::steady_clock::now();
   ReceiverQueue queue(sorter, kQueueReceivers);
-  GatherCrew crew({.octree = *octree_,
+  GatherCrew crew({.world = world_,
                    .queue = queue,
                    .controller = controller_,
-                   .rules = GatherRules(options_),
                    .threads = threads_,
                    .progress = progress_},
                   [](std::span<const ResultStore::Entry>) { return Status(); });

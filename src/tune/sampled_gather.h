@@ -7,6 +7,7 @@
 
 #include "batch/paging_controller.h"
 #include "batch/sorted_receiver.h"
+#include "engine/world.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/bake.h"
 #include "surfeit/progress.h"
@@ -29,14 +30,12 @@ class SampledGather {
   // Gathers at these receivers; returns the wall time until all are done.
   Result<double> gather(std::span<const SortedReceiver> receivers);
 
-  PagedOctree& octree() { return *octree_; }
+  OctreeCaches& caches() { return *world_->engine().caches; }
 
  private:
-  SampledGather(std::unique_ptr<PagedOctree> octree, const GatherOptions& options, int threads,
-                Progress& progress);
+  SampledGather(std::shared_ptr<const World> world, int threads, Progress& progress);
 
-  const std::unique_ptr<PagedOctree> octree_;
-  const GatherOptions options_;
+  const std::shared_ptr<const World> world_;
   const int threads_;
   QuietProgress progress_;
   PagingController controller_;

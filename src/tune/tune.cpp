@@ -127,11 +127,10 @@ Result<GatherMemory> Tuning::planOwnMemory() const {
   const std::uint64_t beside = tuneSampleBytes(*scene_, sample_receivers_, gather_.threads);
   const std::uint64_t least = least_memory_ + beside;
   if (gather_.memory_bytes < least) {
-    return Status::budgetTooSmall(fmt::format(
-        "a memory budget of {:.1f} MiB is too small for tuning {} with {} {} and a sample of {} "
-        "receivers: {} is the least that works",
-        double(gather_.memory_bytes) / (1 << 20), scene_path_, gather_.threads,
-        gather_.threads == 1 ? "thread" : "threads", sample_receivers_, formatMebibytes(least)));
+    return refuseBudget(gather_.memory_bytes,
+                        fmt::format("tuning {} with {} and a sample of {} receivers", scene_path_,
+                                    describeThreads(gather_.threads), sample_receivers_),
+                        least);
   }
   return planGatherMemory(*scene_, gather_.memory_bytes - beside, work_);
 }

@@ -264,11 +264,9 @@ Status Sampling::timeGather(std::span<const SortedReceiver> receivers) {
       const std::unique_ptr<SampledGather> gather,
       SampledGather::create(std::move(scene), memory, options_, threads_, progress_));
   SURFEIT_RETURN_IF_ERROR(gather->gather(receivers).status());
-  PagedOctree& octree = gather->octree();
+  OctreeCaches& caches = gather->caches();
   const auto stalled = [&] {
-    return double(octree.nodeCache().counters().stall_ns +
-                  octree.surfelCache().counters().stall_ns) *
-           1e-9;
+    return double(caches.nodes().counters().stall_ns + caches.surfels().counters().stall_ns) * 1e-9;
   };
   const double stalled_before = stalled();
   SURFEIT_ASSIGN_OR_RETURN(double seconds, gather->gather(receivers));
@@ -278,8 +276,8 @@ Status Sampling::timeGather(std::span<const SortedReceiver> receivers) {
   const auto load_seconds = [](const CacheCounters& counters) {
     return counters.misses > 0 ? double(counters.load_ns) * 1e-9 / double(counters.misses) : 0;
   };
-  sample_.nodes.load_seconds = load_seconds(octree.nodeCache().counters());
-  sample_.surfels.load_seconds = load_seconds(octree.surfelCache().counters());
+  sample_.nodes.load_seconds = load_seconds(caches.nodes().counters());
+  sample_.surfels.load_seconds = load_seconds(caches.surfels().counters());
   return {};
 }
 

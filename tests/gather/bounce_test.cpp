@@ -328,6 +328,18 @@ TEST_F(BounceTest, MoreBouncesAreBrighter) {
   }
 }
 
+// Bounces choose the receivers that they interpolate between.
+TEST_F(BounceTest, MaxVariationDoesNotChangeTheBytes) {
+  const std::string scene = index(furnishedRoom(), "room.sft");
+  BounceOptions options = optionsFor(1);
+  bounced(scene, options);
+  const std::string expected = readBytes(directory_.file("bounced.sft"));
+  ASSERT_FALSE(expected.empty());
+  options.quality.max_variation = .5f;
+  bounced(scene, options);
+  EXPECT_TRUE(readBytes(directory_.file("bounced.sft")) == expected);
+}
+
 TEST_F(BounceTest, ThreadsAndBudgetDoNotChangeTheBytes) {
   const std::string scene = index(furnishedRoom(40), "room.sft");
   for (const int surfels_per_receiver : {1, 4}) {

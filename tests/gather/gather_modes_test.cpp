@@ -52,8 +52,8 @@ class GatherModes : public testing::Test {
     environment.up = UpAxis::kZ;
     Result<EnvironmentMap> map = loadEnvironmentMap(environment, progress);
     EXPECT_TRUE(map.ok()) << map.status().message();
-    EnvironmentCube cube(*map, RasterGeometry(GatherQuality().raster_resolution));
-    environment_.reset(new LoadedEnvironment{std::move(*map), std::move(cube)});
+    environment_ =
+        std::make_unique<LoadedEnvironment>(std::move(*map), GatherQuality().raster_resolution);
   }
 
   void surround(GatherRules& rules) const {

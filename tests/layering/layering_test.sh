@@ -29,6 +29,7 @@ expect_refusal() {
 expect_refusal src/gather/cut/cut.cpp '#include "gather/packet/packet_raster.h"'
 expect_refusal src/gather/cut/cut.cpp '#include "storage/file.h"'
 expect_refusal src/gather/rules/gather_rules.h '#include "batch/gather_memory.h"'
+expect_refusal src/bounce/bounce_crew.cpp '#include "gather/packet/packet_gatherer.h"'
 expect_refusal src/octree/read/scene_file.cpp '#include "cloud/row_reader.h"'
 expect_refusal src/cache/page_cache.cpp '#include "storage/file.h"'
 expect_refusal src/cloud/text/xyz_reader.cpp '#include "cloud/cloud_formats.h"'

@@ -53,8 +53,8 @@ class LatLongGrid final : public SphereGrid {
   std::vector<double> row_ends_;
 };
 
-// The pixels of a raster cube (gather/rules/raster_geometry.h), of any resolution. Areas are exact up
-// to kExactResolution; above, slices are too wide for borders that cross, to some thousandths of
+// The pixels of a raster cube (gather/rules/raster_geometry.h), of any resolution. Areas are exact
+// up to kExactResolution; above, slices are too wide for borders that cross, to some thousandths of
 // cells.
 class CubeGrid final : public SphereGrid {
  public:

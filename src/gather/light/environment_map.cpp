@@ -185,6 +185,9 @@ EnvironmentCube::EnvironmentCube(const EnvironmentMap& map, const RasterGeometry
   for (std::size_t i = 0; i < pixels_.size(); ++i) pixels_[worldPixel(i)] = means[i];
 }
 
+LoadedEnvironment::LoadedEnvironment(EnvironmentMap loaded, int raster_resolution)
+    : map(std::move(loaded)), cube(map, RasterGeometry(raster_resolution)) {}
+
 GatherRules gatherRules(const GatherSettings& settings, const LoadedEnvironment* environment) {
   GatherRules rules(settings);
   if (environment != nullptr) {

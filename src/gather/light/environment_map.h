@@ -89,6 +89,9 @@ class EnvironmentCube {
 
 // An environment, ready for a gather.
 struct LoadedEnvironment {
+  LoadedEnvironment(EnvironmentMap loaded, int raster_resolution);
+  std::uint64_t memoryBytes() const { return map.memoryBytes() + cube.memoryBytes(); }
+
   EnvironmentMap map;
   EnvironmentCube cube;
 };

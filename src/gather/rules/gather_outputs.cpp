@@ -6,6 +6,8 @@
 #include <array>
 #include <bit>
 
+#include "gather/rules/gather_rules.h"
+
 namespace surfeit {
 namespace {
 
@@ -49,6 +51,11 @@ Result<std::uint32_t> parseOutputs(std::string_view words) {
     outputs |= found->output;
   }
   return outputs;
+}
+
+std::uint32_t settledOutputs(const GatherSettings& settings, bool has_environment) {
+  if (settings.outputs != 0) return settings.outputs;
+  return usualOutputs(settings.mode) | (has_environment ? kOutputEnvironment : 0u);
 }
 
 std::size_t resultFloats(std::uint32_t outputs) {

@@ -22,6 +22,10 @@ struct OutputColumns {
 };
 std::span<const OutputColumns> outputColumns();
 
+// The outputs that are asked for; where that is left open, what the mode usually gives, and light
+// of the environment where there is one.
+std::uint32_t settledOutputs(const GatherSettings& settings, bool has_environment);
+
 // Floats that a set of outputs takes when packed, and their names as properties, in that order.
 std::size_t resultFloats(std::uint32_t outputs);
 std::vector<std::string> resultNames(std::uint32_t outputs, GatherMode mode);

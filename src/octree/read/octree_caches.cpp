@@ -156,6 +156,14 @@ void OctreeCaches::detach(const Place& place) {
   surfel_ranges_.giveBack(place.first_surfel_page);
 }
 
+// The one that falls goes first.
+void OctreeCaches::setFrameLimits(std::size_t nodes, std::size_t surfels) {
+  const bool nodes_fall = nodes < nodes_->frameLimit();
+  if (nodes_fall) nodes_->setFrameLimit(nodes);
+  surfels_->setFrameLimit(surfels);
+  if (!nodes_fall) nodes_->setFrameLimit(nodes);
+}
+
 PageNumber OctreeCaches::nodePages() const {
   const std::shared_lock lock(mutex_);
   return node_ranges_.count();

@@ -70,6 +70,9 @@ class OctreeCaches {
   // Nobody may hold a page of the scene any more; its frames are free.
   void detach(const Place& place);
 
+  // Limits of both, so that together they never have more frames than before or after.
+  void setFrameLimits(std::size_t nodes, std::size_t surfels);
+
   PageCache& nodes() { return *nodes_; }
   PageCache& surfels() { return *surfels_; }
   // Null unless pages are tracked.

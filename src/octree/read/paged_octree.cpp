@@ -15,7 +15,7 @@ namespace {
 
 // Pages a thread holds in front of each cache: the knee of the measured curve.
 constexpr std::size_t kFrontSlots = 64;
-// Fewest frames that let one thread hold a page, and load another.
+// Frames that let one thread hold a page, and load another.
 constexpr std::size_t kMinFramesPerThread = 2;
 // Upper levels stay resident while they take no more than this part of the node cache, and no more
 // pages than are read in the blink of an eye.
@@ -31,11 +31,6 @@ PageCache::Options nodeOptions(const SceneFile& file, std::size_t frames) {
 
 PageCache::Options surfelOptions(const SceneFile& file, std::size_t frames) {
   return {file.surfelPageCount(), file.surfelPageCapacityBytes(), frames};
-}
-
-// Frames that `threads` readers need of a cache.
-std::size_t leastFrames(std::uint32_t pages, int threads) {
-  return std::min<std::size_t>(pages, kMinFramesPerThread * static_cast<std::size_t>(threads));
 }
 
 // Frames that fit into `bytes` beside the tables, at most one per page.
@@ -124,6 +119,7 @@ struct PagedOctree::State {
   SceneFile file;
   std::shared_ptr<OctreeCaches> caches;
   OctreeCaches::Place place;
+  bool has_own_caches = false;
   Memory memory;
   std::mutex runs_mutex;                                          // guards runs
   std::map<std::uint64_t, std::shared_ptr<const LeafRuns>> runs;  // by the leaf's first surfel
@@ -147,6 +143,15 @@ struct PagedOctree::Reader::State {
   LobedRecords<Node, NodeLobes> lobed_nodes;
   LobedRecords<Surfel, Lobe> lobed_surfels;
 };
+
+std::size_t PagedOctree::leastFrames(std::size_t pages, int threads) {
+  return std::min(pages, kMinFramesPerThread * static_cast<std::size_t>(threads));
+}
+
+std::size_t PagedOctree::frontSlots(std::size_t frames, std::size_t pages, int threads) {
+  if (frames >= pages) return kFrontSlots;
+  return std::clamp<std::size_t>(frames / (2 * static_cast<std::size_t>(threads)), 1, kFrontSlots);
+}
 
 std::size_t PagedOctree::fixedBytes(const SceneFile& file, int threads) {
   const PageFile& pages = file.pages();
@@ -201,13 +206,8 @@ Result<PagedOctree::Memory> PagedOctree::planMemory(const SceneFile& file, std::
   memory.node_frames = framesWithin(nodeOptions(file, 0), node_bytes);
   memory.surfel_frames = framesWithin(surfelOptions(file, 0), surfel_bytes);
 
-  // At most half of each cache may be pinned by fronts, so that LRU keeps something to choose from
-  const auto slots = [&](std::size_t frames, std::uint32_t pages) {
-    return frames >= pages ? kFrontSlots : frames / (2 * static_cast<std::size_t>(threads));
-  };
-  memory.front_slots = std::clamp<std::size_t>(
-      std::min(slots(memory.node_frames, node_pages), slots(memory.surfel_frames, surfel_pages)), 1,
-      kFrontSlots);
+  memory.front_slots = std::min(frontSlots(memory.node_frames, node_pages, threads),
+                                frontSlots(memory.surfel_frames, surfel_pages, threads));
   memory.resident_node_pages = residentPages(file.header(), memory.node_frames);
   // What fronts pin, once more for LRU, and what is always there
   const std::size_t pinned = 2 * memory.front_slots * static_cast<std::size_t>(threads);
@@ -230,6 +230,7 @@ Result<std::unique_ptr<PagedOctree>> PagedOctree::create(SceneFile file, const M
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<PagedOctree> octree,
                            share(std::move(file), std::move(caches)));
   octree->state_->memory = memory;
+  octree->state_->has_own_caches = true;
   SURFEIT_RETURN_IF_ERROR(octree->nodeCache().keepResident(memory.resident_node_pages));
   return octree;
 }
@@ -243,22 +244,21 @@ Result<std::unique_ptr<PagedOctree>> PagedOctree::share(SceneFile file,
 
 PagedOctree::PagedOctree(std::unique_ptr<State> state) : state_(std::move(state)) {}
 PagedOctree::~PagedOctree() {
-  // Caches that go with their only scene need not forget it, and their upper pages are resident
-  if (state_->caches.use_count() > 1) state_->caches->detach(state_->place);
+  // Caches that nobody uses any more need not forget it, and their upper pages are resident
+  if (!state_->has_own_caches) state_->caches->detach(state_->place);
 }
 
 const SceneFile& PagedOctree::file() const { return state_->file; }
 const PagedOctree::Memory& PagedOctree::memory() const { return state_->memory; }
 OctreeCaches& PagedOctree::caches() { return *state_->caches; }
+std::shared_ptr<OctreeCaches> PagedOctree::sharedCaches() { return state_->caches; }
 PageCache& PagedOctree::nodeCache() { return state_->caches->nodes(); }
 PageCache& PagedOctree::surfelCache() { return state_->caches->surfels(); }
 ReuseDistances* PagedOctree::nodeDistances() { return state_->caches->nodeDistances(); }
 ReuseDistances* PagedOctree::surfelDistances() { return state_->caches->surfelDistances(); }
 
-// One that prefetches has no use for a page but to see it loaded.
-PagedOctree::Reader::Reader(PagedOctree& octree, CacheFront::Role role)
-    : Reader(octree.caches(),
-             role == CacheFront::Role::kPrefetch ? 1 : octree.state_->memory.front_slots, role) {
+PagedOctree::Reader::Reader(PagedOctree& octree)
+    : Reader(octree.caches(), octree.state_->memory.front_slots) {
   use(octree);
 }
 

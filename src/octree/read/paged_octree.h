@@ -52,6 +52,12 @@ class PagedOctree {
   // Node frames for half of the bytes.
   static constexpr double kEvenSplit = 0.5;
 
+  // Frames that `threads` readers need of a cache for so many pages: each holds one, and loads one.
+  static std::size_t leastFrames(std::size_t pages, int threads);
+  // Pages that each of `threads` readers holds in front of a cache: at most half of its frames in
+  // all, so that least-recently-used keeps something to choose from.
+  static std::size_t frontSlots(std::size_t frames, std::size_t pages, int threads);
+
   // Bytes that opening the file takes beside the caches: directory and decode buffers of `threads`.
   static std::size_t fixedBytes(const SceneFile& file, int threads);
   // Splits `cache_bytes` between the two caches of a file that `threads` readers use: everything
@@ -73,12 +79,13 @@ class PagedOctree {
   // In caches that it shares with other scenes. Errors: as OctreeCaches::attach.
   static Result<std::unique_ptr<PagedOctree>> share(SceneFile file,
                                                     std::shared_ptr<OctreeCaches> caches);
-  // No reader of it may be left.
+  // No reader of it may be left. Caches of its own must not be used any more.
   ~PagedOctree();
 
   const SceneFile& file() const;
   const Memory& memory() const;  // as at first, of caches of its own
   OctreeCaches& caches();
+  std::shared_ptr<OctreeCaches> sharedCaches();
   PageCache& nodeCache();
   PageCache& surfelCache();
   // How pages are reused; null unless memory().tracked_pages > 0. Look-ups of resident pages and
@@ -91,7 +98,7 @@ class PagedOctree {
   // thread that pauses must release().
   class Reader {
    public:
-    explicit Reader(PagedOctree& octree, CacheFront::Role role = CacheFront::Role::kRequests);
+    explicit Reader(PagedOctree& octree);
     // For the scenes of these caches; holds up to `slots` pages of each kind. use() comes first.
     Reader(OctreeCaches& caches, std::size_t slots,
            CacheFront::Role role = CacheFront::Role::kRequests);
