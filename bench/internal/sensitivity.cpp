@@ -58,7 +58,6 @@ const std::vector<Number>& allNumbers() {
       {"fill_doubt", &F::fill_doubt, 0},
       {"hull_widening", &F::hull_widening, 0},
       {"most_in_hull", &F::most_in_hull, 0},
-      {"ribbon_radius", &F::ribbon_radius, 0},
       {"soft_disk_area", &F::soft_disk_area, 1},
       {"whole_near", &F::whole_near, 0.999f},
       {"largest_radius", &F::largest_radius, kNever},

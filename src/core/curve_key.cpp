@@ -259,13 +259,13 @@ void curveKeys(const glm::vec3* position, std::size_t stride_bytes, const RootCu
   }
 }
 
-Bounds3 cellBounds(CurveKey key, int level, const RootCube& cube) {
-  std::uint32_t place[3];
-  curveCell(key, place[0], place[1], place[2]);
+Bounds3 cellBounds(const glm::vec3& position, int level, const RootCube& cube) {
   const double size = std::ldexp(cube.size, -level);
   Bounds3 bounds;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = cube.origin[axis] + size * double(place[axis] >> (kCurveLevels - level));
+    const std::int32_t cell =
+        cellAt(position[axis], cube.origin[axis], cube.size) >> (kCurveLevels - level);
+    const double low = cube.origin[axis] + size * double(cell);
     bounds.min[axis] = float(low);
     bounds.max[axis] = float(low + size);
   }

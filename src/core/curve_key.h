@@ -37,8 +37,8 @@ void curveKeys(const glm::vec3* position, std::size_t stride_bytes, const RootCu
 // Inverse of curveKey(x, y, z).
 void curveCell(CurveKey key, std::uint32_t& x, std::uint32_t& y, std::uint32_t& z);
 
-// The cell of a level that a key lies in.
-Bounds3 cellBounds(CurveKey key, int level, const RootCube& cube);
+// The cell of a level that a world position lies in.
+Bounds3 cellBounds(const glm::vec3& position, int level, const RootCube& cube);
 
 // The first level (1..21) at which two keys lie in different cells; 22 when they are equal.
 inline int firstDifferentLevel(CurveKey a, CurveKey b) {

@@ -111,6 +111,8 @@ Status addSurfels(const std::string& path, const RowReaderOptions& options, Clou
     if (!strays.empty()) info.notes.push_back(strays);
     std::string radii = noteOfRadii(scan.surfels, surfels.count, (*source)->sizeNames());
     if (!radii.empty()) info.notes.push_back(std::move(radii));
+    std::string gaps = noteOfGaps(scan.surfels, (*source)->sizeNames());
+    if (!gaps.empty()) info.notes.push_back(std::move(gaps));
     if (statedCrs((*source)->comments()).empty() && !places.empty()) {
       std::vector<glm::vec3> sample(places.begin(), places.end());
       Bounds3d usual = usualBounds(sample);

@@ -74,11 +74,14 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
       !radii.empty()) {
     progress.note(radii);
   }
+  if (const std::string gaps = noteOfGaps(totals.sample, reader.sizeNames()); !gaps.empty()) {
+    progress.inform(gaps);
+  }
   noteBrightness(totals, reader, options.full_precision, progress);
   if (totals.missing_both > 0) {
     progress.note(
         fmt::format("{} surfels have neither radius nor area: both follow from the "
-                    "cells among their neighbours",
+                    "cells among their neighbours, and disks stand in the middle of these",
                     totals.missing_both));
   }
   if (totals.covering > 0) {

@@ -84,4 +84,29 @@ std::string noteOfRadii(std::span<const Surfel> sample, std::uint64_t count,
           : fmt::format("; --channels {} lets index find them from the neighbours", names.drops));
 }
 
+std::string noteOfGaps(std::span<const Surfel> sample, const SizeNames& names) {
+  // The thinnest covering of a plane by equal disks (Kershner 1939, "The Number of Circles Covering
+  // a Set")
+  const double thinnest = 2 * std::numbers::pi / std::sqrt(27.);
+  std::vector<double> parts;
+  for (const Surfel& surfel : sample) {
+    const bool is_tile = !surfel.isSphere() && !surfel.isTwoSided() && surfel.transparency == 0 &&
+                         surfel.long_side == 0;
+    if (!is_tile || !(surfel.radius > 0 && surfel.area > 0)) continue;
+    if (surfel.radius == kPlaceholderSize) continue;
+    const double radius = double(surfel.radius);
+    parts.push_back(std::numbers::pi * radius * radius / double(surfel.area));
+  }
+  if (parts.empty()) return {};
+  const double part = median(parts);
+  if (part >= thinnest) return {};
+  return fmt::format(
+      "half of the disks or more have pi r^2 below 1.21 of their areas, {:.2f} at the median: such "
+      "disks leave gaps however they lie, and light passes. Larger radii close them{}",
+      part,
+      names.drops.empty()
+          ? ""
+          : fmt::format("; --channels {} lets index find sizes from the neighbours", names.drops));
+}
+
 }  // namespace surfeit

@@ -1,4 +1,4 @@
-// Sizes that seem to be in another unit than the places.
+// Sizes that seem to be in another unit than the places, or too small to leave no gaps.
 #pragma once
 
 #include <cstdint>
@@ -16,5 +16,9 @@ namespace surfeit {
 // times closer as the root of how many surfels one of the sample stands for. `names`: of the cloud.
 std::string noteOfRadii(std::span<const Surfel> sample, std::uint64_t count,
                         const SizeNames& names);
+
+// A sentence with the way out, when half of the one-sided disks of `sample` are so small beside the
+// areas they stand for that disks like them leave gaps however they lie; else nothing.
+std::string noteOfGaps(std::span<const Surfel> sample, const SizeNames& names);
 
 }  // namespace surfeit

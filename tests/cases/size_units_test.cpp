@@ -154,5 +154,20 @@ TEST_F(AnglesInText, RowsOfUnitsBelowNamesAreRead) {
   }
 }
 
+TEST_F(SizeUnits, DisksThatLeaveGapsAreTold) {
+  const std::string sizes =
+      "property float nx\nproperty float ny\nproperty float nz\n"
+      "property float radius\nproperty float area\n";
+  const auto gaps = Contains(
+      AllOf(HasSubstr("leave gaps however they lie"), HasSubstr("--channels radius=-,area=-")));
+  EXPECT_THAT(indexed(grid(sizes, "0 0 1 .0564 .01")), gaps);  // as large as the area
+  const auto info = readCloudInfo(path("a.ply"), {}, *std::make_unique<Progress>());
+  ASSERT_TRUE(info.ok());
+  EXPECT_THAT(info->notes, gaps);
+  EXPECT_THAT(indexed(grid(sizes, "0 0 1 .0710 .01")), Not(gaps));  // from corner to corner
+  EXPECT_THAT(indexed(grid(sizes, "0 0 0 .0564 .01")), Not(gaps));  // spheres
+  EXPECT_THAT(indexed(grid(sizes + "property uchar two_sided\n", "0 0 1 .0564 .01 1")), Not(gaps));
+}
+
 }  // namespace
 }  // namespace surfeit

@@ -106,7 +106,12 @@ TEST(Scattered, SquaresWithoutSizesCoverFromTheirSurfaceOn) {
     const auto scene = IndexedScene::make(cloud);
     ASSERT_TRUE(scene.ok()) << scene.status().message();
     const float spacing = std::sqrt(4 / 4000.f);
-    for (const float distance : {.3f, 1.f, 3.f, 8.f}) {
+    struct Limits {
+      float distance;
+      double rms;
+    };
+    // At the places that were given .07, .05, .035, .013
+    for (const auto [distance, rms] : {Limits{.3f, .016}, {1.f, .009}, {3.f, .006}, {8.f, .003}}) {
       std::vector<LocalReceiver> receivers;
       double truth[100], square = 0, sum = 0;
       for (int i = 0; i < 100; ++i) {
@@ -123,8 +128,7 @@ TEST(Scattered, SquaresWithoutSizesCoverFromTheirSurfaceOn) {
       }
       std::printf("%.1f spacings: bias %+.4f, rms %.4f\n", double(distance), sum,
                   std::sqrt(square));
-      // At the places that were given, rms .07, .05, .035, .013
-      EXPECT_LE(std::sqrt(square), .02) << distance;
+      EXPECT_LE(std::sqrt(square), rms) << distance;
       EXPECT_LE(std::abs(sum), .007) << distance;
     }
   }

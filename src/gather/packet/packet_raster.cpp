@@ -416,7 +416,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
                  : surfel.isTwoSided()                        ? Patch::Seen::kBoth
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
-    patch.reach = reachOf(ribbon, patch.radius);
+    patch.reach = reachOf(surfel, ribbon, patch.radius);
     patch.opacity = surfel.opacity(color_);
     patch.lets_through = lets_through;
     if (patch.lets_through && surfel.isSphere()) patch.reach = {};
@@ -426,9 +426,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     }
     patch.is_solid = !surfel.isSphere() && !surfel.isLoose();
     // Positive, for a surfel may be at a receiver; then it is near at any setting
-    const float size = nearFieldSize(patch.radius, ribbon);
     const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;
-    patch.near_distance = std::max(radii * size, std::numeric_limits<float>::min());
+    patch.near_distance = std::max(radii * patch.radius, std::numeric_limits<float>::min());
     patch.parts = parts;
     bringToWorld(patch);
     if (!lobes.empty()) addLobe(lobes[std::size_t(&stored - surfels.data())], surfel.normal);

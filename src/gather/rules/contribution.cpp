@@ -190,9 +190,11 @@ LayerReach reachOf(const Facet& facet) {
   return LayerReach::of(facet.radius, facet.covariance.trace());
 }
 
-LayerReach reachOf(const Ribbon& ribbon, float radius) {
-  if (!ribbon.isEmpty()) return {0, ribbon.spread().trace() * 1.5f};
-  return LayerReach::ofDisk(radius);
+// Strands lie closer to each other than they are long.
+LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius) {
+  if (ribbon.isEmpty()) return LayerReach::ofDisk(radius);
+  const LayerReach reach = LayerReach::of(radius, ribbon.spread().trace());
+  return surfel.isLoose() ? LayerReach{0, reach.spread_sq} : reach;
 }
 
 // Codes round: what is about none is none.

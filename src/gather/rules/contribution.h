@@ -71,7 +71,7 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
 
 LayerReach reachOf(const Facet& facet);
 // Of a surfel; `radius`: drawnRadius.
-LayerReach reachOf(const Ribbon& ribbon, float radius);
+LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius);
 // How much of a rough node is leaves, hair or particles, 0..1: of a loose one, what is two-sided or
 // spheres.
 float thicketPart(const Node& node);

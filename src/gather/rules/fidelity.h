@@ -114,11 +114,6 @@ struct Fidelity {
   // any number, 2 % of the light behind a ball of 50,000 disks leaks at draft quality.)
   float most_in_hull = 64;
 
-  // --- Hair and grass ("Ribbons") ---
-
-  // Part of its length for each radius of the near field within which it is ray traced.
-  float ribbon_radius = 0.25f;
-
   // --- The near field ("The raster cube") ---
 
   // Times the area of a surfel that its soft disk covers, so that disks of a surface leave no gaps;

@@ -14,8 +14,9 @@ namespace {
 
 // Roots of the area of a surfel within which its neighbours are: on a plane, some 19 of its size.
 constexpr float kReach = 2.5f;
-// Of a rectangle, sides within which they are at least: on a plane, all eight around it. Within
-// 2.5 lengths of a hair a cell has ended.
+// A rectangle has neighbours within so many of its sides at least: on a plane, all eight around it.
+// Cells are smaller than 2.5 lengths of a hair. (With 1.3 two-sided rows 10:1 cover .193, with 1.5
+// .200, as one-sided ones do; AO RMSE of hair .0097, .0102.)
 constexpr float kLeastReach = 1.5f;
 // One disk of so many is asked. It is odd, lest rows of a grid are left out.
 constexpr std::size_t kAskedApart = 3;

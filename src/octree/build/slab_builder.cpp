@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/thread_scratch.h"
+#include "octree/build/curve_cells.h"
 #include "octree/build/hidden_surfels.h"
 #include "octree/build/loose_surfels.h"
 #include "octree/page/node_bounds.h"
@@ -54,10 +55,7 @@ class SlabBuilder {
   }
 
  private:
-  struct Cell {
-    std::size_t begin, size;
-    int level;
-  };
+  using Cell = CurveCell;
   void fetchSurfels();
   void buildBrick(std::size_t begin, const Brick& brick);
   void markSurfels(std::size_t first, const Brick& brick);
@@ -65,7 +63,9 @@ class SlabBuilder {
   template <typename Visit>
   void visitCells(std::size_t begin, std::size_t end, int boundary_level, std::size_t capacity,
                   const Visit& visit);
-  Cell cellAt(std::size_t begin, std::size_t end, int boundary_level, std::size_t capacity) const;
+  Cell cellAt(std::size_t begin, std::size_t end, int boundary_level, std::size_t capacity) const {
+    return curveCellAt(keys_, begin, end, boundary_level, capacity);
+  }
   Bounds3 cubeOf(const Cell& cell) const;
   void makeLeaf(std::size_t begin, std::size_t end, FinishedNode& leaf);
   GroupPlace placeSurfels(std::size_t begin, std::size_t end);
@@ -161,27 +161,8 @@ void SlabBuilder::visitCells(std::size_t begin, std::size_t end, int boundary_le
   }
 }
 
-// The cell that begins here, the largest with no more than `capacity` surfels: its level is at
-// least the boundary's, and deep enough to leave out the surfel after the last one that fits. More
-// surfels than that in one cell of the finest level are one.
-SlabBuilder::Cell SlabBuilder::cellAt(std::size_t begin, std::size_t end, int boundary_level,
-                                      std::size_t capacity) const {
-  int level = boundary_level;
-  std::size_t limit = std::min(end - begin, capacity);
-  if (end - begin > capacity) {
-    level = std::max(level, firstDifferentLevel(keys_[begin], keys_[begin + capacity]));
-  }
-  if (level > kCurveLevels) {
-    level = kCurveLevels;
-    limit = end - begin;
-  }
-  std::size_t size = 1;
-  while (size < limit && firstDifferentLevel(keys_[begin], keys_[begin + size]) > level) ++size;
-  return {begin, size, level};
-}
-
 Bounds3 SlabBuilder::cubeOf(const Cell& cell) const {
-  return cellBounds(keys_[cell.begin], cell.level, header_.cube);
+  return cellBounds(surfels_[cell.begin].position, cell.level, header_.cube);
 }
 
 void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& leaf) {

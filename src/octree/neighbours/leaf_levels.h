@@ -10,9 +10,10 @@
 
 namespace surfeit {
 
-// `keys`: of a page's surfels, in order; `before` and `after`: of the surfels next to these on
-// other pages, if there are any. A leaf has up to `capacity` surfels and lies on one page. Of more
-// than that in a cell of the finest level, the level is that.
+// `keys`: of a page's surfels, in order; `before` and `after`: of the surfels next to these on other
+// pages, if there are any. A leaf has up to `capacity` surfels and lies on one page. Leaves of more
+// than a page, and more than `capacity` in a cell of the finest level, get the levels of smaller
+// cells.
 void findLeafLevels(std::span<const CurveKey> keys, std::optional<CurveKey> before,
                     std::optional<CurveKey> after, std::size_t capacity,
                     std::span<std::uint8_t> levels);

@@ -20,8 +20,10 @@ constexpr float kStrayLimit = 8, kSparseLimit = 40;
 constexpr std::size_t kSamplePages = 64, kSampleStep = 16;
 // Pages whose surfels are sized at once, for each thread: what a PlaceIndex serves best.
 constexpr std::uint32_t kThreadPages = 16;
+// Of its width: a rectangle whose middle is farther away from the middle of its cell is a disk.
+constexpr float kAside = 0.19f;
 
-// From a place inside a box along `way`, which lies in the plane with this normal; at a face of the
+// From a place in the box along `way`, which lies in the plane with this normal; at a face of the
 // box along that, in the plane.
 glm::vec3 wayWithin(const Bounds3& box, const glm::vec3& from, glm::vec3 way,
                     const glm::vec3& normal) {
@@ -42,6 +44,7 @@ glm::vec3 wayWithin(const Bounds3& box, const glm::vec3& from, glm::vec3 way,
     if (!(across_sq > 1e-6f)) break;
     way *= 1 - part;
     way -= glm::dot(way, across) / across_sq * across;
+    way[face] = 0;  // but for rounding
   }
   return from + kInside * (place - from);
 }
@@ -65,8 +68,8 @@ SizedSurfelStream::~SizedSurfelStream() = default;
 
 std::size_t SizedSurfelStream::searcherBytes(int threads) {
   // Surfels are read, then copied into a batch with their tickets, which are sorted
-  constexpr std::size_t kSurfelBytes = 2 * sizeof(Surfel) + 2 * sizeof(Ticket) + sizeof(glm::vec3) +
-                                       sizeof(CurveKey) + sizeof(std::uint8_t);
+  constexpr std::size_t kSurfelBytes =
+      2 * sizeof(Surfel) + 2 * sizeof(Ticket) + sizeof(CurveKey) + sizeof(std::uint8_t);
   constexpr std::size_t kBatchBytes = kThreadPages * kDefaultSurfelGroup * kSurfelBytes;
   return std::size_t(threads) * (SurfaceSearch::memoryBytes() + kBatchBytes);
 }
@@ -173,8 +176,9 @@ Result<std::optional<CurveKey>> SizedSurfelStream::keyBeside(std::uint32_t page,
   return std::optional(curveKey(surfel.position, file.header().cube));
 }
 
-// The surfels' keys, and the levels of their leaves.
+// The surfels' keys, and the levels of their leaves, for those that move.
 Status SizedSurfelStream::findLeaves() {
+  if (keeps_places_ || std::none_of(surfels_.begin(), surfels_.end(), needsSize)) return {};
   const SceneHeader& header = octree_.file().header();
   keys_.resize(surfels_.size());
   curveKeys(&surfels_.front().position, sizeof(Surfel), header.cube, keys_);
@@ -203,17 +207,23 @@ Status SizedSurfelStream::findLeaves() {
 
 // Without leaving its leaf, so the order of leaves stays. A disk around its new place is spread out
 // as far as the cell.
-void SizedSurfelStream::moveToMiddle(std::size_t i) {
-  const glm::vec3 way = to_middle_[i];
-  if (way == glm::vec3(0)) return;
+void SizedSurfelStream::moveToMiddle(std::size_t i, const glm::vec3& middle) {
   Surfel& surfel = surfels_[i];
+  // Of places at one position the first one's plane tells for all
+  const glm::vec3 way = middle - glm::dot(middle, surfel.normal) * surfel.normal;
+  if (keeps_places_ || way == glm::vec3(0)) return;
   const RootCube& cube = octree_.file().header().cube;
-  const Bounds3 leaf = cellBounds(keys_[i], leaf_levels_[i], cube);
-  const glm::vec3 place = wayWithin(leaf, surfel.position, way, surfel.normal);
-  if (firstDifferentLevel(keys_[i], curveKey(place, cube)) <= leaf_levels_[i]) return;
+  const Bounds3 leaf = cellBounds(surfel.position, leaf_levels_[i], cube);
+  glm::vec3 place = wayWithin(leaf, surfel.position, way, surfel.normal);
+  const bool is_inside = firstDifferentLevel(keys_[i], curveKey(place, cube)) > leaf_levels_[i];
+  if (!is_inside) place = surfel.position;
   const glm::vec3 left = surfel.position + way - place;
+  const float left_sq = glm::dot(left, left);
   const float radius_sq =
-      surfel.radius * surfel.radius + 2 * overlap_ * (glm::dot(left, left) - glm::dot(way, way));
+      surfel.radius * surfel.radius + 2 * overlap_ * (left_sq - glm::dot(way, way));
+  // A rectangle would lie beside its cell
+  const float width_sq = surfel.area / elongationOf(surfel);
+  if (left_sq > kAside * kAside * width_sq) surfel.long_side = kNoLongSide, surfel.elongation = 0;
   if (!(radius_sq > 0)) return;
   surfel.position = place;
   surfel.radius = std::sqrt(radius_sq);
@@ -225,7 +235,7 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const std::uint32_t pages = kThreadPages * std::uint32_t(searchers_.size());
   SURFEIT_RETURN_IF_ERROR(readPages(next_page_ + std::min(pages, end_page_ - next_page_)));
 
-  to_middle_.assign(surfels_.size(), glm::vec3(0));
+  SURFEIT_RETURN_IF_ERROR(findLeaves());
   SURFEIT_RETURN_IF_ERROR(findOnThreads(
       searchers_, surfels_,
       [&](std::size_t i) {
@@ -239,12 +249,9 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
         // Spheres have no sides
         if (!is_bare || surfel.isSphere()) return;
         setLongSide(surface.long_side, surfel);
-        if (!keeps_places_) to_middle_[i] = surface.middle;
+        moveToMiddle(i, surface.middle);
       },
       progress_));
-
-  SURFEIT_RETURN_IF_ERROR(findLeaves());
-  for (std::size_t i = 0; i < surfels_.size(); ++i) moveToMiddle(i);
 
   const auto batch = std::make_shared<SortedBatch>();
   batch->resize(surfels_.size());

@@ -58,7 +58,7 @@ class SizedSurfelStream : public SortedSurfelStream {
   Status readPages(std::uint32_t end_page);
   Result<std::optional<CurveKey>> keyBeside(std::uint32_t page, bool is_first) const;
   Status findLeaves();
-  void moveToMiddle(std::size_t i);
+  void moveToMiddle(std::size_t i, const glm::vec3& middle);
   bool needsNormal(const Surfel& surfel) const { return normals_ && surfel.isSphere(); }
   void applySize(Surfel& surfel, const SurfaceAt& surface) const;
   void applyNormal(Surfel& surfel, const SurfaceAt& surface);
@@ -71,10 +71,9 @@ class SizedSurfelStream : public SortedSurfelStream {
   float largest_radius_ = 0;
   bool keeps_places_ = false;
   std::uint32_t next_page_ = 0, end_page_ = 0;
-  // Of the pages being sized, where each of them begins, and how far each surfel is to be moved
+  // Of the pages being sized, and where each of them begins
   std::vector<Surfel> surfels_;
   std::vector<std::size_t> page_begins_;
-  std::vector<glm::vec3> to_middle_;
   std::vector<CurveKey> keys_;
   std::vector<std::uint8_t> leaf_levels_;
   std::vector<Ticket> ticket_scratch_;

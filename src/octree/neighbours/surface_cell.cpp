@@ -38,7 +38,9 @@ constexpr float kLooseSlope = 0.3f;
 constexpr float kOpen = SurfaceFitLanes::kOpen;
 
 // A cell so many times as long as wide is a rectangle. Disks along the line of a scan would
-// overlap, and leave gaps between the lines.
+// overlap, and leave gaps between the lines; rectangles of random places would leave gaps at the
+// corners of their cells. (Occlusion one spacing before random places with 2, 2.5 and 3: .0074,
+// .0051, .0048 rms; before rows 3:1 as disks .016.)
 constexpr float kLongCell = 2.5f;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();

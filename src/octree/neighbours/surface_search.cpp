@@ -157,7 +157,7 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
   limit(cell, is_sparse, surface.thickness);
   // There is no plane to move in
   const bool has_plane = place.normal != glm::vec3(0) || surface.thickness <= kLooseThickness;
-  if (!has_plane) cell.middle = glm::vec3(0);
+  if (!has_plane) cell.middle = cell.long_side = glm::vec3(0);
   surface.area = cell.area / float(std::max<std::uint64_t>(place.coincident, 1));
   surface.radius = cell.radius;
   surface.middle = cell.middle;
