@@ -40,6 +40,7 @@ class SizeUnits : public DirectoryTest {
     options.channels = channels;
     const auto stats = indexClouds({path("a.ply")}, path("a.sft"), options, notes);
     EXPECT_TRUE(stats.ok()) << stats.status().message();
+    notes.notes.insert(notes.notes.end(), notes.informed.begin(), notes.informed.end());
     return notes.notes;
   }
 };

@@ -1,7 +1,6 @@
 #include "octree/build/slab_builder.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/thread_scratch.h"
 #include "octree/build/curve_cells.h"
