@@ -36,7 +36,7 @@ struct NamedInput {
 struct IndexOptions : JobOptions, ReadOptions {
   std::uint32_t leaf_capacity = 16;  // surfels per leaf (memo 3.2: "less than 16" or so)
   float disk_overlap = 2;            // disk area over surfel area, where radius or area is
-                                     // missing (--disk-overlap)
+                                     // missing; without both, disks move to mid-cell
   Repeats repeats = Repeats::kKeep;  // of overlapping clouds, such as tiles (--overlap)
   bool full_precision = false;       // keep floats instead of quantized values
   // The origin of positions in the scene, in the cloud's coordinates: finite, at most 1e12. Absent:

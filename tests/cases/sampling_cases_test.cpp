@@ -27,11 +27,32 @@ class SamplingCasesTest : public DirectoryTest {
   }
 
   std::vector<double> occlusion(const std::string& cloud, const std::string& receivers) {
+    return occlusionBefore(sharedCase(cloud), receivers);
+  }
+  std::vector<double> occlusionBefore(const std::string& cloud, const std::string& receivers) {
     Progress quiet;
-    EXPECT_TRUE(indexClouds({sharedCase(cloud)}, path("scene.sft"), {}, quiet).ok());
+    EXPECT_TRUE(indexClouds({cloud}, path("scene.sft"), {}, quiet).ok());
     EXPECT_TRUE(
         gatherCloud(path("scene.sft"), sharedCase(receivers), path("result.ply"), {}, quiet).ok());
     return columnOf(path("result.ply"), "occlusion");
+  }
+
+  // The same places, seen from both sides, to two_sided.ply.
+  void writeTwoSided(const std::string& cloud) {
+    std::vector<std::vector<double>> columns;
+    std::string header;
+    for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) {
+      columns.push_back(columnOf(sharedCase(cloud), name));
+      header += "property float " + std::string(name) + "\n";
+    }
+    std::string rows;
+    for (std::size_t i = 0; i < columns[0].size(); ++i) {
+      for (const auto& column : columns) rows += std::to_string(column[i]) + ' ';
+      rows += "1\n";
+    }
+    write("two_sided.ply", "ply\nformat ascii 1.0\nelement vertex " +
+                               std::to_string(columns[0].size()) + "\n" + header +
+                               "property uchar two_sided\nend_header\n" + rows);
   }
 };
 
@@ -54,14 +75,17 @@ double partOfWall(double distance, double width, double height) {
 TEST_F(SamplingCasesTest, RowsOccludeAsTheirExactAreas) {
   const std::vector<double> x = columnOf(sharedCase("lines/receivers.ply"), "x");
   const std::vector<double> y = columnOf(sharedCase("lines/receivers.ply"), "y");
-  const std::vector<double> found = occlusion("lines/ratio_10.ply", "lines/receivers.ply");
-  ASSERT_EQ(found.size(), x.size());
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const double distance = 5 - y[i], height = 2.8461;
-    const double right =
-        partOfWall(distance, x[i], height) + partOfWall(distance, 9.961 - x[i], height);
-    // Half a row before it, a pixel in the corner shows floor and wall
-    EXPECT_NEAR(found[i], right, distance < .3 ? .035 : .007) << i;
+  writeTwoSided("lines/ratio_10.ply");
+  for (const std::string& cloud : {sharedCase("lines/ratio_10.ply"), path("two_sided.ply")}) {
+    const std::vector<double> found = occlusionBefore(cloud, "lines/receivers.ply");
+    ASSERT_EQ(found.size(), x.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const double distance = 5 - y[i], height = 2.8461;
+      const double right =
+          partOfWall(distance, x[i], height) + partOfWall(distance, 9.961 - x[i], height);
+      // Half a row before it, a pixel in the corner shows floor and wall
+      EXPECT_NEAR(found[i], right, distance < .3 ? .035 : .007) << cloud << ", " << i;
+    }
   }
 }
 

@@ -192,7 +192,7 @@ struct SurfaceCells::Scratch {
   float usualCutter();
   SurfaceCell cell() const;
   SurfaceCell cell(float area, const CellMoments& moments) const;
-  glm::vec3 longSide(float area, const CellMoments& moments) const;
+  glm::vec3 longSide(float area, const CellMoments& moments, const TangentFrame& plane) const;
   void dropOthers();
   bool isSettled(float reach_sq) const {
     const float reach = places[lane].reach / unit;  // beyond which places are not known
@@ -404,19 +404,19 @@ SurfaceCell SurfaceCells::Scratch::cell(float area, const CellMoments& moments) 
   cell.radius = std::sqrt(2 * (moments.square + to_middle_sq)) * unit;
   const TangentFrame plane(normal);
   cell.middle = unit * (moments.middle.x * plane.tangent + moments.middle.y * plane.bitangent);
-  cell.long_side = longSide(area, moments);
+  cell.long_side = longSide(area, moments, plane);
   return cell;
 }
 
 // Of the rectangle with this area and these moments; zero of what shares it.
-glm::vec3 SurfaceCells::Scratch::longSide(float area, const CellMoments& moments) const {
+glm::vec3 SurfaceCells::Scratch::longSide(float area, const CellMoments& moments,
+                                          const TangentFrame& plane) const {
   const float apart = std::hypot(moments.difference, 2 * moments.product);
   const float along = std::sqrt(0.5f * std::max(moments.square + apart, 0.f));
   const float across = std::sqrt(0.5f * std::max(moments.square - apart, 0.f));
   const bool is_long = along > kLongCell * across && across > 0;
   if (!is_long || sharers > 1) return glm::vec3(0);
   const float angle = 0.5f * std::atan2(2 * moments.product, moments.difference);
-  const TangentFrame plane(normal);
   return std::sqrt(along / across * area) * unit *
          (std::cos(angle) * plane.tangent + std::sin(angle) * plane.bitangent);
 }
