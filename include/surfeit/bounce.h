@@ -45,7 +45,7 @@ struct GroupGloss {
 
 // `temporary_directory` holds intermediate bounces. `strict` has no effect.
 struct BounceOptions : JobOptions {
-  int bounces = 1;  // 1 to 100
+  int bounces = 1;        // 1 to 100
   GatherQuality quality;  // but max_variation: surfels_per_receiver spares receivers
   // All bounces but the last are gathered at about one surfel out of this many, 1 to 64, and
   // interpolated to its neighbours by distance and normal. 1: at every surfel.
