@@ -1,5 +1,5 @@
-// Numbers that say how contributions cover pixels; docs/algorithm.md, "Coverage" and "The raster
-// cube", has their measured effect.
+// Formulas that say how contributions cover pixels; docs/algorithm.md, "Coverage" and "The raster
+// cube", tells their use, and fidelity.h the reasons of their numbers.
 #pragma once
 
 #include <algorithm>
