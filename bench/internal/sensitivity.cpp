@@ -42,13 +42,11 @@ const std::vector<Number>& allNumbers() {
   static const std::vector<Number> numbers = {
       {"horizon_slope", &F::horizon_slope, 0},
       {"uneven_share", &F::uneven_share, 1},
-      {"most_coarser", &F::most_coarser},
       {"fading", &F::fading, 1e-4f},
       {"most_node_pixels", &F::most_node_pixels, kNever},
       {"least_visible_part", &F::least_visible_part, 0},
       {"shared_look", &F::shared_look, 0},
       {"filled_outline", &F::filled_outline, kNever},
-      {"most_turn", &F::most_turn, 0},
       {"overlap_gain", &F::overlap_gain, 0},
       {"least_reach", &F::least_reach, 0},
       {"layer_gap", &F::layer_gap, 0},
@@ -60,9 +58,7 @@ const std::vector<Number>& allNumbers() {
       {"most_in_hull", &F::most_in_hull, 0},
       {"soft_disk_area", &F::soft_disk_area, 1},
       {"whole_near", &F::whole_near, 0.999f},
-      {"largest_radius", &F::largest_radius, kNever},
       {"bias_height", &F::bias_height, kNever},
-      {"sphere_clearance", &F::sphere_clearance, 0},
       {"least_axis", &F::least_axis, 0.01f},
       {"least_spread", &F::least_spread, 1e-6f},
   };

@@ -10,7 +10,6 @@
 #include "gather/cut/cut.h"
 #include "gather/packet/packet_raster.h"
 #include "gather/rules/coverage_rules.h"
-#include "gather/rules/drawn_radius.h"
 #include "octree/node/node_sums.h"
 
 namespace surfeit {

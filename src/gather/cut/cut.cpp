@@ -26,9 +26,6 @@ namespace {
 constexpr float kRoundingSlack = 1e-4f;
 
 float shareOf(const Node& node) { return node.isFlat() ? 1 : kFidelity.uneven_share; }
-float mostCoarserOf(const Node& node, const CutRules& rules) {
-  return node.isFlat() ? 1 : rules.most_coarser;
-}
 
 // What lies off the plane that it is drawn on by a pixel is seen in another one. (Small lights
 // differ from place to place by .065 of their power, without by .080; half a pixel makes nothing
@@ -52,8 +49,7 @@ struct alignas(64) Columns {
   float normal_x[kMostSiblings] = {}, normal_y[kMostSiblings] = {}, normal_z[kMostSiblings] = {};
   float radius[kMostSiblings] = {}, thickness[kMostSiblings] = {},
         normal_cosine[kMostSiblings] = {};
-  float share[kMostSiblings] = {};         // what it may look like, of the max solid angle; 0: open
-  float most_coarser[kMostSiblings] = {};  // CutRules
+  float share[kMostSiblings] = {};  // what it may look like, of the max solid angle; 0: open
   float off_plane[kMostSiblings] = {};
 };
 
@@ -71,7 +67,6 @@ Columns ColumnsOf(std::span<const Node> siblings, const CutRules& rules) {
     columns.thickness[i] = node.thickness;
     columns.normal_cosine[i] = node.normal_cosine;
     columns.share[i] = rules.isMixed(node) ? 0 : shareOf(node);
-    columns.most_coarser[i] = mostCoarserOf(node, rules);
     columns.off_plane[i] = node.off_plane;
   }
   return columns;
@@ -183,24 +178,16 @@ Bounds BoundsOf(const Columns& columns, std::size_t at, const PacketView& view, 
                 const Places& places, const CutRules& rules) {
   const D d;
   const V one = Splat(1), tiny = Splat(std::numeric_limits<float>::min());
-  const V share = hn::Load(d, columns.share + at), most = hn::Load(d, columns.most_coarser + at);
+  const V share = hn::Load(d, columns.share + at);
   const V fading = Splat(kFidelity.fading);
   const V off_plane =
       Square(hn::Mul(hn::Load(d, columns.off_plane + at), Splat(inverseOffPlane(rules))));
   const V area = hn::Mul(Splat(kPi), Square(nodes.radius));
   const V scale = hn::Max(hn::Mul(share, Splat(2 * rules.max_solid_angle)), tiny);
   const V farthest = hn::Add(places.distance, Splat(view.radius));
-  V gain = one;
-  if (view.has_horizon) {
-    const V low = hn::Div(places.nearest, hn::Max(places.highest, tiny));
-    gain = hn::Min(most, hn::Max(one, low));
-  }
-  const V near_sq = hn::Max(Square(places.nearest), tiny);
-  const V looks_most = hn::Div(hn::Max(hn::Div(area, hn::Mul(scale, gain)), off_plane), near_sq);
-  const V least_gain = view.has_horizon ? most : one;
-  const V far_sq = hn::Max(Square(farthest), tiny);
-  const V looks_least =
-      hn::Div(hn::Max(hn::Div(area, hn::Mul(scale, least_gain)), off_plane), far_sq);
+  const V size = hn::Max(hn::Div(area, scale), off_plane);
+  const V looks_most = hn::Div(size, hn::Max(Square(places.nearest), tiny));
+  const V looks_least = hn::Div(size, hn::Max(Square(farthest), tiny));
   return {hn::And(hn::Gt(places.nearest, nodes.radius), hn::Lt(looks_most, hn::Sub(one, fading))),
           hn::Or(hn::Lt(farthest, nodes.radius), hn::Gt(looks_least, hn::Add(one, fading)))};
 }
@@ -287,14 +274,7 @@ float openPart(const Node& node, const LocalReceiver& receiver, const CutRules& 
   const float distance_sq = glm::dot(to_node, to_node), distance = std::sqrt(distance_sq);
   if (!(distance > node.radius)) return 1;
 
-  float gain = 1;
-  const float most_coarser = mostCoarserOf(node, rules);
-  if (most_coarser > 1 && !receiver.isSpherical()) {
-    const float highest = glm::dot(to_node, receiver.normal) + riseOf(node, receiver.normal);
-    gain = std::clamp(distance / std::max(highest, std::numeric_limits<float>::min()), 1.f,
-                      most_coarser);
-  }
-  const float limit = 2 * shareOf(node) * gain * rules.max_solid_angle;
+  const float limit = 2 * shareOf(node) * rules.max_solid_angle;
   const float off_plane = node.off_plane * inverseOffPlane(rules);
   const float looks =
       std::max(kPi * node.radius * node.radius / limit, off_plane * off_plane) / distance_sq;

@@ -49,7 +49,6 @@ struct CutRules {
   float max_distance = 0;
   float facing = 1;                   // 1: only fronts are seen, -1: only backs, 0: both
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
-  float most_coarser = 1;             // what is low may look so many times as large
   float pixel = 0;                    // slope of a pixel of the raster
   float bias = 0;                     // of rays, in radii of surfels
   SendingGains gains{};
@@ -113,7 +112,6 @@ class CutWalk {
                rules.quality.max_distance,
                facingOf(rules.quality.sides),
                rules.groups,
-               mostCoarser(rules),
                1 / pixelsPerSlope(rules),
                rules.quality.bias,
                rules.hasLight() ? rules.gains : SendingGains()},

@@ -179,7 +179,8 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   if (!(patch.near_distance > 0)) return sight;
 
   if (patch.isRound()) {
-    const float clearance = kFidelity.sphere_clearance * patch.radius;
+    // A receiver without a normal is a sphere as well: those that touch it are its own surface
+    const float clearance = 2 * patch.radius;
     const M too_close =
         hn::And(receivers.spherical, hn::Lt(sight.distance_sq, Splat(clearance * clearance)));
     sight.in_reach = hn::AndNot(too_close, sight.in_reach);

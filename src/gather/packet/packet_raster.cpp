@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "core/ribbon.h"
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
 #include "gather/rules/coverage_rules.h"
-#include "gather/rules/drawn_radius.h"
 #include "gather/rules/layers.h"
 #include "gather/rules/lobe_light.h"
 #include "octree/node/hidden_layers.h"
@@ -398,7 +398,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.position = surfel.position;
     patch.normal = surfel.normal;
     const Ribbon ribbon = Ribbon::of(surfel);
-    patch.radius = drawnRadius(surfel, ribbon);
+    patch.radius = std::max(surfel.radius, ribbon.radius());
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
       // Only what is opaque may cover more than it should to leave no gaps

@@ -107,7 +107,7 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
   const float length = glm::length(middle);
   if (length > node.radius) middle *= node.radius / length;
   const float turn = part * (glm::dot(v, weighted) - trace) / distance;
-  return {middle, 1 + std::clamp(turn, -kFidelity.most_turn, kFidelity.most_turn)};
+  return {middle, 1 + std::clamp(turn, -1.f, 1.f)};  // first order, but no less than nothing
 }
 
 namespace {

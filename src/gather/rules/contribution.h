@@ -70,7 +70,7 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
                       int color = 0);
 
 LayerReach reachOf(const Facet& facet);
-// Of a surfel; `radius`: drawnRadius.
+// Of a surfel; `radius`: of the circle that it is drawn within.
 LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius);
 // How much of a rough node is leaves, hair or particles, 0..1: of a loose one, what is two-sided or
 // spheres.

@@ -55,11 +55,6 @@ inline float nearBorderSq(float near_distance) {
                     std::numeric_limits<float>::max());
 }
 
-// The disk of a longer sliver does not tell where its surface is.
-inline float effectiveRadius(float radius, float area) {
-  return std::min(radius, kFidelity.largest_radius * std::sqrt(area));
-}
-
 // Coverage in the middle of a soft disk, which falls off as 1 - (distance / radius)^2 and is
 // limited to 1, such that the whole disk covers `area`, or, where gaps are worse, more.
 inline float softDiskPeak(float radius, float area, bool is_exact) {

@@ -20,11 +20,6 @@ struct Fidelity {
   // .0060.)
   float uneven_share = 2.f / 3;
 
-  // Times. Where directions weigh by the cosine, a node that is not flat may look larger by one
-  // over the cosine of its highest point, up to this. (1: -1, -1, -2 %, for a quarter more
-  // patches.)
-  float most_coarser = 4;
-
   // Part, 0 to .5, of the greatest solid angle by which a node fades into what is below it.
   // Without, results step from one receiver to the next, by 2 % of the light along a line in a box
   // (bench/line_steps.sh); errors are the same.
@@ -57,10 +52,6 @@ struct Fidelity {
   // with its covariance: a ball covers 3/4 of that, a rectangle .95. (AO bias with .8, .87, 1: lion
   // on a plane -.0002, +.0017, +.0029; Sponza -.0039, -.0027, -.0023.)
   float filled_outline = 0.87f;
-
-  // Part, 0 to 1, by which a rough node may look different from close by: beyond, first order says
-  // nothing.
-  float most_turn = 0.3f;
 
   // Times. Overlap of a rough node that shows more back than front: 1 where backs are 9/5 of the
   // fronts. (AO bias with 4 and 10: lion +.0002, -.0014; spheres +.0014, +.0008.)
@@ -125,16 +116,9 @@ struct Fidelity {
   // traced and a patch. (Largest step on a floor below a sphere .90 % with 1, .67 % so.)
   float whole_near = 0.875f;
 
-  // Times the root of its area that a disk is wide at most: that of a cell 27 times as long as
-  // wide.
-  float largest_radius = 3;
-
   // Radii. A two-sided surfel whose middle is so far above the horizon has no bias. (AO RMSE of
   // leaves .0081, with a full bias .0110; .02 to .1 do the same.)
   float bias_height = 0.05f;
-
-  // Radii. A receiver without a normal is a sphere itself: closer spheres are its own surface.
-  float sphere_clearance = 3;
 
   // --- Footprints ("The raster cube") ---
 

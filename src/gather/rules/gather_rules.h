@@ -125,12 +125,6 @@ inline float maxSolidAngle(const GatherRules& rules) {
   return std::min(rules.quality.max_solid_angle * (rules.hasConeRaster() ? share : 1),
                   largestPatch(rules));
 }
-// How many times as large what is low may look, where directions weigh by the cosine.
-inline float mostCoarser(const GatherRules& rules) {
-  const bool weighs_by_cosine = !rules.isGlossy() && !rules.hasCone() &&
-                                rules.weights.distribution == GatherWeights::Distribution::kCosine;
-  return weighs_by_cosine ? kFidelity.most_coarser : 1;
-}
 // In radii of a surfel. Disks more than two pixels wide are ray traced in any case, unless nothing
 // is: between such patches the widest hull leaves gaps. Spheres stand alone, and rays through the
 // middles of pixels are no measure of how large they are.
