@@ -89,13 +89,13 @@ enum class GatherSides : std::uint8_t { kFront, kBoth, kBack };
 struct GatherQuality {
   // The largest solid angle of a node that is drawn as a whole: sigma_max, steradians, >= 0. 0
   // opens every node (memo 5). Nodes that are not flat are opened above 2/3 of it.
-  float max_solid_angle = 0.1f;
+  float max_solid_angle = 0.08f;
   int raster_resolution = 16;  // pixels along an edge of a cube face, even, 2..64 (memo 3.4)
   // Rays start, and the horizon lies, this far above the receiver, in radii of the surfel that is
   // tested; for two-sided surfels with a known longer side, in their widths.
   float bias = 0.15f;
-  // Surfels closer than this many of their radii are ray traced (memo 3.4.1). Two-sided surfels
-  // with a known longer side count in fourths of that side.
+  // Surfels closer than this many of their radii are ray traced (memo 3.4.1); the radius of one
+  // with a known longer side is half the diagonal of its rectangle.
   float near_field_radii = 8;
   // Surfels farther than this do not count; scene units.
   float max_distance = 1e30f;

@@ -84,9 +84,9 @@ inline constexpr double kTuneTimeMargin = 0.05;
 // Follows the look-ups of a sample of the receivers through the octree and gathers at some of them.
 // From that it predicts a gather at all of `receivers_path`, in budgets of any size. Writes nothing
 // but temporary files. With all receivers sampled, the predicted loads are the loads of LRU caches
-// for exactly the look-ups of a gather; with fewer they are estimates (docs/algorithm.md,
-// "Predicting misses from a sample"). Times depend on how much of the file is in the system's page
-// cache now. Errors: as gatherCloud; kCorruption without valid receivers.
+// for exactly the look-ups of a gather; with fewer they are estimates (docs/tune.md).
+// Times depend on how much of the file is in the system's page cache now. Errors: as gatherCloud;
+// kCorruption without valid receivers.
 SURFEIT_API Result<TuneReport> tuneGather(const std::string& scene_path,
                                           const std::string& receivers_path,
                                           const TuneOptions& options, Progress& progress);

@@ -1,5 +1,4 @@
-// The miss-ratio curve of a whole gather from look-ups of some of its receivers: docs/algorithm.md,
-// "Predicting misses from a sample".
+// The miss-ratio curve of a whole gather from look-ups of some of its receivers: docs/tune.md.
 #pragma once
 
 #include <cstdint>

@@ -314,7 +314,7 @@ optionsOfTheirOwnWinOverThePreset() {
   makeScene 5000
   makePatch
   gatherPatch default
-  jsonIs default.json max_solid_angle 0.1 raster_resolution 16 near_field_radii 8
+  jsonIs default.json max_solid_angle 0.08 raster_resolution 16 near_field_radii 8
   gatherPatch standard --quality standard
   sameBytes standard.ply default.ply
   gatherPatch draft --quality draft

@@ -459,13 +459,13 @@ TEST(Gather, SpheresOfTheReceiversOwnSurfaceDoNotCount) {
   sphere.flags = kSurfelSphere;
   sphere.radius = 0.1f;
   sphere.area = 0.0314f;
-  // Within three radii it counts for a receiver with a normal, but not for a sphere
-  sphere.position = {0, 0, 0.29f};
+  // A sphere that touches it does not count for a receiver that is one itself
+  sphere.position = {0, 0, 0.19f};
   EXPECT_EQ(bruteForce({sphere}, {{0, 0, 0}, {0, 0, 0}}).occlusion, 0);
   EXPECT_GT(bruteForce({sphere}, {{0, 0, 0}, {0, 0, 1}}).occlusion, 0);
   // Beyond, it covers the share of the whole sphere that its cap has
-  sphere.position = {0, 0, 0.31f};
-  const double cosine = std::sqrt(1 - std::pow(0.1 / 0.31, 2));
+  sphere.position = {0, 0, 0.21f};
+  const double cosine = std::sqrt(1 - std::pow(0.1 / 0.21, 2));
   EXPECT_NEAR(bruteForce({sphere}, {{0, 0, 0}, {0, 0, 0}}).occlusion, (1 - cosine) / 2, 0.01);
 }
 

@@ -65,9 +65,8 @@ inline float softDiskPeak(float radius, float area, bool is_exact) {
 
 // A node that is seen mostly from behind shows fronts that face each other: folds, bumps and
 // leaves, which hide each other instead of lying side by side. Overlap grows from 0 where fronts
-// and backs are equal (anything closed) to 1 where backs are 9/5 of the fronts. (AO bias
-// with 0.1 sr and 16 pixels, with a gain of 4 and 10: lion on a plane +.0002, -.0014; spheres
-// +.0014, +.0008.)
+// and backs are equal (anything closed) to 1 where backs are 9/5 of the fronts.
+// (Fidelity::overlap_gain)
 inline float overlapOf(float front_area, float back_area) {
   return std::clamp(kFidelity.overlap_gain * (back_area - front_area) / (back_area + front_area),
                     0.f, 1.f);
