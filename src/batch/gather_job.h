@@ -14,7 +14,7 @@
 #include "batch/gather_options.h"
 #include "batch/receiver_rows.h"
 #include "batch/row_blocks.h"
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_writer.h"
 #include "gather/light/environment_map.h"
 #include "octree/read/scene_file.h"
 #include "storage/external_sorter.h"
