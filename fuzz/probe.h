@@ -1,6 +1,6 @@
 // What the fuzzers and the replay of their corpora do with bytes from anywhere: read them as a
 // file of one format, to the end, in every way that a reader offers. A probe returns whatever the
-// bytes are; that a reader breaks its contract (cloud/row_reader.h) ends the process.
+// bytes are; that a reader breaks its contract (cloud/rows/row_reader.h) ends the process.
 #pragma once
 
 #include <cstddef>

@@ -8,7 +8,7 @@
 
 #include "core/assert.h"
 #include "surfeit/surfel.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -1,4 +1,4 @@
-// Holds a reader of rows to its contract (cloud/row_reader.h) on whatever file it is given.
+// Holds a reader of rows to its contract (cloud/rows/row_reader.h) on whatever file it is given.
 #pragma once
 
 #include <memory>

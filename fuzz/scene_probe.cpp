@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/row_filter.h"
+#include "cloud/rows/row_filter.h"
 #include "core/assert.h"
 #include "fuzz/row_probe.h"
 #include "octree/node/node.h"

@@ -26,7 +26,7 @@
 #include "octree/page/node_group.h"
 #include "octree/page/surfel_group.h"
 #include "storage/page_codec.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

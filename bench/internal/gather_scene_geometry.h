@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"

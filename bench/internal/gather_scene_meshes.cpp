@@ -11,7 +11,7 @@
 #include "bench/internal/gather_scene_geometry.h"
 #include "storage/file.h"
 #include "surfeit/sample.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

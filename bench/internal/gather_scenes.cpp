@@ -12,7 +12,7 @@
 #include "core/job_limits.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

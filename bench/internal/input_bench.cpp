@@ -17,9 +17,9 @@
 
 #include "cloud/ply/ply_reader.h"
 #include "core/curve_key.h"
-#include "surfels/surfel_mapping.h"
-#include "surfels/surfel_source.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/open_surfel_source.h"
+#include "surfels/rows/surfel_mapping.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

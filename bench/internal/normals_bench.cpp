@@ -24,9 +24,9 @@
 #include "cloud/cloud_formats.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "surfeit/normals.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 #include "tools/normal_options.h"
 
 namespace surfeit {

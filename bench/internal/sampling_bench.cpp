@@ -22,10 +22,10 @@
 #include "bench/or_exit.h"
 #include "cloud/cloud_formats.h"
 #include "core/spherical_harmonics.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
 #include "surfeit/bake.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

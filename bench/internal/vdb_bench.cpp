@@ -22,8 +22,8 @@
 
 #include "bench/or_exit.h"
 #include "cloud/cloud_formats.h"
-#include "cloud/row_reader.h"
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_writer.h"
 
 namespace surfeit {
 namespace {

@@ -114,7 +114,10 @@ SortedGather::SortedGather(std::unique_ptr<PagedOctree> octree, bool is_warm,
                    .memory_bytes = stats.memory_bytes,
                    .work = memory.work,
                    .receivers = stats.receivers - stats.invalid_receivers},
-                  progress) {}
+                  progress) {
+  progress.beginPhase("gather", stats.receivers, "receivers");
+  progress.advance(stats.invalid_receivers);
+}
 
 Status SortedGather::gather(ExternalSorter& sorter, GatherCrew::Sink sink, std::uint64_t count) {
   const auto begin = std::chrono::steady_clock::now();

@@ -61,7 +61,8 @@ class GatherCrew {
 };
 
 // The gather proper: a scene in planned caches, and a crew for each piece of the order. `threads`
-// of the statistics work, as many prefetch as the memory says. One thread at a time.
+// of the statistics work, as many prefetch as the memory says. It is the phase "gather" of the
+// progress, in which the receivers that are not valid are done at once. One thread at a time.
 class SortedGather {
  public:
   // Opens the caches; `stats` has threads, memory and numbers of receivers. All that is referred to

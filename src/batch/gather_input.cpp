@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "batch/gather_memory.h"
-#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
-#include "cloud/property_aliases.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/property_aliases.h"
 #include "core/curve_key.h"
 
 namespace surfeit {

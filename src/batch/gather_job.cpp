@@ -64,6 +64,7 @@ GatherJob::GatherJob(GatherInput input, const std::string& result_path,
     : input_(std::move(input)),
       result_path_(result_path),
       options_(options),
+      rows_(input_.receivers(), options.outputs, options.mode),
       temporary_directory_(surfeit::temporaryDirectory(options.temporary_directory, result_path)),
       progress_(&progress) {}
 
@@ -80,6 +81,13 @@ GatherStats GatherJob::stats() const {
   stats.memory_bytes = options_.memory_bytes;
   stats.receivers = input_.receiverCount();
   return stats;
+}
+
+ResultStore::Options GatherJob::resultPlan() const {
+  return {.count = input_.receiverCount(),
+          .outputs = options_.outputs,
+          .memory_bytes = memory_.result_bytes,
+          .temporary_directory = temporary_directory_};
 }
 
 Status GatherJob::note(const SceneFile& scene) {
@@ -113,9 +121,9 @@ Result<std::unique_ptr<ExternalSorter>> GatherJob::sort(const SceneHeader& scene
   return sorter;
 }
 
-Result<std::unique_ptr<RowWriter>> GatherJob::createWriter(const ResultRows& rows) {
+Status GatherJob::createResult() {
   RowWriterOptions writing;
-  writing.properties = rows.properties();
+  writing.properties = rows_.properties();
   writing.comments = input_.reader().comments();
   writing.count = input_.receiverCount();
   writing.like = &input_.reader();
@@ -125,29 +133,32 @@ Result<std::unique_ptr<RowWriter>> GatherJob::createWriter(const ResultRows& row
   writing.memory_bytes =
       (options_.memory_bytes - std::min(options_.memory_bytes, writing.memory_beside_bytes)) / 2;
   writing.progress = progress_;
-  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<RowWriter> writer,
-                           createRowWriter(result_path_, writing));
-  noteOf(*writer);
-  return writer;
+  SURFEIT_ASSIGN_OR_RETURN(writer_, createRowWriter(result_path_, writing));
+  noteWriter();
+  return {};
 }
 
-Status GatherJob::write(const ResultRows& rows, ResultStore& results, RowWriter& writer,
-                        std::optional<std::uint64_t> checksum) {
+bool GatherJob::writerTakesCaches() const {
+  return heldWriterBytes(result_path_, input_.receiverCount(), rows_.rowBytes()) != 0;
+}
+
+Status GatherJob::write(ResultStore& results, std::optional<std::uint64_t> checksum) {
+  SURFEIT_RETURN_IF_ERROR(results.finish());
   progress_->beginPhase("write", input_.receiverCount(), "receivers");
-  SURFEIT_RETURN_IF_ERROR(input_.write(rows, results, writer, *progress_));
+  SURFEIT_RETURN_IF_ERROR(input_.write(rows_, results, *writer_, *progress_));
   if (checksum && input_.checksum() != *checksum) {
     return Status::corruption(fmt::format(
         "{}: rows with checksum {:016x}, expected {:016x} as the shards were gathered for: gather "
         "the shards again, or merge with the receivers they belong to",
         input_.reader().path(), input_.checksum(), *checksum));
   }
-  SURFEIT_RETURN_IF_ERROR(writer.finish());
-  noteOf(writer);  // what it found out on the way
+  SURFEIT_RETURN_IF_ERROR(writer_->finish());
+  noteWriter();  // what it found out on the way
   return {};
 }
 
-void GatherJob::noteOf(const RowWriter& writer) {
-  for (const std::string& note : writer.notes()) {
+void GatherJob::noteWriter() {
+  for (const std::string& note : writer_->notes()) {
     if (told_.insert(note).second) progress_->note(fmt::format("{}: {}", result_path_, note));
   }
 }

@@ -13,8 +13,9 @@
 #include "batch/gather_memory.h"
 #include "batch/gather_options.h"
 #include "batch/receiver_rows.h"
+#include "batch/result_store.h"
 #include "batch/row_blocks.h"
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_writer.h"
 #include "gather/light/environment_map.h"
 #include "octree/read/scene_file.h"
 #include "storage/external_sorter.h"
@@ -43,13 +44,14 @@ class GatherJob {
   const LoadedEnvironment* environment() const { return environment_.get(); }
   // About the scene's origin.
   const GatherOptions& options() const { return options_; }
-  const std::string& temporaryDirectory() const { return temporary_directory_; }
 
   // Leaves the caches alone while receivers are sorted, where they hold pages already.
   void sortBesideCaches();
 
   // Statistics of a job that has gathered at nothing yet.
   GatherStats stats() const;
+  // How its results are kept until they are written.
+  ResultStore::Options resultPlan() const;
 
   // Tells what the gather makes of its input, and what stays dark.
   Status note(const SceneFile& scene);
@@ -60,11 +62,14 @@ class GatherJob {
                                                const OrderRange& range = {},
                                                const RowBlocks* blocks = nullptr,
                                                std::uint64_t wanted = 0);
-  // Writes the receivers with their results (finished) as rows of the result. `checksum`: of the
-  // receivers' rows, where it is known; kCorruption when they have changed since.
-  Result<std::unique_ptr<RowWriter>> createWriter(const ResultRows& rows);
-  Status write(const ResultRows& rows, ResultStore& results, RowWriter& writer,
-               std::optional<std::uint64_t> checksum = {});
+
+  // Creates the file of the result; before write().
+  Status createResult();
+  // Whether its writer holds all rows until the end, in the memory of the caches.
+  bool writerTakesCaches() const;
+  // Finishes the results, and writes the receivers with them as rows of the result. `checksum`: of
+  // the receivers' rows, where it is known; kCorruption when they have changed since.
+  Status write(ResultStore& results, std::optional<std::uint64_t> checksum = {});
 
  private:
   static Result<GatherJob> openReceivers(const std::string& receivers_path,
@@ -73,15 +78,17 @@ class GatherJob {
   Status plan(const SceneFile& scene);
   GatherJob(GatherInput input, const std::string& result_path, const GatherOptions& options,
             Progress& progress);
-  void noteOf(const RowWriter& writer);
+  void noteWriter();
 
   GatherInput input_;
   std::string result_path_;
   GatherOptions options_;
+  ResultRows rows_;
   std::string temporary_directory_;
   Progress* progress_;
   std::unique_ptr<const LoadedEnvironment> environment_;
   GatherMemory memory_;
+  std::unique_ptr<RowWriter> writer_;
   std::set<std::string> told_;
 };
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "gather/rules/gather_rules.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"

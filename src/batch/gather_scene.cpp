@@ -1,8 +1,10 @@
 #include "batch/gather_scene.h"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
+#include "batch/gather_crew.h"
 #include "batch/gather_options.h"
 
 namespace surfeit {
@@ -100,11 +102,15 @@ Result<GatherScene> GatherScene::open(const std::string& scene_path, const std::
   return scene;
 }
 
-Status GatherScene::makeRoom(const GatherMemory& memory) {
+Status GatherScene::makeRoom(GatherJob& job) {
   if (octree_ == nullptr) return {};
+  const GatherMemory& memory = job.memory();
   const std::uint64_t bytes = std::min(keptBytes(octree_->caches(), memory),
                                        plannedBytes(octree_->caches(), octree_->memory()));
-  if (isLike(*octree_, memory.caches) && limitFrames(*octree_, memory.caches, bytes)) return {};
+  if (isLike(*octree_, memory.caches) && limitFrames(*octree_, memory.caches, bytes)) {
+    job.sortBesideCaches();
+    return {};
+  }
   octree_ = nullptr;
   SURFEIT_ASSIGN_OR_RETURN(SceneFile file, SceneFile::open(path_, access_));
   file.stage(stage_);
@@ -121,8 +127,22 @@ Result<std::unique_ptr<PagedOctree>> GatherScene::takeOctree(const PagedOctree::
   return std::move(octree_);
 }
 
+Status GatherScene::gather(const GatherJob& job, ExternalSorter& sorter, ResultStore& results,
+                           GatherStats& stats, Progress& progress) {
+  const bool is_warm = octree_ != nullptr;
+  SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<PagedOctree> octree, takeOctree(job.memory().caches));
+  std::unique_ptr<SortedGather> gather = SortedGather::create(
+      std::move(octree), is_warm, job.memory(), job.options(), stats, progress, job.environment());
+  SURFEIT_RETURN_IF_ERROR(gather->gather(
+      sorter, [&](std::span<const ResultStore::Entry> entries) { return results.put(entries); }));
+  gather->finish();
+  octree = gather->takeOctree();
+  gather.reset();
+  if (kept_ != nullptr && !job.writerTakesCaches()) keep(std::move(octree), job.memory());
+  return {};
+}
+
 void GatherScene::keep(std::unique_ptr<PagedOctree> octree, const GatherMemory& memory) {
-  if (kept_ == nullptr) return;
   OctreeCaches& caches = octree->caches();
   const std::uint64_t bytes =
       std::min(keptBytes(caches, memory),
@@ -133,12 +153,5 @@ void GatherScene::keep(std::unique_ptr<PagedOctree> octree, const GatherMemory& 
   kept_->access = access_;
   kept_->file = identity_;
 }
-
-KeptScene::KeptScene() : state_(std::make_unique<State>()) {}
-KeptScene::KeptScene(KeptScene&&) noexcept = default;
-KeptScene& KeptScene::operator=(KeptScene&&) noexcept = default;
-KeptScene::~KeptScene() = default;
-void KeptScene::close() { state_->octree = nullptr; }
-bool KeptScene::isOpen() const { return state_->octree != nullptr; }
 
 }  // namespace surfeit

@@ -9,11 +9,15 @@
 #include <optional>
 #include <string>
 
+#include "batch/gather_job.h"
 #include "batch/gather_memory.h"
+#include "batch/result_store.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
+#include "storage/external_sorter.h"
 #include "surfeit/bake.h"
 #include "surfeit/kept_scene.h"
+#include "surfeit/progress.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
@@ -39,19 +43,22 @@ class GatherScene {
                                   Progress& progress);
 
   const SceneFile& file() const { return octree_ != nullptr ? octree_->file() : *file_; }
-  // Whether pages of an earlier gather are there.
-  bool isWarm() const { return octree_ != nullptr; }
 
-  // Makes room for all but the caches: pages that are there stay as far as the plan has memory for
-  // them. They go where the plan divides otherwise. Errors: those of opening the scene again.
-  Status makeRoom(const GatherMemory& memory);
-  // The octree with caches as the plan has them. Then this has only the file's name.
-  Result<std::unique_ptr<PagedOctree>> takeOctree(const PagedOctree::Memory& plan);
-  // Keeps it for the next gather, and makes room. Without `kept` it goes.
-  void keep(std::unique_ptr<PagedOctree> octree, const GatherMemory& memory);
+  // Makes room for all but the caches: pages of an earlier gather stay as far as the plan of the
+  // job has memory for them, and it sorts beside them. They go where the plan divides otherwise.
+  // Errors: those of opening the scene again.
+  Status makeRoom(GatherJob& job);
+  // Gathers at the receivers of the sorter in caches as the plan has them, and completes the
+  // statistics. Then the octree is kept for the next gather, and makes room; without `kept`, and
+  // where the writer of the result takes the memory of the caches, it goes. Once. Errors: as
+  // SortedGather.
+  Status gather(const GatherJob& job, ExternalSorter& sorter, ResultStore& results,
+                GatherStats& stats, Progress& progress);
 
  private:
   explicit GatherScene(KeptScene::State* kept) : kept_(kept) {}
+  Result<std::unique_ptr<PagedOctree>> takeOctree(const PagedOctree::Memory& plan);
+  void keep(std::unique_ptr<PagedOctree> octree, const GatherMemory& memory);
 
   KeptScene::State* kept_;
   std::string path_;

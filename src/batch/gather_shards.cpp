@@ -152,7 +152,6 @@ class ShardGather {
   }
 
   Status gather(SceneFile scene, ShardStats& stats) {
-    progress_.beginPhase("gather", stats.receivers, "receivers");
     SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<SortedGather> gather,
                              SortedGather::create(std::move(scene), job_.memory(), job_.options(),
                                                   stats, progress_, job_.environment()));

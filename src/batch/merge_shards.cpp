@@ -233,15 +233,10 @@ Result<MergeStats> merge(const std::string& scene_path, const std::string& recei
   SURFEIT_RETURN_IF_ERROR(shards.incomplete());
 
   const std::uint64_t receivers = job.input().receiverCount();
-  const ResultRows rows(job.input().receivers(), options.outputs, options.mode);
-  SURFEIT_ASSIGN_OR_RETURN(const std::unique_ptr<RowWriter> writer, job.createWriter(rows));
-  ResultStore results({.count = receivers,
-                       .outputs = options.outputs,
-                       .memory_bytes = job.memory().result_bytes,
-                       .temporary_directory = job.temporaryDirectory()});
+  SURFEIT_RETURN_IF_ERROR(job.createResult());
+  ResultStore results(job.resultPlan());
   SURFEIT_RETURN_IF_ERROR(shards.read(results, receivers));
-  SURFEIT_RETURN_IF_ERROR(results.finish());
-  SURFEIT_RETURN_IF_ERROR(job.write(rows, results, *writer, shards.job().receivers_checksum));
+  SURFEIT_RETURN_IF_ERROR(job.write(results, shards.job().receivers_checksum));
   if (merging.removes_shards) shards.removeShards();
   return MergeStats{.shards = count,
                     .receivers = receivers,

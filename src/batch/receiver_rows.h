@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include "cloud/row_layout.h"
-#include "cloud/rows_with_values.h"
+#include "cloud/edits/rows_with_values.h"
+#include "cloud/rows/row_layout.h"
 #include "gather/rules/receiver.h"
 #include "surfeit/gather.h"
 #include "surfeit/status.h"
-#include "surfels/surfel_mapping.h"
+#include "surfels/rows/surfel_mapping.h"
 
 namespace surfeit {
 

@@ -32,7 +32,7 @@
 #include "core/seconds_since.h"
 #include "engine/planned_scene.h"
 #include "engine/world.h"
-#include "index/row_sample.h"
+#include "index/rows/row_sample.h"
 #include "octree/read/group_set.h"
 #include "octree/read/scene_file.h"
 #include "octree/read/scene_light.h"

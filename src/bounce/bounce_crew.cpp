@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "core/worker_threads.h"
-#include "surfels/surfel_mapping.h"
+#include "surfels/rows/surfel_mapping.h"
 
 namespace surfeit {
 namespace {

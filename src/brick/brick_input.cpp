@@ -12,9 +12,9 @@
 #include <string_view>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/surfel_names.h"
-#include "index/scene_rows.h"
-#include "surfels/surfel_mapping.h"
+#include "cloud/rows/surfel_names.h"
+#include "index/rows/scene_rows.h"
+#include "surfels/rows/surfel_mapping.h"
 
 namespace surfeit {
 namespace {

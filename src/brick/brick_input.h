@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
-#include "cloud/row_reader.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_reader.h"
 #include "surfeit/brick.h"
 #include "surfeit/color_range.h"
 #include "surfeit/progress.h"

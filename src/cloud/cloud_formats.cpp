@@ -7,14 +7,14 @@
 #include <optional>
 #include <utility>
 
-#include "cloud/color_reader.h"
+#include "cloud/edits/color_reader.h"
+#include "cloud/edits/moved_positions.h"
 #include "cloud/exr/exr_reader.h"
 #include "cloud/exr/exr_writer.h"
 #include "cloud/houdini/bgeo_ascii_reader.h"
 #include "cloud/houdini/bgeo_json_reader.h"
 #include "cloud/houdini/bgeo_reader.h"
 #include "cloud/houdini/bgeo_writer.h"
-#include "cloud/moved_positions.h"
 #include "cloud/particles/pdb_reader.h"
 #include "cloud/particles/pdb_writer.h"
 #include "cloud/particles/prt2_reader.h"

@@ -10,11 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/channels.h"
-#include "cloud/filtered_reader.h"
-#include "cloud/row_reader.h"
-#include "cloud/row_reader_options.h"
-#include "cloud/row_writer.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/filtered_reader.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_reader_options.h"
+#include "cloud/rows/row_writer.h"
 #include "storage/byte_input.h"
 #include "storage/file.h"
 #include "surfeit/color_range.h"

@@ -4,12 +4,12 @@
 
 #include <utility>
 
-#include "cloud/color_reader.h"
+#include "cloud/edits/color_reader.h"
 #include "core/guard.h"
 #include "core/up_comment.h"
-#include "index/column_copies.h"
 #include "index/index_from.h"
-#include "index/memory_rows.h"
+#include "index/rows/column_copies.h"
+#include "index/rows/memory_rows.h"
 #include "surfeit/cloud_rows.h"
 
 namespace surfeit {

@@ -7,16 +7,16 @@
 #include "core/job_limits.h"
 #include "core/parallel.h"
 #include "core/seconds_since.h"
-#include "index/cloud_reader.h"
-#include "index/group_plan.h"
-#include "index/index_neighbours.h"
-#include "index/index_plan.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
+#include "index/steps/cloud_reader.h"
+#include "index/steps/group_plan.h"
+#include "index/steps/index_neighbours.h"
+#include "index/steps/index_plan.h"
 #include "octree/neighbours/repeated_surfels.h"
 #include "storage/output_target.h"
 #include "storage/scratch_folder.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "index/cloud_reader.h"
+#include "index/steps/cloud_reader.h"
 #include "surfeit/index.h"
 
 namespace surfeit {

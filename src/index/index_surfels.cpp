@@ -1,5 +1,5 @@
 #include "index/index_from.h"
-#include "index/provided_rows.h"
+#include "index/rows/provided_rows.h"
 #include "surfeit/surfel_source.h"
 
 namespace surfeit {

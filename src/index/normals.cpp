@@ -11,9 +11,9 @@
 #include <optional>
 #include <vector>
 
-#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
-#include "cloud/surfel_names.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/surfel_names.h"
 #include "core/curve_key.h"
 #include "core/guard.h"
 #include "core/job_limits.h"
@@ -22,8 +22,8 @@
 #include "core/seconds_since.h"
 #include "core/up_comment.h"
 #include "index/index_places.h"
-#include "index/index_plan.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
+#include "index/steps/index_plan.h"
 #include "index/trajectory.h"
 #include "octree/neighbours/normal_rule.h"
 #include "octree/neighbours/surface_search.h"

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/surfel_names.h"
+#include "cloud/rows/surfel_names.h"
 
 namespace surfeit {
 

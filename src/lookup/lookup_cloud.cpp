@@ -19,16 +19,16 @@
 #include <utility>
 #include <vector>
 
-#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
-#include "cloud/row_transform.h"
-#include "cloud/rows_with_values.h"
+#include "cloud/edits/row_transform.h"
+#include "cloud/edits/rows_with_values.h"
+#include "cloud/rows/channels.h"
 #include "core/curve_key.h"
 #include "core/guard.h"
 #include "core/job_limits.h"
 #include "core/parallel.h"
 #include "core/program_memory.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
 #include "lookup/baked_map.h"
 #include "lookup/lookup_receivers.h"
 #include "storage/output_target.h"

@@ -4,10 +4,10 @@
 #include <string>
 #include <utility>
 
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
 #include "core/guard.h"
-#include "index/row_sample.h"
-#include "index/scene_rows.h"
+#include "index/rows/row_sample.h"
+#include "index/rows/scene_rows.h"
 #include "lookup/baked_map.h"
 #include "storage/held_bytes.h"
 #include "storage/output_target.h"

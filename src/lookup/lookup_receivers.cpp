@@ -9,7 +9,7 @@
 #include <glm/matrix.hpp>
 #include <utility>
 
-#include "cloud/surfel_names.h"
+#include "cloud/rows/surfel_names.h"
 
 namespace surfeit {
 namespace {

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "surfeit/lookup.h"
 #include "surfeit/status.h"
-#include "surfels/surfel_mapping.h"
+#include "surfels/rows/surfel_mapping.h"
 
 namespace surfeit {
 

@@ -26,7 +26,7 @@
 #include "core/program_memory.h"
 #include "core/spherical_harmonics.h"
 #include "core/up_comment.h"
-#include "index/index_plan.h"
+#include "index/steps/index_plan.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "photons/nearest_photons.h"
@@ -37,7 +37,7 @@
 #include "storage/temporary_name.h"
 #include "surfeit/index.h"
 #include "surfeit/radiance.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -14,8 +14,9 @@
 #include <utility>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/photon_names.h"
-#include "cloud/surfel_names.h"
+#include "cloud/ply/ply_format.h"
+#include "cloud/rows/photon_names.h"
+#include "cloud/rows/surfel_names.h"
 #include "core/up_comment.h"
 #include "octree/neighbours/local_density.h"
 #include "storage/temporary_name.h"

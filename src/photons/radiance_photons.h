@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "storage/positional_file.h"
 #include "surfeit/progress.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "surfeit/up_axis.h"
-#include "surfels/surfel_mapping.h"
+#include "surfels/rows/surfel_mapping.h"
 
 namespace surfeit {
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "sample/dice.h"
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/surfel_maker.h"
 #include "surfels/camera_spacing.h"
 

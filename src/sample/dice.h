@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 
 namespace surfeit {
 

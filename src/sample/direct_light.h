@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/split_mix.h"
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/ray_scene.h"
 #include "surfeit/sample.h"
 

@@ -4,7 +4,7 @@
 #include <glm/vec3.hpp>
 #include <optional>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/photon_random.h"
 
 namespace surfeit {

@@ -24,9 +24,9 @@
 #include <utility>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/photon_names.h"
-#include "cloud/row_writer.h"
-#include "cloud/surfel_names.h"
+#include "cloud/rows/photon_names.h"
+#include "cloud/rows/row_writer.h"
+#include "cloud/rows/surfel_names.h"
 #include "core/job_limits.h"
 #include "core/luminance.h"
 #include "core/seconds_since.h"

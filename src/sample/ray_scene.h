@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

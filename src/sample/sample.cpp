@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/comment_notes.h"
+#include "cloud/rows/comment_notes.h"
 #include "core/crs_comment.h"
 #include "core/group_comment.h"
 #include "core/job_limits.h"
@@ -34,7 +34,7 @@
 #include "sample/surfel_maker.h"
 #include "sample/surroundings.h"
 #include "surfels/camera_spacing.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

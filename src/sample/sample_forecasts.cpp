@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/guard.h"
-#include "index/row_sample.h"
+#include "index/rows/row_sample.h"
 #include "storage/output_target.h"
 #include "storage/scratch_folder.h"
 #include "surfeit/process.h"

@@ -8,7 +8,7 @@
 
 #include "sample/dice.h"
 #include "sample/direct_light.h"
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "surfeit/progress.h"
 #include "surfeit/sample.h"
 #include "surfeit/status.h"

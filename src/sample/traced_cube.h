@@ -2,7 +2,7 @@
 // (surfeit/cube.h) is held to.
 #pragma once
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/ray_scene.h"
 #include "surfeit/cube.h"
 #include "surfeit/sample.h"

@@ -247,8 +247,6 @@ Result<TuneOutcome> Tuning::measure(std::uint64_t memory_bytes) const {
   stats.invalid_receivers = report_.invalid_receivers;
   stats.threads = gather_.threads;
   stats.memory_bytes = memory_bytes;
-  progress.beginPhase("gather", stats.receivers, "receivers");
-  progress.advance(stats.invalid_receivers);
   SURFEIT_ASSIGN_OR_RETURN(
       const std::unique_ptr<SortedGather> gather,
       SortedGather::create(std::move(scene), memory, gather_, stats, progress));

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
 #include "view/srgb.h"
 
 namespace surfeit {

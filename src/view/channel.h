@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"
 #include "view/row_field.h"

@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 #include <string>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "surfeit/status.h"
 #include "view/row_field.h"
 

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/row_reader.h"
+#include "cloud/rows/row_reader.h"
 #include "core/up_comment.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/cloud_info.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "core/bounds.h"
 #include "surfeit/status.h"
 #include "surfeit/surfel.h"

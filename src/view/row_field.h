@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 
 namespace surfeit {
 

@@ -10,8 +10,8 @@
 #include <memory>
 #include <new>
 
-#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
+#include "cloud/rows/channels.h"
 #include "core/job_limits.h"
 #include "core/seconds_since.h"
 #include "core/thread_check.h"

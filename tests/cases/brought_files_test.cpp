@@ -17,7 +17,7 @@
 #include "io/las_test_file.h"
 #include "io/test_directory.h"
 #include "surfeit/sample.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace brought {

@@ -10,7 +10,7 @@
 #include "io/compressed_files.h"
 #include "io/test_directory.h"
 #include "surfeit/convert.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

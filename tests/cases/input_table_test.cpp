@@ -16,8 +16,8 @@
 
 #include "cases/case_files.h"
 #include "io/test_directory.h"
-#include "sample/mesh.h"
-#include "surfels/surfel_source.h"
+#include "sample/meshes/mesh.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

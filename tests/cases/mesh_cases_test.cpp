@@ -14,7 +14,7 @@
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
 #include "surfeit/sample.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

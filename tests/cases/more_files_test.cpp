@@ -14,7 +14,7 @@
 #include "cases/case_files.h"
 #include "io/test_directory.h"
 #include "surfeit/sample.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

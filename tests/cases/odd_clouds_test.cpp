@@ -11,9 +11,9 @@
 
 #include "cases/case_files.h"
 #include "io/test_directory.h"
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "surfeit/convert.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -22,7 +22,7 @@
 #include "surfeit/bounce.h"
 #include "surfeit/convert.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

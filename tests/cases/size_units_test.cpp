@@ -11,7 +11,7 @@
 #include "io/test_directory.h"
 #include "surfeit/cloud_info.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -11,7 +11,7 @@
 #include "cloud/cloud_formats.h"
 #include "engine/engine_scenes.h"
 #include "surfeit/bake.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

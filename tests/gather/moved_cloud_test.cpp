@@ -10,13 +10,13 @@
 
 #include "cloud/cloud_formats.h"
 #include "gather/test_scene.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
 #include "octree/test_scenes.h"
 #include "surfeit/bake.h"
 #include "surfeit/bounce.h"
 #include "surfeit/cube.h"
 #include "surfeit/radiance.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

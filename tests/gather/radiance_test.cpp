@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "gather/test_clouds.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -15,8 +15,8 @@
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_source.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/open_surfel_source.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 

@@ -1,5 +1,5 @@
 // Channel arithmetic on packed rows.
-#include "cloud/channel_assignment.h"
+#include "cloud/edits/channel_assignment.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

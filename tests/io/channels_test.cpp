@@ -1,4 +1,4 @@
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -12,7 +12,8 @@
 #include "surfeit/cloud_info.h"
 #include "surfeit/convert.h"
 #include "surfeit/index.h"
-#include "surfels/no_data.h"
+#include "surfels/open_surfel_source.h"
+#include "surfels/rows/no_data.h"
 
 namespace surfeit {
 namespace {

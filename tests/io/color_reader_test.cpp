@@ -1,4 +1,4 @@
-#include "cloud/color_reader.h"
+#include "cloud/edits/color_reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 
 #include "cloud/cloud_formats.h"
 #include "io/row_damage_test.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_union.h"
+#include "cloud/edits/row_union.h"
 #include "io/convert_tables.h"
 
 namespace surfeit {

@@ -1,4 +1,4 @@
-#include "surfels/float_row_decoder.h"
+#include "surfels/rows/float_row_decoder.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/comment_notes.h"
+#include "cloud/rows/comment_notes.h"
 #include "cloud/scans/las_reader.h"
 #include "core/crs_comment.h"
 #include "io/convert_tables.h"

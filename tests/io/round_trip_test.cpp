@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
+#include "cloud/rows/channels.h"
 #include "io/convert_tables.h"
 #include "io/exr_test_picture.h"
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "cloud/cloud_formats.h"
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_writer.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
 

@@ -1,4 +1,4 @@
-#include "cloud/row_filter.h"
+#include "cloud/rows/row_filter.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/filtered_reader.h"
+#include "cloud/rows/filtered_reader.h"
 #include "io/convert_tables.h"
 
 namespace surfeit {

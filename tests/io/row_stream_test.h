@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_reader.h"
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_writer.h"
 
 namespace surfeit {
 
@@ -64,8 +64,8 @@ inline RowProperty rowProperty(const std::string& name, ValueType type = ValueTy
   return property;
 }
 
-// What cloud/row_reader.h says of every reader: rows do not depend on the batch, rewind goes back,
-// seekRow goes anywhere or is refused.
+// What cloud/rows/row_reader.h says of every reader: rows do not depend on the batch, rewind goes
+// back, seekRow goes anywhere or is refused.
 inline void expectReaderKeepsContract(RowReader& reader) {
   const std::size_t row_bytes = reader.element().row_bytes;
   const std::vector<std::byte> all = readAllRows(reader, 1 << 20);

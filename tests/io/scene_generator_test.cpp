@@ -14,8 +14,8 @@
 #include "core/square_strata.h"
 #include "io/test_bytes.h"
 #include "io/test_directory.h"
-#include "surfels/surfel_source.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/open_surfel_source.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "io/test_directory.h"
-#include "surfels/surfel_source.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/open_surfel_source.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 

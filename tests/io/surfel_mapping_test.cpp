@@ -1,4 +1,4 @@
-#include "surfels/surfel_mapping.h"
+#include "surfels/rows/surfel_mapping.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -15,8 +15,8 @@
 
 #include "io/surfel_cloud_test.h"
 #include "io/test_bytes.h"
-#include "surfels/surfel_source.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/open_surfel_source.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

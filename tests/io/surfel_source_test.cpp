@@ -1,5 +1,3 @@
-#include "surfels/surfel_source.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +7,8 @@
 #include <vector>
 
 #include "io/surfel_cloud_test.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/open_surfel_source.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

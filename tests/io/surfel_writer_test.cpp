@@ -1,4 +1,4 @@
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 #include <gtest/gtest.h>
 

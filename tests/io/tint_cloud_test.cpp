@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
 #include "io/surfel_cloud_test.h"
 #include "surfeit/convert.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "cloud/channels.h"
 #include "cloud/cloud_formats.h"
+#include "cloud/rows/channels.h"
 #include "io/surfel_cloud_test.h"
 #include "surfeit/convert.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "index/index_plan.h"
+#include "index/steps/index_plan.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {

@@ -16,7 +16,7 @@
 #include "octree/neighbours/leaf_levels.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

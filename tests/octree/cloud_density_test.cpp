@@ -1,4 +1,4 @@
-#include "index/cloud_density.h"
+#include "index/clouds/cloud_density.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
 #include "octree/test_scenes.h"
 
 namespace surfeit {

@@ -1,5 +1,5 @@
 // Clouds thinned by a grid: convert with a spacing.
-#include "index/grid_thinner.h"
+#include "index/clouds/grid_thinner.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

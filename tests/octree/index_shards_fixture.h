@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "index/index_shard_file.h"
+#include "index/shards/index_shard_file.h"
 #include "octree/test_scenes.h"
 #include "surfeit/index_shards.h"
 

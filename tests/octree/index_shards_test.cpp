@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "index/index_shard_file.h"
-#include "index/index_shard_ranges.h"
+#include "index/shards/index_shard_file.h"
+#include "index/shards/index_shard_ranges.h"
 #include "octree/index_shards_fixture.h"
 #include "octree/test_scenes.h"
 

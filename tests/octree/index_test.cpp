@@ -12,6 +12,7 @@
 #include "octree/build/curve_sort.h"
 #include "octree/page/surfel_marks.h"
 #include "octree/test_scenes.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

@@ -11,7 +11,7 @@
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
 #include "surfeit/progress.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 

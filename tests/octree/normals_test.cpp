@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "cloud/cloud_formats.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
 #include "surfeit/index.h"

@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "cloud/cloud_formats.h"
-#include "index/scene_rows.h"
+#include "index/rows/scene_rows.h"
 #include "io/row_stream_test.h"
 #include "io/test_directory.h"
 #include "octree/neighbours/side_forest.h"
 #include "surfeit/index.h"
 #include "surfeit/normals.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -13,7 +13,7 @@
 #include "io/test_directory.h"
 #include "octree/test_scenes.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "index/stray_note.h"
+#include "index/notes/stray_note.h"
 #include "octree/build/curve_sort.h"
 #include "octree/test_scenes.h"
 #include "surfeit/cloud_info.h"

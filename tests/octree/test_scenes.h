@@ -18,8 +18,8 @@
 #include "octree/read/paged_octree.h"
 #include "surfeit/index.h"
 #include "surfeit/scene.h"
-#include "surfels/surfel_source.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_source.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 

@@ -13,7 +13,7 @@
 #include "gather/packet/packet_gatherer.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/index.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "cloud/ply/ply_writer.h"
 #include "random/indexed_scene.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

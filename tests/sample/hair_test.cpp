@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "sample/curves.h"
 #include "sample/hair_bytes.h"
+#include "sample/meshes/curves.h"
 #include "sample/scene_files.h"
 #include "surfeit/sample.h"
 

@@ -8,7 +8,7 @@
 
 #include "io/bgeo_json_bytes.h"
 #include "sample/hair_bytes.h"
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/scene_files.h"
 #include "surfeit/sample.h"
 

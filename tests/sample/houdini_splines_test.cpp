@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "io/bgeo_json_bytes.h"
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
+#include "sample/meshes/spline.h"
 #include "sample/scene_files.h"
-#include "sample/spline.h"
 
 namespace surfeit {
 namespace {

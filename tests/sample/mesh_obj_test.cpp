@@ -2,7 +2,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/scene_files.h"
 
 namespace surfeit {

@@ -1,4 +1,4 @@
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 
 #include <gmock/gmock.h>
 

@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/scene_files.h"
 
 namespace surfeit {

@@ -1,10 +1,10 @@
-#include "sample/obj_vertex_colors.h"
+#include "sample/meshes/obj_vertex_colors.h"
 
 #include <gmock/gmock.h>
 
 #include <array>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/scene_files.h"
 
 namespace surfeit {

@@ -1,4 +1,4 @@
-#include "sample/polygon.h"
+#include "sample/meshes/polygon.h"
 
 #include <gtest/gtest.h>
 

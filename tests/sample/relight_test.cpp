@@ -14,7 +14,7 @@
 #include "sample/scene_files.h"
 #include "surfeit/index.h"
 #include "surfeit/scene.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

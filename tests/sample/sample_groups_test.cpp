@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sample/mesh.h"
+#include "sample/meshes/mesh.h"
 #include "sample/scene_files.h"
 #include "surfeit/group_names.h"
 #include "surfeit/index.h"

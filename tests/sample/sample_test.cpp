@@ -10,6 +10,7 @@
 
 #include "core/long_side.h"
 #include "sample/scene_files.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 namespace {

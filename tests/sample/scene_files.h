@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "surfeit/progress.h"
-#include "surfels/surfel_source.h"
+#include "surfels/open_surfel_source.h"
 
 namespace surfeit {
 

@@ -1,4 +1,4 @@
-#include "sample/texture.h"
+#include "sample/meshes/texture.h"
 
 #include <cmath>
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "cloud/channels.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_layout.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -4,9 +4,9 @@
 // Channels. Positions are P.X P.Y P.Z, also with the endings .R .G .B or in small letters, or
 // position.*, normals N.* or normal.*, all with any layer in front (ViewLayer.Position.X); others
 // by --channels LAYER=position. Rows are x y z, nx ny nz where there are normals, pixel_x pixel_y
-// (int32, coordinates of the data window), and the other channels by cloud/channels.h: LAYER.R .G
-// .B as a color, LAYER.X .Y .Z as a vector, R G B as `color`, A as `alpha`, Z or depth as `depth`,
-// all as float32 whether the file has half or float; integers stay uint32.
+// (int32, coordinates of the data window), and the other channels by cloud/rows/channels.h: LAYER.R
+// .G .B as a color, LAYER.X .Y .Z as a vector, R G B as `color`, A as `alpha`, Z or depth as
+// `depth`, all as float32 whether the file has half or float; integers stay uint32.
 //
 // Mask. A pixel is a row when all of these hold, as far as the channels are there: alpha is above
 // 0; depth is finite and below 1e30; the position is finite; position and normal are not both
@@ -24,8 +24,8 @@
 #include <string>
 #include <string_view>
 
-#include "cloud/row_reader.h"
-#include "cloud/row_reader_options.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_reader_options.h"
 
 namespace surfeit {
 

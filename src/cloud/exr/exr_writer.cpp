@@ -11,9 +11,9 @@
 #include <string_view>
 #include <utility>
 
-#include "cloud/channels.h"
 #include "cloud/exr/exr_image_writer.h"
 #include "cloud/exr/exr_reader.h"
+#include "cloud/rows/channels.h"
 #include "storage/byte_output.h"
 
 namespace surfeit {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "cloud/houdini/bgeo_curves.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

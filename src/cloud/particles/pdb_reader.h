@@ -16,8 +16,8 @@
 #include <string>
 #include <string_view>
 
-#include "cloud/row_reader.h"
-#include "cloud/row_reader_options.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_reader_options.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cloud/parts/stored_values.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "storage/byte_coding.h"
 
 namespace surfeit {

@@ -17,7 +17,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
 #include "storage/byte_input.h"
 #include "surfeit/status.h"
 

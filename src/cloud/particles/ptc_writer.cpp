@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "cloud/channels.h"
 #include "cloud/particles/ptc_format.h"
 #include "cloud/particles/ptc_reader.h"
+#include "cloud/rows/channels.h"
 #include "core/assert.h"
 #include "storage/byte_output.h"
 

@@ -8,12 +8,12 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/channels.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_layout.h"
 
 namespace surfeit {
 
-// How a format calls a channel of cloud/channels.h.
+// How a format calls a channel of cloud/rows/channels.h.
 struct ChannelName {
   std::string_view channel, name;
 };

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/row_reader.h"
+#include "cloud/rows/row_reader.h"
 
 namespace surfeit {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "cloud/row_reader.h"
+#include "cloud/rows/row_reader.h"
 #include "storage/byte_input.h"
 
 namespace surfeit {

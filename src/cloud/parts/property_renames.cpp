@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "cloud/property_aliases.h"
+#include "cloud/rows/property_aliases.h"
 
 namespace surfeit {
 namespace {

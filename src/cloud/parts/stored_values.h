@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "cloud/channels.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_layout.h"
 
 namespace surfeit {
 

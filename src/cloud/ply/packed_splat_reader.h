@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "cloud/ply/ply_format.h"
-#include "cloud/row_reader.h"
+#include "cloud/rows/row_reader.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -8,13 +8,12 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/ply_encoding.h"
+#include "cloud/rows/row_layout.h"
 #include "storage/byte_input.h"
 #include "surfeit/status.h"
 
 namespace surfeit {
-
-enum class PlyEncoding : std::uint8_t { kAscii, kBinaryLittleEndian, kBinaryBigEndian };
 
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::kBinaryLittleEndian;

@@ -5,13 +5,13 @@
 #include <optional>
 #include <utility>
 
-#include "cloud/channels.h"
 #include "cloud/parts/property_renames.h"
 #include "cloud/ply/packed_splat_reader.h"
 #include "cloud/ply/ply_reader.h"
 #include "cloud/ply/ply_writer.h"
 #include "cloud/ply/splat_reader.h"
-#include "cloud/surfel_names.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/surfel_names.h"
 
 namespace surfeit {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "cloud/row_reader.h"
-#include "cloud/row_reader_options.h"
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_reader_options.h"
+#include "cloud/rows/row_writer.h"
 
 namespace surfeit {
 

@@ -12,8 +12,8 @@
 #include <string_view>
 #include <utility>
 
-#include "cloud/srgb_curve.h"
-#include "cloud/surfel_names.h"
+#include "cloud/rows/srgb_curve.h"
+#include "cloud/rows/surfel_names.h"
 
 namespace surfeit {
 namespace {

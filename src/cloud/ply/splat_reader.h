@@ -22,7 +22,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_reader.h"
+#include "cloud/rows/row_reader.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

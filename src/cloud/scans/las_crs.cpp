@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/crs_units.h"
+#include "cloud/rows/crs_units.h"
 #include "cloud/scans/las_format.h"
 #include "core/crs_comment.h"
 #include "storage/byte_coding.h"

@@ -9,9 +9,9 @@
 #include <unordered_set>
 #include <utility>
 
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/surfel_names.h"
 #include "cloud/scans/las_reader.h"
-#include "cloud/surfel_names.h"
 #include "storage/byte_coding.h"
 
 namespace surfeit {

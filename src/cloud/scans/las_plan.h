@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "cloud/scans/las_format.h"
 #include "cloud/scans/las_values.h"
 #include "surfeit/status.h"

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/row_reader.h"
-#include "cloud/row_reader_options.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_reader_options.h"
 #include "cloud/scans/las_format.h"
 
 namespace surfeit {
@@ -27,7 +27,7 @@ Result<std::unique_ptr<RowReader>> openLas(const std::string& path,
 // The header of a reader of LAS, which lives as long as it; nullptr for any other.
 const LasHeader* lasHeaderOf(const RowReader* reader);
 
-// What the values of a field are called in rows (cloud/channels.h).
+// What the values of a field are called in rows (cloud/rows/channels.h).
 std::vector<std::string> lasPropertyNames(const LasField& field,
                                           std::span<const ChannelRename> renames);
 

@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "cloud/channels.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_layout.h"
 
 namespace surfeit {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_writer.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "cloud/ply/ply_number.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "cloud/text/text_rows.h"
 
 namespace surfeit {

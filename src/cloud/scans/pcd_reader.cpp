@@ -10,13 +10,13 @@
 #include <utility>
 #include <vector>
 
-#include "cloud/number_change.h"
-#include "cloud/packed_colors.h"
 #include "cloud/parts/bytes_behind.h"
 #include "cloud/parts/counted_row_reader.h"
 #include "cloud/parts/fixed_record_reader.h"
 #include "cloud/parts/property_renames.h"
 #include "cloud/parts/spooled_input.h"
+#include "cloud/rows/number_change.h"
+#include "cloud/rows/packed_colors.h"
 #include "cloud/scans/lzf_stream.h"
 #include "cloud/text/text_rows.h"
 #include "cloud/text/xyz_layout.h"

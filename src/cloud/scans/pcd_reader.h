@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "cloud/row_reader.h"
-#include "cloud/row_reader_options.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_reader_options.h"
 #include "cloud/scans/pcd_format.h"
 
 namespace surfeit {

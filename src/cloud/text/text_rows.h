@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "storage/byte_input.h"
 #include "surfeit/status.h"
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 
 namespace surfeit {
 namespace {

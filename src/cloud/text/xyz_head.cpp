@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "cloud/text/text_rows.h"
 
 namespace surfeit {

@@ -8,7 +8,7 @@
 #include <iterator>
 
 #include "cloud/parts/property_renames.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "cloud/text/text_rows.h"
 #include "cloud/text/xyz_units.h"
 

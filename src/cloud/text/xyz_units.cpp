@@ -6,7 +6,7 @@
 #include <cctype>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "cloud/text/text_rows.h"
 #include "surfeit/length_unit.h"
 

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "cloud/channels.h"
 #include "cloud/ply/ply_number.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_layout.h"
 #include "core/text_case.h"
 #include "core/up_comment.h"
 #include "storage/byte_output.h"

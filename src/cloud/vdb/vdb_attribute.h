@@ -7,9 +7,9 @@
 #include <string>
 #include <string_view>
 
-#include "cloud/channels.h"
 #include "cloud/parts/stored_values.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_layout.h"
 
 namespace surfeit {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cloud/row_layout.h"
+#include "cloud/rows/row_layout.h"
 #include "cloud/vdb/vdb_cursor.h"
 #include "surfeit/status.h"
 

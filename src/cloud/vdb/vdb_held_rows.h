@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_writer.h"
 #include "surfeit/status.h"
 
 namespace surfeit {

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <set>
 
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
 #include "cloud/vdb/vdb_coding.h"
 #include "cloud/vdb/vdb_held_rows.h"
 #include "cloud/vdb/vdb_output.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "cloud/row_reader.h"
-#include "cloud/row_reader_options.h"
+#include "cloud/rows/row_reader.h"
+#include "cloud/rows/row_reader_options.h"
 #include "cloud/vdb/vdb_tree.h"
 #include "surfeit/status.h"
 

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <set>
 
-#include "cloud/channels.h"
+#include "cloud/rows/channels.h"
 #include "cloud/vdb/vdb_coding.h"
 #include "cloud/vdb/vdb_held_rows.h"
 #include "cloud/vdb/vdb_output.h"

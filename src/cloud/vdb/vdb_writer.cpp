@@ -6,7 +6,7 @@
 #include <cctype>
 #include <set>
 
-#include "cloud/surfel_names.h"
+#include "cloud/rows/surfel_names.h"
 #include "cloud/vdb/vdb_volume_reader.h"
 #include "cloud/vdb/vdb_writers.h"
 #include "storage/byte_output.h"

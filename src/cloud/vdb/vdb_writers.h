@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "cloud/row_writer.h"
+#include "cloud/rows/row_writer.h"
 #include "cloud/vdb/vdb_volume_reader.h"
 #include "surfeit/status.h"
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <string>
 
-#include "cloud/channels.h"
-#include "cloud/row_layout.h"
+#include "cloud/rows/channels.h"
+#include "cloud/rows/row_layout.h"
 
 namespace surfeit {
 

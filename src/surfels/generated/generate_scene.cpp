@@ -12,7 +12,7 @@
 #include "surfeit/output.h"
 #include "surfels/generated/scene_generator.h"
 #include "surfels/generated/scene_recipe.h"
-#include "surfels/surfel_writer.h"
+#include "surfels/rows/surfel_writer.h"
 
 namespace surfeit {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "surfeit/status.h"
-#include "surfels/surfel_source.h"
+#include "surfels/rows/surfel_source.h"
 
 namespace surfeit {
 

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
-#include "cloud/row_layout.h"
-#include "surfels/surfel_source.h"
+#include "cloud/rows/row_layout.h"
+#include "core/surfel_limits.h"
 
 namespace surfeit {
 namespace {
