@@ -32,12 +32,13 @@ struct Baked {
 
 class Fidelity : public DirectoryTest {
  protected:
-  void sample(const std::string& mesh, const Surroundings& surroundings, std::uint64_t receivers) {
+  void sample(const std::string& mesh, const Surroundings& surroundings, std::uint64_t receivers,
+              std::uint64_t surfels = 1'000'000) {
     SampleOptions options;
     options.surroundings = surroundings;
     options.count = receivers;
     ASSERT_TRUE(sampleMeshes({mesh}, path("receivers.ply"), options, progress_).ok());
-    options.count = 1'000'000;
+    options.count = surfels;
     ASSERT_TRUE(sampleMeshes({mesh}, path("cloud.ply"), options, progress_).ok());
     ASSERT_TRUE(indexClouds({path("cloud.ply")}, path("scene.sft"), {}, progress_).ok());
     Result<ReferenceScene> reference = ReferenceScene::load({mesh}, surroundings, 2, progress_);

@@ -47,7 +47,8 @@ TEST_F(Fidelity, FloorBesideTheBallOfTheDemo) {
       << rows;
   constexpr int kManyRays = 4096;
   measure("beside the ball, draft", QualityPreset::kDraft, kManyRays, {.005, .003, .045, .01});
-  measure("beside the ball, standard", QualityPreset::kStandard, kManyRays, {.003, .002, .025, .01});
+  measure("beside the ball, standard", QualityPreset::kStandard, kManyRays,
+          {.003, .002, .025, .01});
   measure("beside the ball, final", QualityPreset::kFinal, kManyRays, {.002, .001, .02, .01});
 }
 
