@@ -65,6 +65,10 @@ struct CutRules {
 
 // How much something counts for each receiver of a packet, 0..1.
 using LaneParts = std::array<float, kPacketReceivers>;
+// Null: wholly.
+inline float partOf(const LaneParts* parts, std::size_t i) {
+  return parts != nullptr ? (*parts)[i] : 1;
+}
 
 // The highest that anything of the node rises above its middle, in unit direction `up`: of what its
 // sphere and its slab have in common.
@@ -201,7 +205,7 @@ class CutWalk {
         below[i] = below[i - 1];
         continue;
       }
-      const float all = whole != nullptr ? (*whole)[i] : 1;
+      const float all = partOf(whole, i);
       below[i] = all > 0 ? all * openPart(node, receivers[i], rules_) : 0;
       own[i] = all - below[i];
       division.has_own = division.has_own || own[i] > 0;

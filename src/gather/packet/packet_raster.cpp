@@ -119,7 +119,7 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
 
 void PacketRaster::setFrame(const InstanceFrame* frame) {
   frame_ = frame;
-  local_centre_ = frame != nullptr ? frame->toLocal(view_.centre) : view_.centre;
+  local_centre_ = toLocal(view_.centre);
   local_radius_ = frame != nullptr ? view_.radius / frame->scale : view_.radius;
 }
 
@@ -255,11 +255,10 @@ bool PacketRaster::keepSeenParts(const SeenOf& seenOf, const LaneParts* parts,
   LaneParts seen;
   bool is_all = true, is_none = true;
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
-    const glm::vec3 eye(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
-    const float part = seenOf(frame_ != nullptr ? frame_->toLocal(eye) : eye);
+    const float part = seenOf(toLocal(eye(i)));
     is_all = is_all && part == 1;
     is_none = is_none && part == 0;
-    seen[i] = part * (parts != nullptr ? (*parts)[i] : 1);
+    seen[i] = part * partOf(parts, i);
   }
   if (!is_all) place = keepParts(&seen);
   return !is_none;
@@ -335,10 +334,8 @@ void PacketRaster::addRoughNode(const Node& node, const LaneParts* lane_parts,
   }
   for (std::size_t i = 0; i < receiver_count_; ++i) {
     LaneParts own{};
-    own[i] = lane_parts != nullptr ? (*lane_parts)[i] : 1;
-    if (own[i] == 0) continue;
-    const glm::vec3 eye(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
-    addRoughNode(node, frame_ != nullptr ? frame_->toLocal(eye) : eye, keepParts(&own));
+    own[i] = partOf(lane_parts, i);
+    if (own[i] != 0) addRoughNode(node, toLocal(eye(i)), keepParts(&own));
   }
 }
 

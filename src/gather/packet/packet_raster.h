@@ -129,6 +129,11 @@ class PacketRaster {
   glm::vec3 toWorld(const glm::vec3& place) const {
     return frame_ != nullptr ? frame_->toWorld(place) : place;
   }
+  glm::vec3 toLocal(const glm::vec3& place) const {
+    return frame_ != nullptr ? frame_->toLocal(place) : place;
+  }
+  // Of a receiver, in the world.
+  glm::vec3 eye(std::size_t i) const { return {lanes_.x[i], lanes_.y[i], lanes_.z[i]}; }
   void bringToWorld(Patch& patch) const;
   void orderLastPatch(std::uint32_t faces);
   PacketCanvas canvas() const;
