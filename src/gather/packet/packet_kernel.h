@@ -146,7 +146,6 @@ struct PacketCanvas {
   float turned;           // -1 when one-sided surfels were turned to show their backs, else 1
   float max_distance_sq;  // may be infinite
   glm::vec3 luminance;    // of the colors whose light counts in its direction
-  glm::vec3 centre;       // of the packet
   float packet_radius;
   float* pixels;  // aligned to 64 bytes
   // Faces that were drawn to; the pixels of others hold nothing of this packet.

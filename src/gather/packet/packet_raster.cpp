@@ -448,7 +448,6 @@ PacketCanvas PacketRaster::canvas() const {
           .turned = rules_.quality.sides == GatherSides::kBack ? -1.f : 1.f,
           .max_distance_sq = max_distance_sq_,
           .luminance = luminance_,
-          .centre = view_.centre,
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
           .is_face_used = &is_face_used_,
