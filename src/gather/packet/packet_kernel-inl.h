@@ -70,8 +70,9 @@ HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& pat
     if (hn::AllFalse(d, hn::Or(splatted, sight.traced))) continue;
     if (canvas.rules->hasConeRaster()) return 1;
     if (!hn::AllFalse(d, sight.traced)) {
-      const V3 half = {HalfSide(patch, patch.normal, 0), HalfSide(patch, patch.normal, 1),
-                       HalfSide(patch, patch.normal, 2)};
+      const V3 half = {HalfSide(patch, Splat(patch.normal.x)),
+                       HalfSide(patch, Splat(patch.normal.y)),
+                       HalfSide(patch, Splat(patch.normal.z))};
       faces |= FacesThatReach(RayStartTo(sight, receivers), half, sight.traced);
     }
     if (!hn::AllFalse(d, splatted)) {

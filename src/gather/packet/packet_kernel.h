@@ -142,8 +142,6 @@ struct PacketCanvas {
   const GatherRules* rules;
   const RasterGeometry* geometry;
   const DirectionWeights* weights;
-  float bias;             // of rays, in radii of the surfel
-  float turned;           // -1 when one-sided surfels were turned to show their backs, else 1
   float max_distance_sq;  // may be infinite
   glm::vec3 luminance;    // of the colors whose light counts in its direction
   float packet_radius;

@@ -444,8 +444,6 @@ PacketCanvas PacketRaster::canvas() const {
           .rules = &rules_,
           .geometry = &geometry_,
           .weights = &weights_,
-          .bias = rules_.quality.bias,
-          .turned = rules_.quality.sides == GatherSides::kBack ? -1.f : 1.f,
           .max_distance_sq = max_distance_sq_,
           .luminance = luminance_,
           .packet_radius = view_.radius,
