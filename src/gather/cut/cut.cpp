@@ -109,10 +109,7 @@ struct Places {
   }
 
  private:
-  // Height of the middle for the normal in the cone that comes closest to it. The highest that
-  // anything of the node rises above its middle, of what its sphere and its slab have in common,
-  // falls with the cosine of the angle between the normals: that of the one in the cone that is
-  // farthest from the node's.
+  // Of anything of the node, for any normal in the cone.
   V HighestPoint(const PacketView& from, const Nodes& nodes) const {
     const V zero = hn::Zero(D()), one = Splat(1);
     const V height = Dot(offset, from.axis);
@@ -140,16 +137,7 @@ M IsOutsideCones(const PacketView& view, const Nodes& nodes, const Places& place
   return hn::Gt(outside, hn::Add(nodes.radius, Splat(view.radius)));
 }
 
-// Whether every surfel below shows its back to every receiver. With m the normal of one, at an
-// angle b to the node's normal n, x its place and q that of a receiver,
-//
-//   m . (q - x) <= cos b n . (q - x) + sin b |(q - x) across n|,
-//
-// of which the first factor is at most -depth, the second at most aside: below zero for all b up
-// to the angle of the cone if depth cos > aside sin there.
-//
-// Rays begin before the receiver by the bias, at most in radii of the node: what they see the front
-// of is not dropped.
+// Whether every surfel below shows its back to every receiver, and to where its rays begin.
 M TurnsAway(const PacketView& view, const Nodes& nodes, const Places& places,
             const CutRules& rules) {
   const V along = hn::Mul(Splat(rules.facing), Dot(places.offset, nodes.normal));

@@ -213,14 +213,8 @@ class Brush {
   // The shape of a patch on the plane of the face; it may lie outside the face. `offset`: along the
   // face; `area`: the visible area times the distance.
   //
-  // With a, b, c the entries of the patch's spread on the face, a row is shifted by b / c for each
-  // unit of v and as wide as what is left of a: the exact image, to first order, of a rectangle on
-  // a plane of the world, so neighbours tile. (With I - n n^T for nodes, too: AO RMSE .0037 instead
-  // of .0031 for the bunny.) Distances along the axis vary over a large patch: the mean of 1 / w^3
-  // is greater than that of its middle, and the middle of the image lies farther out than the image
-  // of the middle (docs/algorithm.md, "The raster cube").
-  //
-  // A patch with gaps is spread over its outline, and covers as much less of it: times `part`.
+  // (docs/algorithm.md, "The raster cube".) A patch with gaps is spread over its outline, and
+  // covers as much less of it: times `part`.
   HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse,
                                   V& part) const {
     const V one = Splat(1), least = Splat(kFidelity.least_spread);

@@ -89,25 +89,10 @@ HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& pat
   return faces;
 }
 
-// With w_i the weights, area or power, of the surfels of a node, x_i = d . n_i and T = sum w_i, the
-// expansion of the clamped cosine (memo 3.2) is, band by band,
-//
-//   s0 = T / 4,   s1 = sum w x / 2,   s2 = (5/32) sum w (3 x^2 - 1),
-//
-// so the coefficients hold the first two moments of x exactly. What they do not hold is the shape
-// of its distribution, and the truncated series guesses badly there: a flat cluster shows 17/16 of
-// its area head-on, 3/32 along its edge, -1/25 somewhat behind that and 1/16 from the back. We take
-// x as spread evenly over [m - r, m + r] with mean m = sum w x / T and variance r^2 / 3, and get
-//
-//   T m for m >= r (all face us),   0 for m <= -r (all face away),   T (m + r)^2 / (4 r) between.
-//
-// That is exact for a single normal (r = 0), for evenly spread ones (m = 0, r = 1), and for
-// spheres, whose coefficients are those of four times their weight spread evenly. It is never
-// negative. T m and T r are `mean` and `range` below. Radiosity is power over area by this rule,
-// and what it sees nearly nothing of sends the mean. Areas by themselves are known better: with sum
-// w P2(x) = 3.2 s2, and sum w P4(x), which the node has, facingAreas bounds them.
-//
-// All four kinds of coefficients at once, and band 4 of the area.
+// docs/algorithm.md, "Contributions". Power over area has x spread evenly over [m - r, m + r], and
+// is never negative, as the truncated series is: T m for m >= r, 0 for m <= -r, T (m + r)^2 / (4 r)
+// between. T m and T r are `mean` and `range` below, of all four kinds of coefficients at once.
+// What shows nearly nothing sends the mean.
 void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sight) {
   const hn::CappedTag<float, kNodeShKinds> d4;
   const ShCoefficients basis = shBasis(-direction);

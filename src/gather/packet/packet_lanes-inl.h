@@ -163,7 +163,10 @@ struct Sight {
 
 // How much of what is so far away is ray traced.
 inline V NearPart(const Patch& patch, const Sight& sight) {
-  const float inverse = 1 / nearBorderSq(patch.near_distance);
+  // Finite and positive, for a surfel may be at a receiver; then it is near at any setting
+  const float inverse =
+      1 / std::clamp(patch.near_distance * patch.near_distance, std::numeric_limits<float>::min(),
+                     std::numeric_limits<float>::max());
   const V rest = hn::NegMulAdd(sight.distance_sq, Splat(inverse), Splat(1));
   const V part = hn::Mul(rest, Splat(1 / (1 - kFidelity.whole_near * kFidelity.whole_near)));
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
@@ -196,12 +199,10 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 
   // The bias keeps disks of the receiver's own surface from covering it. What faces the receiver
   // closely is none of those, nor what rises above its plane and is seen from both sides: either
-  // would be looked through. So the bias fades out with the normal, and of two-sided surfels, whose
-  // normal is one of two, with the height. (A dragon on a plane: AO RMSE .0254 with a constant
-  // bias, .0218 fading with the normal.) Ribbons are as rough as they are wide. (AO RMSE of hair
-  // .0088; .0117 with radii.) Along the receiver's normal a disk reaches radius * sin(angle of
-  // normals) above its middle, and must rise above the horizon of the rays: this drops the
-  // receiver's own surface, which would cover it through rounding alone
+  // would be looked through. (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 fading
+  // with the normal.) Ribbons are as rough as they are wide. (AO RMSE of hair .0088; .0117 with
+  // radii.) Along the receiver's normal a disk reaches radius * sin(angle of normals) above its
+  // middle, and must rise above the horizon of the rays: its own surface does so through rounding
   const V cosine = Dot(receivers.normal, patch.normal);
   const GatherQuality& quality = canvas.rules->quality;
   const bool is_turned = patch.seen == Patch::Seen::kFront && quality.sides == GatherSides::kBack;

@@ -3,20 +3,8 @@
 // the packet's cut gives, sorts it by distance from the packet's centre, draws it front to back and
 // integrates (memo 3.4 and 3.5).
 //
-// Each lane is the raster of one receiver; what the lanes share is the walk and the order of what
-// lies outside the packet (packet_order-inl.h). A rough node is seen from the packet's centre. A
-// packet of one receiver is the definition.
-//
-// Contributions come front to back, in the order of the middles of their depth ranges. Coverage
-// adds up within a layer and covers between layers: neighbouring surfels of one surface share a
-// pixel without overlapping, so their coverages add until the layer is full; a surface behind is
-// hidden by the part that the layers before it cover, and by more where both are likely to cover
-// the same side of the pixel (Patch::nested). A contribution belongs to the layer before it
-// when their depth ranges meet, and the less, the wider the gap between them (Fidelity::layer_gap).
-// Adding everything, the memo's rule, lets the half-covered silhouettes of things behind each other
-// fill a pixel. (On a plane with 500 spheres, near field 8: AO RMSE .0135 and bias +.007 with it,
-// .0095 and
-// -.004 with layers. docs/algorithm.md, "Coverage")
+// docs/algorithm.md tells what the lanes share ("Packets") and how contributions cover pixels
+// ("Coverage").
 #pragma once
 
 #include <hwy/aligned_allocator.h>
