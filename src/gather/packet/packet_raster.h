@@ -112,8 +112,6 @@ class PacketRaster {
   void addLobe(const Lobe& lobe, const glm::vec3& normal);
   void addRoughNode(const Node& node, const LaneParts* lane_parts, std::uint32_t parts);
   void addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts);
-  std::uint32_t facesThatSee(const Patch& patch) const;
-  std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
   glm::vec3 toWorld(const glm::vec3& place) const {
     return frame_ != nullptr ? frame_->toWorld(place) : place;
   }
@@ -123,7 +121,7 @@ class PacketRaster {
   // Of a receiver, in the world.
   glm::vec3 eye(std::size_t i) const { return {lanes_.x[i], lanes_.y[i], lanes_.z[i]}; }
   void bringToWorld(Patch& patch) const;
-  void orderLastPatch(std::uint32_t faces);
+  void orderLastPatch(const PacketCanvas& canvas);
   PacketCanvas canvas() const;
 
   const PacketKernel& kernel_;
