@@ -178,8 +178,8 @@ inline std::uint32_t index(std::uint64_t key) { return static_cast<std::uint32_t
 struct PacketKernel {
   const char* name;  // of the instruction set
   void (*findSeenPixels)(const PacketCanvas& canvas, SeenPixels& seen);
-  // The faces on which some receiver may see something of the patch, as bits; of a cone's raster the
-  // first.
+  // The faces on which some receiver may see something of the patch, as bits; of a cone's raster
+  // the first.
   std::uint32_t (*facesThatSee)(const PacketCanvas& canvas, const Patch& patch);
   // What the receivers see of a patch with this lobe.
   void (*seeLobe)(const PacketLanes& lanes, std::size_t receiver_count, const Patch& patch,

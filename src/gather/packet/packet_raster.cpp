@@ -148,7 +148,6 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
   has_tints_ |= node.isTinted();
   const std::uint32_t parts = keepParts(lane_parts);
   const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
-  gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
   if (node.isRough()) return addRoughNode(node, lane_parts, parts);
   const bool has_hidden = rules_.groups == kAllGroups && hasHiddenPieces(node);
   const auto add = [&](std::size_t i, const Facet& facet) {
@@ -231,9 +230,12 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);
   patch.disk_area = facet.area;
-  patch.area = patch.is_spread ? std::max(facet.area, largestOutline(facet)) : facet.area;
-  patch.most_area = mostVisibleArea(facet);
-  if (sides != GatherSides::kBack) patch.radiosity = gain_ * facet.radiosity;
+  patch.area = facet.area;
+  // The root of two principal moments is at most half of the trace
+  if (patch.is_spread) patch.area = std::max(patch.area, 2 * kPi * facet.covariance.trace());
+  patch.most_area = std::min(facet.area, kPi * facet.radius * facet.radius);
+  const float gain = rules_.gains.ofAlike(node.groups);  // the cut opens others
+  if (sides != GatherSides::kBack) patch.radiosity = gain * facet.radiosity;
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + local_radius_ / distance;
   if (is_rim) patch.range = range;
@@ -289,7 +291,8 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   patch.parts = parts;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) {
-    patch.radiosity = (gain_ * front / (round_area * node.opacity(color_))) * seen.radiosity;
+    const float gain = rules_.gains.ofAlike(node.groups);
+    patch.radiosity = (gain * front / (round_area * node.opacity(color_))) * seen.radiosity;
   }
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);

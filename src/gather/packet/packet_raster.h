@@ -142,7 +142,6 @@ class PacketRaster {
   const InstanceFrame* frame_ = nullptr;
   glm::vec3 local_centre_{0};  // of the view, in the frame of what is added
   float local_radius_ = 0;
-  float gain_ = 1;  // of the node that is added
   int color_ = 0;
   bool has_tints_ = false;
   glm::vec3 luminance_{0};               // PacketCanvas::luminance

@@ -110,6 +110,13 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
   for (std::size_t i = 0; i < 3; ++i) spread.entries[i] += kStep * node.covariance.trace();
   return ellipseArea(spread, direction);
 }
+
+// The area of a facet over that of the ellipse that spreads as it does: about 1 for a piece of
+// surface, less where it has gaps, more where it lies behind itself.
+float facetLayers(const Facet& facet) {
+  const float ellipse = ellipseArea(facet.covariance, glm::normalize(facet.normal));
+  return ellipse > 0 ? facet.area / ellipse : 1;
+}
 }  // namespace
 
 // A surface covers no more than the outline of the sphere that holds all disks, and than a part of
@@ -131,18 +138,6 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
                                                 float(node.surfel_count));
   const float area = surface + thicket * (outline - surface), solid = opacity * surface;
   return {area, (solid + thicket * (hidden - solid)) / area, std::max(area, most)};
-}
-
-float mostVisibleArea(const Facet& facet) {
-  return std::min(facet.area, kPi * facet.radius * facet.radius);
-}
-
-// The root of two principal moments is at most half of the trace.
-float largestOutline(const Facet& facet) { return 2 * kPi * facet.covariance.trace(); }
-
-float facetLayers(const Facet& facet) {
-  const float ellipse = ellipseArea(facet.covariance, glm::normalize(facet.normal));
-  return ellipse > 0 ? facet.area / ellipse : 1;
 }
 
 bool isFilled(const Node& node, const Facet& facet) {
