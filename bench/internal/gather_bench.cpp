@@ -1,5 +1,5 @@
 // What a gather costs: rates of our engines at dense and at scattered receivers, what they visit
-// and draw, time by phase, gain from threads, growth with the number of surfels, and what it costs
+// and draw, gain from threads, growth with the number of surfels, and what it costs
 // to keep only a part of the scene in memory.
 //
 // A rate is receivers per second of one thread's processor time, the median of rounds in which all
@@ -25,7 +25,6 @@ namespace {
 struct CostOptions {
   GatherBenchOptions common;
   double memory_share = 0;  // of the decoded scene; 0: no such run
-  bool has_phases = true;
 };
 
 constexpr GatherMode kModes[] = {GatherMode::kOcclusion, GatherMode::kBleeding};
@@ -55,12 +54,11 @@ struct Row {
   EngineWork work{};                          // of one pass, on one thread
 };
 
-// What a pass over the set takes; with phases when the engine has them.
+// What a pass over the set takes.
 Result<EngineWork> measureWork(const Row& row, const CostOptions& options, PagedOctree& octree,
                                const ReceiverSet& set) {
   SURFEIT_ASSIGN_OR_RETURN(std::unique_ptr<GatherEngine> made,
                            makeEngine(row.engine, row.mode, options.common.quality));
-  if (options.has_phases) made->measurePhases();
   const GatherEngine& engine = *made;
   Workers workers;
   workers.push_back(std::make_unique<EngineWorker>(std::move(made), octree));
@@ -71,18 +69,11 @@ Result<EngineWork> measureWork(const Row& row, const CostOptions& options, Paged
 
 void printRow(const Row& row) {
   const double receivers = double(row.work.receivers);
-  fmt::print("  {:<10}{:<11}{:>7}{:>10.0f}{:>10.0f}{:>9.1f}{:>9.1f}{:>9.1f}", row.engine,
+  fmt::print("  {:<10}{:<11}{:>7}{:>10.0f}{:>10.0f}{:>9.1f}{:>9.1f}{:>9.1f}\n", row.engine,
              modeName(row.mode), row.workers.size(), median(row.rates), median(row.wall_rates),
              double(row.work.nodes_visited) / receivers,
              double(row.work.surfels_visited) / receivers,
              double(row.work.contributions) / receivers);
-  const GatherPhases& phases = row.work.phases;
-  if (const double sum = phases.sum(); sum > 0) {
-    fmt::print("  walk {:.0f} %, sort {:.0f} %, draw {:.0f} %, integrate {:.0f} %",
-               100 * phases.walk / sum, 100 * phases.sort / sum, 100 * phases.draw / sum,
-               100 * phases.integrate / sum);
-  }
-  fmt::print("\n");
 }
 
 // Receivers per second of all threads over those of one.
@@ -231,12 +222,11 @@ Status runScene(const CostOptions& options, const std::string& name, const Scene
 
 int main(int argc, char** argv) {
   surfeit::CostOptions options;
-  CLI::App app("What our gathers cost: rates, work, phases, threads, growth, memory.");
+  CLI::App app("What our gathers cost: rates, work, threads, growth, memory.");
   surfeit::addGatherBenchOptions(app, options.common);
   app.add_option("--memory", options.memory_share,
                  "Also gather with this share of the decoded scene in memory, 0..1")
       ->check(CLI::Range(0.0, 1.0));
-  app.add_flag("!--no-phases", options.has_phases, "Leave out time by phase");
   app.footer(
       "Columns: receivers per second of one thread's processor time, and of all threads by the\n"
       "clock; nodes and surfels visited and patches drawn, per receiver. Receivers that are\n"

@@ -37,13 +37,8 @@ class PacketEngine : public GatherEngine {
     return {.receivers = receivers_,
             .nodes_visited = work.nodes_visited,
             .surfels_visited = work.surfels_visited,
-            .contributions = work.patches,
-            .phases = {.walk = work.walk_seconds,
-                       .sort = work.sort_seconds,
-                       .draw = work.draw_seconds,
-                       .integrate = work.integrate_seconds}};
+            .contributions = work.patches};
   }
-  void measurePhases() override { gatherer_.measurePhases(true); }
 
  private:
   PacketGatherer gatherer_;

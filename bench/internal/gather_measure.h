@@ -18,21 +18,11 @@
 
 namespace surfeit {
 
-// Seconds of processor time by phase of a gather.
-struct GatherPhases {
-  double walk = 0;       // choosing the cut, page look-ups included
-  double sort = 0;       // into the order from front to back
-  double draw = 0;       // into the rasters, near field included
-  double integrate = 0;  // the rasters
-  double sum() const { return walk + sort + draw + integrate; }
-};
-
 // What gathers took, summed. Receivers that are gathered together share what they visit and draw.
 struct EngineWork {
   std::uint64_t receivers = 0;
   std::uint64_t nodes_visited = 0, surfels_visited = 0;
   std::uint64_t contributions = 0;  // nodes and surfels drawn
-  GatherPhases phases{};            // while they are measured
 };
 
 // A way to gather from the octree. One thread at a time.
@@ -44,8 +34,6 @@ class GatherEngine {
                         std::span<GatherResult> results) = 0;
   // Of all gathers so far.
   virtual EngineWork work() const = 0;
-  // Measures phases from now on, which costs time; an engine that cannot measures none.
-  virtual void measurePhases() {}
 };
 
 // Names of all engines, and one of them. kInvalidArgument for another name.

@@ -15,7 +15,7 @@
 
 #include "bench/internal/gather_measure.h"
 #include "bench/internal/gather_scenes.h"
-#include "gather/packet/interpolating_gatherer.h"
+#include "gather/packet/group_gatherer.h"
 #include "gather/rules/gather_rules.h"
 
 namespace surfeit {
@@ -93,10 +93,11 @@ Status gatherWhole(PacketGatherer& gatherer, const Groups& groups, PagedOctree::
   return {};
 }
 
-Status gatherSome(InterpolatingGatherer& gatherer, const Groups& groups,
-                  PagedOctree::Reader& reader, Results& results) {
+Status gatherSome(GroupGatherer& gatherer, const Groups& groups, PagedOctree::Reader& reader,
+                  Results& results) {
+  WorldReader world(reader);
   for (std::size_t i = 0; i < groups.groups.size(); ++i) {
-    SURFEIT_RETURN_IF_ERROR(gatherer.gather(groups.groups[i], reader, results[i]));
+    SURFEIT_RETURN_IF_ERROR(gatherer.gather(groups.groups[i], world, results[i]));
   }
   return {};
 }
@@ -132,7 +133,7 @@ Status measure(const InterpolationOptions& options, const std::string& scene,
   GatherQuality quality;
   PacketGatherer whole(mode, quality);
   quality.max_variation = float(options.max_variation);
-  InterpolatingGatherer some(GatherRules(mode, quality));
+  GroupGatherer some(GatherRules(mode, quality));
   PagedOctree::Reader reader(octree);
   Results exact, found;
   for (const auto& group : groups.groups) exact.emplace_back(group.size());

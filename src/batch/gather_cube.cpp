@@ -98,53 +98,19 @@ std::vector<CubeFace> facesOf(const LocalReceiver& receiver, const GatherRules& 
   return faces;
 }
 
-// The pixels of a receiver, as they weigh in its result.
-class PixelViews {
- public:
-  PixelViews(const LocalReceiver& receiver, const GatherRules& rules,
-             const RasterGeometry& geometry)
-      : receiver_(receiver),
-        rules_(rules),
-        geometry_(geometry),
-        axis_(lobeAxis(receiver, rules)),
-        frame_(axis_),
-        weights_(rules, 1 / geometry.pixelsPerSlope()) {}
-
-  CubePixel view(std::size_t i, const PixelContent& content, const PixelRecord& record) const {
-    const RasterGeometry::Pixel& seen = geometry_.pixels()[i];
-    CubePixel pixel;
-    pixel.direction = rules_.hasConeRaster() ? frame_.toWorld(seen.direction) : seen.direction;
-    pixel.solid_angle = seen.solid_angle;
-    pixel.weight = weightOf(pixel.direction);
-    pixel.coverage = content.coverage;
-    pixel.occlusion = content.occlusion;
-    pixel.light = content.radiosity;
-    pixel.environment = content.open * environment(i, pixel);
-    pixel.depth = record.depth;
-    pixel.layers = record.layers();
-    pixel.filled = std::max(0.f, content.coverage - record.total);
-    pixel.kind = record.kind();
-    return pixel;
-  }
-
- private:
-  float weightOf(const glm::vec3& direction) const {
-    if (receiver_.isSpherical()) return 1;
-    return glm::dot(direction, receiver_.normal) > 0 ? weights_(glm::dot(direction, axis_)) : 0;
-  }
-  glm::vec3 environment(std::size_t i, const CubePixel& pixel) const {
-    if (rules_.environment == nullptr) return glm::vec3(0);
-    if (!rules_.hasConeRaster()) return rules_.environment_cube->pixels()[i];
-    return rules_.environment->lookup(pixel.direction, pixel.solid_angle);
-  }
-
-  const LocalReceiver& receiver_;
-  const GatherRules& rules_;
-  const RasterGeometry& geometry_;
-  const glm::vec3 axis_;
-  const ConeFrame frame_;
-  const DirectionWeights weights_;
-};
+CubePixel cubePixel(float solid_angle, const PixelContent& content, const PixelRecord& record) {
+  return {.direction = content.direction,
+          .solid_angle = solid_angle,
+          .weight = content.weight,
+          .coverage = content.coverage,
+          .occlusion = content.occlusion,
+          .light = content.radiosity,
+          .environment = content.open * content.environment,
+          .depth = record.depth,
+          .layers = record.layers(),
+          .filled = std::max(0.f, content.coverage - record.total),
+          .kind = record.kind()};
+}
 
 Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const Receiver& given,
                                     const GatherOptions& given_options, Progress& progress) {
@@ -182,10 +148,10 @@ Result<CubeImage> gatherCubeOrThrow(const std::string& scene_path, const Receive
   image.faces = facesOf(receiver, rules);
   std::vector<PixelContent> contents(raster.geometry().pixels().size());
   raster.readPixels(contents);
-  const PixelViews views(receiver, rules, raster.geometry());
   image.pixels.reserve(contents.size());
   for (std::size_t i = 0; i < contents.size(); ++i) {
-    image.pixels.push_back(views.view(i, contents[i], recorder.record(i)));
+    image.pixels.push_back(
+        cubePixel(raster.geometry().pixels()[i].solid_angle, contents[i], recorder.record(i)));
   }
   image.occlusion = result.occlusion;
   image.irradiance = result.irradiance;

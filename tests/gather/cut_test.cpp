@@ -84,9 +84,9 @@ TEST(Cut, ClassesOfSiblingsHoldForEveryReceiver) {
     for (int i = 0; i < 1 + trial % 8; ++i) siblings.push_back(randomNode(random));
     const std::vector<LocalReceiver> receivers = randomPacket(random, std::size_t(1 + trial % 5));
     const CutRules rules = {
-        trial % 7 == 0 ? 0.f : .1f, trial % 3 == 0 ? 2.f : 1e30f,
-        float(trial % 3 - 1),       trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups,
-        trial % 2 == 0 ? 4.f : 1.f, .125f};
+        trial % 7 == 0 ? 0.f : .1f,  trial % 3 == 0 ? 2.f : 1e30f,
+        float(trial % 3 - 1),        trial % 5 < 2 ? std::uint64_t(1 + trial % 7) : kAllGroups,
+        trial % 2 == 0 ? .25f : 1.f, .125f};
     GatherRules gather(GatherMode::kBleeding, {});
     if (trial % 4 == 0) gather.weights.cone_angle = .1f + .001f * float(trial % 1000);
     const PacketView view = viewPacket(receivers, gather);

@@ -13,7 +13,7 @@
 
 #include "batch/gather_input.h"
 #include "batch/gather_memory.h"
-#include "gather/packet/interpolating_gatherer.h"
+#include "gather/packet/group_gatherer.h"
 #include "gather/packet/packet_fit.h"
 #include "gather/rules/gather_outputs.h"
 #include "gather/rules/interpolation_limits.h"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "gather/packet/interpolating_gatherer.h"
+#include "gather/packet/group_gatherer.h"
 #include "random/indexed_scene.h"
 #include "random/random_scene.h"
 
@@ -94,8 +94,9 @@ void gatherScene(std::uint64_t seed, GatherMode mode, std::span<Counts> counts) 
 
   for (std::size_t i = 0; i < counts.size(); ++i) {
     quality.max_variation = kVariations[i];
-    InterpolatingGatherer some(GatherRules(mode, quality));
-    ASSERT_TRUE(some.gather(receivers, (*indexed)->reader(), found).ok());
+    GroupGatherer some(GatherRules(mode, quality));
+    WorldReader world((*indexed)->reader());
+    ASSERT_TRUE(some.gather(receivers, world, found).ok());
     counts[i].receivers += receivers.size();
     counts[i].interpolated += some.interpolatedCount();
     count(exact, found, kVariations[i], counts[i]);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
+#include <iterator>
 #include <limits>
 
 // Compiled once for every instruction set (Highway, "foreach_target").
@@ -25,12 +26,21 @@ namespace {
 // more on the way.
 constexpr float kRoundingSlack = 1e-4f;
 
-float shareOf(const Node& node) { return node.isFlat() ? 1 : kFidelity.uneven_share; }
-
-// What lies off the plane that it is drawn on by a pixel is seen in another one. (Small lights
-// differ from place to place by .065 of their power, without by .080; half a pixel makes nothing
-// better but the city, AO RMSE .0053 instead of .0056, at .6 of its rate.)
-float inverseOffPlane(const CutRules& rules) { return 1 / rules.pixel; }
+// A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
+// solid angle, or that share of it. A flat square of surfels has about 0.6 of its sphere's outline
+// as area, so this is close to the memo's test on the area, but it also opens sparse nodes, whose
+// area says nothing about how far their surfels spread. Never when only some of these are seen, or
+// when they have several gains. What lies off the plane that it is drawn on by a pixel is seen in
+// another one. (Small lights differ from place to place by .065 of their power, without by .080;
+// half a pixel makes nothing better but the city, AO RMSE .0053 instead of .0056, at .6 of its
+// rate.) The square of the distance from which on it may.
+float wholeDistanceSq(const Node& node, const CutRules& rules) {
+  if (!rules.approximates() || rules.isMixed(node)) return std::numeric_limits<float>::infinity();
+  const float share = node.isFlat() ? 1 : kFidelity.uneven_share;
+  const float off_plane = node.off_plane * rules.pixels_per_slope;
+  return std::max(kPi * node.radius * node.radius / (2 * share * rules.max_solid_angle),
+                  off_plane * off_plane);
+}
 
 }  // namespace
 }  // namespace surfeit
@@ -43,35 +53,6 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Siblings as columns.
-struct alignas(64) Columns {
-  float x[kMostSiblings] = {}, y[kMostSiblings] = {}, z[kMostSiblings] = {};
-  float normal_x[kMostSiblings] = {}, normal_y[kMostSiblings] = {}, normal_z[kMostSiblings] = {};
-  float radius[kMostSiblings] = {}, thickness[kMostSiblings] = {},
-        normal_cosine[kMostSiblings] = {};
-  float share[kMostSiblings] = {};  // what it may look like, of the max solid angle; 0: open
-  float off_plane[kMostSiblings] = {};
-};
-
-Columns ColumnsOf(std::span<const Node> siblings, const CutRules& rules) {
-  Columns columns;
-  for (std::size_t i = 0; i < siblings.size(); ++i) {
-    const Node& node = siblings[i];
-    columns.x[i] = node.position.x;
-    columns.y[i] = node.position.y;
-    columns.z[i] = node.position.z;
-    columns.normal_x[i] = node.normal.x;
-    columns.normal_y[i] = node.normal.y;
-    columns.normal_z[i] = node.normal.z;
-    columns.radius[i] = node.radius;
-    columns.thickness[i] = node.thickness;
-    columns.normal_cosine[i] = node.normal_cosine;
-    columns.share[i] = rules.isMixed(node) ? 0 : shareOf(node);
-    columns.off_plane[i] = node.off_plane;
-  }
-  return columns;
-}
-
 using D = hn::CappedTag<float, kMostSiblings>;
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
@@ -82,20 +63,31 @@ V Other(V square, V x) { return hn::Sqrt(hn::Max(hn::Zero(D()), hn::NegMulAdd(x,
 
 using V3 = VectorsOf3<V>;
 
-// Some of the siblings.
+// Siblings, as many as there are lanes.
 struct Nodes {
   V3 position, normal;
-  V radius, thickness, normal_cosine;
+  V radius, thickness, normal_cosine, whole_distance_sq;
 
-  Nodes(const Columns& columns, std::size_t at) {
-    const D d;
-    position = {hn::Load(d, columns.x + at), hn::Load(d, columns.y + at),
-                hn::Load(d, columns.z + at)};
-    normal = {hn::Load(d, columns.normal_x + at), hn::Load(d, columns.normal_y + at),
-              hn::Load(d, columns.normal_z + at)};
-    radius = hn::Load(d, columns.radius + at);
-    thickness = hn::Load(d, columns.thickness + at);
-    normal_cosine = hn::Load(d, columns.normal_cosine + at);
+  Nodes(std::span<const Node> siblings, const CutRules& rules) {
+    alignas(64) float columns[10][kMostSiblings] = {};
+    for (std::size_t i = 0; i < std::min(siblings.size(), hn::Lanes(D())); ++i) {
+      const Node& node = siblings[i];
+      const float values[] = {node.position.x,    node.position.y,
+                              node.position.z,    node.normal.x,
+                              node.normal.y,      node.normal.z,
+                              node.radius,        node.thickness,
+                              node.normal_cosine, wholeDistanceSq(node, rules)};
+      for (std::size_t column = 0; column < std::size(values); ++column) {
+        columns[column][i] = values[column];
+      }
+    }
+    const auto column = [&](int i) HWY_ATTR { return hn::Load(D(), columns[i]); };
+    position = {column(0), column(1), column(2)};
+    normal = {column(3), column(4), column(5)};
+    radius = column(6);
+    thickness = column(7);
+    normal_cosine = column(8);
+    whole_distance_sq = column(9);
   }
 };
 
@@ -117,9 +109,7 @@ struct Places {
   }
 
  private:
-  // Height of the middle for the normal in the cone that comes closest to it. The rise, as riseOf,
-  // falls with the cosine of the angle between the normals: that of the one in the cone that is
-  // farthest from the node's.
+  // Of anything of the node, for any normal in the cone.
   V HighestPoint(const PacketView& from, const Nodes& nodes) const {
     const V zero = hn::Zero(D()), one = Splat(1);
     const V height = Dot(offset, from.axis);
@@ -147,16 +137,7 @@ M IsOutsideCones(const PacketView& view, const Nodes& nodes, const Places& place
   return hn::Gt(outside, hn::Add(nodes.radius, Splat(view.radius)));
 }
 
-// Whether every surfel below shows its back to every receiver. With m the normal of one, at an
-// angle b to the node's normal n, x its place and q that of a receiver,
-//
-//   m . (q - x) <= cos b n . (q - x) + sin b |(q - x) across n|,
-//
-// of which the first factor is at most -depth, the second at most aside: below zero for all b up
-// to the angle of the cone if depth cos > aside sin there.
-//
-// Rays begin before the receiver by the bias, at most in radii of the node: what they see the front
-// of is not dropped.
+// Whether every surfel below shows its back to every receiver, and to where its rays begin.
 M TurnsAway(const PacketView& view, const Nodes& nodes, const Places& places,
             const CutRules& rules) {
   const V along = hn::Mul(Splat(rules.facing), Dot(places.offset, nodes.normal));
@@ -174,27 +155,18 @@ struct Bounds {
 };
 
 // What openPart is for all receivers.
-Bounds BoundsOf(const Columns& columns, std::size_t at, const PacketView& view, const Nodes& nodes,
-                const Places& places, const CutRules& rules) {
-  const D d;
-  const V one = Splat(1), tiny = Splat(std::numeric_limits<float>::min());
-  const V share = hn::Load(d, columns.share + at);
-  const V fading = Splat(kFidelity.fading);
-  const V off_plane =
-      Square(hn::Mul(hn::Load(d, columns.off_plane + at), Splat(inverseOffPlane(rules))));
-  const V area = hn::Mul(Splat(kPi), Square(nodes.radius));
-  const V scale = hn::Max(hn::Mul(share, Splat(2 * rules.max_solid_angle)), tiny);
+Bounds BoundsOf(const PacketView& view, const Nodes& nodes, const Places& places) {
+  const V tiny = Splat(std::numeric_limits<float>::min());
   const V farthest = hn::Add(places.distance, Splat(view.radius));
-  const V size = hn::Max(hn::Div(area, scale), off_plane);
-  const V looks_most = hn::Div(size, hn::Max(Square(places.nearest), tiny));
-  const V looks_least = hn::Div(size, hn::Max(Square(farthest), tiny));
-  return {hn::And(hn::Gt(places.nearest, nodes.radius), hn::Lt(looks_most, hn::Sub(one, fading))),
-          hn::Or(hn::Lt(farthest, nodes.radius), hn::Gt(looks_least, hn::Add(one, fading)))};
+  const V looks_most = hn::Div(nodes.whole_distance_sq, hn::Max(Square(places.nearest), tiny));
+  const V looks_least = hn::Div(nodes.whole_distance_sq, hn::Max(Square(farthest), tiny));
+  return {hn::And(hn::Gt(places.nearest, nodes.radius),
+                  hn::Lt(looks_most, Splat(1 - kFidelity.fading))),
+          hn::Or(hn::Lt(farthest, nodes.radius), hn::Gt(looks_least, Splat(1 + kFidelity.fading)))};
 }
 
 SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView& view,
                                 const CutRules& rules) {
-  const Columns columns = ColumnsOf(siblings, rules);
   const D d;
   std::uint32_t present = 0;
   for (std::size_t i = 0; i < siblings.size(); ++i) {
@@ -203,7 +175,7 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
   SiblingClasses classes;
   std::uint32_t all_seen = 0;
   for (std::size_t at = 0; at < siblings.size(); at += hn::Lanes(d)) {
-    const Nodes nodes(columns, at);
+    const Nodes nodes(siblings.subspan(at), rules);
     const Places places(view, nodes);
     M seen = hn::Lt(places.nearest, hn::Add(nodes.radius, Splat(rules.max_distance)));
     if (view.has_horizon) {
@@ -215,16 +187,11 @@ SiblingClasses ClassifySiblings(std::span<const Node> siblings, const PacketView
     if (rules.facing != 0 && rules.approximates()) {
       seen = hn::AndNot(TurnsAway(view, nodes, places, rules), seen);
     }
-    M is_far = hn::Lt(hn::Zero(d), hn::Zero(d)), is_open = hn::Not(is_far);
-    if (rules.approximates()) {
-      const Bounds bounds = BoundsOf(columns, at, view, nodes, places, rules);
-      is_far = bounds.is_far;
-      is_open = bounds.is_open;
-    }
+    const Bounds bounds = BoundsOf(view, nodes, places);
     std::uint8_t bits[3][8] = {};
     hn::StoreMaskBits(d, seen, bits[0]);
-    hn::StoreMaskBits(d, is_far, bits[1]);
-    hn::StoreMaskBits(d, is_open, bits[2]);
+    hn::StoreMaskBits(d, bounds.is_far, bits[1]);
+    hn::StoreMaskBits(d, bounds.is_open, bits[2]);
     all_seen |= std::uint32_t{bits[0][0]} << at;
     classes.far |= std::uint32_t{bits[1][0]} << at;
     classes.open |= std::uint32_t{bits[2][0]} << at;
@@ -246,39 +213,12 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 
 namespace surfeit {
-namespace {
 
-float other(float square, float x) { return std::sqrt(std::max(0.f, square - x * x)); }
-
-// As riseOf, where |cosine| is that of the angle between the direction and the node's normal.
-float riseAt(const Node& node, float cosine) {
-  if (node.radius * cosine <= node.thickness) return node.radius;
-  const float across = other(node.radius * node.radius, node.thickness);
-  return node.thickness * cosine + across * other(1, cosine);
-}
-
-}  // namespace
-
-float riseOf(const Node& node, const glm::vec3& up) {
-  return riseAt(node, std::min(1.f, std::abs(glm::dot(node.normal, up))));
-}
-
-// A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
-// solid angle, or that share of it. A flat square of surfels has about 0.6 of its sphere's outline
-// as area, so this is close to the memo's test on the area, but it also opens sparse nodes, whose
-// area says nothing about how far their surfels spread. Never when only some of these are seen, or
-// when they have several gains.
 float openPart(const Node& node, const LocalReceiver& receiver, const CutRules& rules) {
-  if (rules.isMixed(node) || !rules.approximates()) return 1;
   const glm::vec3 to_node = node.position - receiver.position;
-  const float distance_sq = glm::dot(to_node, to_node), distance = std::sqrt(distance_sq);
-  if (!(distance > node.radius)) return 1;
-
-  const float limit = 2 * shareOf(node) * rules.max_solid_angle;
-  const float off_plane = node.off_plane * inverseOffPlane(rules);
-  const float looks =
-      std::max(kPi * node.radius * node.radius / limit, off_plane * off_plane) / distance_sq;
-  const float fading = kFidelity.fading;
+  const float distance_sq = glm::dot(to_node, to_node);
+  if (!(std::sqrt(distance_sq) > node.radius)) return 1;
+  const float looks = wholeDistanceSq(node, rules) / distance_sq, fading = kFidelity.fading;
   return std::clamp((looks - (1 - fading)) / (2 * fading), 0.f, 1.f);
 }
 

@@ -49,7 +49,7 @@ struct CutRules {
   float max_distance = 0;
   float facing = 1;                   // 1: only fronts are seen, -1: only backs, 0: both
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
-  float pixel = 0;                    // slope of a pixel of the raster
+  float pixels_per_slope = 0;         // of the raster
   float bias = 0;                     // of rays, in radii of surfels
   SendingGains gains{};
 
@@ -65,10 +65,10 @@ struct CutRules {
 
 // How much something counts for each receiver of a packet, 0..1.
 using LaneParts = std::array<float, kPacketReceivers>;
-
-// The highest that anything of the node rises above its middle, in unit direction `up`: of what its
-// sphere and its slab have in common.
-float riseOf(const Node& node, const glm::vec3& up);
+// Null: wholly.
+inline float partOf(const LaneParts* parts, std::size_t i) {
+  return parts != nullptr ? (*parts)[i] : 1;
+}
 
 // How much of what is below a node the receiver looks at instead of the node as a whole: 0 when it
 // looks small enough, 1 when it does not, and in between while it fades from one into the other.
@@ -112,7 +112,7 @@ class CutWalk {
                rules.quality.max_distance,
                facingOf(rules.quality.sides),
                rules.groups,
-               1 / pixelsPerSlope(rules),
+               pixelsPerSlope(rules),
                rules.quality.bias,
                rules.hasLight() ? rules.gains : SendingGains()},
         classify_(fastestSiblingClassifier()) {}
@@ -201,7 +201,7 @@ class CutWalk {
         below[i] = below[i - 1];
         continue;
       }
-      const float all = whole != nullptr ? (*whole)[i] : 1;
+      const float all = partOf(whole, i);
       below[i] = all > 0 ? all * openPart(node, receivers[i], rules_) : 0;
       own[i] = all - below[i];
       division.has_own = division.has_own || own[i] > 0;

@@ -14,6 +14,9 @@ namespace {
 // along lines in a box, bench/line_steps.sh: .0066 without this, .0030 with it.)
 constexpr float kMostPacketWidth = 4;
 
+// A difference of normals of 1 counts like this part of the radius of what is divided.
+constexpr float kNormalWeight = 0.5f;
+
 using Places = std::span<std::uint16_t>;
 
 // Position and weighted normal.
@@ -21,11 +24,10 @@ float coordinate(const LocalReceiver& receiver, int axis, float normal_weight) {
   return axis < 3 ? receiver.position[axis] : normal_weight * receiver.normal[axis - 3];
 }
 
-}  // namespace
-
-void divideReceivers(Places places, std::span<const LocalReceiver> receivers, float normal_weight,
-                     std::size_t whole) {
-  if (places.size() <= whole) return;
+// Orders places of `receivers` by halving them. Each kPacketReceivers of them, but for the last,
+// are a packet.
+void divideReceivers(Places places, std::span<const LocalReceiver> receivers, float normal_weight) {
+  if (places.size() <= 1) return;
   int widest = 0;
   float width = -1;
   for (int axis = 0; axis < 6; ++axis) {
@@ -41,16 +43,18 @@ void divideReceivers(Places places, std::span<const LocalReceiver> receivers, fl
     }
   }
   const std::size_t packets = (places.size() + kPacketReceivers - 1) / kPacketReceivers;
-  const std::size_t half = packets > 1 ? packets / 2 * kPacketReceivers : firstHalf(places.size());
+  const std::size_t half = packets > 1 ? packets / 2 * kPacketReceivers : places.size() / 2;
   std::nth_element(places.begin(), places.begin() + std::ptrdiff_t(half), places.end(),
                    [&](std::uint16_t a, std::uint16_t b) {
                      const float x = coordinate(receivers[a], widest, normal_weight);
                      const float y = coordinate(receivers[b], widest, normal_weight);
                      return x != y ? x < y : a < b;
                    });
-  divideReceivers(places.first(half), receivers, normal_weight, whole);
-  divideReceivers(places.subspan(half), receivers, normal_weight, whole);
+  divideReceivers(places.first(half), receivers, normal_weight);
+  divideReceivers(places.subspan(half), receivers, normal_weight);
 }
+
+}  // namespace
 
 PacketCluster::PacketCluster(std::span<const LocalReceiver> receivers)
     : receiver_count_(receivers.size()) {

@@ -18,23 +18,11 @@ namespace surfeit {
 inline constexpr std::size_t kClusterPackets = 16;
 inline constexpr std::size_t kClusterReceivers = kClusterPackets * kPacketReceivers;
 
-// Where a packet of this size is halved.
-inline std::size_t firstHalf(std::size_t packet_size) { return packet_size / 2; }
-
-// Orders places of `receivers` by halving them again and again where they lie farthest apart, in
-// space or by their normals, of which a difference of 1 counts like a distance of normal_weight.
-// Each kPacketReceivers of them, but for the last, are a packet, and halves of packets lie together
-// as well, down to `whole` places.
-void divideReceivers(std::span<std::uint16_t> places, std::span<const LocalReceiver> receivers,
-                     float normal_weight, std::size_t whole = 1);
-
-// A difference of normals of 1 counts like this part of the radius of what is divided.
-inline constexpr float kNormalWeight = 0.5f;
-
 class PacketCluster {
  public:
   // `receivers`: 1 to kClusterReceivers. They are divided into packets again and again where they
-  // lie farthest apart, in space or by their normals: the curve jumps, and packets need not.
+  // lie farthest apart, in space or by their normals: the curve jumps, and packets need not. Halves
+  // of packets lie together as well, down to single receivers.
   explicit PacketCluster(std::span<const LocalReceiver> receivers);
 
   std::size_t packetCount() const { return packet_count_; }

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
-#include "gather/cut/packet_cluster.h"
-
 namespace surfeit {
 namespace {
 
@@ -66,7 +64,7 @@ PacketCost::Division PacketCost::divide(std::span<const LocalReceiver> packet, f
   const float radius = viewPacket(packet).radius;
   const bool may_stay = radius <= most_radius;
   const Division together = {cost(radius), 1};
-  const std::size_t half = firstHalf(packet.size());
+  const std::size_t half = packet.size() / 2;
   if (half == 0 || (may_stay && together.cost <= 2 * least_cost)) return together;
   const Division first = divide(packet.first(half), most_radius, least_cost);
   const Division second = divide(packet.subspan(half), most_radius, least_cost);

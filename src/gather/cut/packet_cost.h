@@ -49,7 +49,7 @@ class PacketCost {
   static constexpr std::size_t memoryBytes() { return kReservedClusters * sizeof(Cluster); }
 
   // Calls visit(begin, count), which answers a Status, for the parts that the receivers of a packet
-  // are best gathered in: all, or halves (firstHalf), or halves of these, whatever draws least, but
+  // are best gathered in: all, or halves, or halves of these, whatever draws least, but
   // none wider than `most_radius`. Stops at the first failure.
   template <typename Visit>
   Status forEachPart(std::span<const LocalReceiver> packet, float most_radius,

@@ -47,6 +47,7 @@ class Brush {
   // What follows draws to this face alone.
   void BeginFace(int face) {
     face_ = face;
+    face_pixels_ = canvas_.geometry->pixels().data() + face * resolution_ * resolution_;
     seen_ = &canvas_.seen->faces[std::size_t(face)];
     pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
     recorder_ = FaceRecorder(canvas_, std::size_t(face), lane_);
@@ -141,12 +142,10 @@ class Brush {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
     const V3 up = InRaster(receivers_.normal);
-    const RasterGeometry::Pixel* const pixels =
-        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
       float* const at = pixels_.at(pixel);
       for (std::size_t i = 0; i < kChannels; ++i) hn::Store(zero, d, at + i * kStep);
-      const M above = hn::Gt(Dot(up, pixels[pixel].direction), zero);
+      const M above = hn::Gt(Dot(up, face_pixels_[pixel].direction), zero);
       const V open = hn::IfThenElseZero(hn::Or(receivers_.spherical, above), one);
       for (const std::size_t i :
            {PacketCanvas::kRoom, PacketCanvas::kOpen, PacketCanvas::kRest, Hull::kRestBefore}) {
@@ -186,12 +185,11 @@ class Brush {
   // Covers a parallelogram around the direction (memo 3.4.2), on every face that it reaches: the
   // image of a parallelogram that spreads as the patch does. Onto face_.
   HWY_INLINE void SplatPatch(const Patch& patch, const Sight& sight, M seen) {
-    const V3 offset = InRaster(sight.offset);
-    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(offset, face_ / 2));
+    const V3 offset = AlongFace(InRaster(sight.offset), face_);
     // Numbers of lanes that see nothing must be numbers, too
     const V distance_sq = hn::IfThenElse(seen, sight.distance_sq, Splat(1));
     const V distance = hn::Mul(distance_sq, InverseSqrt(distance_sq));
-    seen = hn::And(seen, hn::Gt(w, hn::Mul(Splat(kFidelity.least_axis), distance)));
+    seen = hn::And(seen, hn::Gt(offset.z, hn::Mul(Splat(kFidelity.least_axis), distance)));
     if (hn::AllFalse(D(), seen)) return;
 
     // The visible area, times the distance
@@ -203,7 +201,7 @@ class Brush {
     const V area = hn::Min(
         hn::MulAdd(Splat(patch.disk_area), cosine, hn::Mul(Splat(patch.round_area), distance)),
         hn::Mul(Splat(patch.most_area), distance));
-    const V inverse_w = Reciprocal(hn::IfThenElse(seen, w, Splat(1)));
+    const V inverse_w = Reciprocal(hn::IfThenElse(seen, offset.z, Splat(1)));
     V part = hn::Sub(Splat(1), sight.near_part);
     const Parallelogram shape =
         OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w, part);
@@ -212,27 +210,18 @@ class Brush {
     if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
   }
 
-  // The shape of a patch on the plane of the face; it may lie outside the face. `area`: the visible
-  // area times the distance.
+  // The shape of a patch on the plane of the face; it may lie outside the face. `offset`: along the
+  // face; `area`: the visible area times the distance.
   //
-  // With a, b, c the entries of the patch's spread on the face, a row is shifted by b / c for each
-  // unit of v and as wide as what is left of a: the exact image, to first order, of a rectangle on
-  // a plane of the world, so neighbours tile. (With I - n n^T for nodes, too: AO RMSE .0037 instead
-  // of .0031 for the bunny.) Distances along the axis vary over a large patch: the mean of 1 / w^3
-  // is greater than that of its middle, and the middle of the image lies farther out than the image
-  // of the middle (docs/algorithm.md, "The raster cube").
-  //
-  // A patch with gaps is spread over its outline, and covers as much less of it: times `part`.
+  // (docs/algorithm.md, "The raster cube".) A patch with gaps is spread over its outline, and
+  // covers as much less of it: times `part`.
   HWY_INLINE Parallelogram OnFace(const Patch& patch, const V3& offset, V area, V inverse,
                                   V& part) const {
     const V one = Splat(1), least = Splat(kFidelity.least_spread);
-    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-    const Normal normal = InRaster(patch.normal);
-    const V u = hn::Mul(Axis(offset, u_axis), inverse);
-    const V v = hn::Mul(Axis(offset, v_axis), inverse);
-    const V n_axis = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(normal, axis));
-    const V g_u = hn::NegMulAdd(u, n_axis, Axis(normal, u_axis));
-    const V g_v = hn::NegMulAdd(v, n_axis, Axis(normal, v_axis));
+    const V3 normal = AlongFace(InRaster(patch.normal), face_);
+    const V u = hn::Mul(offset.x, inverse), v = hn::Mul(offset.y, inverse);
+    const V g_u = hn::NegMulAdd(u, normal.z, normal.x);
+    const V g_v = hn::NegMulAdd(v, normal.z, normal.y);
 
     // The spread on the face, and what is left of a row's when it is sheared
     const FaceShape m = InRaster(patch.shape);
@@ -249,7 +238,7 @@ class Brush {
     // Area on the face: du dv = area / distance^2 * (distance / w)^3, and more for large ones
     const V inverse_sq = hn::Mul(inverse, inverse);
     const V extent = hn::Min(one, hn::Mul(Splat(patch.area), inverse_sq));
-    const V depth = hn::NegMulAdd(n_axis, n_axis, one);
+    const V depth = hn::NegMulAdd(normal.z, normal.z, one);
     const V bulge = hn::MulAdd(extent, hn::Mul(Splat(0.5f), depth), one);
     V half_area =
         hn::Mul(hn::Mul(Splat(0.25f), area), hn::Mul(hn::Mul(inverse, inverse_sq), bulge));
@@ -262,8 +251,8 @@ class Brush {
     const V inverse_half_u = InverseSqrt(half_u_sq);
     const V shift = hn::Mul(extent, Splat(1.f / 3));
     const V scale = Splat(scale_), middle = Splat(0.5f * float(resolution_));
-    const V middle_u = hn::MulAdd(shift, hn::MulAdd(n_axis, g_u, u), u);
-    const V middle_v = hn::MulAdd(shift, hn::MulAdd(n_axis, g_v, v), v);
+    const V middle_u = hn::MulAdd(shift, hn::MulAdd(normal.z, g_u, u), u);
+    const V middle_v = hn::MulAdd(shift, hn::MulAdd(normal.z, g_v, v), v);
     return {hn::MulAdd(middle_u, scale, middle), hn::MulAdd(middle_v, scale, middle),
             hn::Mul(hn::Mul(half_u_sq, inverse_half_u), scale),
             hn::Mul(hn::Mul(half_area, inverse_half_u), scale), shear};
@@ -271,20 +260,11 @@ class Brush {
 
   // Covers pixels by the part of them that lies in the shape, row by row.
   HWY_INLINE void CoverParallelogram(const Parallelogram& shape, M seen, const Cover& cover) {
-    const D d;
-    const V zero = hn::Zero(d), size = Splat(float(resolution_));
     const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, shape.half_x);
-    const V x0 = hn::Max(zero, hn::Sub(shape.x, reach));
-    const V x1 = hn::Min(size, hn::Add(shape.x, reach));
-    const V y0 = hn::Max(zero, hn::Sub(shape.y, shape.half_y));
-    const V y1 = hn::Min(size, hn::Add(shape.y, shape.half_y));
-    seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)));
-    if (hn::AllFalse(d, seen)) return;
-    const PixelRange range = RangeOf(seen, x0, x1, y0, y1, resolution_, *seen_);
-    if (range.isEmpty()) return;
-
+    const FaceBox box(shape, reach, shape.half_y, resolution_, *seen_, seen);
+    if (box.range.isEmpty()) return;
     const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
-    const Rows rows = {y0, y1, half_x, range};
+    const Rows rows = {box.y0, box.y1, half_x, box.range};
     cover.overlap > 0 ? CoverRows<true>(shape, rows, cover) : CoverRows<false>(shape, rows, cover);
   }
 
@@ -331,15 +311,14 @@ class Brush {
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
                 const Cover& cover) {
     const D d;
-    const int axis = face_ / 2;
     const V centre_sq = Dot(centre, centre);
-    const V w = hn::Mul(Splat(face_ % 2 == 0 ? 1.f : -1.f), Axis(centre, axis));
-    const V half_w = HalfSide(patch, normal, axis);
-    traced = hn::And(traced, hn::Gt(hn::Add(w, half_w), hn::Zero(d)));
+    const V3 c = AlongFace(centre, face_), n = AlongFace(normal, face_);
+    const V half_w = HalfSide(patch, n.z);
+    traced = hn::And(traced, hn::Gt(hn::Add(c.z, half_w), hn::Zero(d)));
     if (hn::AllFalse(d, traced)) return;
     V x0, x1, y0, y1;
-    Outline(patch, centre, normal, (axis + 1) % 3, w, half_w, x0, x1);
-    Outline(patch, centre, normal, (axis + 2) % 3, w, half_w, y0, y1);
+    Outline(patch, c.x, c.z, n.x, n.z, half_w, x0, x1);
+    Outline(patch, c.y, c.z, n.y, n.z, half_w, y0, y1);
     const PixelRange range = RangeOf(traced, x0, x1, y0, y1, resolution_, *seen_);
     if (range.isEmpty()) return;
 
@@ -356,22 +335,18 @@ class Brush {
       return TracePixels(traced, range, cover,
                          [&](const glm::vec3& ray) HWY_ATTR { return rays.Amount(ray); });
     }
-    TraceDisk(patch, centre, normal, traced, c_n, centre_sq, range, cover);
+    TraceDisk(patch, centre, normal, c, n, traced, c_n, centre_sq, range, cover);
   }
 
   // Pixels along an axis of the face whose middles the disk may reach: of the lines across that
   // axis, at u on the face, those touch the outline that are as far from the centre as the disk
   // extends across them, (c_u - u c_w)^2 = s_uu - 2 u s_uw + u^2 s_ww with s = radius^2 (I - n
   // n^T). Of disks that reach behind the receiver those of the box around them.
-  void Outline(const Patch& patch, const V3& centre, const Normal& normal, int u_axis, V w,
-               V half_w, V& begin, V& end) const {
+  void Outline(const Patch& patch, V u, V w, V n_u, V n_w, V half_w, V& begin, V& end) const {
     const V zero = hn::Zero(D()), one = Splat(1), size = Splat(float(resolution_));
-    const V u = Axis(centre, u_axis), half_u = HalfSide(patch, normal, u_axis);
-    V across = zero;
-    if (!patch.isRound()) {
-      const float scale = (face_ % 2 == 0 ? -1.f : 1.f) * patch.radius * patch.radius;
-      across = hn::Mul(Splat(scale), hn::Mul(Axis(normal, u_axis), Axis(normal, face_ / 2)));
-    }
+    const V half_u = HalfSide(patch, n_u);
+    const float minus_sq = patch.isRound() ? 0 : -patch.radius * patch.radius;
+    const V across = hn::Mul(Splat(minus_sq), hn::Mul(n_u, n_w));
     const V near = hn::Sub(w, half_w), far = hn::Add(w, half_w);
     const M in_front = hn::Gt(near, hn::Mul(Splat(kLeastInFront), far));
     const V a = hn::IfThenElse(in_front, hn::Mul(near, far), one);
@@ -419,11 +394,9 @@ class Brush {
   template <typename AmountOf>
   void TracePixels(M traced, const PixelRange& range, const Cover& cover,
                    const AmountOf& amountOf) {
-    const RasterGeometry::Pixel* const pixels =
-        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
     for (int row = range.row_begin; row < range.row_end; ++row) {
       open_.DrawRow(range, row, resolution_, [&](std::size_t pixel, int) HWY_ATTR {
-        const V amount = amountOf(pixels[pixel].direction);
+        const V amount = amountOf(face_pixels_[pixel].direction);
         return CoverTraced(pixel, hn::IfThenElseZero(traced, amount), cover);
       });
     }
@@ -435,36 +408,31 @@ class Brush {
   //   (c.n)^2 q.q - 2 c.n (q.n) (q.c) + (c.c - radius^2) (q.n)^2 < 0,
   //
   // along a row a polynomial of second degree.
-  void TraceDisk(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
-                 V centre_sq, const PixelRange& range, const Cover& cover) {
+  // `c` and `n`: its middle and its normal along the face.
+  void TraceDisk(const Patch& patch, const V3& centre, const Normal& normal, const V3& c,
+                 const V3& n, M traced, V c_n, V centre_sq, const PixelRange& range,
+                 const Cover& cover) {
     const D d;
-    const int axis = face_ / 2, u_axis = (axis + 1) % 3, v_axis = (axis + 2) % 3;
-    const V sign = Splat(face_ % 2 == 0 ? 1.f : -1.f), minus_2 = Splat(-2);
-    const V n_u = Axis(normal, u_axis), n_v = Axis(normal, v_axis);
-    const V n_w = hn::Mul(sign, Axis(normal, axis));
-    const V c_u = Axis(centre, u_axis), c_v = Axis(centre, v_axis);
-    const V c_w = hn::Mul(sign, Axis(centre, axis));
+    const V minus_2 = Splat(-2);
     const V power = hn::Sub(centre_sq, Splat(patch.radius * patch.radius));
     const V plane_sq = hn::Mul(c_n, c_n);
     // Of (q.n) (power q.n - 2 c.n q.c), factor by factor
-    const V m_u = hn::MulAdd(power, n_u, hn::Mul(minus_2, hn::Mul(c_n, c_u)));
-    const V m_v = hn::MulAdd(power, n_v, hn::Mul(minus_2, hn::Mul(c_n, c_v)));
-    const V m_w = hn::MulAdd(power, n_w, hn::Mul(minus_2, hn::Mul(c_n, c_w)));
-    const V square = hn::MulAdd(n_u, m_u, plane_sq);
-    const RasterGeometry::Pixel* const pixels =
-        canvas_.geometry->pixels().data() + face_ * resolution_ * resolution_;
+    const V m_u = hn::MulAdd(power, n.x, hn::Mul(minus_2, hn::Mul(c_n, c.x)));
+    const V m_v = hn::MulAdd(power, n.y, hn::Mul(minus_2, hn::Mul(c_n, c.y)));
+    const V m_w = hn::MulAdd(power, n.z, hn::Mul(minus_2, hn::Mul(c_n, c.z)));
+    const V square = hn::MulAdd(n.x, m_u, plane_sq);
     const float slope = 1 / scale_, first = 0.5f * (1 - float(resolution_));
     for (int row = range.row_begin; row < range.row_end; ++row) {
       const V v = Splat(slope * (float(row) + first));
-      const V n_row = hn::MulAdd(n_v, v, n_w), m_row = hn::MulAdd(m_v, v, m_w);
-      const V linear = hn::MulAdd(n_u, m_row, hn::Mul(m_u, n_row));
+      const V n_row = hn::MulAdd(n.y, v, n.z), m_row = hn::MulAdd(m_v, v, m_w);
+      const V linear = hn::MulAdd(n.x, m_row, hn::Mul(m_u, n_row));
       const V constant = hn::MulAdd(n_row, m_row, hn::Mul(plane_sq, hn::MulAdd(v, v, Splat(1))));
       open_.DrawRow(range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
         const V u = Splat(slope * (float(column) + first));
         const V outside = hn::MulAdd(hn::MulAdd(square, u, linear), u, constant);
         const M hit = hn::And(traced, hn::Lt(outside, hn::Zero(d)));
         if (hn::AllFalse(d, hit)) return true;
-        const glm::vec3& ray = pixels[pixel].direction;
+        const glm::vec3& ray = face_pixels_[pixel].direction;
         const V amount = DiskAmount(patch, normal, ray, centre, c_n, centre_sq);
         return CoverTraced(pixel, hn::IfThenElseZero(hit, amount), cover);
       });
@@ -478,6 +446,7 @@ class Brush {
   const Receivers receivers_;
   const Frames frames_;
   int face_ = 0;
+  const RasterGeometry::Pixel* face_pixels_ = nullptr;
   const SeenPixels::Face* seen_ = nullptr;
   FaceLanes pixels_;  // of the face
   OpenPixels open_;

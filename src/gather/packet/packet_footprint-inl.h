@@ -27,6 +27,24 @@ struct Parallelogram {
   V x, y, half_x, half_y, shear;
 };
 
+// The part on the face of a box around the middle of a shape, and the pixels that it reaches.
+struct FaceBox {
+  V x0, x1, y0, y1;
+  PixelRange range{};
+
+  // `seen`: lanes that count; of these remain those that see some of it.
+  HWY_INLINE FaceBox(const Parallelogram& shape, V half_x, V half_y, int resolution,
+                     const SeenPixels::Face& face, M& seen) {
+    const V zero = hn::Zero(D()), size = Splat(float(resolution));
+    x0 = hn::Max(zero, hn::Sub(shape.x, half_x));
+    x1 = hn::Min(size, hn::Add(shape.x, half_x));
+    y0 = hn::Max(zero, hn::Sub(shape.y, half_y));
+    y1 = hn::Min(size, hn::Add(shape.y, half_y));
+    seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)));
+    if (!hn::AllFalse(D(), seen)) range = RangeOf(seen, x0, x1, y0, y1, resolution, face);
+  }
+};
+
 // What places on a face weigh, their cosine and solid angle for their area there, over what the
 // middles of their pixels weigh; 1 unless directions weigh by the plain cosine. With q = (u, v, 1),
 // the cosine over du dv / solid angle is q.n / |q| / |q|^3.
@@ -38,12 +56,8 @@ class FaceWeights {
         is_any_spherical_(!hn::AllFalse(D(), receivers.spherical)),
         spherical_(receivers.spherical),
         slope_(1 / canvas.geometry->pixelsPerSlope()),
-        middle_(0.5f * float(canvas.geometry->resolution())) {
-    const int axis = face / 2;
-    const V w = Axis(receivers.normal, axis);
-    up_ = {Axis(receivers.normal, (axis + 1) % 3), Axis(receivers.normal, (axis + 2) % 3),
-           face % 2 == 0 ? w : hn::Neg(w)};
-  }
+        middle_(0.5f * float(canvas.geometry->resolution())),
+        up_(AlongFace(receivers.normal, face)) {}
 
   // Of places at `y` in a row of pixels.
   class Row {
@@ -136,7 +150,6 @@ template <typename Hull>
 HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, const Cover& cover,
                         int resolution, const SeenPixels::Face& face, OpenPixels& open) {
   const D d;
-  const V zero = hn::Zero(d), size = Splat(float(resolution));
   const VU widening = Widening(shape, cover.is_solid);
   const V in_samples = hn::ConvertTo(d, hn::BitCast(DI(), widening));
   // Samples are of the hull as a whole or not at all: half of one is to spare, or else rounding
@@ -146,24 +159,18 @@ HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, co
                                  : hn::Zero(d);
   const V half_x = hn::Add(shape.half_x, wider), half_y = hn::Add(shape.half_y, wider);
   const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, half_x);
-  const V y0 = hn::Max(zero, hn::Sub(shape.y, half_y));
-  const V y1 = hn::Min(size, hn::Add(shape.y, half_y));
-  const V x0 = hn::Max(zero, hn::Sub(shape.x, reach));
-  const V x1 = hn::Min(size, hn::Add(shape.x, reach));
-  seen = hn::And(seen, hn::And(hn::Lt(x0, x1), hn::Lt(y0, y1)));
-  if (hn::AllFalse(d, seen)) return;
-  const PixelRange range = RangeOf(seen, x0, x1, y0, y1, resolution, face);
-  if (range.isEmpty()) return;
+  const FaceBox box(shape, reach, half_y, resolution, face, seen);
+  if (box.range.isEmpty()) return;
   const auto counts = hn::RebindMask(DU(), seen);
-  const SampleRun across(y0, y1);
-  for (int row = range.row_begin; row < range.row_end; ++row) {
+  const SampleRun across(box.y0, box.y1);
+  for (int row = box.range.row_begin; row < box.range.row_end; ++row) {
     const VU rows = hn::IfThenElseZero(counts, across.Rows(row));
     // The same shift for all of a row of pixels
     const V along = hn::Sub(Splat(float(row) + 0.5f), shape.y);
     const V within = hn::Min(shape.half_y, hn::Max(hn::Neg(shape.half_y), along));
     const V x = hn::MulAdd(shape.shear, within, shape.x);
-    const SampleRun run(hn::Max(x0, hn::Sub(x, half_x)), hn::Min(x1, hn::Add(x, half_x)));
-    open.DrawRow(range, row, resolution, [&](std::size_t pixel, int column) HWY_ATTR {
+    const SampleRun run(hn::Max(box.x0, hn::Sub(x, half_x)), hn::Min(box.x1, hn::Add(x, half_x)));
+    open.DrawRow(box.range, row, resolution, [&](std::size_t pixel, int column) HWY_ATTR {
       return hull.Add(pixel, hn::And(rows, run.Columns(column)), widening, cover.depth_begin,
                       cover.depth_end);
     });

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdint>
 
 namespace surfeit {
@@ -29,15 +28,6 @@ struct DrawCut {
 PacketGatherer::PacketGatherer(const GatherRules& rules, const PacketKernel& kernel)
     : rules_(rules), raster_(rules, kernel), walk_(rules), cost_(rules) {}
 
-// Adds the time since the last call.
-void PacketGatherer::endPhase(double& seconds) {
-  if (!measures_phases_) return;
-  const double now =
-      std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-  seconds += now - phase_begin_;
-  phase_begin_ = now;
-}
-
 Status PacketGatherer::gatherTogether(std::span<const LocalReceiver> receivers,
                                       std::span<const std::uint16_t> places, WorldReader& world,
                                       std::span<GatherResult> results) {
@@ -47,12 +37,10 @@ Status PacketGatherer::gatherTogether(std::span<const LocalReceiver> receivers,
   SURFEIT_RETURN_IF_ERROR(drawColor(0, view, receivers, world));
   if (!raster_.hasTints()) {
     raster_.integrate(found);
-    endPhase(work_.integrate_seconds);
   } else {
     for (int color = 0; color < 3; ++color) {
       if (color > 0) SURFEIT_RETURN_IF_ERROR(drawColor(color, view, receivers, world));
       raster_.integrateColor(found);
-      endPhase(work_.integrate_seconds);
     }
   }
   for (std::size_t k = 0; k < receivers.size(); ++k) results[places[k]] = packet_results[k];
@@ -69,29 +57,20 @@ Status PacketGatherer::drawColor(int color, const PacketView& view,
   work_.surfels_visited += walk_.surfelsVisited();
   work_.patches += raster_.patchCount();
   ++work_.packets;
-  endPhase(work_.walk_seconds);
   raster_.sort();
-  endPhase(work_.sort_seconds);
   raster_.draw();
-  endPhase(work_.draw_seconds);
   return {};
 }
 
 Status PacketGatherer::foresee(const PacketCluster& cluster, WorldReader& world, PacketCost& cost) {
-  double ignored = 0;
-  endPhase(ignored);
   const std::span<const LocalReceiver> first = cluster.receivers(0).first(1);
   cost.begin(first[0].position);
-  SURFEIT_RETURN_IF_ERROR(walk_.walk(viewPacket(first, rules_), first, world, cost));
-  endPhase(work_.walk_seconds);
-  return {};
+  return walk_.walk(viewPacket(first, rules_), first, world, cost);
 }
 
 Status PacketGatherer::gatherPacket(const PacketCluster& cluster, std::size_t i,
                                     const PacketCost& cost, WorldReader& world,
                                     std::span<GatherResult> results) {
-  double ignored = 0;
-  endPhase(ignored);
   const std::span<const LocalReceiver> packet = cluster.receivers(i);
   const std::span<const std::uint16_t> places = cluster.places(i);
   return cost.forEachPart(packet, cluster.mostPacketRadius(),

@@ -51,13 +51,10 @@ class PacketGatherer {
     std::size_t packets = 0;  // drawn, of whatever size
     std::size_t nodes_visited = 0, surfels_visited = 0;
     std::size_t patches = 0;  // drawn
-    // Time by phase; measured only when asked for with measurePhases().
-    double walk_seconds = 0, sort_seconds = 0, draw_seconds = 0, integrate_seconds = 0;
   };
   const Work& work() const { return work_; }
   // What was drawn last, and who is told of it.
   PacketRaster& raster() { return raster_; }
-  void measurePhases(bool measures) { measures_phases_ = measures; }
 
   // Bytes that a gatherer holds from the start.
   static std::size_t memoryBytes(const GatherRules& rules) {
@@ -70,15 +67,12 @@ class PacketGatherer {
                         std::span<GatherResult> results);
   Status drawColor(int color, const PacketView& view, std::span<const LocalReceiver> receivers,
                    WorldReader& world);
-  void endPhase(double& seconds);
 
   const GatherRules rules_;
   PacketRaster raster_;
   WorldWalk walk_;
   PacketCost cost_;
   Work work_;
-  bool measures_phases_ = false;
-  double phase_begin_ = 0;
 };
 
 }  // namespace surfeit

@@ -26,7 +26,7 @@ std::uint32_t PacketRaster::lanesBeyond(const glm::vec3& position, float distanc
   const float least = frame_ != nullptr ? frame_->scale * distance : distance;
   std::uint32_t lanes = 0;
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
-    const glm::vec3 offset = place - glm::vec3(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
+    const glm::vec3 offset = place - eye(i);
     lanes |= (glm::dot(offset, offset) >= least * least ? 1u : 0u) << i;
   }
   return lanes;
@@ -41,15 +41,9 @@ std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
   lanes &= lanesBeyond(facet.position, std::max(std::sqrt(facet.area / largestPatch(rules_)),
                                                 node.off_plane * geometry_.pixelsPerSlope()));
   if (lanes == 0) return 0;
-  if (lanes == kAllLanes) {
-    addFacet(node, facet, true, keepParts(parts), nullptr);
-    return lanes;
-  }
   LaneParts seen;
-  for (std::size_t i = 0; i < kPacketReceivers; ++i) {
-    seen[i] = (lanes >> i & 1) == 0 ? 0 : parts != nullptr ? (*parts)[i] : 1;
-  }
-  addFacet(node, facet, true, keepParts(&seen), nullptr);
+  for (std::size_t i = 0; i < seen.size(); ++i) seen[i] = float(lanes >> i & 1) * partOf(parts, i);
+  addFacet(node, facet, true, keepParts(lanes == kAllLanes ? parts : &seen), nullptr);
   return lanes;
 }
 

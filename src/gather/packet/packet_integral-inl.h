@@ -76,17 +76,23 @@ class Integral {
 
   // What the first of the receivers has in the pixels of a face.
   void ReadFace(std::size_t face, std::span<PixelContent> pixels) const {
+    const auto size = std::size_t(canvas_.geometry->resolution());
+    const std::size_t first = face * size * size;
+    for (std::size_t i = first; i < first + size * size; ++i) {
+      const glm::vec3& direction = canvas_.geometry->pixels()[i].direction;
+      pixels[i].direction = First(InWorld(direction));
+      pixels[i].weight = hn::GetLane(WeightOf(direction));
+      pixels[i].environment = First(EnvironmentAt(i));
+    }
     if (!(*canvas_.is_face_used)[face]) return;
     const FaceLanes lanes(canvas_.pixels, canvas_, face, lane_, channels_);
-    const auto size = std::size_t(canvas_.geometry->resolution());
     canvas_.seen->faces[face].forEachPixel(size, [&](std::size_t in_face) HWY_ATTR {
       const PixelSight sight = Look(lanes.at(in_face));
-      pixels[face * size * size + in_face] = {
-          hn::GetLane(sight.coverage),
-          hn::GetLane(sight.occlusion),
-          {hn::GetLane(sight.radiosity.x), hn::GetLane(sight.radiosity.y),
-           hn::GetLane(sight.radiosity.z)},
-          glm::vec3(1 - hn::GetLane(sight.coverage))};
+      PixelContent& pixel = pixels[first + in_face];
+      pixel.coverage = hn::GetLane(sight.coverage);
+      pixel.occlusion = hn::GetLane(sight.occlusion);
+      pixel.radiosity = First(sight.radiosity);
+      pixel.open = glm::vec3(1 - pixel.coverage);
     });
   }
 
@@ -117,7 +123,11 @@ class Integral {
   }
 
  private:
-  // As DirectionWeights; `direction` is of the raster.
+  static glm::vec3 First(const V3& v) {
+    return {hn::GetLane(v.x), hn::GetLane(v.y), hn::GetLane(v.z)};
+  }
+
+  // How a direction of the raster weighs (DirectionWeights).
   V WeightOf(const glm::vec3& direction) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);

@@ -96,7 +96,6 @@ void PacketInterpolation::addPacket(std::span<const LocalReceiver> receivers,
 std::span<const std::uint16_t> PacketInterpolation::next(std::span<GatherResult> results) {
   takeSamples(results);
   if (!samples_.empty()) interpolateOpen(results);
-  if (!samples_.empty()) chooseHopeless(2 * cell_);
   chooseSamples(cell_);
   cell_ = std::max<std::size_t>(cell_ / 2, 1);
   for (std::size_t i = 0; i < packets_.size(); ++i) {
@@ -155,36 +154,6 @@ void PacketInterpolation::chooseSamples(std::size_t size) {
       best = &packet;
     }
     best->state = State::kChosen;
-  }
-}
-
-bool PacketInterpolation::isHopeless(const Packet& sample) const {
-  if (sample.foretold != Foretold::kYes) return false;
-  const float most =
-      kInterpolation.hopeless * kInterpolation.tolerance * rules_.quality.max_variation;
-  for (std::size_t i = 0; i < kMostOutputs; ++i) {
-    if (sample.error[i] > most * sample.brightest[i]) return true;
-  }
-  return false;
-}
-
-// Cells that finer samples would not help are gathered.
-void PacketInterpolation::chooseHopeless(std::size_t size) {
-  for (std::size_t begin = 0; begin < packets_.size(); begin += size) {
-    const auto cell = std::span(packets_).subspan(begin, std::min(size, packets_.size() - begin));
-    std::size_t open = 0, samples = 0, hopeless = 0;
-    for (const Packet& packet : cell) {
-      open += packet.state == State::kOpen;
-      samples += packet.state == State::kSample;
-      hopeless += packet.state == State::kSample && isHopeless(packet);
-    }
-    if (2 * hopeless < std::max<std::size_t>(samples, 1) ||
-        float(open + samples) <= kInterpolation.most_open * float(cell.size())) {
-      continue;
-    }
-    for (Packet& packet : cell) {
-      if (packet.state == State::kOpen) packet.state = State::kChosen;
-    }
   }
 }
 

@@ -74,7 +74,6 @@ class PacketInterpolation {
   void takeSamples(std::span<const GatherResult> results);
   void interpolateOpen(std::span<GatherResult> results);
   bool interpolate(Packet& packet, std::span<GatherResult> results);
-  void chooseHopeless(std::size_t size);
   void chooseSamples(std::size_t size);
   Near findNear(std::size_t packet) const;
   bool resemble(const Packet& a, const Packet& b, const glm::vec3& offset, float distance_sq) const;
@@ -83,7 +82,6 @@ class PacketInterpolation {
   void valueAt(std::size_t point, float* row) const;
   PerOutput brightestOf(std::span<const float> rows) const;
   void foretell(std::size_t sample);
-  bool isHopeless(const Packet& sample) const;
   bool isWithin(const Near& near, const PerOutput& brightest);
 
   const GatherRules rules_;

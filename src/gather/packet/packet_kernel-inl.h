@@ -30,16 +30,6 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-HWY_ATTR bool IsAbove(const PacketLanes& lanes, std::size_t receiver_count,
-                      const glm::vec3& position) {
-  for (std::size_t lane = 0; lane < receiver_count; lane += kStep) {
-    const Receivers receivers(lanes, lane);
-    const V height = Dot(receivers.To(position), receivers.normal);
-    if (!hn::AllFalse(D(), receivers.SeeAt(height))) return true;
-  }
-  return false;
-}
-
 // The faces that boxes with these half sides around these centres reach, in lanes of `seen`.
 std::uint32_t FacesThatReach(const V3& centre, const V3& half, M seen) {
   const D d;
@@ -60,6 +50,15 @@ std::uint32_t FacesThatReach(const V3& centre, const V3& half, M seen) {
   return faces;
 }
 
+// How far from its middle a patch may be drawn, in sides: at the edge of a face, where it matters,
+// everything shows larger by the root of 2, and sides need not be equal.
+constexpr float kSplatReach = 0.9f;
+// Side of a thicket, in radii of the node: with outlines as long as the node, and a sheared image.
+constexpr float kThicketSide = 3;
+// Areas over the square of the distance along the axis from where on it matters how long patches
+// are and what perspective makes of them: they go to every face that they may be drawn to.
+constexpr float kLargeExtent = 0.02f;
+
 HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& patch) {
   const D d;
   std::uint32_t faces = 0;
@@ -70,43 +69,37 @@ HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& pat
     if (hn::AllFalse(d, hn::Or(splatted, sight.traced))) continue;
     if (canvas.rules->hasConeRaster()) return 1;
     if (!hn::AllFalse(d, sight.traced)) {
-      const V3 half = {HalfSide(patch, patch.normal, 0), HalfSide(patch, patch.normal, 1),
-                       HalfSide(patch, patch.normal, 2)};
+      const V3 half = {HalfSide(patch, Splat(patch.normal.x)),
+                       HalfSide(patch, Splat(patch.normal.y)),
+                       HalfSide(patch, Splat(patch.normal.z))};
       faces |= FacesThatReach(RayStartTo(sight, receivers), half, sight.traced);
     }
     if (!hn::AllFalse(d, splatted)) {
       const V largest = hn::Max(hn::Abs(sight.offset.x),
                                 hn::Max(hn::Abs(sight.offset.y), hn::Abs(sight.offset.z)));
-      const V shift =
-          hn::Min(hn::Div(Splat(0.5f * patch.area), largest), hn::Mul(Splat(0.5f), largest));
-      const float side =
-          patch.is_ribbon ? patch.area / patch.ribbon_width : std::sqrt(patch.most_area);
-      const V reach = hn::Add(Splat(0.5f * kSplatReach * side), shift);
-      faces |= FacesThatReach(sight.offset, {reach, reach, reach}, splatted);
+      float side = patch.is_ribbon ? patch.area / patch.ribbon_width : std::sqrt(patch.most_area);
+      if (patch.isRound() && patch.thicket > 0) side = std::max(side, kThicketSide * patch.radius);
+      const V reach = hn::MulAdd(Splat(0.5f * kLargeExtent), largest, Splat(kSplatReach * side));
+      const V least = hn::Mul(Splat(kFidelity.least_axis), hn::Sqrt(sight.distance_sq));
+      const M is_large =
+          hn::Gt(Splat(patch.area), hn::Mul(Splat(kLargeExtent), hn::Mul(largest, largest)));
+      const V from = hn::IfThenElse(is_large, least, hn::Max(least, hn::Sub(largest, reach)));
+      for (int axis = 0; axis < 3; ++axis) {
+        const V c = Axis(sight.offset, axis);
+        const M before = hn::And(splatted, hn::Ge(c, from));
+        const M behind = hn::And(splatted, hn::Ge(hn::Neg(c), from));
+        faces |= (hn::AllFalse(d, before) ? 0u : 1u) << 2 * axis;
+        faces |= (hn::AllFalse(d, behind) ? 0u : 1u) << (2 * axis + 1);
+      }
     }
   }
   return faces;
 }
 
-// With w_i the weights, area or power, of the surfels of a node, x_i = d . n_i and T = sum w_i, the
-// expansion of the clamped cosine (memo 3.2) is, band by band,
-//
-//   s0 = T / 4,   s1 = sum w x / 2,   s2 = (5/32) sum w (3 x^2 - 1),
-//
-// so the coefficients hold the first two moments of x exactly. What they do not hold is the shape
-// of its distribution, and the truncated series guesses badly there: a flat cluster shows 17/16 of
-// its area head-on, 3/32 along its edge, -1/25 somewhat behind that and 1/16 from the back. We take
-// x as spread evenly over [m - r, m + r] with mean m = sum w x / T and variance r^2 / 3, and get
-//
-//   T m for m >= r (all face us),   0 for m <= -r (all face away),   T (m + r)^2 / (4 r) between.
-//
-// That is exact for a single normal (r = 0), for evenly spread ones (m = 0, r = 1), and for
-// spheres, whose coefficients are those of four times their weight spread evenly. It is never
-// negative. T m and T r are `mean` and `range` below. Radiosity is power over area by this rule,
-// and what it sees nearly nothing of sends the mean. Areas by themselves are known better: with sum
-// w P2(x) = 3.2 s2, and sum w P4(x), which the node has, facingAreas bounds them.
-//
-// All four kinds of coefficients at once, and band 4 of the area.
+// docs/algorithm.md, "Contributions". Power over area has x spread evenly over [m - r, m + r], and
+// is never negative, as the truncated series is: T m for m >= r, 0 for m <= -r, T (m + r)^2 / (4 r)
+// between. T m and T r are `mean` and `range` below, of all four kinds of coefficients at once.
+// What shows nearly nothing sends the mean.
 void SeeRoughNode(const Node& node, const glm::vec3& direction, RoughSight& sight) {
   const hn::CappedTag<float, kNodeShKinds> d4;
   const ShCoefficients basis = shBasis(-direction);

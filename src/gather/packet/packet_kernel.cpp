@@ -16,7 +16,6 @@ namespace HWY_NAMESPACE {
 PacketKernel Kernel() {
   return {.name = hwy::TargetName(HWY_TARGET),
           .findSeenPixels = FindSeenPixels,
-          .isAbove = IsAbove,
           .facesThatSee = FacesThatSee,
           .seeLobe = SeeLobe,
           .seeRoughNode = SeeRoughNode,

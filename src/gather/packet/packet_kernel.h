@@ -142,11 +142,8 @@ struct PacketCanvas {
   const GatherRules* rules;
   const RasterGeometry* geometry;
   const DirectionWeights* weights;
-  float bias;             // of rays, in radii of the surfel
-  float turned;           // -1 when one-sided surfels were turned to show their backs, else 1
   float max_distance_sq;  // may be infinite
   glm::vec3 luminance;    // of the colors whose light counts in its direction
-  glm::vec3 centre;       // of the packet
   float packet_radius;
   float* pixels;  // aligned to 64 bytes
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
@@ -178,17 +175,11 @@ inline int face(std::uint64_t key) { return static_cast<int>(key >> 61); }
 inline std::uint32_t index(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
 }  // namespace draw_order
 
-// How far from its middle a patch may be drawn, in halves of its side: at the edge of a face, where
-// it matters, everything shows larger by the root of 2, and sides need not be equal.
-inline constexpr float kSplatReach = 1.8f;
-
 struct PacketKernel {
   const char* name;  // of the instruction set
   void (*findSeenPixels)(const PacketCanvas& canvas, SeenPixels& seen);
-  // Whether any receiver has this place above its horizon.
-  bool (*isAbove)(const PacketLanes& lanes, std::size_t receiver_count, const glm::vec3& position);
-  // The faces on which some receiver may see something of the patch, which stands for a surfel, as
-  // bits; of a cone's raster the first.
+  // The faces on which some receiver may see something of the patch, as bits; of a cone's raster
+  // the first.
   std::uint32_t (*facesThatSee)(const PacketCanvas& canvas, const Patch& patch);
   // What the receivers see of a patch with this lobe.
   void (*seeLobe)(const PacketLanes& lanes, std::size_t receiver_count, const Patch& patch,

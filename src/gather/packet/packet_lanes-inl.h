@@ -51,11 +51,9 @@ class FaceLanes {
   FaceLanes() = default;
   FaceLanes(float* values, const PacketCanvas& canvas, std::size_t face, std::size_t lane,
             std::size_t channels)
-      : values_(values == nullptr ? nullptr
-                                  : values + (face * kPacketReceivers + lane) * channels *
-                                                 canvas.geometry->facePixels()),
+      : values_(values +
+                (face * kPacketReceivers + lane) * channels * canvas.geometry->facePixels()),
         pixel_floats_(channels * kStep) {}
-  explicit operator bool() const { return values_ != nullptr; }
   // Of a pixel of the face; kStep of a channel, then of the next.
   float* at(std::size_t pixel) const { return values_ + pixel * pixel_floats_; }
 
@@ -97,6 +95,13 @@ inline V TakenWeight(V covered, V open, V rest, V weight) {
 using V3 = VectorsOf3<V>;
 inline V Axis(const V3& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 inline V Axis(const glm::vec3& v, int axis) { return Splat(v[axis]); }
+// Along the axes u and v of a face, and towards it.
+template <typename Vector>
+HWY_INLINE V3 AlongFace(const Vector& v, int face) {
+  const int axis = face / 2;
+  return {Axis(v, (axis + 1) % 3), Axis(v, (axis + 2) % 3),
+          hn::Mul(Splat(face % 2 == 0 ? 1.f : -1.f), Axis(v, axis))};
+}
 
 // Frames of the lanes' cones.
 struct Frames {
@@ -158,7 +163,10 @@ struct Sight {
 
 // How much of what is so far away is ray traced.
 inline V NearPart(const Patch& patch, const Sight& sight) {
-  const float inverse = 1 / nearBorderSq(patch.near_distance);
+  // Finite and positive, for a surfel may be at a receiver; then it is near at any setting
+  const float inverse =
+      1 / std::clamp(patch.near_distance * patch.near_distance, std::numeric_limits<float>::min(),
+                     std::numeric_limits<float>::max());
   const V rest = hn::NegMulAdd(sight.distance_sq, Splat(inverse), Splat(1));
   const V part = hn::Mul(rest, Splat(1 / (1 - kFidelity.whole_near * kFidelity.whole_near)));
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
@@ -191,22 +199,20 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 
   // The bias keeps disks of the receiver's own surface from covering it. What faces the receiver
   // closely is none of those, nor what rises above its plane and is seen from both sides: either
-  // would be looked through. So the bias fades out with the normal, and of two-sided surfels, whose
-  // normal is one of two, with the height. (A dragon on a plane: AO RMSE .0254 with a constant
-  // bias, .0218 fading with the normal.) Ribbons are as rough as they are wide. (AO RMSE of hair
-  // .0088; .0117 with radii.) Along the receiver's normal a disk reaches radius * sin(angle of
-  // normals) above its middle, and must rise above the horizon of the rays: this drops the
-  // receiver's own surface, which would cover it through rounding alone
+  // would be looked through. (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 fading
+  // with the normal.) Ribbons are as rough as they are wide. (AO RMSE of hair .0088; .0117 with
+  // radii.) Along the receiver's normal a disk reaches radius * sin(angle of normals) above its
+  // middle, and must rise above the horizon of the rays: its own surface does so through rounding
   const V cosine = Dot(receivers.normal, patch.normal);
-  const float turned = patch.seen == Patch::Seen::kFront ? canvas.turned : 1;
+  const GatherQuality& quality = canvas.rules->quality;
+  const bool is_turned = patch.seen == Patch::Seen::kFront && quality.sides == GatherSides::kBack;
   const float size = patch.is_ribbon ? patch.ribbon_width : patch.radius;
-  const float bias = canvas.bias * size;
-  V part = hn::MulAdd(Splat(turned), cosine, one);
+  V part = is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine);
   if (patch.seen == Patch::Seen::kBoth) {
     part =
         hn::Max(zero, hn::NegMulAdd(sight.height, Splat(1 / (kFidelity.bias_height * size)), one));
   }
-  sight.bias = hn::Mul(Splat(bias), hn::Min(one, part));
+  sight.bias = hn::Mul(Splat(quality.bias * size), hn::Min(one, part));
   const V rise =
       hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
   const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));
@@ -240,16 +246,11 @@ HWY_INLINE V3 RayStartTo(const Sight& sight, const Receivers& receivers) {
           hn::NegMulAdd(sight.bias, receivers.normal.z, sight.offset.z)};
 }
 
-// Half of the side along an axis of the box around the disk.
-inline V HalfSide(const Patch& patch, const V3& normal, int axis) {
+// Half of the side of the box around the disk along an axis, on which its normal is `n`.
+inline V HalfSide(const Patch& patch, V n) {
   if (patch.isRound()) return Splat(patch.radius);
-  const V n = Axis(normal, axis);
   return hn::Mul(Splat(patch.radius),
                  hn::Sqrt(hn::Max(hn::Zero(D()), hn::NegMulAdd(n, n, Splat(1)))));
-}
-inline V HalfSide(const Patch& patch, const glm::vec3& normal, int axis) {
-  if (patch.isRound()) return Splat(patch.radius);
-  return Splat(patch.radius * std::sqrt(std::max(0.f, 1 - normal[axis] * normal[axis])));
 }
 
 // How much of it counts: each receiver has its own part while a node fades into what is below it.

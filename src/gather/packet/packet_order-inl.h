@@ -27,9 +27,7 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Of kStep receivers. From the packet's centre, two patches in one direction of a receiver are the
-// other way round only where the sum of their distances from that receiver is less than twice the
-// packet's radius, so both lie within that radius of the centre.
+// Of kStep receivers.
 template <typename Kind>
 class OwnOrders {
  public:

@@ -20,24 +20,6 @@
 namespace surfeit {
 namespace {
 
-// Of thickets, in radii of the node: with outlines as long as the node, and a sheared image.
-constexpr float kThicketExtent = 1.5f;
-// The most that a patch spreads, with lengths 8 times the widths (Fidelity::least_spread), grown by
-// half.
-constexpr float kMostSpread = 24;
-// A parallelogram may reach farther than the rectangle with its spread.
-constexpr float kShear = 1.3f;
-constexpr float kDiagonal = 1.415f;
-// Areas over the square of the distance from where on patches are large. (Against patches
-// on every face: with .2 occlusion is off by up to .0016 at .11 sr and by .019 at .4, in a hollow
-// sphere; with .02 by .0001 and .0006, for 3 % of the time.)
-constexpr float kLargeExtent = 0.02f;
-
-// Thickets fill their outlines however long these are.
-float leastHalf(const Patch& patch) {
-  return patch.isRound() && patch.thicket > 0 ? kThicketExtent * patch.radius : 0;
-}
-
 // Sorts by the upper 32 bits of keys, stable: a radix sort of 8 bits a pass, for a few thousand.
 // The first `count` of `order` are replaced; `scratch` grows to hold as many.
 void sortByUpperHalf(std::vector<std::uint64_t>& order, std::size_t count,
@@ -119,7 +101,7 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
 
 void PacketRaster::setFrame(const InstanceFrame* frame) {
   frame_ = frame;
-  local_centre_ = frame != nullptr ? frame->toLocal(view_.centre) : view_.centre;
+  local_centre_ = toLocal(view_.centre);
   local_radius_ = frame != nullptr ? view_.radius / frame->scale : view_.radius;
 }
 
@@ -140,68 +122,10 @@ void PacketRaster::bringToWorld(Patch& patch) const {
   if (patch.is_ribbon) patch.ribbon_width *= scale;
 }
 
-// The faces that some receiver may see some of a node's patch on, as bits.
-std::uint32_t PacketRaster::facesThatSee(const Patch& patch) const {
-  if (rules_.hasConeRaster()) return 1;
-  const glm::vec3 middle = patch.position - view_.centre;
-  const glm::vec3 size = glm::abs(middle);
-  const float largest = std::max({size.x, size.y, size.z});
-  const float extent = std::min(1.f, patch.area / (largest * largest));
-  if (extent > kLargeExtent) return facesThatSeeLarge(patch, extent);
-  const float side = std::sqrt(std::max(patch.most_area, patch.round_area));
-  const float half = std::max(0.5f * side, leastHalf(patch));
-  const float reach = kSplatReach * half + 0.5f * extent * largest + kDiagonal * view_.radius;
-
-  std::uint32_t faces = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto bit = [&](bool is_before, int face) {
-      const bool is_wide = size[axis] + reach >= largest;
-      return static_cast<std::uint32_t>(is_wide & is_before) << face;  // no branch to be guessed
-    };
-    faces |= bit(middle[axis] + view_.radius > 0, 2 * axis);
-    faces |= bit(view_.radius - middle[axis] > 0, 2 * axis + 1);
-  }
-  return faces;
-}
-
-// Of a patch so large that it matters how long it is and what perspective makes of it
-// (Brush::OnFace), which takes longer to find out.
-std::uint32_t PacketRaster::facesThatSeeLarge(const Patch& patch, float extent) const {
-  const glm::vec3 middle = patch.position - view_.centre;
-  const glm::vec3 size = glm::abs(middle);
-  const float distance = glm::length(middle);
-  const int front = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-  const SymmetricMatrix& shape = patch.shape;
-  const SymmetricMatrix adjoint = adjugate(shape);
-  // Flat ones are longest for their area when seen from above
-  const float determinant =
-      patch.isRound() ? quadraticForm(adjoint, middle / distance) : adjoint.trace();
-  const float growth = (1 + 0.5f * extent) / std::sqrt(std::max(determinant, 1e-12f));
-  const float half_side_sq = 0.25f * std::max(patch.most_area, patch.round_area);
-  const float least_half_sq = leastHalf(patch) * leastHalf(patch);
-  const float shift = 0.5f * extent * size[front] + kDiagonal * view_.radius;
-  std::uint32_t faces = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float gap = size[front] - size[axis] - shift;
-    if (gap > 0) {
-      // What it spreads across the edge to the face in front
-      const float along = middle[axis] * middle[front] < 0 ? -2.f : 2.f;
-      const float spread = shape(axis, axis) + shape(front, front) - along * shape(axis, front);
-      const float half_sq = std::max(
-          kShear * kShear * half_side_sq * std::min(growth * spread, kMostSpread), least_half_sq);
-      // On the face it is drawn larger by (distance / w)^(3/2) than at its middle
-      const float w = std::max(size[axis] - view_.radius, kFidelity.least_axis * distance);
-      if (gap * gap * w > half_sq * distance) continue;
-    }
-    faces |= (middle[axis] + view_.radius > 0 ? 1u : 0u) << 2 * axis;
-    faces |= (view_.radius - middle[axis] > 0 ? 1u : 0u) << (2 * axis + 1);
-  }
-  return faces;
-}
-
-// Puts the last patch in the order of those of the faces that count, or drops it when none does.
-void PacketRaster::orderLastPatch(std::uint32_t faces) {
-  faces &= seen_faces_;
+// Puts the last patch in the order of those faces that count and that some receiver may see some of
+// it on, or drops it when there is none.
+void PacketRaster::orderLastPatch(const PacketCanvas& canvas) {
+  std::uint32_t faces = seen_faces_ & kernel_.facesThatSee(canvas, patches_.back());
   if (faces == 0) return patches_.pop_back();
   SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
   const auto index = static_cast<std::uint32_t>(patches_.size() - 1);
@@ -224,7 +148,6 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
   has_tints_ |= node.isTinted();
   const std::uint32_t parts = keepParts(lane_parts);
   const auto lobeOf = [lobes](std::size_t i) { return lobes != nullptr ? &(*lobes)[i] : nullptr; };
-  gain_ = rules_.gains.ofAlike(node.groups);  // the cut opens others
   if (node.isRough()) return addRoughNode(node, lane_parts, parts);
   const bool has_hidden = rules_.groups == kAllGroups && hasHiddenPieces(node);
   const auto add = [&](std::size_t i, const Facet& facet) {
@@ -255,11 +178,10 @@ bool PacketRaster::keepSeenParts(const SeenOf& seenOf, const LaneParts* parts,
   LaneParts seen;
   bool is_all = true, is_none = true;
   for (std::size_t i = 0; i < kPacketReceivers; ++i) {
-    const glm::vec3 eye(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
-    const float part = seenOf(frame_ != nullptr ? frame_->toLocal(eye) : eye);
+    const float part = seenOf(toLocal(eye(i)));
     is_all = is_all && part == 1;
     is_none = is_none && part == 0;
-    seen[i] = part * (parts != nullptr ? (*parts)[i] : 1);
+    seen[i] = part * partOf(parts, i);
   }
   if (!is_all) place = keepParts(&seen);
   return !is_none;
@@ -288,7 +210,6 @@ void PacketRaster::addLobe(const Lobe& lobe, const glm::vec3& normal) {
 
 void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
                             const Lobe* lobe) {
-  if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(facet.position))) return;
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - local_centre_;
   const float distance = glm::length(to_facet);
@@ -309,9 +230,12 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);
   patch.disk_area = facet.area;
-  patch.area = patch.is_spread ? std::max(facet.area, largestOutline(facet)) : facet.area;
-  patch.most_area = mostVisibleArea(facet);
-  if (sides != GatherSides::kBack) patch.radiosity = gain_ * facet.radiosity;
+  patch.area = facet.area;
+  // The root of two principal moments is at most half of the trace
+  if (patch.is_spread) patch.area = std::max(patch.area, 2 * kPi * facet.covariance.trace());
+  patch.most_area = std::min(facet.area, kPi * facet.radius * facet.radius);
+  const float gain = rules_.gains.ofAlike(node.groups);  // the cut opens others
+  if (sides != GatherSides::kBack) patch.radiosity = gain * facet.radiosity;
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
   const bool is_rim = std::abs(cosine) < range + local_radius_ / distance;
   if (is_rim) patch.range = range;
@@ -324,7 +248,7 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.parts = parts;
   bringToWorld(patch);
   if (lobe != nullptr) addLobe(*lobe, facet.normal);
-  orderLastPatch(facesThatSee(patch));
+  orderLastPatch(canvas());
 }
 
 // As seen from the centre, or, where receivers see it from too different directions, by each.
@@ -335,10 +259,8 @@ void PacketRaster::addRoughNode(const Node& node, const LaneParts* lane_parts,
   }
   for (std::size_t i = 0; i < receiver_count_; ++i) {
     LaneParts own{};
-    own[i] = lane_parts != nullptr ? (*lane_parts)[i] : 1;
-    if (own[i] == 0) continue;
-    const glm::vec3 eye(lanes_.x[i], lanes_.y[i], lanes_.z[i]);
-    addRoughNode(node, frame_ != nullptr ? frame_->toLocal(eye) : eye, keepParts(&own));
+    own[i] = partOf(lane_parts, i);
+    if (own[i] != 0) addRoughNode(node, toLocal(eye(i)), keepParts(&own));
   }
 }
 
@@ -350,7 +272,6 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   const float round_area = shownArea(node, seen.facing, sides);
   if (!(round_area > kFidelity.least_visible_part * node.area)) return;
   const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
-  if (!kernel_.isAbove(lanes_, receiver_count_, toWorld(node.position + visible.middle))) return;
   Patch& patch = patches_.emplace_back();
   patch.position = node.position + visible.middle;
   patch.radius = node.radius;
@@ -370,7 +291,8 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   patch.parts = parts;
   const auto [front, back] = seen.facing;
   if (sides != GatherSides::kBack) {
-    patch.radiosity = (gain_ * front / (round_area * node.opacity(color_))) * seen.radiosity;
+    const float gain = rules_.gains.ofAlike(node.groups);
+    patch.radiosity = (gain * front / (round_area * node.opacity(color_))) * seen.radiosity;
   }
   if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
   if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
@@ -378,7 +300,7 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   patch.seen = Patch::Seen::kAllAround;
   patch.kind = CubeKind::kRoughNode;
   bringToWorld(patch);
-  orderLastPatch(facesThatSee(patch));
+  orderLastPatch(canvas());
 }
 
 void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* lane_parts,
@@ -431,14 +353,13 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.parts = parts;
     bringToWorld(patch);
     if (!lobes.empty()) addLobe(lobes[std::size_t(&stored - surfels.data())], surfel.normal);
-    orderLastPatch(kernel_.facesThatSee(canvas, patch));
+    orderLastPatch(canvas);
   }
 }
 
 void PacketRaster::addPatch(const Patch& patch) {
   patches_.push_back(patch);
-  orderLastPatch(patch.near_distance > 0 ? kernel_.facesThatSee(canvas(), patch)
-                                         : facesThatSee(patch));
+  orderLastPatch(canvas());
 }
 
 PacketCanvas PacketRaster::canvas() const {
@@ -447,11 +368,8 @@ PacketCanvas PacketRaster::canvas() const {
           .rules = &rules_,
           .geometry = &geometry_,
           .weights = &weights_,
-          .bias = rules_.quality.bias,
-          .turned = rules_.quality.sides == GatherSides::kBack ? -1.f : 1.f,
           .max_distance_sq = max_distance_sq_,
           .luminance = luminance_,
-          .centre = view_.centre,
           .packet_radius = view_.radius,
           .pixels = pixels_.get(),
           .is_face_used = &is_face_used_,

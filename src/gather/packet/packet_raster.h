@@ -3,20 +3,8 @@
 // the packet's cut gives, sorts it by distance from the packet's centre, draws it front to back and
 // integrates (memo 3.4 and 3.5).
 //
-// Each lane is the raster of one receiver; what the lanes share is the walk and the order of what
-// lies outside the packet (packet_order-inl.h). A rough node is seen from the packet's centre. A
-// packet of one receiver is the definition.
-//
-// Contributions come front to back, in the order of the middles of their depth ranges. Coverage
-// adds up within a layer and covers between layers: neighbouring surfels of one surface share a
-// pixel without overlapping, so their coverages add until the layer is full; a surface behind is
-// hidden by the part that the layers before it cover, and by more where both are likely to cover
-// the same side of the pixel (Patch::nested). A contribution belongs to the layer before it
-// when their depth ranges meet, and the less, the wider the gap between them (Fidelity::layer_gap).
-// Adding everything, the memo's rule, lets the half-covered silhouettes of things behind each other
-// fill a pixel. (On a plane with 500 spheres, near field 8: AO RMSE .0135 and bias +.007 with it,
-// .0095 and
-// -.004 with layers. docs/algorithm.md, "Coverage")
+// docs/algorithm.md tells what the lanes share ("Packets") and how contributions cover pixels
+// ("Coverage").
 #pragma once
 
 #include <hwy/aligned_allocator.h>
@@ -124,13 +112,16 @@ class PacketRaster {
   void addLobe(const Lobe& lobe, const glm::vec3& normal);
   void addRoughNode(const Node& node, const LaneParts* lane_parts, std::uint32_t parts);
   void addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts);
-  std::uint32_t facesThatSee(const Patch& patch) const;
-  std::uint32_t facesThatSeeLarge(const Patch& patch, float extent) const;
   glm::vec3 toWorld(const glm::vec3& place) const {
     return frame_ != nullptr ? frame_->toWorld(place) : place;
   }
+  glm::vec3 toLocal(const glm::vec3& place) const {
+    return frame_ != nullptr ? frame_->toLocal(place) : place;
+  }
+  // Of a receiver, in the world.
+  glm::vec3 eye(std::size_t i) const { return {lanes_.x[i], lanes_.y[i], lanes_.z[i]}; }
   void bringToWorld(Patch& patch) const;
-  void orderLastPatch(std::uint32_t faces);
+  void orderLastPatch(const PacketCanvas& canvas);
   PacketCanvas canvas() const;
 
   const PacketKernel& kernel_;
@@ -151,7 +142,6 @@ class PacketRaster {
   const InstanceFrame* frame_ = nullptr;
   glm::vec3 local_centre_{0};  // of the view, in the frame of what is added
   float local_radius_ = 0;
-  float gain_ = 1;  // of the node that is added
   int color_ = 0;
   bool has_tints_ = false;
   glm::vec3 luminance_{0};               // PacketCanvas::luminance

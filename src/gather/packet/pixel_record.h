@@ -15,6 +15,9 @@ namespace surfeit {
 
 // What is in a pixel of a raster.
 struct PixelContent {
+  glm::vec3 direction{0};             // CubePixel::direction
+  float weight = 0;                   // CubePixel::weight
+  glm::vec3 environment{0};           // pi times the radiance of what is behind all of it
   float coverage = 0, occlusion = 0;  // occlusion: with falloff
   glm::vec3 radiosity{0};             // times the coverage; zero without light
   glm::vec3 open{1};                  // 1 less the coverage, by color
@@ -22,6 +25,9 @@ struct PixelContent {
 
 // Adds what was drawn for a color: of coverage and occlusion their means over the colors.
 inline void addColor(const PixelContent& drawn, int color, PixelContent& sum) {
+  sum.direction = drawn.direction;
+  sum.weight = drawn.weight;
+  sum.environment = drawn.environment;
   sum.coverage += drawn.coverage / 3;
   sum.occlusion += drawn.occlusion / 3;
   sum.radiosity[color] = drawn.radiosity[color];

@@ -76,7 +76,6 @@ class WorldWalk {
       visit.node(node, parts);
     }
     OpenedNode opened(const Node&, const LaneParts*, OpenedNode) { return {}; }
-    void surfels(std::span<const Surfel>, const LaneParts*) {}
     Status instance(const Node& leaf, const LaneParts* parts) {
       const PlacedScene& placed = world.instances()->instances()[leaf.page];
       visit.setFrame(&placed.frame);

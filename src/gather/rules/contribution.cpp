@@ -39,13 +39,8 @@ Surfel withSides(const Surfel& surfel, GatherSides sides) {
   return turned;
 }
 
-// Two moments of x say little about E |x|, of which front plus back is made: three faces of a box
-// may show 1/3 or 0.58 of its area. Four moments bound it closely: with y = x^2, E y = s and E y^2
-// = q, the least E sqrt(y) has all y that are not 0 alike, at q / s, and the greatest has some at 1
-// and the rest alike (the principal representations of Chebyshev and Markov). Evenly spread normals
-// lie at 0.64 of the way, and so nearly everything does. (Against the surfels below the rough nodes
-// of a cut in Sponza, by a probe that was not kept: areas 0.3 % too large and off by 2.4 % in the
-// mean, where two moments give 7.7 % too little and are off by 10.8 %.)
+// Two moments of x say little about E |x|: three faces of a box may show 1/3 or 0.58 of its area.
+// Four bound it closely (docs/algorithm.md, "Contributions").
 FacingAreas facingAreas(float total, float mean, float second, float fourth) {
   constexpr float kTiny = 1e-9f;
   // With s = 1/3, q = 1/5 and E |x| = 1/2 of evenly spread normals
@@ -62,9 +57,6 @@ FacingAreas facingAreas(float total, float mean, float second, float fourth) {
   return {0.5f * total * (both + m), 0.5f * total * (both - m)};
 }
 
-// The normals n_i of what curves a little have a mean shorter than 1. Their variance 1 - |n|^2 lies
-// in the two directions across it, half in each; x = d . n_i spread evenly over [m - r, m + r] has
-// the variance r^2 / 3.
 float normalRange(const glm::vec3& normal) {
   return std::sqrt(std::max(0.f, 1.5f * (1 - glm::dot(normal, normal))));
 }
@@ -81,17 +73,7 @@ Facet facetOf(const Node& node) {
           .opacity = {node.opacity(0), node.opacity(1), node.opacity(2)}};
 }
 
-// Over the surfels i of a node, with w_i = A_i n_i . v for the direction v towards the receiver,
-// the front moment F times v is the sum of (x_i - c) w_i: what faces the receiver, less what turns
-// away. With m and -m the offsets of the middles of either, as in anything symmetric, that is
-// (front + back) m; and when all of it faces the receiver, it is front m. So m is exact for a
-// sphere (two thirds of its radius towards the receiver), for an edge of which one face shows, and
-// for a cap.
-//
-// From a finite distance D the surfels turn: of the solid angles A_i n_i . (D v - x_i) / |D v -
-// x_i|^3 the sum is front / D^2 (1 + (3 m . v - q) / D) to first order, with q the mean of n_i .
-// x_i, which the trace of F gives like m. In the distance of m it looks 1 + 2 m . v / D as large,
-// and the rest is `perspective`: of a sphere, whose rim is behind its middle, the same less.
+// docs/algorithm.md, "Contributions".
 SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
                   GatherSides sides) {
   const float both = facing.front + facing.back, distance = glm::length(to_node);
@@ -128,6 +110,13 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
   for (std::size_t i = 0; i < 3; ++i) spread.entries[i] += kStep * node.covariance.trace();
   return ellipseArea(spread, direction);
 }
+
+// The area of a facet over that of the ellipse that spreads as it does: about 1 for a piece of
+// surface, less where it has gaps, more where it lies behind itself.
+float facetLayers(const Facet& facet) {
+  const float ellipse = ellipseArea(facet.covariance, glm::normalize(facet.normal));
+  return ellipse > 0 ? facet.area / ellipse : 1;
+}
 }  // namespace
 
 // A surface covers no more than the outline of the sphere that holds all disks, and than a part of
@@ -149,18 +138,6 @@ RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown,
                                                 float(node.surfel_count));
   const float area = surface + thicket * (outline - surface), solid = opacity * surface;
   return {area, (solid + thicket * (hidden - solid)) / area, std::max(area, most)};
-}
-
-float mostVisibleArea(const Facet& facet) {
-  return std::min(facet.area, kPi * facet.radius * facet.radius);
-}
-
-// The root of two principal moments is at most half of the trace.
-float largestOutline(const Facet& facet) { return 2 * kPi * facet.covariance.trace(); }
-
-float facetLayers(const Facet& facet) {
-  const float ellipse = ellipseArea(facet.covariance, glm::normalize(facet.normal));
-  return ellipse > 0 ? facet.area / ellipse : 1;
 }
 
 bool isFilled(const Node& node, const Facet& facet) {

@@ -45,13 +45,6 @@ struct SeenPart {
 SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas& facing,
                   GatherSides sides);
 
-// The largest area that a facet may show in any direction, and the largest that it may be spread
-// over.
-float mostVisibleArea(const Facet& facet);
-float largestOutline(const Facet& facet);
-// The area of a facet over that of the ellipse that spreads as it does: about 1 for a piece of
-// surface, less where it has gaps, more where it lies behind itself.
-float facetLayers(const Facet& facet);
 // Whether a facet of a node, or a flat node, has no gaps, seen head-on: with all that other facets
 // show in that direction it fills its outline, as the slopes of folds do together.
 bool isFilled(const Node& node, const Facet& facet);

@@ -12,10 +12,9 @@
 
 namespace surfeit {
 
-// How far before and behind its middle a contribution meets others of its layer: hardly more than
-// it extends, by its variance along the direction, so that tiles of one surface meet whether they
-// are seen head-on or aslant, and no rounding decides; and at least a part of its radius. Every
-// receiver has its own direction.
+// How far before and behind its middle a contribution meets others of its layer: as far as
+// something even with its variance along the direction extends, which every receiver has its own
+// of; and at least a part of its radius.
 struct LayerReach {
   float least = 0;
   float spread_sq = 0;  // its square is this times the spread along the direction (Patch::shape)
@@ -29,13 +28,8 @@ struct LayerReach {
   bool isNone() const { return least == 0 && spread_sq == 0; }
 };
 
-// What hides, hides: patches have exact areas, and these scatter around what a pixel of a surface
-// holds, so sums alone would let through what lies behind. So a pixel also knows which of its 4 by
-// 4 samples lie within the hull, the union of the patches, each widened (docs/algorithm.md,
-// "Closing"). Where the hull, narrowed again by as much, holds the pixel, a surface goes on there,
-// and what is left open before its layer ends is closed. Holes narrower than twice the widening
-// close so; outlines stay where they are, and areas, and with them power, are not touched.
-inline constexpr int kHullSide = 4;  // samples along a pixel
+// The samples of a pixel for its hull (docs/algorithm.md, "Closing").
+inline constexpr int kHullSide = 4;  // along a pixel
 inline constexpr std::uint32_t kHullSamples = 0xffff;
 
 // What so many pieces, of this area together, hide of an outline, spread in it at random: all that
@@ -49,12 +43,6 @@ inline float layersOpacity(float opacity, float depth) {
   return opacity < 1 ? 1 - std::pow(1 - opacity, std::max(1.f, depth)) : 1;
 }
 
-// Finite and positive, for a surfel may be at a receiver; then it is near at any setting.
-inline float nearBorderSq(float near_distance) {
-  return std::clamp(near_distance * near_distance, std::numeric_limits<float>::min(),
-                    std::numeric_limits<float>::max());
-}
-
 // Coverage in the middle of a soft disk, which falls off as 1 - (distance / radius)^2 and is
 // limited to 1, such that the whole disk covers `area`, or, where gaps are worse, more.
 inline float softDiskPeak(float radius, float area, bool is_exact) {
@@ -63,10 +51,7 @@ inline float softDiskPeak(float radius, float area, bool is_exact) {
   return share < 0.5f ? 2 * share : 1 / (2 * (1 - share));
 }
 
-// A node that is seen mostly from behind shows fronts that face each other: folds, bumps and
-// leaves, which hide each other instead of lying side by side. Overlap grows from 0 where fronts
-// and backs are equal (anything closed) to 1 where backs are 9/5 of the fronts.
-// (Fidelity::overlap_gain)
+// How far a rough node hides behind itself: folds, bumps and leaves do.
 inline float overlapOf(float front_area, float back_area) {
   return std::clamp(kFidelity.overlap_gain * (back_area - front_area) / (back_area + front_area),
                     0.f, 1.f);

@@ -148,7 +148,8 @@ inline glm::vec3 lobeAxis(const LocalReceiver& receiver, const GatherRules& rule
   return mirrored / glm::length(mirrored);
 }
 
-// How directions weigh by the cosine of their angle to an axis, the normal or the reflection.
+// How directions weigh by the cosine of their angle to an axis, the normal or the reflection
+// (packet_integral-inl.h).
 class DirectionWeights {
  public:
   // `pixel`: angle of a pixel of the raster; the edge of a cone fades over as much.
@@ -160,16 +161,6 @@ class DirectionWeights {
       edge_cosine_ = std::cos(rules.weights.cone_angle);
       edge_slope_ = 1 / (pixel * std::sin(rules.weights.cone_angle));
     }
-  }
-
-  float operator()(float cosine) const {
-    if (!(cosine > 0)) return 0;
-    float weight = is_cosine_ ? cosine : 1;
-    if (exponent_ > 0) weight *= std::pow(cosine, exponent_);
-    if (edge_slope_ > 0) {
-      weight *= std::clamp(0.5f + (cosine - edge_cosine_) * edge_slope_, 0.f, 1.f);
-    }
-    return weight;
   }
 
   bool isPlainCosine() const { return is_cosine_ && edge_slope_ == 0; }

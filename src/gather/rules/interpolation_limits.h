@@ -13,11 +13,6 @@ struct InterpolationLimits {
   // Packets, a power of 2 up to 128. Cells of so many have one sample at first; one that is not
   // smooth is halved, down to pairs. (16: a Cornell box 16 instead of 13 %.)
   std::size_t widest_cell = 32;
-  // Part, 0 to 1, of a cell. Where more is open or sampled, and half of its samples are `hopeless`
-  // times as far off as allowed, 1 or more, finer samples would be for nothing: all of it is
-  // gathered. (Hopeless 20: the same shares, and more time for nothing where a scan is rough.)
-  float most_open = 0.9f;
-  float hopeless = 5;
 
   // --- Which samples a packet resembles ---
 

@@ -65,13 +65,4 @@ LobeLight::LobeLight(const Lobe& lobe, const glm::vec3& normal) : shares(lobe.sh
   facing = std::max(facingPart(concentration, glm::dot(axis, normal)), kLeastFacing);
 }
 
-// Evenly is 1 / pi of the radiosity in every direction above the surface. The packet's kernel does
-// the same (gather/packet/packet_lobe-inl.h).
-float LobeLight::gain(const glm::vec3& direction, float spread) const {
-  const float seen = concentration / (1 + concentration * spread);
-  const float density = seen / (2 * kPi * -std::expm1(-2 * seen)) *
-                        std::exp(seen * std::min(0.f, glm::dot(axis, direction) - 1));
-  return kPi * density / facing;
-}
-
 }  // namespace surfeit

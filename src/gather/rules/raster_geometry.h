@@ -61,11 +61,7 @@ class RasterGeometry {
 struct ConeFrame {
   glm::vec3 x, y, z;
 
-  explicit ConeFrame(const glm::vec3& axis = {1, 0, 0});  // unit
-  glm::vec3 toLocal(const glm::vec3& v) const {
-    return {glm::dot(x, v), glm::dot(y, v), glm::dot(z, v)};
-  }
-  glm::vec3 toWorld(const glm::vec3& v) const { return v.x * x + v.y * y + v.z * z; }
+  explicit ConeFrame(const glm::vec3& axis);  // unit
 };
 
 }  // namespace surfeit
