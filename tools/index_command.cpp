@@ -202,8 +202,8 @@ void addIndexCommand(CLI::App& app, CommandContext& context) {
   context.addFrameOptions(*command);
   command->footer(
       "Missing channels are filled in by rules, and each rule used is reported once: area from\n"
-      "radius and disk overlap; radius from area; both from the neighbours, with disks in the\n"
-      "middle of their cells; without a normal a surfel is a sphere (or --normals estimate).\n"
+      "radius and disk overlap; radius, or both, from the neighbours, with disks in the middle\n"
+      "of their cells; without a normal a surfel is a sphere (or --normals estimate).\n"
       "--memory defaults to 1G, or 3/4 of what the job may hold where that is less; the least\n"
       "is 64M, and some 13M more for each thread beyond the second.\n"
       "Examples:\n"

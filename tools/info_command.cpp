@@ -187,8 +187,7 @@ void addMissing(const CloudSurfels& surfels, nlohmann::json& json) {
   }
   if (!channels.radius && !channels.area) {
     sizes =
-        "`surfeit index` finds them from the neighbours; `surfeit normals --sizes` writes "
-        "them, but `index` puts disks in the middle of their cells only where it finds sizes";
+        "`surfeit index` finds them from the neighbours; `surfeit normals --sizes` writes areas";
   }
   addMissing(channels, normals, sizes, json);
 }

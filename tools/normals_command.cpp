@@ -63,7 +63,7 @@ void addNormalsOptions(CLI::App& command, NormalsOptions& options) {
   addNormalOptions(command, options.estimation);
   addUpOption(command, options.up, "Axis that is up", "as the cloud states, z for LAS, else y");
   command.add_flag("--sizes", options.with_sizes,
-                   "Write radius and area, too, as index would find them");
+                   "Write the area, too, as index would find it (the radius follows there)");
   addChannelOptions(command, options.channels, options.part, options.filter);
   addColorRangeOption(command, options.color_range);
   addTemporaryOption(command, options.temporary_directory);

@@ -18,7 +18,7 @@ namespace surfeit {
 struct NormalsOptions : JobOptions, ReadOptions {
   NormalEstimation estimation;
   std::optional<UpAxis> up{};  // absent: the axis that the cloud states (surfeit/up_axis.h)
-  bool with_sizes = false;     // write radius and area, too, as indexClouds would find them
+  bool with_sizes = false;     // write the area, too, as indexClouds would find it
 };
 
 struct NormalsStats {

@@ -227,7 +227,7 @@ SURFEIT_API void surfeit_gatherer_pause(surfeit_gatherer* gatherer);
 typedef struct surfeit_surfel {
   double position[3];
   float normal[3];    /* of any length; zero: a sphere */
-  float radius;       /* > 0; 0: found from area, or, if no surfel has a size, from neighbours */
+  float radius;       /* > 0; 0: found from neighbours, and with an area from that, too */
   float area;         /* > 0; 0: found from radius, or, if no surfel has a size, from neighbours */
   float radiosity[3]; /* scene-linear, >= 0 */
   float albedo[3];    /* 0 to 1 */

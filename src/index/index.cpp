@@ -144,7 +144,7 @@ Result<IndexStats> Indexer::run() {
   // Others may have filled the disk while we read; blocks that are read will give room back
   if (!gives_space_back_) SURFEIT_RETURN_IF_ERROR(checkOutputRoom());
   SURFEIT_ASSIGN_OR_RETURN(const auto writer, createWriter(output_, options_.full_precision));
-  if (totals_.missing_both + totals_.covering > 0 || estimatesNormals()) {
+  if (totals_.missesSizes() || estimatesNormals()) {
     SURFEIT_RETURN_IF_ERROR(buildWithNeighbours(std::move(buckets), *writer));
   } else {
     SURFEIT_RETURN_IF_ERROR(build(*writer, *distinct_, "build"));

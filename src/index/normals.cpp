@@ -49,8 +49,8 @@ static_assert(sizeof(OrderedPlace) == 40);
 struct FoundRow {
   std::uint64_t row = 0, reserved = 0;
   glm::vec3 normal{0};
-  float confidence = 0, radius = 0, area = 0;
-  std::uint32_t is_thin = 1, is_two_sided = 0;
+  float confidence = 0, area = 0;
+  std::uint32_t is_thin = 1, is_two_sided = 0, unused = 0;
 };
 static_assert(sizeof(FoundRow) == 48);
 
@@ -286,7 +286,6 @@ class NormalsJob {
     row.normal = found.normal;
     if (rule_->needsSides() && found.normal != glm::vec3(0)) row.normal = surface.own_normal;
     row.confidence = surface.confidence;
-    row.radius = std::sqrt(IndexOptions().disk_overlap) * surface.radius;
     row.area = surface.area;
     row.is_thin = found.is_thin;
     row.is_two_sided = found.is_two_sided;
@@ -297,7 +296,7 @@ class NormalsJob {
     const RowLayout& element = reader_->element();
     RowWriterOptions writing;
     std::vector<std::string> found = {"nx", "ny", "nz", "normal_confidence"};
-    if (options_.with_sizes) found.insert(found.end(), {"radius", "area"});
+    if (options_.with_sizes) found.push_back("area");
     if (options_.estimation.thin_is_two_sided) found.emplace_back("two_sided");
     for (const RowProperty& property : element.properties) {
       if (std::find(found.begin(), found.end(), property.name) == found.end()) {
@@ -365,9 +364,9 @@ class NormalsJob {
     } else {
       stats_.mean_confidence += double(found.confidence);
     }
-    const float values[] = {found.normal.x,   found.normal.y, found.normal.z,
-                            found.confidence, found.radius,   found.area};
-    const std::size_t count = options_.with_sizes ? 6 : 4;
+    const float values[] = {found.normal.x, found.normal.y, found.normal.z, found.confidence,
+                            found.area};
+    const std::size_t count = options_.with_sizes ? 5 : 4;
     std::byte* const at = to + writer_->element().find("nx")->offset;
     std::memcpy(at, values, count * sizeof(float));
     if (options_.estimation.thin_is_two_sided) {

@@ -70,6 +70,13 @@ TEST_F(IndexShardsWithNeighbours, MixedCloudsHaveTheBytesOfOneMachine) {
   expectSameBytes(3);
 }
 
+TEST_F(IndexShardsWithNeighbours, AreasAloneHaveTheBytesOfOneMachine) {
+  std::vector<Surfel> cloud = bareCloud(60000);
+  for (std::size_t i = 0; i < cloud.size(); ++i) cloud[i].area = 1e-3f * float(1 + i % 3);
+  writeInput("a.ply", cloud, {.normal = true, .area = true});
+  for (const int count : {2, 5}) expectSameBytes(count);
+}
+
 TEST_F(IndexShardsWithNeighbours, SmallAndEmptyPartsAreFine) {
   writeInput("a.ply", sphereCloud(9), kPositionsOnly);
   writeInput("none.ply", {}, kPositionsOnly);

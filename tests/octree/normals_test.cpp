@@ -275,6 +275,33 @@ TEST_F(NormalsTest, SizesAreThoseOfTheSurface) {
   EXPECT_NEAR(area, 4 * 3.14159265, .05);
 }
 
+// Areas of cells lead to the disks of a cloud without sizes.
+TEST_F(NormalsTest, IndexMakesTheSameDisksOfSizesThatAreWritten) {
+  write(sphere(20000, 0));
+  NormalsOptions options;
+  options.with_sizes = true;
+  options.estimation.orientation.toward = Toward::kOutward;
+  find(options);
+  IndexOptions indexing;
+  indexing.full_precision = true;
+  std::vector<std::vector<double>> radii(20000);
+  for (const char* channels : {"normal_confidence=-", "area=-"}) {
+    indexing.channels = channels;
+    const auto stats = indexClouds({path("normals.ply")}, path("cloud.sft"), indexing, notes_);
+    ASSERT_TRUE(stats.ok()) << stats.status().message();
+    const auto reader = openCloud(path("cloud.sft"), {});
+    ASSERT_TRUE(reader.ok());
+    const std::vector<std::byte> rows = readAllRows(**reader);
+    for (std::size_t i = 0; i < 20000; ++i) {
+      radii[i].push_back(valueOf(**reader, rows, i, "radius"));
+    }
+  }
+  const auto differing = std::count_if(radii.begin(), radii.end(), [](const auto& both) {
+    return std::abs(both[0] - both[1]) > .03 * both[1];
+  });
+  EXPECT_LT(differing, 10);
+}
+
 std::array<long, 3> rounded(const glm::dvec3& p) {
   return {std::lround(p.x * 1e5), std::lround(p.y * 1e5), std::lround(p.z * 1e5)};
 }

@@ -2,14 +2,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "core/long_side.h"
+#include "core/spherical_harmonics.h"
 #include "io/test_directory.h"
 #include "octree/test_scenes.h"
 #include "surfeit/index.h"
@@ -73,8 +77,15 @@ class SamplingTest : public DirectoryTest {
   double found(double area, bool has_normals = false) {
     CloudChannels channels;
     channels.normal = has_normals;
-    EXPECT_TRUE(writeSurfels(path("cloud.ply"), surfels_, channels));
+    const std::vector<Surfel> scene = indexed(channels);
     surfels_.clear();
+    double sum = 0;
+    for (const Surfel& surfel : scene) sum += double(surfel.area);
+    return sum / area;
+  }
+
+  std::vector<Surfel> indexed(const CloudChannels& channels) {
+    EXPECT_TRUE(writeSurfels(path("cloud.ply"), surfels_, channels));
     IndexOptions options;
     options.full_precision = true;
     Progress quiet;
@@ -82,9 +93,16 @@ class SamplingTest : public DirectoryTest {
     EXPECT_TRUE(stats.ok()) << stats.status().message();
     const Result<ReadScene> scene = readScene(path("scene.sft"));
     EXPECT_TRUE(scene.ok());
-    double sum = 0;
-    for (const Surfel& surfel : scene->surfels) sum += double(surfel.area);
-    return sum / area;
+    return scene.ok() ? scene->surfels : std::vector<Surfel>();
+  }
+  static std::vector<float> areasOf(const std::vector<Surfel>& surfels) {
+    std::vector<float> areas;
+    for (const Surfel& surfel : surfels) areas.push_back(surfel.area);
+    std::sort(areas.begin(), areas.end());
+    return areas;
+  }
+  static double diskArea(const Surfel& surfel) {
+    return double(kPi) * double(surfel.radius) * double(surfel.radius);
   }
 
   static bool writeSurfels(const std::string& file, const std::vector<Surfel>& surfels,
@@ -201,6 +219,82 @@ TEST_F(SamplingTest, StraysStaySmall) {
     surfels_.push_back(stray);
   }
   EXPECT_NEAR(found(1), 1, .5);  // each no more than 8 times the median radius
+}
+
+// Areas of a file stay to the bit, and neighbours tell the disks.
+TEST_F(SamplingTest, AreasAloneStayAndDisksFillTheirCells) {
+  addFlat(rows(10));
+  for (Surfel& surfel : surfels_) surfel.area = float(.5 + unit()) * 1e-4f;
+  const std::vector<Surfel> found = indexed({.normal = true, .area = true});
+  EXPECT_EQ(areasOf(found), areasOf(surfels_));
+  // Rows lie ten times as far apart as their points
+  for (const Surfel& surfel : found) {
+    EXPECT_NEAR(elongationOf(surfel), 10, .5);
+    EXPECT_NEAR(diskArea(surfel), 1.01e-3, 3e-4);  // by the moments of 10:1
+  }
+}
+
+TEST_F(SamplingTest, RadiiOfAFileStayWhereverTheyLie) {
+  addFlat(scattered(2000));
+  for (Surfel& surfel : surfels_) surfel.area = 5e-4f, surfel.radius = 1e-3f;
+  std::vector<Surfel> found = indexed({.normal = true, .radius = true, .area = true});
+  ASSERT_EQ(found.size(), surfels_.size());
+  const auto isBefore = [](const Surfel& a, const Surfel& b) {
+    return std::pair(a.position.x, a.position.y) < std::pair(b.position.x, b.position.y);
+  };
+  std::sort(found.begin(), found.end(), isBefore);
+  std::sort(surfels_.begin(), surfels_.end(), isBefore);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i].position, surfels_[i].position);
+    EXPECT_EQ(found[i].radius, 1e-3f);
+  }
+}
+
+// Confetti on the ground, a tenth of which they cover; and leaves all around.
+TEST_F(SamplingTest, DisksOfWhatCoversLittleStaySmall) {
+  constexpr float kArea = 1e-5f;
+  addFlat(scattered(kSide * kSide));
+  for (Surfel& surfel : surfels_) surfel.area = kArea, surfel.flags |= kSurfelTwoSided;
+  double mean = 0;
+  for (const Surfel& surfel : indexed({.normal = true, .area = true, .two_sided = true})) {
+    mean += diskArea(surfel) / (kSide * kSide);
+    if (surfel.elongation == 0) {
+      EXPECT_LT(diskArea(surfel), 2 * 5.001 * double(kArea));
+    }
+  }
+  EXPECT_NEAR(mean, 2 * double(kArea), .3 * 2 * double(kArea));
+
+  surfels_.clear();
+  for (int i = 0; i < 5000; ++i) {
+    Surfel leaf;
+    leaf.position = {unit(), unit(), unit()};
+    leaf.normal = glm::normalize(glm::vec3(normal(), normal(), normal()));
+    leaf.area = kArea;
+    leaf.flags |= kSurfelTwoSided;
+    surfels_.push_back(leaf);
+  }
+  for (const Surfel& surfel : indexed({.normal = true, .area = true, .two_sided = true})) {
+    ASSERT_NEAR(diskArea(surfel), 2 * double(kArea), 1e-3 * double(kArea));
+  }
+}
+
+// One surfel far from all others does not shrink the disks of those that come before and after it.
+TEST_F(SamplingTest, StraysDoNotShrinkOthers) {
+  addFlat(hexagons());
+  const std::size_t count = surfels_.size();
+  for (int i = 0; i < 20; ++i) {
+    Surfel stray;
+    stray.position = {3 * unit() - 1, -1.5 - unit(), 0};
+    stray.normal = {0, 0, 1};
+    surfels_.push_back(stray);
+  }
+  for (Surfel& surfel : surfels_) surfel.area = 1 / float(count);
+  for (const Surfel& surfel : indexed({.normal = true, .area = true})) {
+    if (surfel.position.y > .02 && surfel.position.y < .98) {
+      EXPECT_GT(diskArea(surfel), 1.9 / double(count));
+    }
+    EXPECT_LT(diskArea(surfel), 20. / double(count));
+  }
 }
 
 // What a dry run says is what a run takes, about; and it leaves nothing.

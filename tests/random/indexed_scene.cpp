@@ -81,7 +81,8 @@ CloudChannels channelsOf(std::span<const Surfel> cloud) {
   CloudChannels channels;
   channels.normal = channels.radiosity = channels.albedo = true;
   const auto has = [cloud](auto test) { return std::any_of(cloud.begin(), cloud.end(), test); };
-  channels.radius = channels.area = has([](const Surfel& surfel) { return surfel.area > 0; });
+  channels.area = has([](const Surfel& surfel) { return surfel.area > 0; });
+  channels.radius = has([](const Surfel& surfel) { return surfel.radius > 0; });
   channels.two_sided = has([](const Surfel& surfel) { return surfel.isTwoSided(); });
   channels.group = has([](const Surfel& surfel) { return surfel.group != 0; });
   channels.long_side = has([](const Surfel& surfel) { return surfel.long_side != 0; });

@@ -44,6 +44,7 @@ json jsonOf(const CloudTotals& totals) {
                {"missing_both", totals.missing_both},
                {"missing_area", totals.missing_area},
                {"missing_radius", totals.missing_radius},
+               {"radius_from_area", totals.radius_from_area},
                {"spheres", totals.spheres},
                {"covering", totals.covering},
                {"bright", totals.bright},
@@ -210,7 +211,7 @@ IndexShardPlan planOf(const IndexShardJob& job, RoundCounts counts, int round) {
   plan.cube = cubeAsked(job.options, plan.totals.bounds, plan.origin);
   plan.round = round;
   const CloudTotals& totals = plan.totals;
-  plan.needs_neighbours = totals.missing_both + totals.covering > 0 || normalRule(job, plan);
+  plan.needs_neighbours = totals.missesSizes() || normalRule(job, plan);
   plan.sample.resize(plan.totals.sample.size());
   if (!plan.sample.empty()) {
     curveKeys(&plan.totals.sample.front().position, sizeof(Surfel), plan.cube, plan.sample);
@@ -235,6 +236,7 @@ bool totalsOf(const json& facts, CloudTotals& totals) {
     totals.missing_both = text.at("missing_both").get<std::uint64_t>();
     totals.missing_area = text.at("missing_area").get<std::uint64_t>();
     totals.missing_radius = text.at("missing_radius").get<std::uint64_t>();
+    totals.radius_from_area = text.at("radius_from_area").get<std::uint64_t>();
     totals.spheres = text.at("spheres").get<std::uint64_t>();
     totals.covering = text.at("covering").get<std::uint64_t>();
     totals.bright = text.at("bright").get<std::uint64_t>();

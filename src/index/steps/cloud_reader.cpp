@@ -18,6 +18,7 @@
 #include "index/notes/mixed_clouds.h"
 #include "index/rows/row_fetcher.h"
 #include "index/rows/scene_rows.h"
+#include "octree/neighbours/given_areas.h"
 #include "surfeit/group_names.h"
 
 namespace surfeit {
@@ -114,7 +115,9 @@ void CloudTotals::add(std::span<const Surfel> added) {
     missing_both += surfel.radius <= 0 && surfel.area <= 0 ? 1 : 0;
     missing_area += surfel.radius > 0 && surfel.area == 0 ? 1 : 0;
     covering += surfel.radius > 0 && surfel.area < 0 ? 1 : 0;
-    missing_radius += surfel.radius <= 0 && surfel.area > 0 ? 1 : 0;
+    const bool finds_radius = findsRadius(surfel);
+    missing_radius += finds_radius ? 1 : 0;
+    radius_from_area += surfel.radius <= 0 && surfel.area > 0 && !finds_radius ? 1 : 0;
     spheres += surfel.isSphere() ? 1 : 0;
     const float albedo = std::max({surfel.albedo.x, surfel.albedo.y, surfel.albedo.z});
     bright += albedo > 1 ? 1 : 0;
@@ -136,6 +139,7 @@ void CloudTotals::add(const CloudTotals& other) {
   missing_area += other.missing_area;
   covering += other.covering;
   missing_radius += other.missing_radius;
+  radius_from_area += other.radius_from_area;
   spheres += other.spheres;
   bright += other.bright;
   largest_albedo = std::max(largest_albedo, other.largest_albedo);
@@ -179,8 +183,7 @@ Result<CloudReader> CloudReader::open(const std::vector<std::string>& inputs, bo
     }
     if (reader.size_names_.property.empty()) reader.size_names_ = source->sizeNames();
     const CloudChannels channels = source->channels();
-    reader.lacks_sizes_ =
-        reader.lacks_sizes_ || (!channels.radius && !channels.area) || source->hasCoverage();
+    reader.lacks_sizes_ = reader.lacks_sizes_ || !channels.radius || source->hasCoverage();
     if (opener) {
       reader.file_bytes_ += source->recordCount() * source->rowBytes();
       continue;

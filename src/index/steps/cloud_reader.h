@@ -36,13 +36,16 @@ struct CloudTotals {
   std::uint64_t content = 0;  // sum of the surfels' hashes
   CloudChannels channels;
   std::uint64_t missing_both = 0, missing_area = 0, missing_radius = 0, spheres = 0;
-  std::uint64_t covering = 0;  // surfels that have a coverage instead of an area
-  std::uint64_t bright = 0;    // surfels with an albedo above 1
-  float largest_albedo = 0;    // of any component
-  std::vector<Surfel> sample;  // surfels from all over the inputs
+  std::uint64_t covering = 0;          // surfels that have a coverage instead of an area
+  std::uint64_t radius_from_area = 0;  // surfels whose radius needs no neighbours (findsRadius())
+  std::uint64_t bright = 0;            // surfels with an albedo above 1
+  float largest_albedo = 0;            // of any component
+  std::vector<Surfel> sample;          // surfels from all over the inputs
 
   void add(std::span<const Surfel> surfels);
   void add(const CloudTotals& other);
+  // Whether any need neighbours to tell.
+  bool missesSizes() const { return missing_both + covering + missing_radius > 0; }
 };
 
 // How an input is opened; openCloudSource, unless surfels do not come from files.

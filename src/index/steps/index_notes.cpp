@@ -95,8 +95,15 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
                               options.disk_overlap));
   }
   if (totals.missing_radius > 0) {
+    progress.note(fmt::format(
+        "{} surfels have an area and no radius: the area stays; where the disk lies and how far it "
+        "reaches follows from the cells among their neighbours, which takes time (convert --set "
+        "\"radius = sqrt({} * area / 3.14159)\" makes disks around the places)",
+        totals.missing_radius, options.disk_overlap));
+  }
+  if (totals.radius_from_area > 0) {
     progress.note(fmt::format("{} surfels have no radius: a disk of {} times the area is used",
-                              totals.missing_radius, options.disk_overlap));
+                              totals.radius_from_area, options.disk_overlap));
   }
   if (totals.spheres == 0) return;
   if (options.normals) {

@@ -26,7 +26,8 @@ SceneHeader SceneDescription::header(bool full_precision) const {
   header.channels = totals.channels;
   header.channels.normal = header.channels.normal || normals != nullptr;
   // Sizes from neighbours may tell the shape
-  header.channels.long_side = header.channels.long_side || totals.missing_both > 0;
+  header.channels.long_side =
+      header.channels.long_side || totals.missing_both + totals.missing_radius > 0;
   header.format_version = formatVersionFor(header.channels);
   header.full_precision = full_precision;
   return header;
@@ -61,8 +62,9 @@ std::string SceneDescription::provenance() const {
                          {"skipped_records", totals.skipped},
                          {"sizes_from_neighbours", totals.missing_both},
                          {"areas_from_radius", totals.missing_area},
-                         {"radii_from_area", totals.missing_radius},
+                         {"radii_from_area", totals.radius_from_area},
                          {"spheres", totals.spheres}};
+  if (totals.missing_radius > 0) json["radii_from_neighbours"] = totals.missing_radius;
   if (options.repeats == Repeats::kThin) json["repeats"] = "thin";
   const auto cube =
       options.cube ? PinnedCube(*options.cube).unusualNumbers(totals.bounds, origin) : std::nullopt;

@@ -50,6 +50,8 @@ glm::vec3 wayWithin(const Bounds3& box, const glm::vec3& from, glm::vec3 way,
   return from + kInside * (place - from);
 }
 
+float radiusOfArea(float area, float overlap) { return std::sqrt(area * overlap / kPi); }
+
 bool needsSize(const Surfel& surfel) { return (surfel.flags & kSurfelNeedsSize) != 0; }
 
 }  // namespace
@@ -69,8 +71,8 @@ SizedSurfelStream::~SizedSurfelStream() = default;
 
 std::size_t SizedSurfelStream::searcherBytes(int threads) {
   // Surfels are read, then copied into a batch with their tickets, which are sorted
-  constexpr std::size_t kSurfelBytes =
-      2 * sizeof(Surfel) + 2 * sizeof(Ticket) + sizeof(CurveKey) + sizeof(std::uint8_t);
+  constexpr std::size_t kSurfelBytes = 2 * sizeof(Surfel) + 2 * sizeof(Ticket) + sizeof(CurveKey) +
+                                       sizeof(std::uint8_t) + sizeof(SurfaceAt);
   constexpr std::size_t kBatchBytes = kThreadPages * kDefaultSurfelGroup * kSurfelBytes;
   return std::size_t(threads) * (SurfaceSearch::memoryBytes() + kBatchBytes);
 }
@@ -230,6 +232,50 @@ void SizedSurfelStream::moveToMiddle(std::size_t i, const glm::vec3& middle) {
   surfel.radius = std::sqrt(radius_sq);
 }
 
+void SizedSurfelStream::take(std::size_t i, const SurfaceAt& surface) {
+  Surfel& surfel = surfels_[i];
+  const bool has_area = hasAreaAlone(surfel), needs_size = needsSize(surfel);
+  const bool is_bare = needs_size && !has_area && surfel.radius <= kPlaceholderSize;
+  if (has_area) {
+    area_cells_[i] = surface;
+  } else if (needs_size) {
+    applySize(surfel, surface);
+  }
+  if (needsNormal(surfel)) applyNormal(surfel, surface);
+  // Spheres have no sides
+  if (!is_bare || surfel.isSphere()) return;
+  setLongSide(surface.long_side, surfel);
+  moveToMiddle(i, surface.middle);
+}
+
+// The disks of surfels with an area alone, when the cells of all are known.
+void SizedSurfelStream::shapeGiven() {
+  if (area_cells_.empty()) return;
+  for (std::size_t page = 0; page < page_begins_.size(); ++page) {
+    const bool is_last = page + 1 == page_begins_.size();
+    const std::size_t begin = page_begins_[page],
+                      size = (is_last ? surfels_.size() : page_begins_[page + 1]) - begin;
+    shrinkToAreas(std::span(surfels_).subspan(begin, size),
+                  std::span(area_cells_).subspan(begin, size));
+  }
+  for (std::size_t i = 0; i < surfels_.size(); ++i) {
+    Surfel& surfel = surfels_[i];
+    if (!hasAreaAlone(surfel)) continue;
+    const SurfaceAt& cell = area_cells_[i];
+    surfel.flags &= ~(kSurfelNeedsSize | kSurfelMarks);
+    surfel.radius = std::sqrt(overlap_) * cell.radius;
+    if (!surfel.isSphere() && cell.area > 0) {
+      setLongSide(cell.long_side, surfel);
+      moveToMiddle(i, cell.middle);
+    }
+    const float radius = radiusOfArea(surfel.area, overlap_);
+    if (!(cell.area > 0)) surfel.radius = radius;
+    if (surfel.long_side == kNoLongSide) {
+      surfel.radius = std::min(surfel.radius, std::sqrt(kMostOverArea) * radius);
+    }
+  }
+}
+
 Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   const SceneFile& file = octree_.file();
   if (next_page_ == end_page_) return std::shared_ptr<const SortedBatch>();
@@ -237,22 +283,16 @@ Result<std::shared_ptr<const SortedBatch>> SizedSurfelStream::next() {
   SURFEIT_RETURN_IF_ERROR(readPages(next_page_ + std::min(pages, end_page_ - next_page_)));
 
   SURFEIT_RETURN_IF_ERROR(findLeaves());
+  area_cells_.assign(
+      std::any_of(surfels_.begin(), surfels_.end(), hasAreaAlone) ? surfels_.size() : 0,
+      SurfaceAt());
   SURFEIT_RETURN_IF_ERROR(findOnThreads(
       searchers_, surfels_,
       [&](std::size_t i) {
         return SurfaceNeeds{.size = needsSize(surfels_[i]), .normal = needsNormal(surfels_[i])};
       },
-      [&](std::size_t i, const SurfaceAt& surface) {
-        Surfel& surfel = surfels_[i];
-        const bool is_bare = needsSize(surfel) && surfel.radius <= kPlaceholderSize;
-        if (needsSize(surfel)) applySize(surfel, surface);
-        if (needsNormal(surfel)) applyNormal(surfel, surface);
-        // Spheres have no sides
-        if (!is_bare || surfel.isSphere()) return;
-        setLongSide(surface.long_side, surfel);
-        moveToMiddle(i, surface.middle);
-      },
-      progress_));
+      [&](std::size_t i, const SurfaceAt& surface) { take(i, surface); }, progress_));
+  shapeGiven();
 
   const auto batch = std::make_shared<SortedBatch>();
   batch->resize(surfels_.size());
@@ -274,8 +314,11 @@ void applySizeRules(Surfel& surfel, float overlap) {
     } else {
       surfel.area = areaOfDisk(surfel.radius, overlap);
     }
+  } else if (findsRadius(surfel)) {
+    surfel.radius = kPlaceholderSize;
+    surfel.flags |= kSurfelNeedsSize;
   } else if (surfel.area > 0) {
-    surfel.radius = std::sqrt(surfel.area * overlap / kPi);
+    surfel.radius = radiusOfArea(surfel.area, overlap);
   } else {
     surfel.radius = surfel.area = kPlaceholderSize;
     surfel.flags |= kSurfelNeedsSize;

@@ -15,6 +15,7 @@
 #include "core/curve_key.h"
 #include "core/spherical_harmonics.h"
 #include "octree/build/sorted_surfels.h"
+#include "octree/neighbours/given_areas.h"
 #include "octree/neighbours/normal_rule.h"
 #include "octree/neighbours/surface_search.h"
 #include "octree/page/surfel_marks.h"
@@ -25,8 +26,8 @@
 namespace surfeit {
 
 // The surfels of a scene in curve order, with sizes filled in, and with `normals` the normals of
-// those without. Disks that had neither radius nor area stand in the middle of their cells, as far
-// as that is in their leaf of the octree. The neighbour search goes through the scene's own caches,
+// those without. Disks that had no radius stand in the middle of their cells, as far as that is in
+// their leaf of the octree. The neighbour search goes through the scene's own caches,
 // so memory stays within their budget. `overlap`: disk area over surfel area.
 class SizedSurfelStream : public SortedSurfelStream {
  public:
@@ -59,6 +60,8 @@ class SizedSurfelStream : public SortedSurfelStream {
   Result<std::optional<CurveKey>> keyBeside(std::uint32_t page, bool is_first) const;
   Status findLeaves();
   void moveToMiddle(std::size_t i, const glm::vec3& middle);
+  void take(std::size_t i, const SurfaceAt& surface);
+  void shapeGiven();
   bool needsNormal(const Surfel& surfel) const { return normals_ && surfel.isSphere(); }
   void applySize(Surfel& surfel, const SurfaceAt& surface) const;
   void applyNormal(Surfel& surfel, const SurfaceAt& surface);
@@ -76,6 +79,7 @@ class SizedSurfelStream : public SortedSurfelStream {
   std::vector<std::size_t> page_begins_;
   std::vector<CurveKey> keys_;
   std::vector<std::uint8_t> leaf_levels_;
+  std::vector<SurfaceAt> area_cells_;  // empty where no surfel has an area alone
   std::vector<Ticket> ticket_scratch_;
   std::atomic<std::uint64_t> normals_found_ = 0, thin_surfels_ = 0;
 };

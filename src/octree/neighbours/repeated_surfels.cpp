@@ -51,7 +51,7 @@ void RepeatFilter::thin(const SortedBatch& batch, SortedBatch& thinned) {
       const Surfel& surfel = batch.surfels[tickets[i].index];
       is_repeated = isRepeated(surfel);
       if (is_repeated && repeats_ == Repeats::kKeep) {
-        repeated_ += (surfel.flags & kSurfelNeedsSize) == 0 ? 1 : 0;
+        repeated_ += (surfel.flags & kSurfelNeedsSize) == 0 || hasAreaAlone(surfel) ? 1 : 0;
         is_repeated = false;
       }
     } else {

@@ -23,9 +23,6 @@ constexpr int kMostFarther = 32;
 // Strays: radii of open cells are limited to this many times the distance of the neighbours from
 // each other.
 constexpr float kOpenLimit = 4;
-// Of the neighbours of strays, in spacings; a surface with noise may have as much, which does no
-// harm: only radii 8 times the median's are limited.
-constexpr float kLooseThickness = 0.4f;
 
 glm::vec3 normalOf(const Surfel& surfel) {
   return surfel.isSphere() ? glm::vec3(0) : surfel.normal;

@@ -21,6 +21,10 @@
 
 namespace surfeit {
 
+// Of the neighbours of strays, in spacings; a surface with noise may have as much, which does no
+// harm: only radii 8 times the median's are limited.
+inline constexpr float kLooseThickness = 0.4f;
+
 struct SurfaceAt {
   float area = 0;    // per surfel at the place; 0: unknown
   float radius = 0;  // of a disk that is spread out as far as the piece of surface around the place

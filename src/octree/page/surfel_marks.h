@@ -14,6 +14,6 @@ inline constexpr std::uint32_t kSurfelNeedsSize = 1u << 7, kSurfelNeedsSide = 1u
 // Radius and area of such a surfel meanwhile: positive, because pages hold nothing else.
 inline constexpr float kPlaceholderSize = 1e-30f;
 // Surfels with a coverage keep their radius and have the coverage times the placeholder as area:
-// what is found is the area.
+// what is found is the area. Surfels with an area alone keep that.
 
 }  // namespace surfeit
