@@ -2,7 +2,7 @@
 // occlusion before them against that before the surface itself (a hexagonal grid, nine times as
 // dense, with its true areas).
 //
-//   sampling_bench [--side N]
+//   sampling_bench [--side N] [--only TEXT]
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -301,7 +301,7 @@ class Bench {
   std::vector<double> true_occlusions_;
 };
 
-void run(int side) {
+void run(int side, const std::string& only) {
   Samplings samplings(side);
   const std::vector<std::pair<std::string, std::function<Places()>>> kinds = {
       {"random", [&] { return samplings.scattered(); }},
@@ -323,7 +323,11 @@ void run(int side) {
       side, side);
   Bench bench(side);
   for (const Shape& shape : shapes(1. / side)) {
-    for (const auto& [name, sampling] : kinds) bench.row(shape, name, sampling);
+    for (const auto& [name, sampling] : kinds) {
+      if ((shape.name + ' ' + name).find(only) != std::string::npos) {
+        bench.row(shape, name, sampling);
+      }
+    }
   }
 }
 
@@ -334,7 +338,9 @@ int main(int argc, char** argv) {
   CLI::App app("Areas found for bare positions, beside the true ones");
   int side = 100;
   app.add_option("--side", side, "Places along an edge of a patch")->capture_default_str();
+  std::string only;
+  app.add_option("--only", only, "Only rows whose shape and sampling hold this text");
   CLI11_PARSE(app, argc, argv);
-  surfeit::run(side);
+  surfeit::run(side, only);
   return 0;
 }

@@ -211,6 +211,22 @@ TEST_F(SamplingTest, DensitiesMayChangeByAThousand) {
   EXPECT_NEAR(found(1), 1, .05);
 }
 
+// Beside something a thousand times as dense all neighbours may be of another wall. Before that
+// was told by normals .73 of the area were found.
+TEST_F(SamplingTest, NormalsTellSparseWallsFromDenseOnes) {
+  for (const bool is_back : {false, true}) {
+    Places places = scattered(100000);
+    for (glm::dvec2& place : places) place.x *= .5;
+    for (const glm::dvec2& place : scattered(100)) places.emplace_back(.5 + .5 * place.x, place.y);
+    if (is_back) {
+      add(places, {0, 0, -.01}, {0, 1, 0}, {1, 0, 0});
+    } else {
+      addFlat(places);
+    }
+  }
+  EXPECT_NEAR(found(2, true), 1, .1);
+}
+
 TEST_F(SamplingTest, StraysStaySmall) {
   addFlat(scattered(kSide * kSide));
   for (int i = 0; i < 20; ++i) {
@@ -293,7 +309,9 @@ TEST_F(SamplingTest, StraysDoNotShrinkOthers) {
     if (surfel.position.y > .02 && surfel.position.y < .98) {
       EXPECT_GT(diskArea(surfel), 1.9 / double(count));
     }
-    EXPECT_LT(diskArea(surfel), 20. / double(count));
+    if (surfel.elongation == 0) {
+      EXPECT_LT(diskArea(surfel), 10.001 / double(count));
+    }
   }
 }
 

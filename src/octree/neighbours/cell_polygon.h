@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <span>
 
 namespace surfeit {
 
@@ -51,6 +52,7 @@ class CellPolygon {
     return keepWithin(beyond);
   }
 
+  std::span<const glm::vec2> corners() const { return std::span(corners_).first(count_); }
   float reach() const { return std::sqrt(reach_sq_); }
   float reachSq() const { return reach_sq_; }
   // Whether what is nearer to a corner than the place is lies within `radius` of there: only that

@@ -13,6 +13,7 @@
 #include "core/tangent_frame.h"
 #include "octree/neighbours/cell_polygon.h"
 #include "octree/neighbours/surface_fits.h"
+#include "octree/neighbours/third_nearest.h"
 
 namespace surfeit {
 namespace {
@@ -113,46 +114,6 @@ float thicknessOf(const std::vector<Flat>& flat, std::vector<float>& heights) {
   return heights.empty() ? 0 : *middle;
 }
 
-// How far each of some places is from the third of the others, since scans come in pairs.
-class ThirdNearest {
- public:
-  // The median; lengths in `unit`.
-  float median(std::span<const Neighbour> places, float unit) {
-    const std::size_t count = places.size();
-    for (std::vector<float>* column : {&x_, &y_, &z_, &squares_}) column->resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const glm::vec3 offset = places[i].offset / unit;
-      x_[i] = offset.x, y_[i] = offset.y, z_[i] = offset.z;
-    }
-    thirds_.clear();
-    for (std::size_t i = 0; i < count; ++i) thirds_.push_back(thirdSquare(i));
-    const auto middle = thirds_.begin() + std::ptrdiff_t(count / 2);
-    std::nth_element(thirds_.begin(), middle, thirds_.end());
-    return std::sqrt(*middle) * unit;
-  }
-
- private:
-  float thirdSquare(std::size_t i) {
-    const std::size_t count = x_.size();
-    const float x = x_[i], y = y_[i], z = z_[i];
-    for (std::size_t j = 0; j < count; ++j) {
-      const float dx = x_[j] - x, dy = y_[j] - y, dz = z_[j] - z;
-      squares_[j] = dx * dx + dy * dy + dz * dz;
-    }
-    squares_[i] = kInfinity;
-    float least[3] = {kInfinity, kInfinity, kInfinity};
-    for (const float square : squares_) {
-      if (square >= least[2]) continue;
-      least[2] = square;
-      if (least[2] < least[1]) std::swap(least[1], least[2]);
-      if (least[1] < least[0]) std::swap(least[0], least[1]);
-    }
-    return least[2];
-  }
-
-  std::vector<float> x_, y_, z_, squares_, thirds_;
-};
-
 }  // namespace
 
 struct SurfaceCells::Scratch {
@@ -161,7 +122,8 @@ struct SurfaceCells::Scratch {
   std::vector<Flat> flat;
   std::vector<float> heights;
   std::vector<glm::vec2> cutters;
-  std::vector<float> slopes_sq;  // of those from farther away
+  std::vector<float> slopes_sq;           // of those from farther away
+  std::vector<Neighbour> cutting, sheet;  // the cutters; all on the place's own sheet
   ThirdNearest third_nearest;
 
   // Of the cell in the making. Lengths are in units of the farthest neighbour.
@@ -170,8 +132,12 @@ struct SurfaceCells::Scratch {
   glm::vec3 own_normal{0}, normal{0};
   TangentFrame frame{glm::vec3(0, 0, 1)};  // of cells that are cut one by one
   CellPolygon polygon;
+  float neighbour_spacing = 0;
+  bool was_touching = false;  // of the cell that was closed last
+  float open = kOpen;         // the polygon begins as a square of twice that
 
   bool has_measures = false;
+  std::array<float, SurfaceFitLanes::kLanes> sheet_thickness{};  // as of SurfaceCell
 
   Flat flatten(const glm::vec3& place) const {
     const glm::vec3 offset = place / unit;
@@ -186,9 +152,16 @@ struct SurfaceCells::Scratch {
     return !are_known || glm::dot(n.normal, own_normal) >= kLeastCosine;
   }
   bool isLine() const { return fits.is_line[lane] > 0; }
+  bool hasPlane() const { return !isLine() || own_normal != glm::vec3(0); }
 
   void begin(std::size_t of_lane);
+  void begin();
+  void cutByNeighbours();
+  bool isLoose() const;
+  bool isFull(const SurfaceCell& cell) const;
+  bool isSparse() const;
   void flattenAll(std::span<const Neighbour> neighbours);
+  float thicknessOfSheet(std::span<const Neighbour> neighbours) const;
   float usualCutter();
   SurfaceCell cell() const;
   SurfaceCell cell(float area, const CellMoments& moments) const;
@@ -248,10 +221,17 @@ void SurfaceCells::Scratch::begin(std::size_t of_lane) {
   normal = own_normal != glm::vec3(0)
                ? own_normal
                : glm::vec3(fits.normal_x[lane], fits.normal_y[lane], fits.normal_z[lane]);
-  polygon.begin(kOpen);
+  open = kOpen;
+  begin();
+}
+
+void SurfaceCells::Scratch::begin() {
+  polygon.begin(open);
   sharers = 1;
   cutters.clear();
   slopes_sq.clear();
+  cutting.clear();
+  sheet.clear();
 }
 
 // Of the place's own sheet.
@@ -265,6 +245,7 @@ void SurfaceCells::Scratch::flattenAll(std::span<const Neighbour> neighbours) {
         {fits.beside_u[i][lane], fits.beside_v[i][lane]}, fits.above[i][lane], std::uint32_t(i)};
   }
   flat.resize(count);
+  sheet_thickness[lane] = count < neighbours.size() ? thicknessOfSheet(neighbours) : -1;
   if (fits.highest[lane] <= kNarrowGap * spacing) return;  // there is no gap below anything
   const SideGaps gaps = gapsIn(flat, kNarrowGap * spacing);
   if (!gaps.above && !gaps.below) return;
@@ -273,9 +254,24 @@ void SurfaceCells::Scratch::flattenAll(std::span<const Neighbour> neighbours) {
   if (gaps.below) dropSheet(-1, spacing, thickness, flat, heights);
 }
 
+// How thick the own sheet is, root mean square, over its spacing, where neighbours that face
+// elsewhere all lie on one side of it, as those around an edge. Else they lie all around.
+float SurfaceCells::Scratch::thicknessOfSheet(std::span<const Neighbour> neighbours) const {
+  float low = 0, high = 0, sum = 0;
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    if (mayShareSheet(neighbours[i])) continue;
+    low = std::min(low, fits.above[i][lane]), high = std::max(high, fits.above[i][lane]);
+  }
+  if (std::min(-low, high) > kNarrowGap * spacing) return -1;
+  if (flat.empty()) return 0;
+  for (const Flat& n : flat) sum += n.above * n.above;
+  return std::sqrt(sum / float(flat.size())) / spacingOf(float(flat.size()));
+}
+
 // Neighbours on other sheets are infinitely far.
 void SurfaceCells::Scratch::dropOthers() {
   const bool may_have_sheets = fits.highest[lane] > kNarrowGap * spacing;
+  sheet_thickness[lane] = -1;
   if (own_normal == glm::vec3(0) && !may_have_sheets) return;
   const std::size_t count = places[lane].neighbours.size();
   flattenAll(places[lane].neighbours);
@@ -298,6 +294,19 @@ void SurfaceCells::measure() {
   at.has_measures = true;
 }
 
+// By those of the own sheet, which are flattened.
+void SurfaceCells::Scratch::cutByNeighbours() {
+  const float coincident_sq = (kCoincident * spacing) * (kCoincident * spacing);
+  for (const Flat& n : flat) {
+    if (glm::dot(n.beside, n.beside) < coincident_sq) {
+      ++sharers;
+    } else if (polygon.cut(n.beside)) {
+      cutters.push_back(n.beside);
+      cutting.push_back(places[lane].neighbours[n.index]);
+    }
+  }
+}
+
 SurfaceCell SurfaceCells::cellOf(std::size_t lane) {
   Scratch& at = *scratch_;
   at.begin(lane);
@@ -317,14 +326,7 @@ SurfaceCell SurfaceCells::cellOf(std::size_t lane) {
   }
   at.frame = TangentFrame(at.normal);
   at.flattenAll(place.neighbours);
-  const float coincident_sq = (kCoincident * at.spacing) * (kCoincident * at.spacing);
-  for (const Flat& n : at.flat) {
-    if (glm::dot(n.beside, n.beside) < coincident_sq) {
-      ++at.sharers;
-    } else if (at.polygon.cut(n.beside)) {
-      at.cutters.push_back(n.beside);
-    }
-  }
+  at.cutByNeighbours();
   SurfaceCell cell = at.cell();
   cell.is_settled = !at.cutters.empty() && at.isSettled(at.polygon.reachSq());
   return cell;
@@ -334,8 +336,36 @@ float SurfaceCells::reach() const { return 2 * scratch_->polygon.reach() * scrat
 
 bool SurfaceCells::isOpen() const {
   const Scratch& at = *scratch_;
-  const bool has_plane = !at.isLine() || at.own_normal != glm::vec3(0);
-  return !at.cutters.empty() && has_plane;
+  return at.hasPlane() && !at.cutters.empty();
+}
+
+// Whether places close by cannot tell the size of the cell that was closed last: they are too few,
+// or closer to each other than to the place.
+bool SurfaceCells::Scratch::isSparse() const {
+  if (cutters.size() < 3) return true;
+  const auto nearest = std::min_element(
+      cutters.begin(), cutters.end(),
+      [](const glm::vec2& a, const glm::vec2& b) { return glm::dot(a, a) < glm::dot(b, b); });
+  return glm::length(*nearest) * unit > neighbour_spacing;
+}
+
+bool SurfaceCells::widen(float radius) {
+  Scratch& at = *scratch_;
+  if (!at.hasPlane() || !(radius > at.unit) || !at.was_touching) return false;
+  if (!at.isSparse()) return false;
+  at.open = kOpen * radius / at.unit;
+  at.begin();
+  at.cutByNeighbours();
+  return true;
+}
+
+glm::vec3 SurfaceCells::farthestCorner() const {
+  const Scratch& at = *scratch_;
+  const std::span<const glm::vec2> corners = at.polygon.corners();
+  const glm::vec2 corner = *std::max_element(
+      corners.begin(), corners.end(),
+      [](const glm::vec2& a, const glm::vec2& b) { return glm::dot(a, a) < glm::dot(b, b); });
+  return at.unit * (corner.x * at.frame.tangent + corner.y * at.frame.bitangent);
 }
 
 bool SurfaceCells::mayCut(const glm::vec3& centre, float radius) const {
@@ -354,6 +384,8 @@ bool SurfaceCells::cut(const Neighbour& place) {
   const Flat flat = at.flatten(place.offset);
   if (!at.polygon.cut(flat.beside)) return false;
   at.cutters.push_back(flat.beside);
+  at.cutting.push_back(place);
+  at.sheet.push_back(place);
   const float slope = flat.above / glm::length(flat.beside);
   at.slopes_sq.push_back(slope * slope);
   return true;
@@ -361,9 +393,8 @@ bool SurfaceCells::cut(const Neighbour& place) {
 
 SurfaceCell SurfaceCells::closed() {
   Scratch& at = *scratch_;
-  const float slopes_sq = std::accumulate(at.slopes_sq.begin(), at.slopes_sq.end(), 0.f);
-  const bool is_loose = slopes_sq > kLooseSlope * kLooseSlope * float(at.slopes_sq.size());
-  const bool is_open = !at.cutters.empty() && (at.polygon.touches(kOpen) || is_loose ||
+  at.was_touching = at.polygon.touches(at.open);
+  const bool is_open = !at.cutters.empty() && (at.was_touching || at.isLoose() ||
                                                at.polygon.reach() > kSpike * at.usualCutter());
   if (is_open) {
     // One close by shares the cell rather than telling its size
@@ -373,9 +404,52 @@ SurfaceCell SurfaceCells::closed() {
   }
   SurfaceCell cell = at.cell();
   cell.is_settled = !is_open;
-  if (is_open)
-    cell.neighbour_spacing = at.third_nearest.median(at.places[at.lane].neighbours, at.unit);
+  if (is_open) {
+    // The normal tells the sheet; without one a stray may have any
+    const CellPlace& place = at.places[at.lane];
+    if (at.own_normal == glm::vec3(0)) {
+      at.sheet.assign(place.neighbours.begin(), place.neighbours.end());
+    } else {
+      for (const Flat& n : at.flat) at.sheet.push_back(place.neighbours[n.index]);
+    }
+    const bool is_known = at.own_normal != glm::vec3(0) && !at.isLoose();
+    at.neighbour_spacing = cell.neighbour_spacing =
+        at.third_nearest.median(is_known ? at.cutting : at.sheet, at.sheet, at.unit);
+  }
   return cell;
+}
+
+SurfaceCell SurfaceCells::closedWide() {
+  Scratch& at = *scratch_;
+  SurfaceCell cell = at.cell();
+  cell.is_settled = at.isFull(cell);
+  return cell.is_settled ? cell : closed();
+}
+
+// Whether what cuts from farther away lies on a slope, as strays do.
+bool SurfaceCells::Scratch::isLoose() const {
+  const float sum = std::accumulate(slopes_sq.begin(), slopes_sq.end(), 0.f);
+  return sum > kLooseSlope * kLooseSlope * float(slopes_sq.size());
+}
+
+// Whether places lie all around a cell that is cut by places near and far, as at the border of
+// something dense. A corner is as far from those that cut it as from the place. Where the surface
+// ends these lie on either side of the place, and the corner lies farther away than both. Across
+// a hole in something dense cells are long.
+bool SurfaceCells::Scratch::isFull(const SurfaceCell& cell) const {
+  constexpr float kRounding = 1e-3f;
+  if (cutters.empty() || polygon.touches(open) || isLoose()) return false;
+  if (cell.long_side != glm::vec3(0)) return false;
+  for (const glm::vec2& corner : polygon.corners()) {
+    float farthest_sq = 0;
+    for (const glm::vec2& cutter : cutters) {
+      const float square = glm::dot(cutter, cutter);
+      const bool is_at_corner = glm::dot(corner, cutter) > (0.5f - kRounding) * square;
+      if (is_at_corner) farthest_sq = std::max(farthest_sq, square);
+    }
+    if (glm::dot(corner, corner) > farthest_sq) return false;
+  }
+  return true;
 }
 
 float SurfaceCells::Scratch::usualCutter() {
@@ -389,7 +463,7 @@ float SurfaceCells::Scratch::usualCutter() {
 SurfaceCell SurfaceCells::Scratch::cell() const {
   if (cutters.empty()) return {};
   // Of a line all that is known is a width: the piece is a square of it
-  if (isLine() && polygon.touches(kOpen)) {
+  if (isLine() && polygon.touches(open)) {
     const float width = polygon.width(glm::normalize(cutters[0]));
     return cell(width * width, {.square = width * width / 6});
   }
@@ -405,6 +479,7 @@ SurfaceCell SurfaceCells::Scratch::cell(float area, const CellMoments& moments) 
   const TangentFrame plane(normal);
   cell.middle = unit * (moments.middle.x * plane.tangent + moments.middle.y * plane.bitangent);
   cell.long_side = longSide(area, moments, plane);
+  cell.sheet_thickness = sheet_thickness[lane];
   return cell;
 }
 

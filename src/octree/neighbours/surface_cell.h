@@ -43,8 +43,10 @@ struct SurfaceCell {
   glm::vec3 long_side{0};
   // Whether places beyond the last neighbour would not change it.
   bool is_settled = false;
-  // Of cells that stay open: how far the neighbours are from each other.
+  // Of cells that stay open: how far the places that cut them are from others of the sheet.
   float neighbour_spacing = 0;
+  // As of SurfacePlane, of the place's own sheet where normals tell it from others; else negative.
+  float sheet_thickness = -1;
 };
 
 // One thread at a time: it keeps memory, and the cell that it made last.
@@ -69,6 +71,11 @@ class SurfaceCells {
   // nearer than reach(): a place, or one within a sphere.
   bool isOpen() const;
   float reach() const;
+  // Opens the cell that was closed last, to be cut by places farther than twice the last neighbour,
+  // up to twice `radius`. False where these are not needed.
+  bool widen(float radius);
+  // From the place.
+  glm::vec3 farthestCorner() const;
   bool mayCut(const glm::vec3& centre, float radius) const;
   bool wouldCut(const Neighbour& place) const;
   // False when it does not after all.
@@ -77,6 +84,8 @@ class SurfaceCells {
   // The cell when nothing else cuts it: where it is still open, at the edge of a surface, it is
   // closed by the mirror images of the places that cut it.
   SurfaceCell closed();
+  // The same of a widened cell, which is settled where places lie all around it, however far.
+  SurfaceCell closedWide();
 
  private:
   struct Scratch;

@@ -145,15 +145,21 @@ Status SurfaceSearch::findOpen(const Take& take) {
 // Closes the cell that was made last, if it is open, and hands on what was found.
 Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float reach,
                              SurfaceCells& cells, const Take& take) {
-  const bool is_sparse = !cell.is_settled;
-  if (is_sparse) {
+  // The normal tells the surface that places farther away belong to; without one they may be strays
+  const bool has_normal = place.normal != glm::vec3(0);
+  const bool is_doubtful = !cell.is_settled && !has_normal;
+  if (!cell.is_settled) {
     SURFEIT_RETURN_IF_ERROR(cutByFarther(place.spot.position, reach, cells));
     cell = cells.closed();
+    if (has_normal && (!cell.is_settled || cell.area == 0)) {
+      SURFEIT_RETURN_IF_ERROR(findWide(place.spot.position, cells, cell));
+    }
   }
   SurfaceAt surface = place.surface;
-  limit(cell, is_sparse, surface.thickness);
+  if (cell.sheet_thickness >= 0) surface.thickness = cell.sheet_thickness;
+  limit(cell, is_doubtful, surface.thickness);
   // There is no plane to move in
-  const bool has_plane = place.normal != glm::vec3(0) || surface.thickness <= kLooseThickness;
+  const bool has_plane = has_normal || surface.thickness <= kLooseThickness;
   if (!has_plane) cell.middle = cell.long_side = glm::vec3(0);
   surface.area = cell.area / float(std::max<std::uint64_t>(place.coincident, 1));
   surface.radius = cell.radius;
@@ -166,10 +172,10 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
 
 // What is open may be a stray, far from neighbours that are close to each other; and strays may lie
 // all around each other.
-void SurfaceSearch::limit(SurfaceCell& cell, bool is_sparse, float thickness) const {
+void SurfaceSearch::limit(SurfaceCell& cell, bool is_doubtful, float thickness) const {
   float largest = std::numeric_limits<float>::infinity();
   if (!cell.is_settled) largest = kOpenLimit * cell.neighbour_spacing;
-  if (is_sparse) largest = std::min(largest, largest_sparse_radius_);
+  if (!cell.is_settled || is_doubtful) largest = std::min(largest, largest_sparse_radius_);
   if (thickness > kLooseThickness) largest = std::min(largest, largest_loose_radius_);
   if (cell.radius <= largest) return;
   cell.middle = glm::vec3(0);
@@ -191,6 +197,32 @@ Status SurfaceSearch::cutByFarther(const glm::vec3& position, float reach, Surfa
             [&](const Neighbour& other) { return cells.wouldCut(other); }));
     if (!place || !cells.cut(*place)) break;
   }
+  return {};
+}
+
+// Of a place beside something much denser all its neighbours may be of that, or of another sheet.
+// What is found farther away counts where it is all around.
+Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, SurfaceCell& cell) {
+  if (std::isinf(largest_sparse_radius_) || !cells.widen(largest_sparse_radius_)) return {};
+  for (int i = 0; i < kMostFarther; ++i) {
+    const glm::vec3 corner = cells.farthestCorner();
+    SURFEIT_ASSIGN_OR_RETURN(
+        std::optional<Neighbour> place,
+        findPlace(
+            position + corner, glm::length(corner), *reader_,
+            [&](const glm::vec3& centre, float radius) {
+              return cells.mayCut(centre + corner, radius);
+            },
+            [&](const Neighbour& other) {
+              return cells.wouldCut({other.offset + corner, other.normal, other.id});
+            }));
+    if (!place) break;
+    place->offset += corner;
+    if (!cells.cut(*place)) break;
+  }
+  SURFEIT_RETURN_IF_ERROR(cutByFarther(position, 0, cells));
+  const SurfaceCell wide = cells.closedWide();
+  if (wide.is_settled || cell.area == 0) cell = wide;
   return {};
 }
 

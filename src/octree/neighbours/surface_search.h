@@ -59,8 +59,8 @@ class SurfaceSearch {
   Status find(std::span<const Surfel> places, const Wants& wants, const Take& take,
               const Progress& progress);
 
-  // Of places off a surface, and of those that only places farther away tell the size of (sparse
-  // beside dense): no radius becomes larger.
+  // Of places off a surface; and of those that only places farther away tell the size of (sparse
+  // beside dense), at the edge of a surface or without a normal: no radius becomes larger.
   void limitRadii(float largest_loose, float largest_sparse) {
     largest_loose_radius_ = largest_loose;
     largest_sparse_radius_ = largest_sparse;
@@ -87,8 +87,9 @@ class SurfaceSearch {
   Status findOpen(const Take& take);
   Status finish(const OpenPlace& place, SurfaceCell cell, float reach, SurfaceCells& cells,
                 const Take& take);
+  Status findWide(const glm::vec3& position, SurfaceCells& cells, SurfaceCell& cell);
   Status cutByFarther(const glm::vec3& position, float reach, SurfaceCells& cells);
-  void limit(SurfaceCell& cell, bool is_sparse, float thickness) const;
+  void limit(SurfaceCell& cell, bool is_doubtful, float thickness) const;
 
   std::unique_ptr<PagedOctree::Reader> reader_;
   PlaceIndex index_;
