@@ -26,14 +26,13 @@ namespace {
 // more on the way.
 constexpr float kRoundingSlack = 1e-4f;
 
-// A node may stand in for its surfels when its bounding sphere looks smaller than twice the max
-// solid angle, or that share of it. A flat square of surfels has about 0.6 of its sphere's outline
-// as area, so this is close to the memo's test on the area, but it also opens sparse nodes, whose
-// area says nothing about how far their surfels spread. Never when only some of these are seen, or
-// when they have several gains. What lies off the plane that it is drawn on by a pixel is seen in
-// another one. (Small lights differ from place to place by .065 of their power, without by .080;
-// half a pixel makes nothing better but the city, AO RMSE .0053 instead of .0056, at .6 of its
-// rate.) The square of the distance from which on it may.
+// The square of the distance from which on a node may stand in for its surfels: where its bounding
+// sphere looks smaller than twice the max solid angle, or that share of it. (A flat square of
+// surfels has about 0.6 of its sphere's outline as area, so this is close to the memo's test on the
+// area, but also opens sparse nodes.) What lies off the plane that it is drawn on by a pixel is
+// seen in another one. (Small lights differ from place to place by .065 of their power, without by
+// .080; half a pixel makes nothing better but the city, AO RMSE .0053 instead of .0056, at .6 of
+// its rate.)
 float wholeDistanceSq(const Node& node, const CutRules& rules) {
   if (!rules.approximates() || rules.isMixed(node)) return std::numeric_limits<float>::infinity();
   const float share = node.isFlat() ? 1 : kFidelity.uneven_share;

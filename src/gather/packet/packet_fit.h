@@ -1,7 +1,6 @@
 // Results as a function of place and direction, fitted to the receivers of some packets: of second
-// order in the position and of first order in the axis of the lobe (memo 7.7 has the bilinear
-// counterpart on grids). The gradients that irradiance caches compute from rays are here the
-// differences within packets.
+// order in the position and of first order in the axis of the lobe. docs/many_gathers.md,
+// "Interpolation".
 #pragma once
 
 #include <array>

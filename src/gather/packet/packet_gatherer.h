@@ -1,6 +1,5 @@
-// The gather of neighbouring receivers from a paged octree: for every packet of 16 one traversal,
-// one cut, one order front to back, and a raster cube per receiver in the lanes of vectors (memo,
-// section 3).
+// The gather of neighbouring receivers from a paged octree, in packets. docs/algorithm.md,
+// "Packets".
 #pragma once
 
 #include <cstddef>

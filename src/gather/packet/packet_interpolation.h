@@ -1,9 +1,5 @@
 // Which packets of a group are gathered, and what the others get (memo 7.7; slides, "Optimization:
 // interpolation"; app note 2.2). docs/many_gathers.md, "Interpolation".
-//
-// Samples are whole packets: neighbours cost hardly more together than one receiver alone, and show
-// how results change and how much they scatter. They are the packets of the plain gather, so what
-// is gathered has the bytes of that, and refining a cell wastes nothing.
 #pragma once
 
 #include <array>

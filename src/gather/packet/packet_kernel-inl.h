@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 
 #include "core/spherical_harmonics.h"
 #include "gather/packet/packet_brush-inl.h"
@@ -178,17 +179,16 @@ void DrawAll(const PacketCanvas& canvas, const Patch* patches,
 
 void Draw(const PacketCanvas& canvas, const Patch* patches, std::span<const std::uint64_t> order) {
   const GatherRules& rules = *canvas.rules;
-  const auto withFrame = [&]<bool kColor, bool kFade>() {
-    rules.hasConeRaster() ? DrawAll<BrushKind<kColor, kFade, true>>(canvas, patches, order)
-                          : DrawAll<BrushKind<kColor, kFade, false>>(canvas, patches, order);
+  const auto with = [](bool is, const auto& next) {
+    is ? next(std::true_type()) : next(std::false_type());
   };
-  if (rules.hasLight()) {
-    rules.fades() ? withFrame.template operator()<true, true>()
-                  : withFrame.template operator()<true, false>();
-  } else {
-    rules.fades() ? withFrame.template operator()<false, true>()
-                  : withFrame.template operator()<false, false>();
-  }
+  with(rules.hasLight(), [&](auto color) {
+    with(rules.fades(), [&](auto fade) {
+      with(rules.hasConeRaster(), [&](auto frame) {
+        DrawAll<BrushKind<color.value, fade.value, frame.value>>(canvas, patches, order);
+      });
+    });
+  });
 }
 
 }  // namespace

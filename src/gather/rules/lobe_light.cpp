@@ -1,11 +1,6 @@
-// A lobe is a von Mises-Fisher distribution, the normal distribution on the sphere: with the axis a
-// and the concentration k its density in direction v is
-//
-//   f(v) = k / (2 pi (1 - exp(-2 k))) exp(k (a . v - 1))
-//
-// It is known by the mean of its directions, of length r = coth k - 1 / k. Means of mixtures are
-// sums, so nodes add lobes up (as normals are: Han et al. 2007, "Frequency domain normal map
-// filtering").
+// A lobe is a von Mises-Fisher distribution: with the axis a and the concentration k its density is
+// f(v) = k / (2 pi (1 - exp(-2 k))) exp(k (a . v - 1)), and r = coth k - 1 / k the length of its
+// mean.
 #include "gather/rules/lobe_light.h"
 
 #include <algorithm>
