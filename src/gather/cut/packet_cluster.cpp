@@ -14,7 +14,8 @@ namespace {
 // along lines in a box, bench/line_steps.sh: .0066 without this, .0030 with it.)
 constexpr float kMostPacketWidth = 4;
 
-// A difference of normals of 1 counts like this part of the radius of what is divided.
+// Part of the radius of what is divided that a difference of normals of 1 counts like: it changes
+// which receivers share a packet, and no result of one alone.
 constexpr float kNormalWeight = 0.5f;
 
 using Places = std::span<std::uint16_t>;

@@ -57,7 +57,9 @@ constexpr float kSplatReach = 0.9f;
 // Side of a thicket, in radii of the node: with outlines as long as the node, and a sheared image.
 constexpr float kThicketSide = 3;
 // Areas over the square of the distance along the axis from where on it matters how long patches
-// are and what perspective makes of them: they go to every face that they may be drawn to.
+// are and what perspective makes of them: they go to every face that they may be drawn to. (Against
+// all patches on every face, in a hollow sphere: with .2 occlusion is off by up to .0016 at .11 sr
+// and by .019 at .4, with .02 by .0001 and .0006, for 3 % of the time.)
 constexpr float kLargeExtent = 0.02f;
 
 HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& patch) {

@@ -199,10 +199,11 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
 
   // The bias keeps disks of the receiver's own surface from covering it. What faces the receiver
   // closely is none of those, nor what rises above its plane and is seen from both sides: either
-  // would be looked through. (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 fading
-  // with the normal.) Ribbons are as rough as they are wide. (AO RMSE of hair .0088; .0117 with
-  // radii.) Along the receiver's normal a disk reaches radius * sin(angle of normals) above its
-  // middle, and must rise above the horizon of the rays: its own surface does so through rounding
+  // would be looked through. So the bias fades out with the normal, and of two-sided surfels with
+  // the height. (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 fading with the
+  // normal.) Ribbons are as rough as they are wide. (AO RMSE of hair .0088; .0117 with radii.)
+  // Along the receiver's normal a disk reaches radius * sin(angle of normals) above its middle. It
+  // must rise above the horizon of the rays, which the receiver's own surface does not
   const V cosine = Dot(receivers.normal, patch.normal);
   const GatherQuality& quality = canvas.rules->quality;
   const bool is_turned = patch.seen == Patch::Seen::kFront && quality.sides == GatherSides::kBack;
