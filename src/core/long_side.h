@@ -1,5 +1,6 @@
 // The longer side of the piece of surface that a surfel stands for, in three bytes: where it points
-// (either way), and how much longer than wide the piece is.
+// (either way), and how much longer than wide the piece is. Of disks, these bytes tell how many
+// surfels share the piece.
 #pragma once
 
 #include <algorithm>
@@ -18,10 +19,9 @@ namespace surfeit {
 // Representations for Independent Unit Vectors"): half a degree. Both bytes are 1 to 255, 128 is 0.
 inline constexpr std::uint16_t kNoLongSide = 0;
 
-// Whether a page may hold these.
-constexpr bool isLongSide(std::uint16_t direction, std::uint8_t elongation) {
-  if (direction == kNoLongSide) return elongation == 0;
-  return (direction & 0xff) != 0 && direction >> 8 != 0;
+// Whether a page may hold it.
+constexpr bool isLongSide(std::uint16_t direction) {
+  return direction == kNoLongSide || ((direction & 0xff) != 0 && direction >> 8 != 0);
 }
 
 // The code of a vector of any length; kNoLongSide of what is zero, or nearly, or not finite.
@@ -59,8 +59,7 @@ inline glm::vec3 directionOf(std::uint16_t code) {
 // Elongations are logarithmic, from 1 (code 0) to 251.
 inline constexpr float kElongationSteps = 32;  // for a factor of 2
 
-// Length over width.
-inline float elongationOf(const Surfel& surfel) {
+inline float elongationOfCode(std::uint8_t code) {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -68,18 +67,37 @@ inline float elongationOf(const Surfel& surfel) {
     }
     return values;
   }();
-  return table[surfel.elongation];
+  return table[code];
+}
+inline std::uint8_t elongationCode(float elongation) {
+  if (!(elongation > 1)) return 0;
+  const float code = std::round(kElongationSteps * std::log2(elongation));
+  return static_cast<std::uint8_t>(std::min(code, 255.f));
+}
+
+// Length over width; 1 where the longer side is not known.
+inline float elongationOf(const Surfel& surfel) {
+  return surfel.long_side == kNoLongSide ? 1 : elongationOfCode(surfel.elongation);
 }
 
 // Gives a surfel, which has its area, the side as a vector as long as it is.
 inline void setLongSide(const glm::vec3& side, Surfel& surfel) {
   surfel.long_side = directionCode(side);
-  surfel.elongation = 0;
-  const float elongation = glm::dot(side, side) / surfel.area;
-  if (surfel.long_side == kNoLongSide || !(elongation > 1)) return;
-  const float code = std::round(kElongationSteps * std::log2(elongation));
-  surfel.elongation = static_cast<std::uint8_t>(std::min(code, 255.f));
+  surfel.elongation = surfel.long_side == kNoLongSide
+                          ? std::uint8_t{0}
+                          : elongationCode(glm::dot(side, side) / surfel.area);
 }
+
+// Where several surfels lie at one place, or nearly, each is a disk as large as the piece around
+// them, and has its part of the area: how many they are. Rectangles and spheres are alone.
+inline void setSharers(float sharers, Surfel& surfel) {
+  if (surfel.long_side == kNoLongSide) surfel.elongation = elongationCode(sharers);
+}
+inline float sharersOf(const Surfel& surfel) {
+  return surfel.long_side == kNoLongSide ? elongationOfCode(surfel.elongation) : 1;
+}
+// Of the piece of surface around it.
+inline float pieceArea(const Surfel& surfel) { return surfel.area * sharersOf(surfel); }
 
 // The side as a vector; zero when it is not known.
 inline glm::vec3 longSideOf(const Surfel& surfel) {

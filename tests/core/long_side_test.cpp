@@ -40,7 +40,7 @@ TEST(LongSide, EveryCodeThatAPageMayHoldComesBack) {
   for (std::uint32_t code = 0; code < 0x10000; ++code) {
     const auto direction = static_cast<std::uint16_t>(code);
     const auto elongation = static_cast<std::uint8_t>(code * 7 >> 3);
-    if (!isLongSide(direction, elongation)) continue;
+    if (direction == kNoLongSide || !isLongSide(direction)) continue;
     surfel.long_side = direction;
     surfel.elongation = elongation;
     Surfel again;
@@ -51,7 +51,7 @@ TEST(LongSide, EveryCodeThatAPageMayHoldComesBack) {
     ASSERT_EQ(again.elongation, elongation) << code;
     ++count;
   }
-  EXPECT_EQ(count, 255 * 255 + 1);
+  EXPECT_EQ(count, 255 * 255);
 }
 
 TEST(LongSide, ElongationIsLengthOverWidth) {
@@ -65,11 +65,38 @@ TEST(LongSide, ElongationIsLengthOverWidth) {
 }
 
 TEST(LongSide, PagesHoldNoHalfDirections) {
-  EXPECT_TRUE(isLongSide(kNoLongSide, 0));
-  EXPECT_FALSE(isLongSide(kNoLongSide, 1));
-  EXPECT_FALSE(isLongSide(0x0100, 0));
-  EXPECT_FALSE(isLongSide(0x0001, 0));
-  EXPECT_TRUE(isLongSide(0x0101, 255));
+  EXPECT_TRUE(isLongSide(kNoLongSide));
+  EXPECT_FALSE(isLongSide(0x0100));
+  EXPECT_FALSE(isLongSide(0x0001));
+  EXPECT_TRUE(isLongSide(0x0101));
+}
+
+// Of disks the elongation is the number of surfels that share the piece.
+TEST(LongSide, DisksMaySharePieces) {
+  Surfel surfel;
+  surfel.area = 0.5f;
+  EXPECT_EQ(sharersOf(surfel), 1);
+  setSharers(4, surfel);
+  EXPECT_EQ(sharersOf(surfel), 4);
+  EXPECT_EQ(pieceArea(surfel), 2);
+  EXPECT_EQ(elongationOf(surfel), 1);
+  EXPECT_EQ(longSideOf(surfel), glm::vec3(0));
+  setSharers(3, surfel);
+  EXPECT_NEAR(sharersOf(surfel), 3, 0.03f);
+  setSharers(1e6f, surfel);
+  EXPECT_NEAR(sharersOf(surfel), 251, 1);
+  setSharers(1, surfel);
+  EXPECT_EQ(sharersOf(surfel), 1);
+}
+
+TEST(LongSide, RectanglesShareNothing) {
+  Surfel surfel;
+  surfel.area = 0.2f;
+  setLongSide({0, 2, 0}, surfel);
+  const Surfel before = surfel;
+  setSharers(4, surfel);
+  EXPECT_EQ(surfel.elongation, before.elongation);
+  EXPECT_EQ(sharersOf(surfel), 1);
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ double difference(const GatherResult& a, const GatherResult& b) {
   return double(std::max({std::abs(a.occlusion - b.occlusion), color.x, color.y, color.z}));
 }
 
-// Equal distances are drawn in the order of the walk.
+// Equal distances are drawn in the order of the walk, and may close other pixels.
 TEST(Subset, WithEveryNodeOpenItIsTheSubsetAlone) {
   TestScene scene(groupedCloud());
   for (const std::uint64_t groups : kSubsets) {
@@ -103,8 +103,8 @@ TEST(Subset, WithEveryNodeOpenItIsTheSubsetAlone) {
     const GatherRules subset = rulesFor(groups, 0), all = rulesFor(kAllGroups, 0);
     for (const LocalReceiver& receiver : receiversOn(scene.cloud(), 1511)) {
       const GatherResult found = scene.gather(receiver, subset);
-      EXPECT_LT(difference(found, alone.gather(receiver, all)), 1e-3);
-      EXPECT_LT(difference(found, gatherBruteForce(receiver, scene.cloud(), subset)), 1e-3);
+      EXPECT_LT(difference(found, alone.gather(receiver, all)), 3e-3);
+      EXPECT_LT(difference(found, gatherBruteForce(receiver, scene.cloud(), subset)), 3e-3);
     }
   }
 }

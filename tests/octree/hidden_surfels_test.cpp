@@ -180,6 +180,22 @@ TEST(HiddenSurfels, NoiseIsNoLayer) {
   EXPECT_LE(double(hidden), 1e-3 * double(all));
 }
 
+// Heights of a few places look like sheets by chance, however many surfels lie there.
+TEST(HiddenSurfels, PlacesCountAndNotRecords) {
+  std::ptrdiff_t hidden = 0, all = 0;
+  for (const int side : {2, 3}) {
+    for (unsigned seed = 0; seed < 500; ++seed) {
+      const std::vector<Surfel> once = sheet(side, 0, .3f, seed);
+      std::vector<Surfel> cell;
+      for (const Surfel& surfel : once) cell.insert(cell.end(), 4, surfel);
+      markHidden(cell);
+      hidden += hiddenCount(cell);
+      all += std::ptrdiff_t(cell.size());
+    }
+  }
+  EXPECT_LE(double(hidden), 1e-3 * double(all));
+}
+
 TEST(HiddenSurfels, SpheresAndFewSurfelsAreLeftAlone) {
   std::vector<Surfel> cell = together(sheet(8, 0), sheet(8, -.1f));
   for (Surfel& surfel : cell) surfel.flags = kSurfelSphere, surfel.normal = {0, 0, 0};

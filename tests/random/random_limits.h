@@ -27,7 +27,7 @@ inline constexpr FidelityLimits kFalloffLimits = {.006, .025, 0, 0, .015};
 inline constexpr FidelityLimits kSubsetLimits = {.0045, .025, 0, 0, .0145};
 
 // One bounce, by default against exactly: RMS of irradiance over its mean. Goal: .02.
-inline constexpr double kMostBounceLight = .0015;
+inline constexpr double kMostBounceLight = .0025;
 
 // A receiver with others against alone. Of all receivers of a batch, so many in 10,000 may differ
 // by more than kUsualStep; goal 1. None by more than kMostStep; goal .01.

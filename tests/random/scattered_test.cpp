@@ -103,12 +103,12 @@ struct Limits {
   double rms;
 };
 
-// Over 100 receivers before the square, at distances in spacings.
+// Over 100 receivers before the square, at distances in spacings of 4000 places.
 void expectCovering(const std::vector<Surfel>& cloud, const glm::mat3& turn,
                     const std::vector<Limits>& limits, double most_bias) {
   const auto scene = IndexedScene::make(cloud);
   ASSERT_TRUE(scene.ok()) << scene.status().message();
-  const float spacing = std::sqrt(4 / float(cloud.size()));
+  const float spacing = std::sqrt(4 / 4000.f);
   for (const auto [distance, rms] : limits) {
     std::vector<LocalReceiver> receivers;
     double truth[100], square = 0, sum = 0;
@@ -148,6 +148,24 @@ TEST(Scattered, SquaresWithAreasAloneLeaveFewHoles) {
     for (Surfel& surfel : cloud) surfel.radius = 0;
     // Disks of twice the area around the places: .32, .23, .18, .10
     expectCovering(cloud, turn, {{.3f, .12}, {1.f, .09}, {3.f, .065}, {8.f, .042}}, .06);
+  }
+}
+
+// Surfels at one place share its cell: each is a disk of all of it that hides its part. (Leaves hold
+// fewer places then, and hold the disks back.)
+TEST(Scattered, PlacesThatComeSeveralTimesCoverAsOnce) {
+  for (const glm::mat3& turn : {glm::mat3(1), slanted()}) {
+    for (const int times : {2, 4}) {
+      const std::vector<Surfel> once = scatteredSquare(4000, false, turn);
+      std::vector<Surfel> bare;
+      for (int i = 0; i < times; ++i) bare.insert(bare.end(), once.begin(), once.end());
+      std::vector<Surfel> with_areas = bare;
+      for (Surfel& surfel : bare) surfel.area = surfel.radius = 0;
+      for (Surfel& surfel : with_areas) surfel.area /= float(times), surfel.radius = 0;
+      std::printf("%d times\n", times);
+      expectCovering(bare, turn, {{.3f, .016}, {1.f, .012}, {3.f, .012}, {8.f, .006}}, .011);
+      expectCovering(with_areas, turn, {{.3f, .13}, {1.f, .095}, {3.f, .08}, {8.f, .042}}, .075);
+    }
   }
 }
 

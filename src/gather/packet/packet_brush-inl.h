@@ -152,6 +152,7 @@ class Brush {
         hn::Store(open, d, at + i * kStep);
       }
       hn::Store(Splat(-kInfinity), d, at + Hull::kEnd * kStep);
+      hn::Store(Splat(-kInfinity), d, at + Hull::kEndBefore * kStep);
       if (recorder_) recorder_.Clear(pixel, open);
     });
   }
@@ -164,6 +165,8 @@ class Brush {
     Cover cover;
     cover.depth_begin = hn::Sub(distance, range);
     cover.depth_end = hn::Add(distance, range);
+    cover.hull_begin = hn::Sub(distance, Splat(patch.radius));
+    cover.hull_end = hn::Add(distance, Splat(patch.radius));
     // In part where the gap is narrow beside the reach: else results would step from one receiver
     // to the next
     cover.inverse_gap =
@@ -380,13 +383,12 @@ class Brush {
   }
 
   bool CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
-    amount = hn::Mul(cover.opacity, amount);
-    const bool is_open =
-        CoverPixel<Kind, false>(pixels_.at(pixel), pixel, amount, Splat(1), cover, hull_);
+    const bool is_open = CoverPixel<Kind, false>(
+        pixels_.at(pixel), pixel, hn::Mul(cover.opacity, amount), Splat(1), cover, hull_);
     if (!is_open || !cover.has_hull) return is_open;
     const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(0.5f)));
     hull_.Add(pixel, hn::IfThenElseZero(is_hull, SplatU(kHullSamples)),
-              SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.depth_begin, cover.depth_end);
+              SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.hull_begin, cover.hull_end);
     return true;
   }
 

@@ -31,6 +31,7 @@ namespace {
 // How some of the receivers' pixels are covered.
 struct Cover {
   V depth_begin, depth_end;
+  V hull_begin, hull_end;  // within which it may touch others
   V inverse_gap;  // one over the gap in depth that is all new
   M is_lit;
   bool is_all_lit;

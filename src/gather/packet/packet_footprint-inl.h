@@ -171,8 +171,8 @@ HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, co
     const V x = hn::MulAdd(shape.shear, within, shape.x);
     const SampleRun run(hn::Max(box.x0, hn::Sub(x, half_x)), hn::Min(box.x1, hn::Add(x, half_x)));
     open.DrawRow(box.range, row, resolution, [&](std::size_t pixel, int column) HWY_ATTR {
-      return hull.Add(pixel, hn::And(rows, run.Columns(column)), widening, cover.depth_begin,
-                      cover.depth_end);
+      return hull.Add(pixel, hn::And(rows, run.Columns(column)), widening, cover.hull_begin,
+                      cover.hull_end);
     });
   }
 }

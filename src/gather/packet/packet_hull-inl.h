@@ -65,11 +65,14 @@ class FaceRecorder {
 template <std::size_t kChannels>
 class FaceHull {
  public:
-  // Places in a pixel. What was left before the last layer is negative once that layer was asked
-  // for its hull.
+  // Places in a pixel: samples of the hull of the last thing, and in the upper half of all things
+  // before it; where the last thing begins and ends in depth; what was left before the last layer,
+  // negative once that layer was asked for its hull; samples that the things before the last one
+  // hold; where these end.
   static constexpr std::size_t kHull = PacketCanvas::kCoverageChannels + kChannels;
   static constexpr std::size_t kBegin = kHull + 1, kEnd = kHull + 2, kRestBefore = kHull + 3;
-  static constexpr std::size_t kColorBefore = kHull + 4, kAll = kColorBefore + kChannels;
+  static constexpr std::size_t kKept = kHull + 4, kEndBefore = kHull + 5;
+  static constexpr std::size_t kColorBefore = kHull + 6, kAll = kColorBefore + kChannels;
   static_assert(kAll ==
                 PacketCanvas::kCoverageChannels + PacketCanvas::kHullChannels + 2 * kChannels);
 
@@ -93,6 +96,7 @@ class FaceHull {
     const V end = hn::Load(d, pixel + kEnd * kStep), begin = hn::Load(d, pixel + kBegin * kStep);
     VU hull = hn::BitCast(du, hn::Load(d, pixel + kHull * kStep));
     const M is_new = hn::And(counts, hn::Gt(depth_begin, end));
+    if (!hn::AllFalse(d, is_new)) Keep(at, is_new, end);
     const VU moved = hn::AndNot(SplatU(kHullSamples), hn::Or(hull, hn::ShiftLeft<16>(hull)));
     hull = hn::Or(hn::IfThenElse(hn::RebindMask(du, is_new), moved, hull), samples);
     hn::Store(hn::BitCast(d, hull), d, pixel + kHull * kStep);
@@ -143,69 +147,121 @@ class FaceHull {
  private:
   static constexpr std::uint32_t kWidening = 7;  // bits
 
-  // Samples of what begins no farther than `distance`.
-  static VU UpTo(const float* pixel, V distance) {
+  // Before another thing begins in these lanes: what the last one, which ends at `end`, holds.
+  HWY_NOINLINE void Keep(std::size_t at, M lanes, V end) const {
     const D d;
     const DU du;
-    const VU hull = hn::BitCast(du, hn::Load(d, pixel + kHull * kStep));
-    const VU before = hn::ShiftRight<16>(hull);
-    const M all = hn::Le(hn::Load(d, pixel + kBegin * kStep), distance);
-    return hn::IfThenElse(hn::RebindMask(du, all), hn::Or(before, hull), before);
+    float* const pixel = pixels_.at(at);
+    const V end_before = hn::Load(d, pixel + kEndBefore * kStep);
+    hn::Store(hn::IfThenElse(lanes, end, end_before), d, pixel + kEndBefore * kStep);
+    const VU own = hn::And(HullOf(pixel), SplatU(kHullSamples));
+    lanes = hn::And(lanes, hn::RebindMask(d, hn::Ne(own, hn::Zero(du))));
+    if (hn::AllFalse(d, lanes)) return;
+    const VU held = hn::IfThenElseZero(hn::RebindMask(du, lanes), Narrowed(at, own, end));
+    const VU kept = hn::BitCast(du, hn::Load(d, pixel + kKept * kStep));
+    hn::Store(hn::BitCast(d, hn::Or(kept, held)), d, pixel + kKept * kStep);
+  }
+  static VU HullOf(const float* pixel) {
+    return hn::BitCast(DU(), hn::Load(D(), pixel + kHull * kStep));
   }
 
-  // Those of these lanes where the hull of what was drawn up to the end of the pixel's last layer,
-  // narrowed again, holds the pixel: all of its own samples are of the hull, and those of its
-  // neighbours that are as near as the hull was widened. What is not looked at lacks none, nor what
-  // is covered.
+  // Those of these lanes where the hulls of the things drawn up to the end of the pixel's last
+  // layer, each narrowed again by itself, hold the pixel.
   M Held(std::size_t at, M lanes) const {
     const D d;
     const DU du;
     const float* const pixel = pixels_.at(at);
     const V end = hn::Load(d, pixel + PacketCanvas::kEnd * kStep);
-    lanes = hn::And(lanes, Holds(UpTo(pixel, end), SplatU(kHullSamples)));
+    const VU kept = hn::BitCast(du, hn::Load(d, pixel + kKept * kStep));
+    const M counts = hn::Le(hn::Load(d, pixel + kBegin * kStep), end);
+    const VU last = hn::And(HullOf(pixel), SplatU(kHullSamples));
+    const VU own = hn::IfThenElseZero(hn::RebindMask(du, counts), last);
+    lanes = hn::And(lanes, Holds(hn::Or(kept, own)));
     if (hn::AllFalse(d, lanes)) return lanes;
+    return hn::And(lanes, Holds(hn::Or(kept, Narrowed(at, own, end))));
+  }
+  static M Holds(VU hull) {
+    const DU du;
+    return hn::RebindMask(D(), hn::Eq(hn::AndNot(hull, SplatU(kHullSamples)), hn::Zero(du)));
+  }
+
+  // Of these samples of the last thing in the pixel, those around which it has all others, as far
+  // as its hull was widened. In neighbours, things count that reach from where it begins to `end`.
+  VU Narrowed(std::size_t at, VU own, V end) const {
+    const D d;
+    const DU du;
+    const float* const pixel = pixels_.at(at);
     const VU widening =
         hn::And(hn::BitCast(du, hn::Load(d, pixel + kBegin * kStep)), SplatU(kWidening));
-    const Borders borders(widening);
+    const V begin = hn::Load(d, pixel + kBegin * kStep);
     const int column = int(at) % resolution_, row = int(at) / resolution_;
-    for (int y = -1; y <= 1; ++y) {
-      const int other_row = row + y;
-      if (other_row < seen_->row_begin || other_row >= seen_->row_end) continue;
-      const SeenPixels::Columns& columns = seen_->rows[std::size_t(other_row)];
-      for (int x = -1; x <= 1; ++x) {
-        const int other_column = column + x;
-        if ((x == 0 && y == 0) || other_column < columns.begin || other_column >= columns.end) {
-          continue;
-        }
-        const float* const other = pixels_.at(std::size_t(other_row * resolution_ + other_column));
-        const M is_full = hn::Le(hn::Load(d, other + PacketCanvas::kOpen * kStep), hn::Zero(d));
-        const M holds = Holds(UpTo(other, end), borders.Of(x, y));
-        lanes = hn::And(lanes, hn::Or(is_full, holds));
-        if (hn::AllFalse(d, lanes)) return lanes;
+    VU rows[3];
+    for (int y = 0; y < 3; ++y) {
+      VU masks[3];
+      for (int x = 0; x < 3; ++x) {
+        masks[x] = x == 1 && y == 1 ? own : OfNeighbour(column + x - 1, row + y - 1, begin, end);
       }
+      rows[y] = NarrowedAcross(masks, widening);
     }
-    return lanes;
+    return NarrowedAlong(rows, widening);
   }
-  static M Holds(VU hull, VU samples) {
-    const DU du;
-    return hn::RebindMask(D(), hn::Eq(hn::AndNot(hull, samples), hn::Zero(du)));
+  // What is not looked at lacks none, nor what is covered.
+  VU OfNeighbour(int column, int row, V begin, V end) const {
+    const D d;
+    const VU all = SplatU(kHullSamples);
+    if (row < seen_->row_begin || row >= seen_->row_end) return all;
+    const SeenPixels::Columns& columns = seen_->rows[std::size_t(row)];
+    if (column < columns.begin || column >= columns.end) return all;
+    const float* const other = pixels_.at(std::size_t(row * resolution_ + column));
+    const M is_full = hn::Le(hn::Load(d, other + PacketCanvas::kOpen * kStep), hn::Zero(d));
+    const V last_begin = hn::Load(d, other + kBegin * kStep);
+    const V last_end = hn::Load(d, other + kEnd * kStep);
+    const V end_before = hn::Load(d, other + kEndBefore * kStep);
+    // The last thing there may be farther away, or nearer; then those before it tell
+    const M is_later = hn::Gt(last_begin, end), is_near = hn::Ge(last_end, begin);
+    const M has_last = hn::AndNot(is_later, is_near);
+    const M has_before = hn::Or(is_later, hn::Ge(end_before, begin));
+    const VU hull = HullOf(other);
+    const VU found =
+        hn::Or(hn::IfThenElseZero(hn::RebindMask(DU(), has_last), hn::And(hull, all)),
+               hn::IfThenElseZero(hn::RebindMask(DU(), has_before), hn::ShiftRight<16>(hull)));
+    return hn::IfThenElse(hn::RebindMask(DU(), is_full), all, found);
   }
 
-  // Samples of the neighbour in direction (x, y) that lie within `widening` samples of the pixel.
-  struct Borders {
-    VU columns[3], rows[3];
-
-    explicit Borders(VU widening) {
-      const VU all = SplatU(kHullSamples), column = SplatU((1u << kHullSide) - 1);
-      const VU rest = hn::Sub(SplatU(kHullSide), widening);
-      columns[0] = hn::And(all, hn::Shl(all, hn::ShiftLeft<2>(rest)));
-      columns[1] = rows[1] = all;
-      columns[2] = hn::AndNot(hn::Shl(all, hn::ShiftLeft<2>(widening)), all);
-      rows[0] = InEveryColumn(hn::And(column, hn::Shl(column, rest)));
-      rows[2] = InEveryColumn(hn::AndNot(hn::Shl(column, widening), column));
+  // Of three pixels in a row, the samples of the middle one that have all within `widening`
+  // columns.
+  static VU NarrowedAcross(const VU (&pixels)[3], VU widening) {
+    const VU all = SplatU(kHullSamples);
+    VU held = pixels[1];
+    for (int k = 1; k <= kHullSide; ++k) {
+      const auto counts = hn::Gt(widening, SplatU(std::uint32_t(k - 1)));
+      if (hn::AllFalse(DU(), counts)) break;
+      const int by = k * kHullSide, rest = kHullSide * kHullSide - by;
+      const VU before =
+          hn::Or(hn::ShiftLeftSame(pixels[1], by), hn::ShiftRightSame(pixels[0], rest));
+      const VU after =
+          hn::Or(hn::ShiftRightSame(pixels[1], by), hn::ShiftLeftSame(pixels[2], rest));
+      held = hn::And(held, hn::IfThenElse(counts, hn::And(before, after), all));
     }
-    VU Of(int x, int y) const { return hn::And(columns[x + 1], rows[y + 1]); }
-  };
+    return hn::And(held, all);
+  }
+  // The same of three pixels in a column, and rows.
+  static VU NarrowedAlong(const VU (&pixels)[3], VU widening) {
+    VU held = pixels[1];
+    const VU all = SplatU(kHullSamples);
+    for (int k = 1; k <= kHullSide; ++k) {
+      const auto counts = hn::Gt(widening, SplatU(std::uint32_t(k - 1)));
+      if (hn::AllFalse(DU(), counts)) break;
+      const int rest = kHullSide - k;
+      const std::uint32_t high = (0xfu << k & 0xfu) * 0x1111u, low = (0xfu >> k) * 0x1111u;
+      const VU before = hn::Or(hn::And(hn::ShiftLeftSame(pixels[1], k), SplatU(high)),
+                               hn::AndNot(SplatU(high), hn::ShiftRightSame(pixels[0], rest)));
+      const VU after = hn::Or(hn::And(hn::ShiftRightSame(pixels[1], k), SplatU(low)),
+                              hn::AndNot(SplatU(low), hn::ShiftLeftSame(pixels[2], rest)));
+      held = hn::And(held, hn::IfThenElse(counts, hn::And(before, after), all));
+    }
+    return hn::And(held, all);
+  }
 
   // Of the lanes whose layers cover something. What is closed belongs to what its layer has
   // brought.

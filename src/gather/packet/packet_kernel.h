@@ -132,7 +132,7 @@ struct PacketCanvas {
   // Places: what the layers before the last one leave open; what the last one covers by itself, and
   // where its depth ranges end; what is open; and what is open of the weight
   static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3, kRest = 4;
-  static constexpr std::size_t kCoverageChannels = 5, kHullChannels = 4;
+  static constexpr std::size_t kCoverageChannels = 5, kHullChannels = 6;
   static std::size_t channels(const GatherRules& rules) {
     return kCoverageChannels + kHullChannels + 2 * rules.channels();
   }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/assert.h"
+#include "core/long_side.h"
 #include "core/ribbon.h"
 #include "gather/packet/pixel_record.h"
 #include "gather/rules/contribution.h"
@@ -320,26 +321,27 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.position = surfel.position;
     patch.normal = surfel.normal;
     const Ribbon ribbon = Ribbon::of(surfel);
+    const float piece_area = pieceArea(surfel);
     patch.radius = std::max(surfel.radius, ribbon.radius());
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
       // Only what is opaque may cover more than it should to leave no gaps
       const bool is_exact = surfel.isTwoSided() || lets_through;
-      patch.soft_peak = softDiskPeak(patch.radius, surfel.area, is_exact);
+      patch.soft_peak = softDiskPeak(patch.radius, piece_area, is_exact);
     } else {
       patch.shape = ribbon.shape();
       patch.is_ribbon = true;
       patch.ribbon_width = ribbon.width;
     }
-    patch.area = patch.most_area = surfel.area;
-    (surfel.isSphere() ? patch.round_area : patch.disk_area) = surfel.area;
+    patch.area = patch.most_area = piece_area;
+    (surfel.isSphere() ? patch.round_area : patch.disk_area) = piece_area;
     patch.radiosity = rules_.gains.of(surfel.group) * surfel.radiosity;
     patch.seen = surfel.isSphere()                            ? Patch::Seen::kAllAround
                  : surfel.isTwoSided()                        ? Patch::Seen::kBoth
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
     patch.reach = reachOf(surfel, ribbon, patch.radius);
-    patch.opacity = surfel.opacity(color_);
+    patch.opacity = surfel.opacity(color_) / sharersOf(surfel);
     patch.lets_through = lets_through;
     if (patch.lets_through && surfel.isSphere()) patch.reach = {};
     if (surfel.isLone()) {

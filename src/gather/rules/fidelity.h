@@ -70,8 +70,8 @@ struct Fidelity {
   float layer_gap = 0.5f;
 
   // Part, 0 to 1, of a surface that hides behind other layers as if all rose from the same side of
-  // a pixel; the rest hides at random, as leaves, hair, particles and rough nodes do. (0: +4, -2,
-  // 0 %, and .39 % of the light behind a ball of 5,000 disks leaks at draft quality, with it less
+  // a pixel; the rest hides at random, as leaves, hair, particles and rough nodes do. (0: -1, -2,
+  // 0 %, and .41 % of the light behind a ball of 5,000 disks leaks at draft quality, with it less
   // than .3. 1: AO RMSE of spheres .0128 instead of .0045.)
   float nested = 0.3f;
 

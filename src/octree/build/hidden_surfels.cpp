@@ -21,9 +21,9 @@
 namespace surfeit {
 namespace {
 
-// Fewer tell nothing: by chance, heights of six surfels of a rough surface look like sheets 1 time
-// in 25, of twelve 1 time in 1000.
-constexpr std::size_t kFewestSurfels = 12;
+// Fewer places tell nothing: by chance, heights of six surfels of a rough surface look like sheets
+// 1 time in 25, of twelve 1 time in 1000.
+constexpr std::size_t kFewestPlaces = 12;
 // A gap is clear that is so many times as wide as every sheet is thick.
 constexpr float kClearGap = 3;
 constexpr std::size_t kMostSheets = 6;
@@ -130,6 +130,7 @@ class Facing {
   bool findNormal();
   bool isPiled() const;
   void findHeights();
+  std::size_t placeCount() const;
   float outlineOf(const SymmetricMatrix& spread) const;
   float widthOf(const AreaSums& sums) const;
   Sheet sheetOf(std::span<const Height> heights) const;
@@ -227,6 +228,15 @@ void Facing::findHeights() {
   }
 }
 
+// Surfels at one place follow each other.
+std::size_t Facing::placeCount() const {
+  std::size_t count = 1;
+  for (std::size_t i = 1; i < heights_.size(); ++i) {
+    count += cell_[heights_[i - 1].surfel].position != cell_[heights_[i].surfel].position;
+  }
+  return count;
+}
+
 // Of the ellipse that spreads as they do, along the normal.
 float Facing::outlineOf(const SymmetricMatrix& spread) const {
   // Products of lengths may be zero or infinite
@@ -299,7 +309,7 @@ bool Facing::covers(const Sheet& sheet, const Sheet& own, const Height& of) cons
 }
 
 void Facing::mark() {
-  if (heights_.size() < kFewestSurfels || !findNormal()) return;
+  if (placeCount() < kFewestPlaces || !findNormal()) return;
   if (!isPiled()) return;
   findHeights();
   std::sort(heights_.begin(), heights_.end());

@@ -6,13 +6,15 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "core/long_side.h"
 #include "core/ribbon.h"
 #include "core/symmetric_matrix.h"
 
 namespace surfeit {
 namespace {
 
-// Roots of the area of a surfel within which its neighbours are: on a plane, some 19 of its size.
+// Roots of the area of a surfel's piece within which its neighbours are: on a plane, some 19 of its
+// size.
 constexpr float kReach = 2.5f;
 // A rectangle has neighbours within so many of its sides at least: on a plane, all eight around it.
 // Cells are smaller than 2.5 lengths of a hair. (With 1.3 two-sided rows 10:1 cover .193, with 1.5
@@ -54,7 +56,7 @@ bool holdsAround(const Bounds3& box, const glm::vec3& p, float reach) {
 class Frame {
  public:
   explicit Frame(const Surfel& surfel)
-      : normal_(surfel.normal), ribbon_(Ribbon::of(surfel)), size_(std::sqrt(surfel.area)) {
+      : normal_(surfel.normal), ribbon_(Ribbon::of(surfel)), size_(std::sqrt(pieceArea(surfel))) {
     if (!ribbon_.isEmpty()) longer_ = ribbon_.length / size_;
   }
 

@@ -28,6 +28,7 @@ GroupPlace SceneWriter::addSiblings(int level, std::span<const LevelNode> siblin
   for (const LevelNode& node : siblings) {
     header_.has_layers |= (node.marks & kSurfelHiddenSides) != 0;
     header_.has_loose |= (node.marks & kSurfelLoose) != 0;
+    header_.has_sharers |= (node.marks & kNodeShares) != 0;
   }
   return place;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/long_side.h"
 #include "core/thread_scratch.h"
 #include "octree/build/curve_cells.h"
 #include "octree/build/hidden_surfels.h"
@@ -178,7 +179,10 @@ void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& lea
   boundSurfels(surfels, leaf.node);
   leaf.node.child_level = 0;
   leaf.node.marks = 0;
-  for (const Surfel& surfel : surfels) leaf.node.marks |= surfel.flags & kSurfelMarks;
+  for (const Surfel& surfel : surfels) {
+    leaf.node.marks |= surfel.flags & kSurfelMarks;
+    if (sharersOf(surfel) > 1) leaf.node.marks |= kNodeShares;
+  }
   const GroupPlace place = placeSurfels(begin, end);
   node.page = place.page;
   node.first = place.first;

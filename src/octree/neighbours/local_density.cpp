@@ -246,6 +246,7 @@ void SizedSurfelStream::take(std::size_t i, const SurfaceAt& surface) {
   if (!is_bare || surfel.isSphere()) return;
   setLongSide(surface.long_side, surfel);
   moveToMiddle(i, surface.middle);
+  setSharers(surface.sharers, surfel);
 }
 
 // The disks of surfels with an area alone, when the cells of all are known.
@@ -267,8 +268,9 @@ void SizedSurfelStream::shapeGiven() {
     if (!surfel.isSphere() && cell.area > 0) {
       setLongSide(cell.long_side, surfel);
       moveToMiddle(i, cell.middle);
+      setSharers(cell.sharers, surfel);
     }
-    const float radius = radiusOfArea(surfel.area, overlap_);
+    const float radius = radiusOfArea(pieceArea(surfel), overlap_);
     if (!(cell.area > 0)) surfel.radius = radius;
     if (surfel.long_side == kNoLongSide) {
       surfel.radius = std::min(surfel.radius, std::sqrt(kMostOverArea) * radius);

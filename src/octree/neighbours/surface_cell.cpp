@@ -471,8 +471,7 @@ SurfaceCell SurfaceCells::Scratch::cell() const {
 }
 
 SurfaceCell SurfaceCells::Scratch::cell(float area, const CellMoments& moments) const {
-  SurfaceCell cell;
-  cell.area = area / sharers * unit * unit;
+  SurfaceCell cell{.area = area / sharers * unit * unit, .sharers = sharers};
   // A disk's mean squared distance from its middle is half of its radius squared
   const float to_middle_sq = glm::dot(moments.middle, moments.middle);
   cell.radius = std::sqrt(2 * (moments.square + to_middle_sq)) * unit;

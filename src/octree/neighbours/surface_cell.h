@@ -34,7 +34,8 @@ struct SurfacePlane {
 };
 
 struct SurfaceCell {
-  float area = 0;       // 0: the neighbours do not tell
+  float area = 0;       // per surfel that shares it; 0: the neighbours do not tell
+  float sharers = 1;    // the place, and others nearly there
   float radius = 0;     // of the disk around the place that is spread out as far: the same second
                         // moment over its area
   glm::vec3 middle{0};  // from the place

@@ -161,7 +161,9 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
   // There is no plane to move in
   const bool has_plane = has_normal || surface.thickness <= kLooseThickness;
   if (!has_plane) cell.middle = cell.long_side = glm::vec3(0);
-  surface.area = cell.area / float(std::max<std::uint64_t>(place.coincident, 1));
+  const float coincident = float(std::max<std::uint64_t>(place.coincident, 1));
+  surface.area = cell.area / coincident;
+  surface.sharers = cell.sharers * coincident;
   surface.radius = cell.radius;
   surface.middle = cell.middle;
   // Rectangles on each other would cover the area of one

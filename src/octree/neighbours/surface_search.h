@@ -26,7 +26,8 @@ namespace surfeit {
 inline constexpr float kLooseThickness = 0.4f;
 
 struct SurfaceAt {
-  float area = 0;    // per surfel at the place; 0: unknown
+  float area = 0;     // per surfel at the place; 0: unknown
+  float sharers = 1;  // surfels at the place, or nearly there
   float radius = 0;  // of a disk that is spread out as far as the piece of surface around the place
   glm::vec3 middle{0};      // SurfaceCell::middle
   glm::vec3 long_side{0};   // SurfaceCell::long_side, of a surfel's area

@@ -33,7 +33,8 @@ enum FeatureBits : std::uint32_t {
   kHasLayers = 4,
   kHasLoose = 8,
   kHasRectangles = 16,
-  kAllFeatures = 31
+  kHasSharers = 32,
+  kAllFeatures = 63
 };
 
 // Largest groups that a reader accepts: they bound what a page can make it allocate.
@@ -141,7 +142,8 @@ std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
   ByteWriter writer(bytes);
   writer.put((header.full_precision ? kFullPrecision : 0u) | (header.has_lobes ? kHasLobes : 0u) |
              (header.has_layers ? kHasLayers : 0u) | (header.has_loose ? kHasLoose : 0u) |
-             (header.has_rectangles ? kHasRectangles : 0u));
+             (header.has_rectangles ? kHasRectangles : 0u) |
+             (header.has_sharers ? kHasSharers : 0u));
   writer.put(channelBits(header.channels));
   writer.put(header.surfel_count);
   writer.put(header.node_count);
@@ -174,6 +176,7 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
   header.has_layers = (features & kHasLayers) != 0;
   header.has_loose = (features & kHasLoose) != 0;
   header.has_rectangles = (features & kHasRectangles) != 0;
+  header.has_sharers = (features & kHasSharers) != 0;
   const std::uint32_t channels = reader.get<std::uint32_t>();
   if ((channels & ~kAllChannels) != 0) {
     return wrongField("channel bits", fmt::format("{:#x}", channels), "known channels");

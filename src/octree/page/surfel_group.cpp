@@ -159,7 +159,7 @@ Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns
       if (!getBytes8(reader, bytes)) return damaged("long_side");
     }
     for (std::size_t i = 0; i < columns.group.size(); ++i) {
-      if (!isLongSide(columns.longSideAt(i), columns.long_side[2][i])) return damaged("long_side");
+      if (!isLongSide(columns.longSideAt(i))) return damaged("long_side");
     }
   }
   if (form.has_opacity && !columns.transparency.get(reader)) return damaged("transparency");
