@@ -64,8 +64,8 @@ struct Surfel {
   std::uint16_t transparency = 0;  // 1 - opacity in red, in 1/65535; 0: opaque
   glm::vec3 albedo{0};             // diffuse reflectance, scene-linear rgb, for further bounces
   std::uint8_t group = 0;          // object group, 0 to kMaxGroups - 1; 0 in clouds without groups
-  // Ratio of length to width of the piece, and direction of its longer side, as codes
-  // (core/long_side.h); 0: not known. Two-sided surfels with a longer side are drawn as rectangles.
+  // Length over width of the piece, and direction of its longer side, as codes (core/long_side.h).
+  // With a direction it is drawn as a rectangle; without (0), the number of surfels that share it.
   std::uint8_t elongation = 0;
   std::uint16_t long_side = 0;
   Tint tint{};  // of the transparency

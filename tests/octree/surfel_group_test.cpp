@@ -89,6 +89,17 @@ TEST(SurfelGroup, DecodeRejectsLongSidesThatThereAreNot) {
   }
 }
 
+TEST(SurfelGroup, DecodeRejectsSpheresThatShareAPiece) {
+  const PageForm form = {false, false, false, true};
+  std::vector<Surfel> cloud = randomCloud(20), found(20);
+  for (Surfel& surfel : cloud) surfel.long_side = 0, surfel.elongation = 64;
+  cloud[7].flags = kSurfelSphere;
+  std::vector<std::byte> payload;
+  encodeSurfelGroup(cloud, form, payload);
+  EXPECT_EQ(decodeSurfelGroup(payload, form, found).status().message(),
+            "surfel group: damaged field long_side");
+}
+
 TEST(SurfelGroup, DecodeRejectsGroupsThatThereAreNot) {
   std::vector<Surfel> cloud = randomCloud(20);
   cloud[7].group = kMaxGroups;

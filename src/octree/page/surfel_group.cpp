@@ -159,7 +159,10 @@ Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns
       if (!getBytes8(reader, bytes)) return damaged("long_side");
     }
     for (std::size_t i = 0; i < columns.group.size(); ++i) {
-      if (!isLongSide(columns.longSideAt(i))) return damaged("long_side");
+      const std::uint16_t side = columns.longSideAt(i);
+      const bool is_sphere = (columns.flags[i] & kSurfelSphere) != 0;
+      const bool is_shared = side == kNoLongSide && columns.long_side[2][i] != 0;
+      if (!isLongSide(side) || (is_sphere && is_shared)) return damaged("long_side");
     }
   }
   if (form.has_opacity && !columns.transparency.get(reader)) return damaged("transparency");
