@@ -12,9 +12,10 @@ namespace surfeit {
 namespace {
 
 // A sheet of disks that face the cube at x = `distance`, on the face +x of 16 pixels: squares of
-// `side` pixels, scattered by a part of that, within a square of `half` pixels around the middle.
+// `side` pixels, scattered by a part of that, within a square of `half` pixels, `aside` from the
+// middle.
 struct SheetOfDisks {
-  float distance = 1, side = .8f, scatter = .3f, half = 8;
+  float distance = 1, side = .8f, scatter = .3f, half = 8, aside = 0;
   bool is_solid = true;
   float thicket = 0;
 
@@ -24,8 +25,8 @@ struct SheetOfDisks {
     const float step = side * distance / 8;
     const int count = int(2 * half / side);
     for (int i = 0; i < count * count; ++i) {
-      const float u =
-          (float(i % count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
+      const float u = (float(i % count) + .5f + scatter * uniform(random)) * step +
+                      (aside - half) * distance / 8;
       const float v =
           (float(i / count) + .5f + scatter * uniform(random)) * step - half * distance / 8;
       const glm::vec3 to(distance, u, v), direction = glm::normalize(to);
@@ -80,6 +81,34 @@ TEST_F(Closing, WhatIsClosedShinesAsItsOwnLayerDoes) {
 TEST_F(Closing, OutlinesStayWhereTheyAre) {
   SheetOfDisks{.side = .5f, .scatter = 0, .half = 3.25f}.drawTo(raster_, dark_);
   EXPECT_NEAR(seen(8).y * 256, 6.5f * 6.5f, .8f);
+}
+
+// Two sheets, one three times as far away, end beside each other in one pixel. Between sheets that
+// may touch, so narrow a gap is none.
+TEST_F(Closing, TheGapBetweenThingsBehindEachOtherStaysOpen) {
+  const auto coveredOfRow = [&](float gap, float at, float distance) {
+    raster_.clear();
+    const SheetOfDisks sheet{.side = .5f, .scatter = 0, .half = 3};
+    SheetOfDisks left = sheet, right = sheet;
+    left.aside = at - gap / 2 - 3;
+    right.aside = at + gap / 2 + 3;
+    right.distance = distance;
+    left.drawTo(raster_, dark_);
+    right.drawTo(raster_, dark_);
+    float sum = 0;
+    for (std::size_t column = 0; column < 16; ++column) {
+      for (const std::size_t row : {7u, 8u}) sum += raster_.coverage(16 * row + column) / 2;
+    }
+    return sum;
+  };
+  for (const float gap : {.3f, .5f}) {
+    for (const float at : {.35f, .5f, .65f}) {
+      const float covered = coveredOfRow(gap, at, 3);
+      EXPECT_LT(covered, 12.05f) << gap << ' ' << at;
+      EXPECT_GT(covered, 11.75f) << gap << ' ' << at;  // layers hide each other at random
+      EXPECT_GT(coveredOfRow(gap, at, 1), 12 + .8f * gap) << gap << ' ' << at;
+    }
+  }
 }
 
 TEST_F(Closing, GapsBetweenSpheresStayOpen) {
