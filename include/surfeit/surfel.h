@@ -64,8 +64,8 @@ struct Surfel {
   std::uint16_t transparency = 0;  // 1 - opacity in red, in 1/65535; 0: opaque
   glm::vec3 albedo{0};             // diffuse reflectance, scene-linear rgb, for further bounces
   std::uint8_t group = 0;          // object group, 0 to kMaxGroups - 1; 0 in clouds without groups
-  // Length over width of the piece, and direction of its longer side, as codes (core/long_side.h).
-  // With a direction it is drawn as a rectangle; without (0), the number of surfels that share it.
+  // Codes (core/long_side.h): length over width of a rectangle, and the direction of its longer
+  // side. Without a direction (0) it is a disk, and the former is how many surfels share its piece.
   std::uint8_t elongation = 0;
   std::uint16_t long_side = 0;
   Tint tint{};  // of the transparency

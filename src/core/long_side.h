@@ -94,7 +94,8 @@ inline void setSharers(float sharers, Surfel& surfel) {
   if (surfel.long_side == kNoLongSide) surfel.elongation = elongationCode(sharers);
 }
 inline float sharersOf(const Surfel& surfel) {
-  return surfel.long_side == kNoLongSide ? elongationOfCode(surfel.elongation) : 1;
+  const bool is_shared = surfel.elongation != 0 && surfel.long_side == kNoLongSide;
+  return is_shared ? elongationOfCode(surfel.elongation) : 1;
 }
 // Of the piece of surface around it.
 inline float pieceArea(const Surfel& surfel) { return surfel.area * sharersOf(surfel); }

@@ -186,14 +186,14 @@ class FaceHull {
   }
 
   // Of these samples of the last thing in the pixel, those around which it has all others, as far
-  // as its hull was widened. In neighbours, things count that reach from where it begins to `end`.
+  // as anything there was widened. In neighbours, things count that reach from where it begins to
+  // `end`.
   VU Narrowed(std::size_t at, VU own, V end) const {
     const D d;
     const DU du;
     const float* const pixel = pixels_.at(at);
-    const VU widening =
-        hn::And(hn::BitCast(du, hn::Load(d, pixel + kBegin * kStep)), SplatU(kWidening));
     const V begin = hn::Load(d, pixel + kBegin * kStep);
+    const VU widening = hn::And(hn::BitCast(du, begin), SplatU(kWidening));
     const int column = int(at) % resolution_, row = int(at) / resolution_;
     VU rows[3];
     for (int y = 0; y < 3; ++y) {

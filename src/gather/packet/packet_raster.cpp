@@ -321,7 +321,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.position = surfel.position;
     patch.normal = surfel.normal;
     const Ribbon ribbon = Ribbon::of(surfel);
-    const float piece_area = pieceArea(surfel);
+    const float sharers = sharersOf(surfel), piece_area = sharers * surfel.area;
     patch.radius = std::max(surfel.radius, ribbon.radius());
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
@@ -341,7 +341,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
     patch.reach = reachOf(surfel, ribbon, patch.radius);
-    patch.opacity = surfel.opacity(color_) / sharersOf(surfel);
+    patch.opacity = surfel.opacity(color_) / sharers;
     patch.lets_through = lets_through;
     if (patch.lets_through && surfel.isSphere()) patch.reach = {};
     if (surfel.isLone()) {
