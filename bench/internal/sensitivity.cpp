@@ -46,18 +46,12 @@ const std::vector<Number>& allNumbers() {
       {"most_node_pixels", &F::most_node_pixels, kNever},
       {"least_visible_part", &F::least_visible_part, 0},
       {"shared_look", &F::shared_look, 0},
-      {"filled_outline", &F::filled_outline, kNever},
-      {"overlap_gain", &F::overlap_gain, 0},
-      {"least_reach", &F::least_reach, 0},
-      {"layer_gap", &F::layer_gap, 0},
-      {"nested", &F::nested, 0},
       {"own_order", &F::own_order, 0},
       {"least_filled", &F::least_filled, 0},
       {"fill_doubt", &F::fill_doubt, 0},
       {"hull_widening", &F::hull_widening, 0},
       {"most_in_hull", &F::most_in_hull, 0},
       {"soft_disk_area", &F::soft_disk_area, 1},
-      {"whole_near", &F::whole_near, 0.999f},
       {"bias_height", &F::bias_height, kNever},
       {"least_axis", &F::least_axis, 0.01f},
       {"least_spread", &F::least_spread, 1e-6f},
@@ -322,7 +316,7 @@ void printChange(const std::string& name, float value, const std::vector<SetErro
   std::fflush(stdout);
 }
 
-// "nested=0,layer_gap=0"
+// "fading=0,fill_doubt=0"
 Status applyChange(const std::string& change) {
   std::size_t begin = 0;
   while (begin < change.size()) {
@@ -394,7 +388,7 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", options.seeds, "Scenes by chance")->capture_default_str();
   app.add_option("--first-seed", options.first_seed, "The first of them")->capture_default_str();
   app.add_option("--number", options.numbers, "Numbers to change [all]");
-  app.add_option("--change", options.changes, "Several at once, \"nested=0,layer_gap=0\"");
+  app.add_option("--change", options.changes, "Several at once, \"fading=0,fill_doubt=0\"");
   app.add_flag("--as-is", options.as_is, "Print errors of each scene, with --change");
   app.add_option("--surfels", options.place.surfels, "Of each scene")->capture_default_str();
   app.add_option("--data", options.place.data, "Directory of meshes")->capture_default_str();
@@ -407,7 +401,7 @@ int main(int argc, char** argv) {
       "Of each set: changes of RMSE of occlusion, of its bias over the RMSE, and of color, in %.\n"
       "Examples:\n"
       "  sensitivity --keep scenes\n"
-      "  sensitivity --number nested layer_gap --scene city --unseen koala --seeds 50");
+      "  sensitivity --number fading fill_doubt --scene city --unseen koala --seeds 50");
   CLI11_PARSE(app, argc, argv);
   const surfeit::Status status = surfeit::run(options);
   if (status.ok()) return 0;

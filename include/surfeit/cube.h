@@ -43,8 +43,8 @@ struct CubePixel {
   // Distance at which kCubeFirstPart of the pixel is covered, in scene units. The gather knows the
   // distance of the middle of each node or surfel. Infinite where the coverage stays below that.
   float depth = std::numeric_limits<float>::infinity();
-  // Layers that began in the pixel (docs/algorithm.md, "Coverage"), fractions included; at least 1
-  // where anything covers, else 0.
+  // Things that lie behind each other and cover some of the pixel (docs/algorithm.md, "Coverage"),
+  // 0 to some 100: at least 1 where anything covers.
   float layers = 0;
   float filled = 0;  // part of the coverage that comes from closing gaps
   // The kind that brought most of the coverage, closed gaps aside.

@@ -107,7 +107,7 @@ CubePixel cubePixel(float solid_angle, const PixelContent& content, const PixelR
           .light = content.radiosity,
           .environment = content.open * content.environment,
           .depth = record.depth,
-          .layers = record.layers(),
+          .layers = record.things,
           .filled = std::max(0.f, content.coverage - record.total),
           .kind = record.kind()};
 }

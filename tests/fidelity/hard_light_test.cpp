@@ -31,8 +31,8 @@ struct LitMesh {
 };
 void PrintTo(const LitMesh& mesh, std::ostream* out) { *out << mesh.name; }
 constexpr LitMesh kMeshes[] = {
-    {"bunny", "meshes/bunny.ply", false, 1'000'000, .04, .02, .01},
-    {"igea", "meshes/igea.ply", false, 1'000'000, .04, .02, .015},
+    {"bunny", "meshes/bunny.ply", false, 1'000'000, .04, .02, .011},
+    {"igea", "meshes/igea.ply", false, 1'000'000, .04, .021, .016},
     {"koala", "meshes/koala.ply", false, 1'000'000, .04, .02, .01},
     {"dragon", "meshes/dragon_res2.ply", false, 1'000'000, .05, .032, .01},
     {"sponza", "scenes/sponza/sponza.obj", true, 4'000'000, .13, .085, .025}};

@@ -16,7 +16,7 @@ namespace surfeit {
 namespace {
 
 // What instruction sets may differ by, and packets of equal receivers from the scalar gather. Where
-// rounding decides whether two things are of one layer, instruction sets differ by as much as the
+// rounding decides whether two patches are of one thing, instruction sets differ by as much as the
 // scalar gather may; that must be rare.
 constexpr float kKernelTolerance = 1e-4f;
 constexpr float kMostBeyondTolerance = 2e-3f;  // of all receivers

@@ -30,7 +30,7 @@ inline Patch patchAt(const glm::vec3& direction, const glm::vec3& normal, float 
   patch.shape = withoutDirection(normal);
   patch.area = spread * square;
   patch.round_area = patch.most_area = solid_angle * square;
-  patch.reach.least = .5f * (end - begin);
+  patch.reach = .5f * (end - begin);
   patch.radiosity = kWhite;
   patch.seen = Patch::Seen::kAllAround;
   return patch;

@@ -85,7 +85,7 @@ TEST(RasterPixels, PatchesKeepTheirSolidAngleEverywhere) {
       for (const float solid_angle : {1e-4f, .01f, .05f}) {
         raster.clear();
         Patch patch = patchAt(direction, kRound, solid_angle, solid_angle);
-        patch.thicket = 1;  // nothing is closed
+        patch.lets_through = true;  // nothing is closed
         raster.add(patch);
         // What spills over an edge is drawn as a rectangle instead of a trapezoid, and the part
         // of a pixel that is covered is measured on the face
@@ -155,7 +155,7 @@ TEST(RasterPixels, TracedSpheresHaveTheirAnalyticSolidAngle) {
   }
 }
 
-TEST(RasterPixels, CoverageAddsWithinALayerAndNeverExceedsOne) {
+TEST(RasterPixels, CoverageAddsWithinAThingAndNeverExceedsOne) {
   OneRaster raster(12);
   for (int i = 0; i < 100; ++i) {
     for (const glm::vec3& direction : testDirections()) {
@@ -180,76 +180,54 @@ Patch quarterPatch(float amount, float begin, float end, const glm::vec3& radios
   return patch;
 }
 
-TEST(RasterPixels, LayersCoverEachOtherInsteadOfAdding) {
+TEST(RasterPixels, ThingsCoverEachOtherInsteadOfAdding) {
   OneRaster raster(2);
-  raster.add(quarterPatch(.5f, 1, 2, {1, 0, 0}));
+  Patch without_hull = quarterPatch(.5f, 1, 2, {1, 0, 0});
+  without_hull.lets_through = true;
+  raster.add(without_hull);
   EXPECT_NEAR(raster.coverage(kQuarter), .5f, 1e-5);
-  raster.add(quarterPatch(.5f, 3, 4, {0, 1, 0}));  // half of what is left
+  raster.add(quarterPatch(.5f, 2.01f, 3, {0, 1, 0}));  // half of the rest
   EXPECT_NEAR(raster.coverage(kQuarter), .75f, 1e-5);
   EXPECT_NEAR(raster.radiosity(kQuarter).x, .5f, 1e-5);
   EXPECT_NEAR(raster.radiosity(kQuarter).y, .25f, 1e-5);
 
   raster.clear();
   raster.add(quarterPatch(.5f, 1, 2, {1, 0, 0}));
-  raster.add(quarterPatch(.5f, 1.5f, 2.5f, {0, 1, 0}));  // the same layer
+  raster.add(quarterPatch(.5f, 1.99f, 3, {0, 1, 0}));  // of the same thing
   EXPECT_NEAR(raster.coverage(kQuarter), 1, 1e-5);
   EXPECT_NEAR(raster.radiosity(kQuarter).y, .5f, 1e-5);
 }
 
-TEST(RasterPixels, LayersBeginByAndBy) {
-  OneRaster raster(2);
-  const auto covered = [&](float gap) {
-    raster.clear();
-    raster.add(quarterPatch(.5f, 1, 2));
-    raster.add(quarterPatch(.5f, 2 + gap, 3 + gap));
-    return raster.coverage(kQuarter);
-  };
-  EXPECT_NEAR(covered(-.1f), 1, 1e-5);
-  EXPECT_NEAR(covered(.5f * kFidelity.layer_gap), .75f, 1e-5);  // half of the range is its reach
-  float before = 1;
-  for (float gap = 0; gap < .6f * kFidelity.layer_gap; gap += .01f * kFidelity.layer_gap) {
-    const float now = covered(gap);
-    EXPECT_LE(now, before + 1e-5f) << gap;
-    EXPECT_GT(now, before - .02f) << gap;
-    before = now;
+// Halves of one thing, and what is alone before, between or behind them: it hides half of both.
+TEST(RasterPixels, WhatIsAloneBelongsToNoThing) {
+  for (const float place : {.5f, 1.6f, 4.f}) {
+    OneRaster raster(2);
+    raster.add(quarterPatch(.5f, 1, 2, {1, 0, 0}));
+    raster.add(quarterPatch(.4f, 1.5f, 2.5f, {1, 0, 0}));
+    Patch alone = quarterPatch(.5f, .9f * place, 1.1f * place, {0, 1, 0});
+    alone.is_alone = true;
+    raster.add(alone);
+    EXPECT_NEAR(raster.coverage(kQuarter), .95f, 1e-5) << place;
   }
 }
 
-TEST(RasterPixels, WhatIsNestedHidesBehindTheLargerLayer) {
+TEST(RasterPixels, PatchesThatAreAloneHideEachOtherAtRandom) {
   OneRaster raster(2);
-  const auto covered = [&](float first, float second, bool is_solid) {
-    raster.clear();
-    for (Patch patch : {quarterPatch(first, 1, 1.5f), quarterPatch(second, 2, 2.5f)}) {
-      patch.is_solid = is_solid;
-      raster.add(patch);
-    }
-    return double(raster.coverage(kQuarter));
-  };
-  for (const bool is_solid : {false, true}) {
-    const double apart = 1 - (is_solid ? double(kFidelity.nested) : 0);
-    EXPECT_NEAR(covered(.5f, .3f, is_solid), .5 + apart * .15, 1e-5) << "the smaller lies behind";
-    EXPECT_NEAR(covered(.3f, .5f, is_solid), .5 + apart * .15, 1e-5) << "the larger rises above";
-    EXPECT_NEAR(covered(.5f, 1.5f, is_solid), 1, 1e-6) << "what fills the pixel fills all of it";
-  }
-}
-
-TEST(RasterPixels, WhatOverlapsHidesBehindItsOwnLayer) {
-  OneRaster raster(2);
-  const auto covered = [&](float overlap) {
+  const auto covered = [&](bool is_alone) {
     raster.clear();
     for (int i = 0; i < 10; ++i) {
       Patch patch = quarterPatch(.1f, 1, 2);
-      patch.overlap = overlap;
+      patch.is_alone = is_alone;
       raster.add(patch);
     }
     return double(raster.coverage(kQuarter));
   };
-  EXPECT_GT(covered(0), .99);
-  EXPECT_NEAR(covered(1), 1 - std::exp(-1.), .06);  // as anything spread at random
+  EXPECT_GT(covered(false), .99);
+  EXPECT_NEAR(covered(true), 1 - std::pow(.9, 10), 1e-4);
 }
 
 // What is left open of a floor of rectangles with these sides, on the side faces and across the
-// edges of the cube, too; as a part of the whole. Nothing is closed of thickets.
+// edges of the cube, too; as a part of the whole. Nothing is closed.
 double gapsOfFloor(float side_x, float side_y, const SymmetricMatrix& shape) {
   OneRaster raster(12);
   for (float x = -20 + side_x / 2; x < 20; x += side_x) {
@@ -261,7 +239,7 @@ double gapsOfFloor(float side_x, float side_y, const SymmetricMatrix& shape) {
       Patch patch = patchAt(direction, {0, 0, 1}, spread * -direction.z, spread);
       patch.shape = shape;
       patch.is_solid = false;
-      patch.thicket = 1;
+      patch.lets_through = true;
       raster.add(patch);
     }
   }

@@ -122,14 +122,14 @@ std::vector<Layers> allLayers() {
 }
 
 // The goal is .02 for all. Sheets four spacings apart and more share no cells at their borders, and
-// nodes of both are drawn by distance. Who looks aslant sees below the front one's edge, and of
-// boards not just half.
+// nodes of both are drawn by distance. Seen aslant, as far apart, both have the same distances
+// within a pixel, and some of its edge lies behind the front one's; of boards not just half shows.
 struct Limits {
   double light = .1, exact = .065, occlusion = .045;
 };
 Limits limitsOf(const Layers& layers) {
   if (layers.board > 0) return {.25, .22, .1};
-  if (layers.gap > .05f) return {.34, .03, .065};
+  if (layers.gap > .05f) return {.34, .045, .065};
   return {};
 }
 

@@ -51,13 +51,13 @@ class Brush {
     seen_ = &canvas_.seen->faces[std::size_t(face)];
     pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
     recorder_ = FaceRecorder(canvas_, std::size_t(face), lane_);
-    hull_ = Hull(pixels_, *seen_, resolution_, recorder_);
+    things_ = Things(pixels_, *seen_, resolution_, recorder_);
     open_.Begin(*seen_);
     if constexpr (!Kind::kFrame) weights_ = FaceWeights(canvas_, receivers_, face);
     ClearFace();
   }
   // Nothing more is drawn to it.
-  void EndFace() { hull_.CloseAll(); }
+  void EndFace() { things_.CloseAll(); }
 
   HWY_INLINE void DrawPatch(const Patch& patch) {
     DrawSeen(patch, See(canvas_, patch, receivers_), hn::FirstN(D(), kStep));
@@ -99,8 +99,8 @@ class Brush {
     });
   }
 
-  using Hull = FaceHull<Kind::kChannels>;
-  static constexpr std::size_t kChannels = Hull::kAll;
+  using Things = FaceThings<Kind::kChannels>;
+  static constexpr std::size_t kChannels = Things::kAll;
   // Of a patch, in the frame of the raster.
   using Normal = std::conditional_t<Kind::kFrame, V3, glm::vec3>;
   Normal InRaster(const glm::vec3& normal) const {
@@ -137,7 +137,7 @@ class Brush {
     }
   }
 
-  // What a receiver does not look at is not open. No layer has ended anywhere.
+  // What a receiver does not look at is not open. Nothing is there yet.
   void ClearFace() {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
@@ -148,11 +148,11 @@ class Brush {
       const M above = hn::Gt(Dot(up, face_pixels_[pixel].direction), zero);
       const V open = hn::IfThenElseZero(hn::Or(receivers_.spherical, above), one);
       for (const std::size_t i :
-           {PacketCanvas::kRoom, PacketCanvas::kOpen, PacketCanvas::kRest, Hull::kRestBefore}) {
+           {PacketCanvas::kRoom, PacketCanvas::kOpen, PacketCanvas::kRest, Things::kRestBefore}) {
         hn::Store(open, d, at + i * kStep);
       }
-      hn::Store(Splat(-kInfinity), d, at + Hull::kEnd * kStep);
-      hn::Store(Splat(-kInfinity), d, at + Hull::kEndBefore * kStep);
+      hn::Store(Splat(-kInfinity), d, at + Things::kEnd * kStep);
+      hn::Store(Splat(-kInfinity), d, at + Things::kEndBefore * kStep);
       if (recorder_) recorder_.Clear(pixel, open);
     });
   }
@@ -160,24 +160,14 @@ class Brush {
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
   // Of this part of it.
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
-    const V reach = ReachOf(patch, sight);
-    const V range = patch.isDrop() ? Splat(-kInfinity) : reach;
     Cover cover;
-    cover.depth_begin = hn::Sub(distance, range);
-    cover.depth_end = hn::Add(distance, range);
-    cover.hull_begin = hn::Sub(distance, Splat(patch.radius));
-    cover.hull_end = hn::Add(distance, Splat(patch.radius));
-    // In part where the gap is narrow beside the reach: else results would step from one receiver
-    // to the next
-    cover.inverse_gap =
-        Reciprocal(hn::Max(hn::Mul(Splat(kFidelity.layer_gap), reach), Splat(1e-30f)));
+    cover.depth_begin = hn::Sub(distance, Splat(patch.reach));
+    cover.depth_end = hn::Add(distance, Splat(patch.reach));
     cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
-    cover.overlap = patch.overlap;
-    cover.has_hull = patch.thicket == 0 && !patch.lets_through;
+    cover.is_alone = patch.is_alone;
+    cover.has_hull = !patch.is_alone && !patch.lets_through;
     cover.is_solid = patch.is_solid;
-    cover.nested = patch.nested();
     cover.opacity = hn::Mul(part, hn::Mul(Splat(patch.opacity), PartsOf(canvas_, patch, lane_)));
-    cover.own = 0.5f * (1 - patch.thicket);
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
     cover.lights = patch.lights == 0 ? nullptr : canvas_.lights[patch.lights].of(lane_);
@@ -208,9 +198,7 @@ class Brush {
     V part = hn::Sub(Splat(1), sight.near_part);
     const Parallelogram shape =
         OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w, part);
-    const Cover cover = MakeCover(patch, sight, distance, part);
-    if (!patch.is_hull) CoverParallelogram(shape, seen, cover);
-    if (cover.has_hull) AddHull(hull_, shape, seen, cover, resolution_, *seen_, open_);
+    DrawShape(shape, seen, MakeCover(patch, sight, distance, part), patch.is_hull);
   }
 
   // The shape of a patch on the plane of the face; it may lie outside the face. `offset`: along the
@@ -261,44 +249,61 @@ class Brush {
             hn::Mul(hn::Mul(half_area, inverse_half_u), scale), shear};
   }
 
-  // Covers pixels by the part of them that lies in the shape, row by row.
-  HWY_INLINE void CoverParallelogram(const Parallelogram& shape, M seen, const Cover& cover) {
+  // Covers pixels by the part of them in the shape, and adds those in the widened one to hulls.
+  HWY_INLINE void DrawShape(const Parallelogram& shape, M seen, const Cover& cover, bool is_hull) {
+    const Widening widening(shape, cover.has_hull && cover.is_solid);
     const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, shape.half_x);
-    const FaceBox box(shape, reach, shape.half_y, resolution_, *seen_, seen);
+    const FaceBox box(shape, hn::Add(reach, widening.pixels),
+                      hn::Add(shape.half_y, widening.pixels), resolution_, *seen_, seen);
     if (box.range.isEmpty()) return;
-    const V half_x = hn::IfThenElseZero(seen, shape.half_x);  // 0: no width
-    const Rows rows = {box.y0, box.y1, half_x, box.range};
-    cover.overlap > 0 ? CoverRows<true>(shape, rows, cover) : CoverRows<false>(shape, rows, cover);
-  }
-
-  struct Rows {
-    V begin, end, half_x;
-    PixelRange range;
-  };
-  template <bool kOverlaps>
-  HWY_INLINE void CoverRows(const Parallelogram& shape, const Rows& rows, const Cover& cover) {
-    const V zero = hn::Zero(D());
-    for (int row = rows.range.row_begin; row < rows.range.row_end; ++row) {
-      const V bottom = hn::Max(rows.begin, Splat(float(row)));
-      const V top = hn::Min(rows.end, Splat(float(row + 1)));
-      const V height = hn::Mul(cover.opacity, hn::Max(zero, hn::Sub(top, bottom)));
-      const V along = hn::NegMulAdd(Splat(0.5f), hn::Add(top, bottom), shape.y);
-      const V x = hn::NegMulAdd(shape.shear, along, shape.x);
-      const V left = hn::Sub(x, rows.half_x), right = hn::Add(x, rows.half_x);
-      const FaceWeights::Row weights(weights_, row, hn::Mul(Splat(0.5f), hn::Add(top, bottom)));
-      open_.DrawRow(rows.range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
-        const V width = hn::Max(zero, hn::Sub(hn::Min(right, Splat(float(column + 1))),
-                                              hn::Max(left, Splat(float(column)))));
-        V weight = Splat(1);
-        if constexpr (!Kind::kFrame) {
-          const V across = hn::Add(hn::Min(right, Splat(float(column + 1))),
-                                   hn::Max(left, Splat(float(column))));
-          weight = weights.At(column, hn::Mul(Splat(0.5f), across));
-        }
-        return CoverPixel<Kind, kOverlaps>(pixels_.at(pixel), pixel, hn::Mul(width, height), weight,
-                                           cover, hull_);
+    AreaRows area(shape, seen, cover.opacity, resolution_);
+    HullRows hull(shape, seen, widening.pixels, box);
+    for (int row = box.range.row_begin; row < box.range.row_end; ++row) {
+      const bool has_area = !is_hull && area.BeginRow(row);
+      if (!has_area && !cover.has_hull) continue;
+      if (cover.has_hull) hull.BeginRow(row);
+      const FaceWeights::Row weights(weights_, row, has_area ? area.middleY() : hn::Zero(D()));
+      open_.DrawRow(box.range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
+        V amount = hn::Zero(D()), middle = amount;
+        if (has_area) amount = area.Amount(column, middle);
+        const VU samples = cover.has_hull ? hull.Samples(column) : hn::Zero(DU());
+        const V weight = Kind::kFrame || !has_area ? Splat(1) : weights.At(column, middle);
+        return DrawPixel(pixel, amount, weight, samples, widening.samples, cover,
+                         [&](VU held) HWY_ATTR { return area.PartIn(held, row, column); });
       });
     }
+  }
+
+  // False: the pixel is open to nobody.
+  // `partIn(samples)`: the part that lies in these samples.
+  template <typename PartIn>
+  HWY_INLINE bool DrawPixel(std::size_t at, V amount, V weight, VU samples, VU widening,
+                            const Cover& cover, const PartIn& partIn) {
+    const D d;
+    float* const pixel = pixels_.at(at);
+    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    const M is_open = hn::Gt(open, hn::Zero(d));
+    if (hn::AllFalse(d, is_open)) return false;
+    amount = hn::IfThenElseZero(is_open, amount);
+    const M covers = hn::Gt(amount, hn::Zero(d));
+    if (!cover.is_alone) {
+      samples = hn::IfThenElseZero(hn::RebindMask(DU(), is_open), samples);
+      const M has_samples = hn::RebindMask(d, hn::Ne(samples, hn::Zero(DU())));
+      const M meets = hn::Or(covers, has_samples);
+      if (hn::AllFalse(d, meets)) return true;
+      things_.Meet(at, meets, cover.depth_begin, cover.depth_end);
+      if (cover.has_hull) things_.AddHull(at, samples, widening);
+    }
+    if (hn::AllFalse(d, covers)) return true;
+    V room = hn::Load(d, pixel + PacketCanvas::kRoom * kStep);
+    if (!cover.is_alone) {
+      const VU held = Things::HeldOf(pixel);
+      if (!hn::AllTrue(DU(), hn::Eq(held, hn::Zero(DU())))) {
+        room = RoomAt(partIn(held), PartOf(held), room);
+      }
+    }
+    CoverPixel<Kind>(pixel, amount, weight, cover, room);
+    return true;
   }
 
   // Covers the pixels whose rays hit the surfel: the near field (memo 3.4.1). Coverage of a disk
@@ -383,13 +388,14 @@ class Brush {
   }
 
   bool CoverTraced(std::size_t pixel, V amount, const Cover& cover) {
-    const bool is_open = CoverPixel<Kind, false>(
-        pixels_.at(pixel), pixel, hn::Mul(cover.opacity, amount), Splat(1), cover, hull_);
-    if (!is_open || !cover.has_hull) return is_open;
-    const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(0.5f)));
-    hull_.Add(pixel, hn::IfThenElseZero(is_hull, SplatU(kHullSamples)),
-              SplatU(cover.is_solid ? kHullSide / 2 : 0), cover.hull_begin, cover.hull_end);
-    return true;
+    VU samples = hn::Zero(DU());
+    if (cover.has_hull) {
+      const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(0.5f)));
+      samples = hn::IfThenElseZero(is_hull, SplatU(kHullSamples));
+    }
+    return DrawPixel(pixel, hn::Mul(cover.opacity, amount), Splat(1), samples,
+                     SplatU(cover.is_solid ? kHullSide / 2 : 0), cover,
+                     [](VU held) HWY_ATTR { return PartOf(held); });
   }
 
   // Covers pixels by what amountOf(ray) says.
@@ -454,7 +460,7 @@ class Brush {
   OpenPixels open_;
   FaceWeights weights_;
   FaceRecorder recorder_;
-  Hull hull_;
+  Things things_;
 };
 
 }  // namespace

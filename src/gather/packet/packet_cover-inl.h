@@ -18,9 +18,9 @@
 #include <glm/vec3.hpp>
 #include <iterator>
 
-#include "gather/packet/packet_hull-inl.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
+#include "gather/packet/packet_things-inl.h"
 #include "gather/rules/coverage_rules.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -30,16 +30,13 @@ namespace {
 
 // How some of the receivers' pixels are covered.
 struct Cover {
-  V depth_begin, depth_end;
-  V hull_begin, hull_end;  // within which it may touch others
-  V inverse_gap;  // one over the gap in depth that is all new
+  V depth_begin, depth_end;  // within which it meets others
   M is_lit;
   bool is_all_lit;
-  float overlap, nested;
-  bool has_hull;  // it is no thicket
-  bool is_solid;  // and its hull is widened
+  bool is_alone;  // it belongs to no thing
+  bool has_hull;
+  bool is_solid;  // its hull is widened
   V opacity;
-  float own;  // the part of its own that overlaps
   glm::vec3 radiosity;
   const float* lights;  // instead of it, PacketLights of these lanes; null: none
   V fade;               // only when something fades
@@ -66,50 +63,43 @@ struct BrushKind {
   static constexpr std::size_t kChannels = (kColor ? 3 : 0) + (kFade ? 1 : 0);
 };
 
-// Covers so much of a pixel where `amount` is positive. A layer with less room ends at exactly 1,
-// and the pixel is exactly full then. Without kOverlaps, nothing hides behind its own layer.
-// `place`: that of the pixel, which the hull is asked about; `weight`: of the middle of what covers
-// it, over that of its own. False: the pixel was open to nobody.
-template <typename Kind, bool kOverlaps>
-HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, const Cover& cover,
-                           const FaceHull<Kind::kChannels>& hull) {
+// The part of a pixel that is in these samples.
+HWY_INLINE V PartOf(VU samples) {
+  const auto count = hn::BitCast(DI(), hn::PopulationCount(samples));
+  return hn::Mul(Splat(1.f / (kHullSide * kHullSide)), hn::ConvertTo(D(), count));
+}
+
+// Of a pixel of which the things before leave `room` open, and hold the part `held` of the samples:
+// how much is open where something is, of which the part `behind` lies behind these samples. What
+// is open lies beside them, as far as it has a place there.
+HWY_INLINE V RoomAt(V behind, V held, V room) {
+  const V zero = hn::Zero(D()), one = Splat(1), tiny = Splat(1e-6f);
+  const V closed = hn::Sub(one, room);
+  const V inside = hn::Max(zero, hn::Sub(one, hn::Div(closed, hn::Max(held, tiny))));
+  const V beside = hn::Div(hn::NegMulAdd(held, inside, room), hn::Max(hn::Sub(one, held), tiny));
+  return hn::Min(one, hn::Max(zero, hn::MulAdd(behind, hn::Sub(inside, beside), beside)));
+}
+
+// What is left open of a pixel of which something covers so much.
+HWY_INLINE V LeftOpen(float* pixel, V amount, V open, const Cover& cover, V room) {
   const D d;
-  const V zero = hn::Zero(d), one = Splat(1);
-  const M is_open = hn::Gt(hn::Load(d, pixel + PacketCanvas::kOpen * kStep), zero);
-  if (hn::AllFalse(d, is_open)) return false;
-  const M is_drawn = hn::And(hn::Gt(amount, zero), is_open);
-  if (hn::AllFalse(d, is_drawn)) return true;
-  float* const room_at = pixel + PacketCanvas::kRoom * kStep;
-  float* const layer_at = pixel + PacketCanvas::kLayer * kStep;
-  float* const end_at = pixel + PacketCanvas::kEnd * kStep;
+  if (cover.is_alone) {  // before all others, and behind them
+    const V clear = hn::Sub(Splat(1), amount);
+    hn::Store(hn::Mul(room, clear), d, pixel + PacketCanvas::kRoom * kStep);
+    return hn::Mul(open, clear);
+  }
+  return hn::Max(hn::Zero(d), hn::NegMulAdd(room, amount, open));
+}
+
+// Covers so much of a pixel where `amount` is positive. `weight`: of the middle of what covers it,
+// over that of its own.
+template <typename Kind>
+HWY_INLINE void CoverPixel(float* pixel, V amount, V weight, const Cover& cover, V room) {
+  const D d;
   float* const open_at = pixel + PacketCanvas::kOpen * kStep;
-  const V end = hn::Load(d, end_at);
-  V room = hn::Load(d, room_at), before = hn::Load(d, layer_at);
-
-  // A gap in depth begins a new layer, by and by
-  const V gap = hn::Mul(hn::Sub(cover.depth_begin, end), cover.inverse_gap);
-  const V is_new = hn::IfThenElseZero(is_drawn, hn::Min(one, hn::Max(zero, gap)));
-  const M ends = hn::And(is_drawn, hn::Ge(gap, one));
-  if (!hn::AllFalse(d, hn::Gt(is_new, zero))) {
-    hull.Turn(place, ends, hn::And(is_drawn, hn::Gt(is_new, zero)));
-  }
   const V open = hn::Load(d, open_at);
-  room = hn::MulAdd(is_new, hn::Sub(open, room), room);
-  before = hn::NegMulAdd(is_new, before, before);
-  hn::Store(room, d, room_at);
-  hn::Store(hn::IfThenElse(is_drawn, hn::Max(end, cover.depth_end), end), d, end_at);
-
-  // The slope of s - s^2 / 2 in the middle of what is added leaves out what hides behind the layer;
-  // what of a thicket hides behind itself is left out of its opacity
-  V counts = amount;
-  if constexpr (kOverlaps) {
-    const V middle = hn::Min(one, hn::MulAdd(Splat(cover.own), amount, before));
-    counts = hn::Mul(amount, hn::NegMulAdd(middle, Splat(cover.overlap), one));
-  }
-  const V layer = hn::Min(one, hn::Add(before, counts));
-  hn::Store(layer, d, layer_at);
-  const V left = hn::Min(open, OpenBehind(room, layer, Splat(cover.nested)));
-  const V covered = hn::IfThenElseZero(hn::Gt(amount, zero), hn::Sub(open, left));
+  const V left = LeftOpen(pixel, amount, open, cover, room);
+  const V covered = hn::IfThenElseZero(hn::Gt(amount, hn::Zero(d)), hn::Sub(open, left));
   hn::Store(hn::Sub(open, covered), d, open_at);
   float* const rest_at = pixel + PacketCanvas::kRest * kStep;
   const V rest = hn::Load(d, rest_at);
@@ -131,7 +121,6 @@ HWY_INLINE bool CoverPixel(float* pixel, std::size_t place, V amount, V weight, 
       }
     }
   }
-  return true;
 }
 
 // Pixels of a face, half open.

@@ -12,9 +12,9 @@
 #include <cstddef>
 
 #include "gather/packet/packet_cover-inl.h"
-#include "gather/packet/packet_hull-inl.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/packet/packet_lanes-inl.h"
+#include "gather/packet/packet_things-inl.h"
 #include "gather/rules/coverage_rules.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -106,6 +106,7 @@ struct SampleRun {
   using VI = hn::Vec<DI>;
   VI begin, end;
 
+  SampleRun() = default;
   SampleRun(V low, V high) {
     const V scale = Splat(float(kHullSide));
     begin = hn::ConvertTo(DI(), hn::Ceil(hn::Mul(scale, low)));
@@ -133,49 +134,120 @@ struct SampleRun {
   }
 };
 
-// Of the hull of a patch, in samples. Spheres, two-sided surfels and rough nodes may stand alone,
-// and are not widened.
-inline VU Widening(const Parallelogram& shape, bool is_solid) {
-  if (!is_solid) return hn::Zero(DU());
-  const V side = hn::Sqrt(hn::Mul(shape.half_x, shape.half_y));
-  const V samples =
-      hn::MulAdd(side, Splat(kFidelity.hull_widening * float(kHullSide)), Splat(0.5f));
-  const V within = hn::Min(Splat(float(kHullSide)), hn::Max(Splat(1), samples));
-  return hn::BitCast(DU(), hn::ConvertTo(DI(), within));
-}
+// How far the hull of a shape reaches beyond it.
+struct Widening {
+  VU samples = hn::Zero(DU());
+  V pixels = hn::Zero(D());
 
-// Adds the samples of the widened shape to the hull in lanes of `seen`, with the same shift for all
-// of a row of pixels.
-template <typename Hull>
-HWY_INLINE void AddHull(const Hull& hull, const Parallelogram& shape, M seen, const Cover& cover,
-                        int resolution, const SeenPixels::Face& face, OpenPixels& open) {
-  const D d;
-  const VU widening = Widening(shape, cover.is_solid);
-  const V in_samples = hn::ConvertTo(d, hn::BitCast(DI(), widening));
-  // Samples are of the hull as a whole or not at all: half of one is to spare, or else rounding
-  // would tear tiles apart. (What stands alone has none: small balls would grow.)
-  const V wider = cover.is_solid ? hn::MulAdd(in_samples, Splat(1 / float(kHullSide)),
-                                              Splat(0.5f / float(kHullSide)))
-                                 : hn::Zero(d);
-  const V half_x = hn::Add(shape.half_x, wider), half_y = hn::Add(shape.half_y, wider);
-  const V reach = hn::MulAdd(hn::Abs(shape.shear), shape.half_y, half_x);
-  const FaceBox box(shape, reach, half_y, resolution, face, seen);
-  if (box.range.isEmpty()) return;
-  const auto counts = hn::RebindMask(DU(), seen);
-  const SampleRun across(box.y0, box.y1);
-  for (int row = box.range.row_begin; row < box.range.row_end; ++row) {
-    const VU rows = hn::IfThenElseZero(counts, across.Rows(row));
-    // The same shift for all of a row of pixels
-    const V along = hn::Sub(Splat(float(row) + 0.5f), shape.y);
-    const V within = hn::Min(shape.half_y, hn::Max(hn::Neg(shape.half_y), along));
-    const V x = hn::MulAdd(shape.shear, within, shape.x);
-    const SampleRun run(hn::Max(box.x0, hn::Sub(x, half_x)), hn::Min(box.x1, hn::Add(x, half_x)));
-    open.DrawRow(box.range, row, resolution, [&](std::size_t pixel, int column) HWY_ATTR {
-      return hull.Add(pixel, hn::And(rows, run.Columns(column)), widening, cover.hull_begin,
-                      cover.hull_end);
-    });
+  // Only tiles of surfaces are widened: spheres, rough nodes and leaves may stand alone. Samples
+  // are of the hull as a whole or not at all: half of one is to spare, or else rounding would tear
+  // tiles apart.
+  Widening(const Parallelogram& shape, bool is_solid) {
+    if (!is_solid) return;
+    const D d;
+    const V side = hn::Sqrt(hn::Mul(shape.half_x, shape.half_y));
+    const V wide = hn::MulAdd(side, Splat(kFidelity.hull_widening * float(kHullSide)), Splat(0.5f));
+    const V within = hn::Min(Splat(float(kHullSide)), hn::Max(Splat(1), wide));
+    const auto whole = hn::ConvertTo(DI(), within);
+    samples = hn::BitCast(DU(), whole);
+    pixels = hn::Mul(hn::Add(hn::ConvertTo(d, whole), Splat(0.5f)), Splat(1 / float(kHullSide)));
   }
-}
+};
+
+// The parts of pixels in a shape, row by row.
+class AreaRows {
+ public:
+  AreaRows(const Parallelogram& shape, M seen, V opacity, int resolution)
+      : shape_(shape),
+        opacity_(opacity),
+        half_x_(hn::IfThenElseZero(seen, shape.half_x)),  // 0: no width
+        begin_(hn::Max(hn::Zero(D()), hn::Sub(shape.y, shape.half_y))),
+        end_(hn::Min(Splat(float(resolution)), hn::Add(shape.y, shape.half_y))) {}
+
+  // False: the shape does not reach the row.
+  HWY_INLINE bool BeginRow(int row) {
+    const V bottom = hn::Max(begin_, Splat(float(row)));
+    const V top = hn::Min(end_, Splat(float(row + 1)));
+    const V height = hn::Sub(top, bottom);
+    if (hn::AllFalse(D(), hn::Gt(height, hn::Zero(D())))) return false;
+    height_ = hn::Mul(opacity_, hn::Max(hn::Zero(D()), height));
+    middle_y_ = hn::Mul(Splat(0.5f), hn::Add(top, bottom));
+    const V x = hn::MulAdd(shape_.shear, hn::Sub(middle_y_, shape_.y), shape_.x);
+    left_ = hn::Sub(x, half_x_);
+    right_ = hn::Add(x, half_x_);
+    bottom_ = bottom;
+    top_ = top;
+    return true;
+  }
+  // Of what is in a pixel: its part in these samples.
+  HWY_NOINLINE V PartIn(VU samples, int row, int column) const {
+    const D d;
+    V heights[kHullSide], sum = hn::Zero(d), all = sum;
+    for (int i = 0; i < kHullSide; ++i) heights[i] = Within(bottom_, top_, row, i);
+    for (int j = 0; j < kHullSide; ++j) {
+      V height = hn::Zero(d), full = height;
+      for (int i = 0; i < kHullSide; ++i) {
+        const auto has = hn::TestBit(samples, SplatU(1u << (kHullSide * j + i)));
+        height = hn::Add(height, hn::IfThenElseZero(hn::RebindMask(d, has), heights[i]));
+        full = hn::Add(full, heights[i]);
+      }
+      const V width = Within(left_, right_, column, j);
+      sum = hn::MulAdd(width, height, sum);
+      all = hn::MulAdd(width, full, all);
+    }
+    return hn::Div(sum, hn::Max(all, Splat(1e-30f)));
+  }
+  V middleY() const { return middle_y_; }
+  // Of a pixel of the row: its part, and where the middle of that lies.
+  HWY_INLINE V Amount(int column, V& middle_x) const {
+    const V right = hn::Min(right_, Splat(float(column + 1)));
+    const V left = hn::Max(left_, Splat(float(column)));
+    middle_x = hn::Mul(Splat(0.5f), hn::Add(right, left));
+    return hn::Mul(height_, hn::Max(hn::Zero(D()), hn::Sub(right, left)));
+  }
+
+ private:
+  // Of what is between `low` and `high`: how much lies in a column, or row, of a pixel's samples.
+  static V Within(V low, V high, int pixel, int sample) {
+    const float begin = float(pixel) + float(sample) / kHullSide, end = begin + 1.f / kHullSide;
+    const V within = hn::Sub(hn::Min(high, Splat(end)), hn::Max(low, Splat(begin)));
+    return hn::Max(hn::Zero(D()), within);
+  }
+
+  const Parallelogram& shape_;
+  const V opacity_, half_x_, begin_, end_;
+  V height_, middle_y_, left_, right_, bottom_, top_;
+};
+
+// The samples of pixels in a widened shape, row by row, with the same shift for all of a row of
+// pixels.
+class HullRows {
+ public:
+  HullRows(const Parallelogram& shape, M seen, V wider, const FaceBox& box)
+      : shape_(shape),
+        box_(box),
+        wider_(wider),
+        seen_(hn::RebindMask(DU(), seen)),
+        across_(box.y0, box.y1) {}
+
+  HWY_INLINE void BeginRow(int row) {
+    rows_ = hn::IfThenElseZero(seen_, across_.Rows(row));
+    const V along = hn::Sub(Splat(float(row) + 0.5f), shape_.y);
+    const V within = hn::Min(shape_.half_y, hn::Max(hn::Neg(shape_.half_y), along));
+    const V x = hn::MulAdd(shape_.shear, within, shape_.x), half = hn::Add(shape_.half_x, wider_);
+    run_ = SampleRun(hn::Max(box_.x0, hn::Sub(x, half)), hn::Min(box_.x1, hn::Add(x, half)));
+  }
+  HWY_INLINE VU Samples(int column) const { return hn::And(rows_, run_.Columns(column)); }
+
+ private:
+  const Parallelogram& shape_;
+  const FaceBox& box_;
+  const V wider_;
+  const hn::Mask<DU> seen_;
+  const SampleRun across_;
+  VU rows_;
+  SampleRun run_;
+};
 
 }  // namespace
 }  // namespace HWY_NAMESPACE

@@ -1,7 +1,7 @@
 // The inner loops of the packet raster, in vectors of whatever width this machine has (Highway).
 // Results of different instruction sets agree within 1e-4 of occlusion and relative irradiance, and
 // within 3e-3 for two of 1000 receivers: sums are rounded differently, and rounding decides whether
-// things that hardly meet are of one layer. Of one instruction set they are the same bit for bit.
+// patches that hardly meet are of one thing. Of one instruction set they are the same bit for bit.
 #pragma once
 
 #include <array>
@@ -44,10 +44,6 @@ struct alignas(64) Patch {
   float most_area = 0;  // and no more than this
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
-  // How far it hides behind its own layer, 0..1: 0 for a tile beside the others, 1 for what lies
-  // anywhere before or behind them
-  float overlap = 0;
-  float thicket = 0;  // how much of it is leaves or hair, between which gaps stay open: 0..1
   float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
   bool lets_through = false;  // it is translucent, or a fence: nothing closes what it leaves open
   // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
@@ -55,6 +51,7 @@ struct alignas(64) Patch {
   bool is_solid = true;
   bool is_spread = false;  // a facet that may have gaps: it is spread evenly over its outline
   bool is_ribbon = false;  // a ray traced surfel is a rectangle, not a disk
+  bool is_alone = false;   // it belongs to no thing, but hides at random: a leaf, a drop of smoke
   bool is_hull = false;    // it covers nothing, but closes what others leave open
   // From where it is seen: before its front alone; from both sides of a two-sided disk or facet;
   // from both, though it sends light from its front alone; or as something else says
@@ -65,20 +62,13 @@ struct alignas(64) Patch {
   std::uint32_t lights = 0;  // place in PacketCanvas::lights; 0: it sends evenly
   glm::vec3 radiosity{0};    // in all directions together
   float near_distance = 0;   // closer than this it is ray traced; 0: a node, which never is
-  LayerReach reach;          // how far before and behind its middle it meets others of its layer
+  float reach = 0;           // how far before and behind its middle it meets others
   union {                    // as it is ray traced:
     float soft_peak = 0;     // of a disk, softDiskPeak
     float ribbon_width;      // of a ribbon
   };
 
-  // What is in a volume, as of smoke, hides behind its own layer as behind others: it is one alone.
-  bool isDrop() const { return lets_through && reach.isNone(); }
   bool isRound() const { return disk_area == 0; }
-  // Outlines of surfaces on the same ground rise from the same side of a pixel, and the smaller
-  // lies behind the larger: how much of the patch does so.
-  float nested() const {
-    return is_solid && !lets_through && seen != Seen::kBoth ? kFidelity.nested * (1 - thicket) : 0;
-  }
   bool showsBoth() const { return seen == Seen::kBoth || seen == Seen::kDarkBack; }
 };
 static_assert(sizeof(Patch) == 128);
@@ -125,16 +115,15 @@ struct SeenPixels {
 };
 
 // Where a packet is drawn: 16 rasters, interleaved by pixel as many at a time as a vector holds
-// (FaceLanes). A pixel has room, layer, the layer's end, what is open of it and of its weight; with
-// color red, green and blue; the faded coverage, when occlusion fades; then the hull (FaceHull),
-// and what was left and seen before the last layer.
+// (FaceLanes). A pixel has room, what is open of it and of its weight; with color red, green and
+// blue; the faded coverage, when occlusion fades; then things (FaceThings), and what was left and
+// seen before the last one.
 struct PacketCanvas {
-  // Places: what the layers before the last one leave open; what the last one covers by itself, and
-  // where its depth ranges end; what is open; and what is open of the weight
-  static constexpr std::size_t kRoom = 0, kLayer = 1, kEnd = 2, kOpen = 3, kRest = 4;
-  static constexpr std::size_t kCoverageChannels = 5, kHullChannels = 6;
+  // Places: what all but the last thing leave open; what is open; and what is open of the weight
+  static constexpr std::size_t kRoom = 0, kOpen = 1, kRest = 2;
+  static constexpr std::size_t kCoverageChannels = 3, kThingChannels = 6;
   static std::size_t channels(const GatherRules& rules) {
-    return kCoverageChannels + kHullChannels + 2 * rules.channels();
+    return kCoverageChannels + kThingChannels + 2 * rules.channels();
   }
 
   const PacketLanes* lanes;

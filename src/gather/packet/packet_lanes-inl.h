@@ -73,12 +73,6 @@ inline V InverseSqrt(V x) {
   return hn::Mul(estimate, hn::NegMulAdd(hn::Mul(half, estimate), estimate, Splat(1.5f)));
 }
 
-// What a layer leaves open that covers `layer` of a pixel, of which `room` was open before it.
-inline V OpenBehind(V room, V layer, V nested) {
-  const V rest = hn::Sub(Splat(1), layer), apart = hn::Mul(room, rest);
-  return hn::MulAdd(nested, hn::Sub(hn::Min(room, rest), apart), apart);
-}
-
 // What lies where in a pixel counts by its own weight there. Of what was open, and of the weight
 // that was left, this part of the weight goes to what covers `covered`, the middle of which weighs
 // `weight` beside the middle of the pixel. What lies by itself takes its own; what takes all that
@@ -161,14 +155,15 @@ struct Sight {
   M traced;     // near in part, and seen by the rays
 };
 
-// How much of what is so far away is ray traced.
+// How much of what is so far away is ray traced: it fades as nodes do.
 inline V NearPart(const Patch& patch, const Sight& sight) {
   // Finite and positive, for a surfel may be at a receiver; then it is near at any setting
   const float inverse =
       1 / std::clamp(patch.near_distance * patch.near_distance, std::numeric_limits<float>::min(),
                      std::numeric_limits<float>::max());
+  const float width = std::max(2 * kFidelity.fading, std::numeric_limits<float>::min());
   const V rest = hn::NegMulAdd(sight.distance_sq, Splat(inverse), Splat(1));
-  const V part = hn::Mul(rest, Splat(1 / (1 - kFidelity.whole_near * kFidelity.whole_near)));
+  const V part = hn::Mul(rest, Splat(1 / width));
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
 }
 
@@ -257,22 +252,6 @@ inline V HalfSide(const Patch& patch, V n) {
 // How much of it counts: each receiver has its own part while a node fades into what is below it.
 inline V PartsOf(const PacketCanvas& canvas, const Patch& patch, std::size_t lane) {
   return patch.parts == 0 ? Splat(1) : LoadLanes(canvas.parts[patch.parts].of, lane);
-}
-
-// Of its layer, along the direction to it (LayerReach).
-inline V ReachOf(const Patch& patch, const Sight& sight) {
-  const V least = Splat(patch.reach.least);
-  if (patch.reach.spread_sq == 0) return least;
-  const auto& [xx, yy, zz, xy, xz, yz] = patch.shape.entries;
-  const V3& to = sight.offset;
-  const V x =
-      hn::MulAdd(Splat(2 * xy), to.y, hn::MulAdd(Splat(2 * xz), to.z, hn::Mul(Splat(xx), to.x)));
-  const V y = hn::MulAdd(Splat(2 * yz), to.z, hn::Mul(Splat(yy), to.y));
-  const V spread =
-      hn::MulAdd(x, to.x, hn::MulAdd(y, to.y, hn::Mul(hn::Mul(Splat(zz), to.z), to.z)));
-  const V distance_sq = hn::Max(sight.distance_sq, Splat(std::numeric_limits<float>::min()));
-  const V square = hn::Div(hn::Mul(Splat(patch.reach.spread_sq), spread), distance_sq);
-  return hn::Max(least, hn::Sqrt(hn::Max(square, hn::Zero(D()))));
 }
 
 // At the rim of a curved thing, a part of a piece faces the receiver whose mean normal does not:

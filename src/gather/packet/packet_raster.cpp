@@ -116,10 +116,9 @@ void PacketRaster::bringToWorld(Patch& patch) const {
   for (float* area : {&patch.area, &patch.disk_area, &patch.round_area, &patch.most_area}) {
     *area *= square;
   }
-  patch.reach.spread_sq *= square;
-  for (float* length : {&patch.radius, &patch.near_distance, &patch.reach.least}) {
-    *length *= scale;
-  }
+  patch.radius *= scale;
+  patch.reach *= scale;
+  patch.near_distance *= scale;
   if (patch.is_ribbon) patch.ribbon_width *= scale;
 }
 
@@ -220,10 +219,9 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
 
   Patch& patch = patches_.emplace_back();
   patch.position = facet.position;
-  patch.radius = facet.radius;
+  patch.radius = patch.reach = facet.radius;
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
-  patch.reach = reachOf(facet);
-  patch.overlap = patch.thicket = facet.is_thicket ? 1 : 0;
+  patch.is_alone = facet.is_thicket;
   patch.lets_through = facet.opacity[color_] < 1;
   if (patch.lets_through) patch.opacity = facetOpacity(facet, color_);
   patch.is_solid = is_hull || (!facet.is_thicket && isFilled(node, facet));
@@ -265,6 +263,10 @@ void PacketRaster::addRoughNode(const Node& node, const LaneParts* lane_parts,
   }
 }
 
+// It is no tile, and meets others where its middle does; but nodes of regular scenes are equally
+// far, and rounding must not decide about these.
+constexpr float kRoughReach = 1.f / 64;
+
 void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts) {
   RoughSight seen;
   const GatherSides sides = rules_.quality.sides;
@@ -276,16 +278,13 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   Patch& patch = patches_.emplace_back();
   patch.position = node.position + visible.middle;
   patch.radius = node.radius;
+  patch.reach = kRoughReach * node.radius;
   patch.normal = node.flatness * node.normal;
   patch.lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
-  if (!patch.lets_through) {
-    patch.reach = LayerReach::of(node.radius, node.covariance.trace());
-  }
+  patch.is_alone = isThicket(node) || patch.lets_through;
   patch.shape = shapeOf(node.covariance);
-  patch.thicket = thicketPart(node);
   patch.is_solid = false;
-  const RoughCover cover =
-      roughCover(node, direction, visible.perspective * round_area, patch.thicket, color_);
+  const RoughCover cover = roughCover(node, direction, visible.perspective * round_area, color_);
   patch.area = patch.round_area = cover.area;
   patch.most_area = cover.most;
   patch.opacity = cover.opacity;
@@ -295,9 +294,6 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
     const float gain = rules_.gains.ofAlike(node.groups);
     patch.radiosity = (gain * front / (round_area * node.opacity(color_))) * seen.radiosity;
   }
-  if (sides == GatherSides::kFront) patch.overlap = overlapOf(front, back);
-  if (sides == GatherSides::kBack) patch.overlap = overlapOf(back, front);
-  patch.overlap = std::max(patch.overlap, patch.thicket);
   patch.seen = Patch::Seen::kAllAround;
   patch.kind = CubeKind::kRoughNode;
   bringToWorld(patch);
@@ -322,7 +318,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.normal = surfel.normal;
     const Ribbon ribbon = Ribbon::of(surfel);
     const float sharers = sharersOf(surfel), piece_area = sharers * surfel.area;
-    patch.radius = std::max(surfel.radius, ribbon.radius());
+    patch.radius = patch.reach = std::max(surfel.radius, ribbon.radius());
+    if (surfel.isLoose() && !ribbon.isEmpty()) patch.reach = 0.7071f * ribbon.width;
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
       // Only what is opaque may cover more than it should to leave no gaps
@@ -340,14 +337,9 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
                  : surfel.isTwoSided()                        ? Patch::Seen::kBoth
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
-    patch.reach = reachOf(surfel, ribbon, patch.radius);
     patch.opacity = surfel.opacity(color_) / sharers;
     patch.lets_through = lets_through;
-    if (patch.lets_through && surfel.isSphere()) patch.reach = {};
-    if (surfel.isLone()) {
-      patch.overlap = patch.thicket = 1;
-      patch.reach = {};
-    }
+    patch.is_alone = surfel.isLone() || (lets_through && surfel.isSphere());
     patch.is_solid = !surfel.isSphere() && !surfel.isLoose();
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;

@@ -38,39 +38,36 @@ struct PixelRecord {
   std::array<float, kCubeKinds> covered{};  // by what it was drawn as; gaps are not filled yet
   float total = 0;                          // the sum of these
   float depth = std::numeric_limits<float>::infinity();  // CubePixel::depth
-  float new_layers = 0;                                  // sum of what each began of a new layer
+  float things = 0;  // that lie behind each other and cover some of it
 
-  float layers() const { return total > 0 ? std::max(1.f, new_layers) : 0; }
   CubeKind kind() const {
     const auto most = std::max_element(covered.begin(), covered.end());
     return *most > 0 ? CubeKind(most - covered.begin()) : CubeKind::kNothing;
   }
 };
 
-// Looks at the pixels after each thing is drawn. One thread at a time.
+// Looks at the pixels after each patch is drawn. One thread at a time.
 class PixelRecorder {
  public:
   // Forgets everything; so many pixels follow.
   void begin(std::size_t pixels) { pixels_.assign(pixels, {}); }
   // A pixel before anything is drawn: so much of it is open.
-  void clear(std::size_t pixel, float open) { pixels_[pixel].open = pixels_[pixel].room = open; }
-  // Something of this kind, at this distance, was drawn: now so much of the pixel is open, and so
-  // much was before its last layer.
-  void look(std::size_t pixel, CubeKind kind, float distance, float room, float open) {
+  void clear(std::size_t pixel, float open) { pixels_[pixel].open = open; }
+  // What comes belongs to another thing.
+  void beginThing(std::size_t pixel) { pixels_[pixel].is_new = true; }
+  // Something of this kind, at this distance, was drawn: now so much of the pixel is open.
+  void look(std::size_t pixel, CubeKind kind, float distance, float open) {
     Pixel& was = pixels_[pixel];
     if (!(open < was.open)) return;
     PixelRecord& record = was.record;
-    const float before = was.open - was.room;  // the last layer
-    record.new_layers += before < 0         ? std::clamp((room - was.room) / before, 0.f, 1.f)
-                         : record.total > 0 ? 0.f
-                                            : 1.f;
+    if (was.is_new) ++record.things;
+    was.is_new = false;
     record.covered[std::size_t(kind)] += was.open - open;
     record.total += was.open - open;
     if (record.total >= kCubeFirstPart) record.depth = std::min(record.depth, distance);
     was.open = open;
-    was.room = room;
   }
-  // A layer at this distance is closed: it covers the pixel.
+  // The last thing, at this distance, is closed: it covers the pixel.
   void close(std::size_t pixel, float distance) {
     PixelRecord& record = pixels_[pixel].record;
     record.depth = std::min(record.depth, distance);
@@ -83,7 +80,8 @@ class PixelRecorder {
  private:
   struct Pixel {
     PixelRecord record;
-    float room = 0, open = 0;
+    float open = 0;
+    bool is_new = true;  // nothing of the last thing has covered yet
   };
   std::vector<Pixel> pixels_;
 };

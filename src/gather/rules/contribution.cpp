@@ -93,10 +93,6 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 }
 
 namespace {
-// How much of a rough node is spheres, 0..1, when the rest is two-sided; one-sided disks count for
-// less.
-float spherePart(const Node& node) { return std::clamp(0.5f * (partsOfBand0(node) - 2), 0.f, 1.f); }
-
 // The ellipse of what has this covariance, projected along the direction.
 float ellipseArea(const SymmetricMatrix& covariance, const glm::vec3& direction) {
   return 4 * kPi * std::sqrt(std::max(0.f, quadraticForm(adjugate(covariance), direction)));
@@ -119,25 +115,22 @@ float facetLayers(const Facet& facet) {
 }
 }  // namespace
 
-// A surface covers no more than the outline of the sphere that holds all disks, and than a part of
-// its ellipse: what exceeds that hides behind the rest.
+// A surface covers no more than the outline of the sphere that holds all disks, and than its
+// ellipse: what exceeds that hides behind the rest.
 // The outline of a thicket is that of a ball full of leaves, pi r^2, which has a covariance of r^2
 // / 5 along every axis, so an ellipse of 4 pi r^2 / 5.
-RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket,
-                      int color) {
+RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, int color) {
   const float ellipse = ellipseArea(node, direction), sphere = kPi * node.radius * node.radius;
-  const float filled = kFidelity.filled_outline + spherePart(node) * (1 - kFidelity.filled_outline);
-  const float most = std::min({node.area, sphere, filled * ellipse});
+  const float most = std::min({node.area, sphere, ellipse});
   const float surface = std::min(shown, most);
   constexpr float kThicketOutline = 5.f / 4;
   const float outline = std::min(sphere, kThicketOutline * ellipse);
   const float each = node.opacity(color);
   const float opacity = layersOpacity(each, shown / surface);
-  if (!(thicket > 0 && outline > 0)) return {surface, opacity, most};
-  const float hidden = outline * thicketOpacity(each * std::min(shown, node.area), outline,
-                                                float(node.surfel_count));
-  const float area = surface + thicket * (outline - surface), solid = opacity * surface;
-  return {area, (solid + thicket * (hidden - solid)) / area, std::max(area, most)};
+  if (!isThicket(node) || !(outline > 0)) return {surface, opacity, most};
+  const float area = each * std::min(shown, node.area);
+  return {outline, thicketOpacity(area, outline, float(node.surfel_count)),
+          std::max(outline, most)};
 }
 
 bool isFilled(const Node& node, const Facet& facet) {
@@ -161,25 +154,8 @@ float facetOpacity(const Facet& facet, int color) {
   return layersOpacity(facet.opacity[color], depth) / depth;
 }
 
-LayerReach reachOf(const Facet& facet) {
-  // What overlaps hides behind its own layer as behind others: it needs none
-  if (facet.is_thicket) return {};
-  return LayerReach::of(facet.radius, facet.covariance.trace());
-}
-
-// Strands lie closer to each other than they are long.
-LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius) {
-  if (ribbon.isEmpty()) return LayerReach::ofDisk(radius);
-  const LayerReach reach = LayerReach::of(radius, ribbon.spread().trace());
-  return surfel.isLoose() ? LayerReach{0, reach.spread_sq} : reach;
-}
-
-// Codes round: what is about none is none.
-float thicketPart(const Node& node) {
-  if (!node.isLoose()) return 0;
-  constexpr float kNone = 0.05f;
-  return std::clamp((partsOfBand0(node) - 1 - kNone) / (1 - 2 * kNone), 0.f, 1.f);
-}
+// Half of it two-sided, or a sixth spheres, whose outlines are a fourth of their areas.
+bool isThicket(const Node& node) { return node.isLoose() && partsOfBand0(node) > 1.5f; }
 
 SymmetricMatrix shapeOf(const SymmetricMatrix& covariance) {
   const float trace = covariance.trace();

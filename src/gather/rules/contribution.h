@@ -53,21 +53,16 @@ bool isFilled(const Node& node, const Facet& facet);
 float facetOpacity(const Facet& facet, int color);
 
 // What a rough node covers in a color that shows `shown` of its area in unit direction `direction`
-// (or its opposite), and of which `thicket` is leaves or hair: an area, and what it hides of that.
-// A surface fills what it shows, a thicket is spread over its outline.
+// (or its opposite): an area, and what it hides of that. A surface fills what it shows, a thicket
+// is spread over its outline.
 struct RoughCover {
   float area, opacity;
   float most;  // what `area` might be, however much is shown
 };
-RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, float thicket,
-                      int color = 0);
+RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, int color = 0);
 
-LayerReach reachOf(const Facet& facet);
-// Of a surfel; `radius`: of the circle that it is drawn within.
-LayerReach reachOf(const Surfel& surfel, const Ribbon& ribbon, float radius);
-// How much of a rough node is leaves, hair or particles, 0..1: of a loose one, what is two-sided or
-// spheres.
-float thicketPart(const Node& node);
+// Whether a rough node is leaves, hair or particles: it is loose, and not mostly one-sided.
+bool isThicket(const Node& node);
 
 // How what has this covariance spreads, as Patch::shape.
 SymmetricMatrix shapeOf(const SymmetricMatrix& covariance);

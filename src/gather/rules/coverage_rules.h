@@ -12,22 +12,6 @@
 
 namespace surfeit {
 
-// How far before and behind its middle a contribution meets others of its layer: as far as
-// something even with its variance along the direction extends, which every receiver has its own
-// of; and at least a part of its radius.
-struct LayerReach {
-  float least = 0;
-  float spread_sq = 0;  // its square is this times the spread along the direction (Patch::shape)
-
-  // Of what has a radius and a covariance with this trace: three times the variance.
-  static LayerReach of(float radius, float trace) {
-    return {kFidelity.least_reach * radius, 1.5f * trace};
-  }
-  // A sphere is as a disk along the direction.
-  static LayerReach ofDisk(float radius) { return of(radius, 0.5f * radius * radius); }
-  bool isNone() const { return least == 0 && spread_sq == 0; }
-};
-
 // The samples of a pixel for its hull (docs/algorithm.md, "Closing").
 inline constexpr int kHullSide = 4;  // along a pixel
 inline constexpr std::uint32_t kHullSamples = 0xffff;
@@ -49,12 +33,6 @@ inline float softDiskPeak(float radius, float area, bool is_exact) {
   const float covered = (is_exact ? 1 : kFidelity.soft_disk_area) * area;
   const float share = std::min(0.95f, covered / (kPi * radius * radius));
   return share < 0.5f ? 2 * share : 1 / (2 * (1 - share));
-}
-
-// How far a rough node hides behind itself: folds, bumps and leaves do.
-inline float overlapOf(float front_area, float back_area) {
-  return std::clamp(kFidelity.overlap_gain * (back_area - front_area) / (back_area + front_area),
-                    0.f, 1.f);
 }
 
 }  // namespace surfeit

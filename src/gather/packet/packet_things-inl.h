@@ -1,10 +1,10 @@
-// The hulls of what is drawn, and the closing of layers by them, in the rasters of a packet; for
-// one instruction set (see packet_kernel-inl.h).
-#if defined(SURFEIT_PACKET_HULL_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef SURFEIT_PACKET_HULL_INL_H_
-#undef SURFEIT_PACKET_HULL_INL_H_
+// The things that lie behind each other in the pixels of a packet's rasters, and how their hulls
+// close them; for one instruction set (see packet_kernel-inl.h).
+#if defined(SURFEIT_PACKET_THINGS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SURFEIT_PACKET_THINGS_INL_H_
+#undef SURFEIT_PACKET_THINGS_INL_H_
 #else
-#define SURFEIT_PACKET_HULL_INL_H_
+#define SURFEIT_PACKET_THINGS_INL_H_
 #endif
 
 #include <hwy/highway.h>
@@ -48,139 +48,134 @@ class FaceRecorder {
   }
   void Look(std::size_t pixel, CubeKind kind, V distance, const float* lanes) const {
     recorder_->look(first_pixel_ + pixel, kind, hn::GetLane(distance),
-                    lanes[PacketCanvas::kRoom * kStep], lanes[PacketCanvas::kOpen * kStep]);
+                    lanes[PacketCanvas::kOpen * kStep]);
+  }
+  void BeginThing(std::size_t pixel, M lanes) const {
+    if (HasFirst(lanes)) recorder_->beginThing(first_pixel_ + pixel);
   }
   void Close(std::size_t pixel, M lanes, V begin, V end) const {
-    const D d;
-    if (!(hn::GetLane(hn::VecFromMask(d, hn::RebindMask(d, lanes))) != 0)) return;
+    if (!HasFirst(lanes)) return;
     recorder_->close(first_pixel_ + pixel, 0.5f * (hn::GetLane(begin) + hn::GetLane(end)));
   }
 
  private:
+  static bool HasFirst(M lanes) { return (LaneBits(lanes) & 1) != 0; }
+
   PixelRecorder* recorder_ = nullptr;
   std::size_t first_pixel_ = 0;
 };
 
 // Of one face. `kChannels` values of color and fade follow those of coverage in a pixel.
 template <std::size_t kChannels>
-class FaceHull {
+class FaceThings {
  public:
   // Places in a pixel: samples of the hull of the last thing, and in the upper half of all things
-  // before it; where the last thing begins and ends in depth; what was left before the last layer,
-  // negative once that layer was asked for its hull; samples that the things before the last one
-  // hold; where these end.
+  // before it; where the last thing begins and ends in depth; what was left before it; samples that
+  // the things before it hold; where these end; and their color.
   static constexpr std::size_t kHull = PacketCanvas::kCoverageChannels + kChannels;
   static constexpr std::size_t kBegin = kHull + 1, kEnd = kHull + 2, kRestBefore = kHull + 3;
-  static constexpr std::size_t kKept = kHull + 4, kEndBefore = kHull + 5;
+  static constexpr std::size_t kHeld = kHull + 4, kEndBefore = kHull + 5;
   static constexpr std::size_t kColorBefore = kHull + 6, kAll = kColorBefore + kChannels;
   static_assert(kAll ==
-                PacketCanvas::kCoverageChannels + PacketCanvas::kHullChannels + 2 * kChannels);
+                PacketCanvas::kCoverageChannels + PacketCanvas::kThingChannels + 2 * kChannels);
 
-  FaceHull() = default;
-  FaceHull(const FaceLanes& pixels, const SeenPixels::Face& seen, int resolution,
-           FaceRecorder recorder)
+  FaceThings() = default;
+  FaceThings(const FaceLanes& pixels, const SeenPixels::Face& seen, int resolution,
+             FaceRecorder recorder)
       : pixels_(pixels), seen_(&seen), resolution_(resolution), recorder_(recorder) {}
 
-  // Adds samples of lanes that have some. `widening` in samples. False: the pixel is open to
-  // nobody.
-  HWY_INLINE bool Add(std::size_t at, VU samples, VU widening, V depth_begin, V depth_end) const {
+  // Something between these depths meets the pixel in lanes of `meets`: it belongs to the last
+  // thing there, or to a new one behind it.
+  HWY_INLINE void Meet(std::size_t at, M meets, V depth_begin, V depth_end) const {
+    const D d;
+    float* const pixel = pixels_.at(at);
+    const V end = hn::Load(d, pixel + kEnd * kStep);
+    const M begins = hn::And(meets, hn::Gt(depth_begin, end));
+    if (!hn::AllFalse(d, begins)) Begin(at, begins, depth_begin, end);
+    hn::Store(hn::IfThenElse(meets, hn::Max(end, depth_end), end), d, pixel + kEnd * kStep);
+  }
+
+  // Adds samples to the hull of the last thing. `widening` in samples.
+  HWY_INLINE void AddHull(std::size_t at, VU samples, VU widening) const {
     const D d;
     const DU du;
     float* const pixel = pixels_.at(at);
-    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
-    const M is_open = hn::Gt(open, hn::Zero(d));
-    if (hn::AllFalse(d, is_open)) return false;
-    const M counts = hn::And(hn::RebindMask(d, hn::Ne(samples, hn::Zero(du))), is_open);
-    if (hn::AllFalse(d, counts)) return true;
-    samples = hn::IfThenElseZero(hn::RebindMask(du, counts), samples);
-    const V end = hn::Load(d, pixel + kEnd * kStep), begin = hn::Load(d, pixel + kBegin * kStep);
-    VU hull = hn::BitCast(du, hn::Load(d, pixel + kHull * kStep));
-    const M is_new = hn::And(counts, hn::Gt(depth_begin, end));
-    if (!hn::AllFalse(d, is_new)) Keep(at, is_new, end);
-    const VU moved = hn::AndNot(SplatU(kHullSamples), hn::Or(hull, hn::ShiftLeft<16>(hull)));
-    hull = hn::Or(hn::IfThenElse(hn::RebindMask(du, is_new), moved, hull), samples);
-    hn::Store(hn::BitCast(d, hull), d, pixel + kHull * kStep);
-    hn::Store(hn::IfThenElse(counts, hn::Max(end, depth_end), end), d, pixel + kEnd * kStep);
+    hn::Store(hn::BitCast(d, hn::Or(HullOf(pixel), samples)), d, pixel + kHull * kStep);
     // The widening is in the lowest bits of the beginning
-    const VU before = hn::And(hn::BitCast(du, begin), SplatU(kWidening));
-    const VU widest = hn::Max(before, hn::IfThenElseZero(hn::RebindMask(du, counts), widening));
-    const VU place = hn::BitCast(du, hn::IfThenElse(is_new, depth_begin, begin));
-    hn::Store(hn::BitCast(d, hn::Or(hn::AndNot(SplatU(kWidening), place), widest)), d,
+    const VU begin = hn::BitCast(du, hn::Load(d, pixel + kBegin * kStep));
+    const auto has_some = hn::Ne(samples, hn::Zero(du));
+    const VU widest =
+        hn::Max(hn::And(begin, SplatU(kWidening)), hn::IfThenElseZero(has_some, widening));
+    hn::Store(hn::BitCast(d, hn::Or(hn::AndNot(SplatU(kWidening), begin), widest)), d,
               pixel + kBegin * kStep);
-    return true;
   }
 
-  // What comes before something is drawn that begins layers of their own in lanes of `ends`, and
-  // new ones in lanes of `begins`.
-  HWY_INLINE void Turn(std::size_t at, M ends, M begins) const {
-    const D d;
-    float* const pixel = pixels_.at(at);
-    const V before = hn::Load(d, pixel + kRestBefore * kStep);
-    V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
-    const M has_layer = hn::And(ends, hn::Gt(before, rest));
-    if (!hn::AllFalse(d, has_layer)) Close(at, has_layer);
-    rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
-    begins = hn::And(begins, hn::Ne(before, rest));
-    if (hn::AllFalse(d, begins)) return;
-    hn::Store(hn::IfThenElse(begins, rest, hn::Load(d, pixel + kRestBefore * kStep)), d,
-              pixel + kRestBefore * kStep);
-    for (std::size_t c = 0; c < kChannels; ++c) {
-      float* const to = pixel + (kColorBefore + c) * kStep;
-      const float* const from = pixel + (PacketCanvas::kCoverageChannels + c) * kStep;
-      hn::Store(hn::IfThenElse(begins, hn::Load(d, from), hn::Load(d, to)), d, to);
-    }
-  }
-
-  // Closes the last layers of all pixels.
+  // Closes the last things of all pixels.
   void CloseAll() const {
     const D d;
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t at) HWY_ATTR {
       const float* const pixel = pixels_.at(at);
-      const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
-      const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
-      const V before = hn::Load(d, pixel + kRestBefore * kStep);
-      const M has_layer = hn::And(hn::Gt(before, rest), hn::Gt(open, hn::Zero(d)));
-      if (!hn::AllFalse(d, has_layer)) Close(at, has_layer);
+      const M lanes = hn::And(BringSome(pixel), IsWhole(hn::Or(HeldOf(pixel), HullOf(pixel))));
+      if (hn::AllFalse(d, lanes)) return;
+      const V end = hn::Load(d, pixel + kEnd * kStep);
+      const VU own = hn::And(HullOf(pixel), SplatU(kHullSamples));
+      const M held = hn::And(lanes, IsWhole(hn::Or(HeldOf(pixel), Narrowed(at, own, end))));
+      if (!hn::AllFalse(d, held)) Close(at, held);
     });
+  }
+
+  static VU HeldOf(const float* pixel) {
+    return hn::BitCast(DU(), hn::Load(D(), pixel + kHeld * kStep));
   }
 
  private:
   static constexpr std::uint32_t kWidening = 7;  // bits
 
-  // Before another thing begins in these lanes: what the last one, which ends at `end`, holds.
-  HWY_NOINLINE void Keep(std::size_t at, M lanes, V end) const {
+  // A thing in these lanes, behind the last one, which ends at `end`.
+  HWY_NOINLINE void Begin(std::size_t at, M lanes, V depth_begin, V end) const {
     const D d;
     const DU du;
     float* const pixel = pixels_.at(at);
-    const V end_before = hn::Load(d, pixel + kEndBefore * kStep);
-    hn::Store(hn::IfThenElse(lanes, end, end_before), d, pixel + kEndBefore * kStep);
-    const VU own = hn::And(HullOf(pixel), SplatU(kHullSamples));
-    lanes = hn::And(lanes, hn::RebindMask(d, hn::Ne(own, hn::Zero(du))));
-    if (hn::AllFalse(d, lanes)) return;
-    const VU held = hn::IfThenElseZero(hn::RebindMask(du, lanes), Narrowed(at, own, end));
-    const VU kept = hn::BitCast(du, hn::Load(d, pixel + kKept * kStep));
-    hn::Store(hn::BitCast(d, hn::Or(kept, held)), d, pixel + kKept * kStep);
+    const VU hull = HullOf(pixel);
+    const VU own =
+        hn::IfThenElseZero(hn::RebindMask(du, lanes), hn::And(hull, SplatU(kHullSamples)));
+    if (!hn::AllTrue(du, hn::Eq(own, hn::Zero(du)))) {
+      const VU samples = hn::Or(HeldOf(pixel), Narrowed(at, own, end));
+      hn::Store(hn::BitCast(d, samples), d, pixel + kHeld * kStep);
+      const M held = hn::And(lanes, hn::And(BringSome(pixel), IsWhole(samples)));
+      if (!hn::AllFalse(d, held)) Close(at, held);
+    }
+    if (recorder_) recorder_.BeginThing(at, lanes);
+    const auto is_new = hn::RebindMask(du, lanes);
+    const VU before = hn::AndNot(SplatU(kHullSamples), hn::Or(hull, hn::ShiftLeft<16>(hull)));
+    hn::Store(hn::BitCast(d, hn::IfThenElse(is_new, before, hull)), d, pixel + kHull * kStep);
+    Move(pixel, lanes, kEnd, kEndBefore);
+    Move(pixel, lanes, PacketCanvas::kOpen, PacketCanvas::kRoom);
+    Move(pixel, lanes, PacketCanvas::kRest, kRestBefore);
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      Move(pixel, lanes, PacketCanvas::kCoverageChannels + c, kColorBefore + c);
+    }
+    const V begin = hn::Load(d, pixel + kBegin * kStep);
+    const V new_begin = hn::BitCast(d, hn::AndNot(SplatU(kWidening), hn::BitCast(du, depth_begin)));
+    hn::Store(hn::IfThenElse(lanes, new_begin, begin), d, pixel + kBegin * kStep);
+  }
+  static void Move(float* pixel, M lanes, std::size_t from, std::size_t to) {
+    const D d;
+    const V moved = hn::Load(d, pixel + from * kStep), was = hn::Load(d, pixel + to * kStep);
+    hn::Store(hn::IfThenElse(lanes, moved, was), d, pixel + to * kStep);
   }
   static VU HullOf(const float* pixel) {
     return hn::BitCast(DU(), hn::Load(D(), pixel + kHull * kStep));
   }
-
-  // Those of these lanes where the hulls of the things drawn up to the end of the pixel's last
-  // layer, each narrowed again by itself, hold the pixel.
-  M Held(std::size_t at, M lanes) const {
+  // Lanes whose last thing covers some of what is still open.
+  static M BringSome(const float* pixel) {
     const D d;
-    const DU du;
-    const float* const pixel = pixels_.at(at);
-    const V end = hn::Load(d, pixel + PacketCanvas::kEnd * kStep);
-    const VU kept = hn::BitCast(du, hn::Load(d, pixel + kKept * kStep));
-    const M counts = hn::Le(hn::Load(d, pixel + kBegin * kStep), end);
-    const VU last = hn::And(HullOf(pixel), SplatU(kHullSamples));
-    const VU own = hn::IfThenElseZero(hn::RebindMask(du, counts), last);
-    lanes = hn::And(lanes, Holds(hn::Or(kept, own)));
-    if (hn::AllFalse(d, lanes)) return lanes;
-    return hn::And(lanes, Holds(hn::Or(kept, Narrowed(at, own, end))));
+    const V open = hn::Load(d, pixel + PacketCanvas::kOpen * kStep);
+    const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
+    const V before = hn::Load(d, pixel + kRestBefore * kStep);
+    return hn::And(hn::Gt(before, rest), hn::Gt(open, hn::Zero(d)));
   }
-  static M Holds(VU hull) {
+  static M IsWhole(VU hull) {
     const DU du;
     return hn::RebindMask(D(), hn::Eq(hn::AndNot(hull, SplatU(kHullSamples)), hn::Zero(du)));
   }
@@ -263,22 +258,19 @@ class FaceHull {
     return hn::And(held, all);
   }
 
-  // Of the lanes whose layers cover something. What is closed belongs to what its layer has
-  // brought.
+  // What is closed belongs to what the last thing has brought.
   void Close(std::size_t at, M lanes) const {
     const D d;
     const V zero = hn::Zero(d), one = Splat(1);
     float* const pixel = pixels_.at(at);
     const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
     const V before = hn::Load(d, pixel + kRestBefore * kStep);
-    hn::Store(hn::IfThenElse(lanes, hn::Neg(before), before), d, pixel + kRestBefore * kStep);
-    lanes = Held(at, lanes);
-    if (hn::AllFalse(d, lanes)) return;
-    const V layer = hn::IfThenElse(lanes, hn::Sub(before, rest), one);
-    const V scale = hn::Div(hn::IfThenElseZero(lanes, rest), layer);
-    if (recorder_)
+    const V brought = hn::IfThenElse(lanes, hn::Sub(before, rest), one);
+    const V scale = hn::Div(hn::IfThenElseZero(lanes, rest), brought);
+    if (recorder_) {
       recorder_.Close(at, lanes, hn::Load(d, pixel + kBegin * kStep),
-                      hn::Load(d, pixel + PacketCanvas::kEnd * kStep));
+                      hn::Load(d, pixel + kEnd * kStep));
+    }
     for (const std::size_t i : {PacketCanvas::kOpen, PacketCanvas::kRest}) {
       float* const left = pixel + i * kStep;
       hn::Store(hn::IfThenElse(lanes, zero, hn::Load(d, left)), d, left);
