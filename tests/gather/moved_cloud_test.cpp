@@ -112,7 +112,7 @@ class MovedCloudTest : public DirectoryTest, public testing::WithParamInterface<
   }
 
   // Gathers may differ by rounding of doubles far from 0, and by nothing else.
-  static constexpr double kLimit = 1e-5;
+  static constexpr double kLimit = 2e-5;
   Progress progress_;
 };
 
