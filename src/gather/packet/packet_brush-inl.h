@@ -162,7 +162,9 @@ class Brush {
   Cover MakeCover(const Patch& patch, const Sight& sight, V distance, V part) const {
     Cover cover;
     cover.depth_begin = hn::Sub(distance, Splat(patch.reach));
-    cover.depth_end = hn::Add(distance, Splat(patch.reach));
+    // Rounding must not decide about equal distances, which regular scenes have
+    constexpr float kRounding = 1e-5f;
+    cover.depth_end = hn::MulAdd(Splat(kRounding), distance, hn::Add(distance, Splat(patch.reach)));
     cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
     cover.is_alone = patch.is_alone;
     cover.has_hull = !patch.is_alone && !patch.lets_through;

@@ -182,20 +182,22 @@ class AreaRows {
   // Of what is in a pixel: its part in these samples.
   HWY_NOINLINE V PartIn(VU samples, int row, int column) const {
     const D d;
-    V heights[kHullSide], sum = hn::Zero(d), all = sum;
-    for (int i = 0; i < kHullSide; ++i) heights[i] = Within(bottom_, top_, row, i);
+    V heights[kHullSide], all_heights = hn::Zero(d), all_widths = all_heights, in_all = all_heights;
+    for (int i = 0; i < kHullSide; ++i) {
+      heights[i] = Within(bottom_, top_, row, i);
+      all_heights = hn::Add(all_heights, heights[i]);
+    }
     for (int j = 0; j < kHullSide; ++j) {
-      V height = hn::Zero(d), full = height;
+      V in_column = hn::Zero(d);
       for (int i = 0; i < kHullSide; ++i) {
         const auto has = hn::TestBit(samples, SplatU(1u << (kHullSide * j + i)));
-        height = hn::Add(height, hn::IfThenElseZero(hn::RebindMask(d, has), heights[i]));
-        full = hn::Add(full, heights[i]);
+        in_column = hn::Add(in_column, hn::IfThenElseZero(hn::RebindMask(d, has), heights[i]));
       }
       const V width = Within(left_, right_, column, j);
-      sum = hn::MulAdd(width, height, sum);
-      all = hn::MulAdd(width, full, all);
+      in_all = hn::MulAdd(width, in_column, in_all);
+      all_widths = hn::Add(all_widths, width);
     }
-    return hn::Div(sum, hn::Max(all, Splat(1e-30f)));
+    return hn::Div(in_all, hn::Max(hn::Mul(all_widths, all_heights), Splat(1e-30f)));
   }
   V middleY() const { return middle_y_; }
   // Of a pixel of the row: its part, and where the middle of that lies.

@@ -81,7 +81,9 @@ HWY_ATTR std::uint32_t FacesThatSee(const PacketCanvas& canvas, const Patch& pat
       const V largest = hn::Max(hn::Abs(sight.offset.x),
                                 hn::Max(hn::Abs(sight.offset.y), hn::Abs(sight.offset.z)));
       float side = patch.is_ribbon ? patch.area / patch.ribbon_width : std::sqrt(patch.most_area);
-      if (patch.isRound() && patch.is_alone) side = std::max(side, kThicketSide * patch.radius);
+      if (patch.isRound() && patch.is_alone && patch.near_distance == 0) {
+        side = std::max(side, kThicketSide * patch.radius);
+      }
       const V reach = hn::MulAdd(Splat(0.5f * kLargeExtent), largest, Splat(kSplatReach * side));
       const V least = hn::Mul(Splat(kFidelity.least_axis), hn::Sqrt(sight.distance_sq));
       const M is_large =

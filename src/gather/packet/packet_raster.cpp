@@ -263,10 +263,6 @@ void PacketRaster::addRoughNode(const Node& node, const LaneParts* lane_parts,
   }
 }
 
-// It is no tile, and meets others where its middle does; but nodes of regular scenes are equally
-// far, and rounding must not decide about these.
-constexpr float kRoughReach = 1.f / 64;
-
 void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts) {
   RoughSight seen;
   const GatherSides sides = rules_.quality.sides;
@@ -277,8 +273,8 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
   Patch& patch = patches_.emplace_back();
   patch.position = node.position + visible.middle;
+  // No reach: it is no tile, and meets others where its middle does
   patch.radius = node.radius;
-  patch.reach = kRoughReach * node.radius;
   patch.normal = node.flatness * node.normal;
   patch.lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
   patch.is_alone = isThicket(node) || patch.lets_through;
