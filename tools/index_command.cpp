@@ -152,6 +152,7 @@ Status runIndex(IndexArguments& arguments, CommandContext& context) {
                              {"repeated_surfels", stats.repeated_surfels},
                              {"normals_found", stats.normals_found},
                              {"thin_surfels", stats.thin_surfels},
+                             {"scattered_surfels", stats.scattered_surfels},
                              {"nodes", stats.nodes},
                              {"node_pages", stats.node_pages},
                              {"surfel_pages", stats.surfel_pages},

@@ -248,7 +248,7 @@ class Bench {
           const Point at = patch((i % 8 + .5) / 8, (i / 8 + .5) / 8);
           Surfel receiver;
           receiver.normal = glm::vec3(-at.normal);
-          receiver.position = glm::vec3(at.position + away / side_ * at.normal);
+          receiver.position = glm::vec3(at.position + away * std::sqrt(at.area) / side_ * at.normal);
           receivers.push_back(receiver);
         }
       }

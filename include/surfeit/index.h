@@ -72,6 +72,8 @@ struct IndexStats {
   std::uint64_t repeated_surfels = 0;
   std::uint64_t normals_found = 0;  // surfels with a normal from their neighbours
   std::uint64_t thin_surfels = 0;   // surfels without a normal that lie on no surface
+  // Surfels that scatter about a surface, whose disks stand on it instead.
+  std::uint64_t scattered_surfels = 0;
   std::uint64_t nodes = 0;
   std::uint64_t node_pages = 0;
   std::uint64_t surfel_pages = 0;

@@ -148,9 +148,9 @@ py::dict record(const IndexStats& stats) {
                   "surfels"_a = stats.surfels, "skipped_records"_a = stats.skipped_records,
                   "repeated_surfels"_a = stats.repeated_surfels,
                   "normals_found"_a = stats.normals_found, "thin_surfels"_a = stats.thin_surfels,
-                  "nodes"_a = stats.nodes, "node_pages"_a = stats.node_pages,
-                  "surfel_pages"_a = stats.surfel_pages, "file_bytes"_a = stats.file_bytes,
-                  "temporary_bytes"_a = stats.temporary_bytes,
+                  "scattered_surfels"_a = stats.scattered_surfels, "nodes"_a = stats.nodes,
+                  "node_pages"_a = stats.node_pages, "surfel_pages"_a = stats.surfel_pages,
+                  "file_bytes"_a = stats.file_bytes, "temporary_bytes"_a = stats.temporary_bytes,
                   "phase_seconds"_a = phases(stats.phase_seconds));
 }
 

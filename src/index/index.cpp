@@ -415,6 +415,7 @@ Status Indexer::buildWithNeighbours(std::unique_ptr<BucketStream> buckets, Scene
   how.build = [&](SortedSurfelStream& stream) { return build(writer, stream, "build"); };
   SURFEIT_RETURN_IF_ERROR(buildFromNeighbours(std::move(places), how, stats_, clock_, progress_));
   noteThinSurfels(stats_, options_, progress_);
+  noteScatteredSurfels(stats_, progress_);
   return {};
 }
 

@@ -62,7 +62,7 @@ statisticsHaveTheDocumentedFields() {
   run 0 sample cornell.obj -o again.ply --count 1000 --stats sample.json
   jsonHas sample.json "${common[@]}" triangles surfels area spacing phases
   run 0 index cornell.ply -o again.sft --stats index.json
-  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records repeated_surfels normals_found thin_surfels nodes node_pages \
+  jsonHas index.json "${common[@]}" memory_bytes input_bytes surfels skipped_records repeated_surfels normals_found thin_surfels scattered_surfels nodes node_pages \
     surfel_pages file_bytes bytes_per_surfel temporary_bytes surfels_per_second phases \
     sample read build finish
   run 0 generate --surfels 1k -o city.ply --stats generate.json

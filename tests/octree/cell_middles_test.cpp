@@ -1,8 +1,11 @@
-// Disks without sizes stand in the middle of their cells, but stay in their leaves.
+// Disks without sizes stand in the middle of their cells, and on the surface that places scatter
+// about, but stay in their leaves.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -12,6 +15,8 @@
 #include <vector>
 
 #include "core/curve_key.h"
+#include "core/spherical_harmonics.h"
+#include "core/tangent_frame.h"
 #include "io/test_directory.h"
 #include "octree/neighbours/leaf_levels.h"
 #include "octree/read/scene_file.h"
@@ -89,7 +94,7 @@ class CellMiddles : public DirectoryTest {
 
   std::vector<Surfel> indexed(const std::vector<Surfel>& cloud, bool keeps_sizes, RootCube& cube) {
     CloudChannels channels;
-    channels.normal = true;
+    channels.normal = channels.two_sided = true;
     channels.area = channels.radius = keeps_sizes;
     auto writer = SurfelWriter::create(path("cloud.ply"), channels);
     EXPECT_TRUE(writer.ok() && writer->write(cloud).ok() && writer->finish().ok());
@@ -117,6 +122,32 @@ class CellMiddles : public DirectoryTest {
     std::vector<std::uint8_t> levels;
     findLeaves(keys, 0, 16, levels);
     return levels;
+  }
+
+  // 100 x 100 places of a plane, 1 apart on average, that scatter by `noise` along its normal.
+  std::vector<Surfel> noisyPlane(const glm::vec3& normal, float noise) {
+    const TangentFrame frame(normal);
+    std::uniform_real_distribution<float> side(-50, 50);
+    std::normal_distribution<float> any;
+    std::vector<Surfel> surfels(10000);
+    for (Surfel& surfel : surfels) {
+      surfel.position = side(random_) * frame.tangent + side(random_) * frame.bitangent +
+                        noise * any(random_) * normal;
+      surfel.normal = normal;
+    }
+    return surfels;
+  }
+
+  // How far disks stand off a surface, root mean square.
+  float offSurface(const std::vector<Surfel>& cloud,
+                   const std::function<float(const glm::vec3&)>& height) {
+    RootCube cube;
+    double sum = 0;
+    const std::vector<Surfel> surfels = indexed(cloud, false, cube);
+    for (const Surfel& surfel : surfels) {
+      sum += double(height(surfel.position)) * double(height(surfel.position));
+    }
+    return float(std::sqrt(sum / double(surfels.size())));
   }
 
   std::mt19937 random_{2};
@@ -159,6 +190,49 @@ TEST_F(CellMiddles, PairsPart) {
   }
   EXPECT_GT(count, 3000u);
   EXPECT_GT(parted, count * 6 / 10);
+}
+
+TEST_F(CellMiddles, DisksStandOnThePlaneThatPlacesScatterAbout) {
+  for (const glm::vec3& normal :
+       {glm::vec3(0, 0, 1), glm::vec3(-1, 0, 0), glm::normalize(glm::vec3(1, 2, -3))}) {
+    const auto height = [&](const glm::vec3& place) { return glm::dot(place, normal); };
+    // Leaves hold some back
+    const float most = glm::length(glm::fract(normal)) > 0 ? .56f : .42f;
+    EXPECT_LT(offSurface(noisyPlane(normal, .2f), height), .2f * most);
+    EXPECT_LT(offSurface(noisyPlane(normal, .5f), height), .5f * most);
+    EXPECT_LT(offSurface(noisyPlane(normal, 0), height), 1e-3f);
+    // A receiver at its place would be behind it
+    std::vector<Surfel> two_sided = noisyPlane(normal, .5f);
+    for (Surfel& surfel : two_sided) surfel.flags |= kSurfelTwoSided;
+    EXPECT_NEAR(offSurface(two_sided, height), .5f, .02f);
+  }
+}
+
+TEST_F(CellMiddles, DisksStandOnASphereThatPlacesScatterAbout) {
+  const auto height = [](const glm::vec3& place) { return glm::length(place) - 1; };
+  const float spacing = std::sqrt(4 * kPi / 6000);
+  std::vector<Surfel> noisy = cloud(true);
+  const float clean = offSurface(noisy, height);
+  EXPECT_LT(clean, .03f * spacing);
+  std::normal_distribution<float> any;
+  for (Surfel& surfel : noisy) surfel.position += .5f * spacing * any(random_) * surfel.normal;
+  EXPECT_LT(offSurface(noisy, height), .5f * spacing * .56f);
+}
+
+// Two slopes that meet at an angle, which are no noise.
+TEST_F(CellMiddles, EdgesStaySharp) {
+  for (const float degrees : {20.f, 45.f, 55.f}) {
+    const float angle = degrees * kPi / 360, slope = std::tan(angle);
+    std::vector<Surfel> roof = noisyPlane({0, 0, 1}, 0);
+    for (Surfel& surfel : roof) {
+      glm::vec3& place = surfel.position;
+      place.x *= std::cos(angle);
+      place.z = -slope * std::abs(place.x);
+      surfel.normal = {std::copysign(std::sin(angle), place.x), 0, std::cos(angle)};
+    }
+    const auto height = [&](const glm::vec3& place) { return place.z + slope * std::abs(place.x); };
+    EXPECT_LT(offSurface(roof, height), .015f) << degrees;
+  }
 }
 
 }  // namespace

@@ -50,6 +50,7 @@ class IndexMerge {
     noteSceneName(job_.output, progress_);
     SURFEIT_RETURN_IF_ERROR(needsSides() ? mergeWithSides(*writer) : merge(*writer));
     if (plan_.needs_neighbours) noteThinSurfels(stats_, options, progress_);
+    noteScatteredSurfels(stats_, progress_);
     SURFEIT_RETURN_IF_ERROR(writer->finish(description_.provenance()));
     clock_.finish("finish");
     takeStats(*writer);
@@ -84,6 +85,7 @@ class IndexMerge {
       surfels += reader->facts().value("surfels", std::uint64_t{0});
       stats_.normals_found += reader->facts().value("normals_found", std::uint64_t{0});
       stats_.thin_surfels += reader->facts().value("thin_surfels", std::uint64_t{0});
+      stats_.scattered_surfels += reader->facts().value("scattered_surfels", std::uint64_t{0});
     }
     SURFEIT_RETURN_IF_ERROR(lacking.status(job_, passName(pass_), "merge"));
     if (surfels == expected_) return {};

@@ -77,6 +77,7 @@ class ShardSizes {
         cut, memory.slabs, [&](const BuiltSlab& slab) { return slabs.append(slab); }, progress_));
     facts["normals_found"] = found.normalsFound();
     facts["thin_surfels"] = found.thinSurfels();
+    facts["scattered_surfels"] = found.scatteredSurfels();
     return {};
   }
 

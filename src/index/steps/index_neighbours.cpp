@@ -30,6 +30,7 @@ Result<std::optional<SceneFile>> buildFound(SceneFile places, const NeighbourBui
   }
   stats.normals_found = found.normalsFound();
   stats.thin_surfels = found.thinSurfels();
+  stats.scattered_surfels = found.scatteredSurfels();
   return unoriented;
 }
 

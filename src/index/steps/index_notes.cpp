@@ -130,6 +130,14 @@ void noteRepeats(const IndexStats& stats, const IndexOptions& options, Progress&
   }
 }
 
+void noteScatteredSurfels(const IndexStats& stats, Progress& progress) {
+  if (stats.scattered_surfels == 0) return;
+  progress.inform(
+      fmt::format("{} surfels scatter about a surface: their disks stand on it, not at their "
+                  "places (disks of a cloud with radius and area stay)",
+                  stats.scattered_surfels));
+}
+
 void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress) {
   if (stats.thin_surfels == 0) return;
   progress.inform(

@@ -17,6 +17,7 @@ void noteIndexRules(const CloudTotals& totals, const CloudReader& reader,
                     const IndexOptions& options, Progress& progress);
 
 // How many surfels lie on no surface, of those that got normals.
+void noteScatteredSurfels(const IndexStats& stats, Progress& progress);
 void noteThinSurfels(const IndexStats& stats, const IndexOptions& options, Progress& progress);
 
 // How many surfels repeat another; nothing where none does.

@@ -135,6 +135,7 @@ class CellLanes {
 
 void MeasureCells(SurfaceFitLanes& lanes) {
   for (std::size_t lane = 0; lane < SurfaceFitLanes::kLanes; lane += kStep) {
+    FindHeights(lanes, lane);
     CellLanes(lanes, lane).run();
   }
 }

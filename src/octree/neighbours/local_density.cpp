@@ -50,6 +50,17 @@ glm::vec3 wayWithin(const Bounds3& box, const glm::vec3& from, glm::vec3 way,
   return from + kInside * (place - from);
 }
 
+// The part of a way from a place in the box that stays in it.
+float partWithin(const Bounds3& box, const glm::vec3& from, const glm::vec3& way) {
+  constexpr float kInside = 0.999f;  // rounding may leave the box
+  float part = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float room = std::abs((way[axis] > 0 ? box.max[axis] : box.min[axis]) - from[axis]);
+    if (std::abs(way[axis]) * part > kInside * room) part = kInside * room / std::abs(way[axis]);
+  }
+  return part;
+}
+
 float radiusOfArea(float area, float overlap) { return std::sqrt(area * overlap / kPi); }
 
 bool needsSize(const Surfel& surfel) { return (surfel.flags & kSurfelNeedsSize) != 0; }
@@ -208,6 +219,19 @@ Status SizedSurfelStream::findLeaves() {
   return {};
 }
 
+// As far as its leaf reaches. A receiver at the place may then be behind the disk, which matters
+// where backs are seen.
+void SizedSurfelStream::moveToSurface(std::size_t i, const glm::vec3& height) {
+  Surfel& surfel = surfels_[i];
+  if (keeps_places_ || surfel.isTwoSided() || height == glm::vec3(0)) return;
+  const RootCube& cube = octree_.file().header().cube;
+  const Bounds3 leaf = cellBounds(surfel.position, leaf_levels_[i], cube);
+  const glm::vec3 place = surfel.position + partWithin(leaf, surfel.position, height) * height;
+  if (firstDifferentLevel(keys_[i], curveKey(place, cube)) <= leaf_levels_[i]) return;
+  surfel.position = place;
+  ++scattered_surfels_;
+}
+
 // Without leaving its leaf, so the order of leaves stays. A disk around its new place is spread out
 // as far as the cell.
 void SizedSurfelStream::moveToMiddle(std::size_t i, const glm::vec3& middle) {
@@ -246,6 +270,7 @@ void SizedSurfelStream::take(std::size_t i, const SurfaceAt& surface) {
   if (!is_bare || surfel.isSphere()) return;
   setLongSide(surface.long_side, surfel);
   moveToMiddle(i, surface.middle);
+  moveToSurface(i, surface.height);
   setSharers(surface.sharers, surfel);
 }
 
@@ -268,6 +293,7 @@ void SizedSurfelStream::shapeGiven() {
     if (!surfel.isSphere() && cell.area > 0) {
       setLongSide(cell.long_side, surfel);
       moveToMiddle(i, cell.middle);
+      moveToSurface(i, cell.height);
       setSharers(cell.sharers, surfel);
     }
     const float radius = radiusOfArea(pieceArea(surfel), overlap_);

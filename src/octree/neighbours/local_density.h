@@ -51,6 +51,7 @@ class SizedSurfelStream : public SortedSurfelStream {
   // So far.
   std::uint64_t normalsFound() const { return normals_found_; }
   std::uint64_t thinSurfels() const { return thin_surfels_; }
+  std::uint64_t scatteredSurfels() const { return scattered_surfels_; }
 
   Result<std::shared_ptr<const SortedBatch>> next() override;
 
@@ -60,6 +61,7 @@ class SizedSurfelStream : public SortedSurfelStream {
   Result<std::optional<CurveKey>> keyBeside(std::uint32_t page, bool is_first) const;
   Status findLeaves();
   void moveToMiddle(std::size_t i, const glm::vec3& middle);
+  void moveToSurface(std::size_t i, const glm::vec3& height);
   void take(std::size_t i, const SurfaceAt& surface);
   void shapeGiven();
   bool needsNormal(const Surfel& surfel) const { return normals_ && surfel.isSphere(); }
@@ -81,7 +83,8 @@ class SizedSurfelStream : public SortedSurfelStream {
   std::vector<std::uint8_t> leaf_levels_;
   std::vector<SurfaceAt> area_cells_;  // empty where no surfel has an area alone
   std::vector<Ticket> ticket_scratch_;
-  std::atomic<std::uint64_t> normals_found_ = 0, thin_surfels_ = 0;
+  std::atomic<std::uint64_t> normals_found_ = 0, thin_surfels_ = 0,
+                             scattered_surfels_ = 0;
 };
 
 // The rules that need no neighbourhood; marks surfels that do.

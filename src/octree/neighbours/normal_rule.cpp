@@ -6,15 +6,12 @@
 #include <glm/geometric.hpp>
 
 #include "core/up_comment.h"
+#include "octree/neighbours/surface_fits.h"
 
 namespace surfeit {
 namespace {
 
 using Toward = NormalOrientation::Toward;
-
-// Neighbours that lie farther off their plane than this, in spacings, lie all around; those of a
-// surface with noise of half a spacing lie half a spacing off.
-constexpr float kThinThickness = 0.75f;
 
 }  // namespace
 

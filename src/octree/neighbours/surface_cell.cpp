@@ -213,6 +213,15 @@ SurfacePlane SurfaceCells::planeOf(std::size_t lane) const {
   return plane;
 }
 
+glm::vec3 SurfaceCells::heightOf(std::size_t lane) const {
+  const SurfaceFitLanes& fits = scratch_->fits;
+  const glm::vec3 own = scratch_->places[lane].normal;
+  const glm::vec3 normal = own != glm::vec3(0) ? own
+                                               : glm::vec3(fits.normal_x[lane], fits.normal_y[lane],
+                                                           fits.normal_z[lane]);
+  return fits.surface_height[lane] * fits.unit[lane] * normal;
+}
+
 void SurfaceCells::Scratch::begin(std::size_t of_lane) {
   lane = of_lane;
   unit = fits.unit[lane];

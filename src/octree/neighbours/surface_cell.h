@@ -65,6 +65,9 @@ class SurfaceCells {
   // Finds the cells of all of them at once, of those that nothing farther away can cut. Of many
   // neighbours, or for one place, they are found faster one by one.
   void measure();
+  // After measure(): from the place to the surface that its sheet scatters about, along its normal.
+  // Zero where places do not scatter.
+  glm::vec3 heightOf(std::size_t lane) const;
   // Neighbours on another sheet (turned away, or above or below with nothing between) do not count.
   SurfaceCell cellOf(std::size_t lane);
 

@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include "core/spherical_harmonics.h"
+#include "octree/neighbours/quadric_lanes-inl.h"
 #include "octree/neighbours/surface_fits.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -16,26 +17,12 @@ namespace surfeit {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
 // Places on a line have this part of their variance, at most, across it.
 constexpr float kLineFlatness = 1e-4f;
 // A plane is fitted again where what lies off it is more than this part of the spacing; then
 // neighbours so many spacings off it count half.
 constexpr float kThick = 0.1f, kHalfWeight = 0.2f;
 constexpr int kSheetPasses = 6;
-// Places that lie this far off their surface, in spacings, are noisy.
-constexpr float kNoisy = 0.1f;
-
-using D = hn::CappedTag<float, SurfaceFitLanes::kLanes>;
-using V = hn::Vec<D>;
-using M = hn::Mask<D>;
-constexpr std::size_t kStep = hn::MaxLanes(D());
-
-inline V Splat(float value) { return hn::Set(D(), value); }
-inline V At(const float* lanes) { return hn::Load(D(), lanes); }
-inline void Put(V value, float* lanes) { hn::Store(value, D(), lanes); }
-inline V Product(V a, V b, V c) { return hn::Mul(hn::Mul(a, b), c); }
 
 struct Vector3 {
   V x, y, z;
@@ -201,76 +188,18 @@ class Fit {
     return plane;
   }
 
-  struct Quadric {
-    V slope_u, slope_v;  // at the place
-    V noise;             // what lies off it, root mean square
-  };
-
   // The quadric over a plane that fits the neighbours and the place best (jets of order 2: Cazals
   // and Pouget 2005): places on one side alone do not turn it as they turn a plane. Neighbours
   // count by their weight and, with `is_narrow`, the less, the farther they are.
   Quadric quadric(const Vector3& normal, const Frame& frame, bool is_narrow) const {
-    const V zero = hn::Zero(D()), one = Splat(1);
-    // Sums of u^i v^j, and of these times the height
-    V s = one, u = zero, v = zero, uu = zero, uv = zero, vv = zero;
-    V uuu = zero, uuv = zero, uvv = zero, vvv = zero;
-    V u4 = zero, u3v = zero, u2v2 = zero, uv3 = zero, v4 = zero;
-    V h = zero, hu = zero, hv = zero, huu = zero, huv = zero, hvv = zero, hh = zero;
-    const auto sum = [](V& to, V value) { to = hn::Add(to, value); };
+    QuadricSums sums;
     for (std::size_t i = 0; i < at_.most_neighbours; ++i) {
       const Vector3 p = offset(i);
       V weight = At(at_.weight[i] + lane_);
-      if (is_narrow) {
-        const V near = hn::Max(hn::Sub(one, Dot(p, p)), zero), square = hn::Mul(near, near);
-        weight = Product(weight, square, square);
-      }
-      const V pu = Dot(p, frame.tangent), pv = Dot(p, frame.bitangent), ph = Dot(p, normal);
-      const V wu = hn::Mul(weight, pu), wv = hn::Mul(weight, pv), wh = hn::Mul(weight, ph);
-      const V wuu = hn::Mul(wu, pu), wuv = hn::Mul(wu, pv), wvv = hn::Mul(wv, pv);
-      const V puu = hn::Mul(pu, pu), puv = hn::Mul(pu, pv), pvv = hn::Mul(pv, pv);
-      sum(s, weight), sum(u, wu), sum(v, wv), sum(uu, wuu), sum(uv, wuv), sum(vv, wvv);
-      sum(uuu, hn::Mul(wuu, pu)), sum(uuv, hn::Mul(wuu, pv));
-      sum(uvv, hn::Mul(wvv, pu)), sum(vvv, hn::Mul(wvv, pv));
-      sum(u4, hn::Mul(wuu, puu)), sum(u3v, hn::Mul(wuu, puv)), sum(u2v2, hn::Mul(wuu, pvv));
-      sum(uv3, hn::Mul(wuv, pvv)), sum(v4, hn::Mul(wvv, pvv));
-      sum(h, wh), sum(hu, hn::Mul(wh, pu)), sum(hv, hn::Mul(wh, pv)), sum(hh, hn::Mul(wh, ph));
-      sum(huu, hn::Mul(wh, puu)), sum(huv, hn::Mul(wh, puv)), sum(hvv, hn::Mul(wh, pvv));
+      if (is_narrow) weight = hn::Mul(weight, NarrowWeight(Dot(p, p)));
+      sums.add(Dot(p, frame.tangent), Dot(p, frame.bitangent), Dot(p, normal), weight);
     }
-    V matrix[6][6] = {{s, uu, uv, vv, u, v},          {uu, u4, u3v, u2v2, uuu, uuv},
-                      {uv, u3v, u2v2, uv3, uuv, uvv}, {vv, u2v2, uv3, v4, uvv, vvv},
-                      {u, uuu, uuv, uvv, uu, uv},     {v, uuv, uvv, vvv, uv, vv}};
-    V right[6] = {h, huu, huv, hvv, hu, hv};
-    return solve(matrix, right, hh);
-  }
-
-  // By L D L^T, of a matrix that is positive definite when its diagonal is a little larger. The
-  // slopes are the last two.
-  static Quadric solve(V (&matrix)[6][6], V (&right)[6], V squares) {
-    const V weights = matrix[0][0];
-    V trace = matrix[0][0];
-    for (int i = 1; i < 6; ++i) trace = hn::Add(trace, matrix[i][i]);
-    const V more = hn::Mul(Splat(1e-6f), trace);
-    for (int i = 0; i < 6; ++i) matrix[i][i] = hn::Add(matrix[i][i], more);
-    V explained = hn::Zero(D());
-    for (int i = 0; i < 6; ++i) {
-      const V pivot = hn::Max(matrix[i][i], hn::Mul(Splat(1e-3f), more));  // 0 but for rounding
-      const V per_pivot = hn::Div(Splat(1), pivot);
-      explained = hn::Add(explained, Product(right[i], right[i], per_pivot));
-      for (int j = i + 1; j < 6; ++j) {
-        const V factor = hn::Mul(matrix[i][j], per_pivot);
-        for (int k = j; k < 6; ++k) {
-          matrix[j][k] = hn::Sub(matrix[j][k], hn::Mul(factor, matrix[i][k]));
-        }
-        right[j] = hn::Sub(right[j], hn::Mul(factor, right[i]));
-      }
-      matrix[i][i] = per_pivot;
-    }
-    Quadric found;
-    found.slope_v = hn::Mul(right[5], matrix[5][5]);
-    found.slope_u = hn::Mul(hn::Sub(right[4], hn::Mul(matrix[4][5], found.slope_v)), matrix[4][4]);
-    const V off = hn::Max(hn::Sub(squares, explained), hn::Zero(D()));
-    found.noise = hn::Sqrt(hn::Div(off, weights));
-    return found;
+    return sums.solve();
   }
 
   // The normal of the surface at the place. Where there is no noise the nearest tell it best.

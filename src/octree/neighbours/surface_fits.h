@@ -12,6 +12,10 @@
 
 namespace surfeit {
 
+// Neighbours that lie farther off their plane than this, in spacings, lie all around; those of a
+// surface with noise of half a spacing lie half a spacing off.
+inline constexpr float kThinThickness = 0.75f;
+
 // By lane; lengths are in units of the farthest neighbour: fourth powers of them must stay finite.
 struct SurfaceFitLanes {
   static constexpr std::size_t kLanes = 16, kMostNeighbours = 112;
@@ -46,6 +50,7 @@ struct SurfaceFitLanes {
   Lanes half_sq[kMostNeighbours];
   Lanes coincident_half_sq;
   // Found
+  Lanes surface_height;  // of the sheet that the place scatters about, above it
   Lanes cell_area;
   Lanes cell_middle_u, cell_middle_v;
   Lanes cell_square, cell_difference, cell_product;  // CellMoments::fromPlace
@@ -57,7 +62,7 @@ struct SurfaceFitLanes {
 struct SurfaceFitKernel {
   // Planes and quadrics, and the neighbours in the own planes' frames.
   void (*fit)(SurfaceFitLanes& lanes);
-  // Then the cells of neighbours that count.
+  // Then the cells of neighbours that count, and the surfaces that these scatter about.
   void (*measure)(SurfaceFitLanes& lanes);
 };
 

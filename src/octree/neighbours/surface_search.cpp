@@ -98,6 +98,7 @@ Status SurfaceSearch::findAt(const Spot& spot, std::size_t lane, const NearestPl
     take(spot.index, surface);
     return {};
   }
+  if (spot.needs.size) surface.height = cells_.heightOf(lane);
   const OpenPlace place{spot, group_[lane].normal, surface, plane.is_line, nearest.coincident};
   const SurfaceCell cell = cells_.cellOf(lane);
   if (cell.is_settled || std::isinf(nearest.reach)) {
@@ -160,7 +161,7 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
   limit(cell, is_doubtful, surface.thickness);
   // There is no plane to move in
   const bool has_plane = has_normal || surface.thickness <= kLooseThickness;
-  if (!has_plane) cell.middle = cell.long_side = glm::vec3(0);
+  if (!has_plane) cell.middle = cell.long_side = surface.height = glm::vec3(0);
   const float coincident = float(std::max<std::uint64_t>(place.coincident, 1));
   surface.area = cell.area / coincident;
   surface.sharers = cell.sharers * coincident;

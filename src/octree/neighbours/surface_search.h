@@ -30,6 +30,7 @@ struct SurfaceAt {
   float sharers = 1;  // surfels at the place, or nearly there
   float radius = 0;  // of a disk that is spread out as far as the piece of surface around the place
   glm::vec3 middle{0};      // SurfaceCell::middle
+  glm::vec3 height{0};      // SurfaceCells::heightOf
   glm::vec3 long_side{0};   // SurfaceCell::long_side, of a surfel's area
   glm::vec3 normal{0};      // of the plane through the neighbours, unit, either way; zero: unknown
   float confidence = 0;     // 1: they lie on the plane; 0: all around (Pauly et al. 2002)
