@@ -273,8 +273,10 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   const SeenPart visible = seenPart(node, to_node, seen.facing, sides);
   Patch& patch = patches_.emplace_back();
   patch.position = node.position + visible.middle;
-  // No reach: it is no tile, and meets others where its middle does
+  // Rough one-sided disks are corners and folds, which meet others where their middle does. What
+  // has no sides is rough on a smooth sheet, too, of which its neighbours are the rest
   patch.radius = node.radius;
+  patch.reach = partWithoutSides(node) * node.radius;
   patch.normal = node.flatness * node.normal;
   patch.lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
   patch.is_alone = isThicket(node) || patch.lets_through;

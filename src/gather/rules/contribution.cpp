@@ -18,11 +18,13 @@ float partsOfBand0(const Node& node) {
 }
 }  // namespace
 
+float partWithoutSides(const Node& node) { return std::clamp(partsOfBand0(node) - 1, 0.f, 1.f); }
+
 float shownArea(const Node& node, const FacingAreas& facing, GatherSides sides) {
   switch (sides) {
     case GatherSides::kBoth:
       // Two-sided surfels and spheres are in the front and in the back
-      return (facing.front + facing.back) / (1 + std::clamp(partsOfBand0(node) - 1, 0.f, 1.f));
+      return (facing.front + facing.back) / (1 + partWithoutSides(node));
     case GatherSides::kBack:
       return facing.back;
     case GatherSides::kFront:

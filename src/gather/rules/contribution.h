@@ -61,6 +61,10 @@ struct RoughCover {
 };
 RoughCover roughCover(const Node& node, const glm::vec3& direction, float shown, int color = 0);
 
+// Of a rough node: the part of what it shows that looks the same from both sides, two-sided disks
+// and spheres.
+float partWithoutSides(const Node& node);
+
 // Whether a rough node is leaves, hair or particles: it is loose, and not mostly one-sided.
 bool isThicket(const Node& node);
 
