@@ -55,12 +55,13 @@ Status visitNearestFirst(const NodeRange& range, PagedOctree::Reader& reader,
     const float distance = distanceTo(node.position, node.radius);
     if (isBeyond(distance)) continue;
     copies[count] = node;
-    candidates[count] = {distance, count};
-    ++count;
+    std::size_t place = count++;
+    for (; place > 0 && candidates[place - 1].first > distance; --place) {
+      candidates[place] = candidates[place - 1];
+    }
+    candidates[place] = {distance, count - 1};
   }
-  const auto order = std::span(candidates).first(count);
-  std::sort(order.begin(), order.end());
-  for (const auto& [distance, i] : order) {
+  for (const auto& [distance, i] : std::span(candidates).first(count)) {
     if (isBeyond(distance)) break;
     const Node& node = copies[i];
     if (node.isLeaf()) {

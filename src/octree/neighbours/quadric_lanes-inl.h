@@ -30,8 +30,6 @@ inline V Product(V a, V b, V c) { return hn::Mul(hn::Mul(a, b), c); }
 
 // Places that lie this far off their surface, in spacings, are noisy.
 constexpr float kNoisy = 0.1f;
-// Those that lie farther off it lie on no surface.
-constexpr float kLoose = kThinThickness;
 
 struct Quadric {
   V height, slope_u, slope_v;  // at the origin
@@ -114,7 +112,7 @@ class QuadricSums {
 // own planes' frames. Zero where they hardly scatter, or all around.
 inline void FindHeights(SurfaceFitLanes& lanes, std::size_t lane) {
   const V spacing = hn::Sqrt(hn::Div(Splat(kPi), hn::Add(At(lanes.count + lane), Splat(1))));
-  const V least = hn::Mul(Splat(kNoisy), spacing), most = hn::Mul(Splat(kLoose), spacing);
+  const V least = hn::Mul(Splat(kNoisy), spacing), most = hn::Mul(Splat(kThinThickness), spacing);
   Put(hn::Zero(D()), lanes.surface_height + lane);
   if (hn::AllFalse(D(), hn::Gt(At(lanes.highest + lane), least))) return;
   QuadricSums sums;
