@@ -12,22 +12,18 @@
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
 #include "octree/neighbours/cell_polygon.h"
+#include "octree/neighbours/sheet_gaps.h"
 #include "octree/neighbours/surface_fits.h"
 #include "octree/neighbours/third_nearest.h"
 
 namespace surfeit {
 namespace {
 
-// Sheets are told apart by a gap between them: of half a spacing, or of a fifth where it is four
-// times as wide as the own sheet is thick (two scans of one surface lie closer than that).
-constexpr float kWideGap = 0.5f, kNarrowGap = 0.2f, kGapOverThickness = 4;
 // What lies so close beside a place, in spacings, has no mirror image.
 constexpr float kSharing = 0.05f;
 // What lies so close beside a place, in spacings, shares its cell.
 constexpr float kCoincident = 1e-3f;
 
-// Of a slope from the place to a neighbour that is another sheet's, not its own.
-constexpr float kSteep = 0.7f;
 // Neighbours whose normals differ by more than 60 degrees are of another surface, which meets this
 // one at an edge (as of photons, photons/nearest_photons.h).
 constexpr float kLeastCosine = 0.5f;
@@ -46,80 +42,20 @@ constexpr float kLongCell = 2.5f;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-// A neighbour in the plane: beside the place, and above it.
-struct Flat {
-  glm::vec2 beside;
-  float above;
-  std::uint32_t index = 0;  // of the neighbour
-};
-
-// Drops what lies above (`side` 1) or below (-1) the first gap on that side. What lies only far
-// beside the place may belong to a slope: a sheet that goes has something steeply above the place.
-void dropSheet(float side, float spacing, float thickness, std::vector<Flat>& flat,
-               std::vector<float>& heights) {
-  heights.clear();
-  for (const Flat& n : flat) {
-    if (side * n.above > 0) heights.push_back(side * n.above);
-  }
-  std::sort(heights.begin(), heights.end());
-  float below = 0, limit = 0;
-  for (const float height : heights) {
-    const float gap = height - below;
-    if (gap > kWideGap * spacing ||
-        (gap > kNarrowGap * spacing && gap > kGapOverThickness * thickness)) {
-      limit = height;
-      break;
-    }
-    below = height;
-  }
-  if (limit == 0) return;
-  const auto is_beyond = [&](const Flat& n) { return side * n.above >= limit; };
-  const bool is_sheet = std::any_of(flat.begin(), flat.end(), [&](const Flat& n) {
-    return is_beyond(n) && std::abs(n.above) > kSteep * glm::length(n.beside);
-  });
-  const auto beyond = std::count_if(flat.begin(), flat.end(), is_beyond);
-  // A few places are strays of their surface, not a sheet
-  const std::ptrdiff_t fewest = std::ptrdiff_t(flat.size()) / 6;
-  if (is_sheet && beyond >= fewest && std::ptrdiff_t(flat.size()) - beyond >= fewest) {
-    std::erase_if(flat, is_beyond);
-  }
-}
-
-struct SideGaps {
-  bool above = false, below = false;
-};
-
-// On which sides a gap may lie that is wider than `narrow`: one leaves a free slot of half of that.
-SideGaps gapsIn(const std::vector<Flat>& flat, float narrow) {
-  constexpr float kLastSlot = 62;
-  std::uint64_t above = 1, below = 1;  // the plane takes the first
-  for (const Flat& n : flat) {
-    const float slot = std::min(std::abs(n.above) * (2 / narrow), kLastSlot);
-    const std::uint64_t bit = std::uint64_t{1} << int(slot);
-    (n.above > 0 ? above : below) |= bit;
-  }
-  const auto hasFree = [](std::uint64_t slots) { return (slots & (slots + 1)) != 0; };
-  return {hasFree(above), hasFree(below)};
+// Of the plane that its cell lies in.
+glm::vec3 normalIn(const SurfaceFitLanes& fits, std::size_t lane) {
+  return {fits.own_x[lane], fits.own_y[lane], fits.own_z[lane]};
 }
 
 // Of so many neighbours, in units of the farthest.
 float spacingOf(float count) { return std::sqrt(kPi / (count + 1)); }
-
-// How thick the own sheet is: a quarter of the neighbours lie nearer to the plane.
-float thicknessOf(const std::vector<Flat>& flat, std::vector<float>& heights) {
-  heights.clear();
-  for (const Flat& n : flat) heights.push_back(std::abs(n.above));
-  const auto middle = heights.begin() + std::ptrdiff_t(heights.size() / 4);
-  std::nth_element(heights.begin(), middle, heights.end());
-  return heights.empty() ? 0 : *middle;
-}
 
 }  // namespace
 
 struct SurfaceCells::Scratch {
   SurfaceFitLanes fits;
   std::array<CellPlace, SurfaceFitLanes::kLanes> places;
-  std::vector<Flat> flat;
+  std::vector<FlatNeighbour> flat;
   std::vector<float> heights;
   std::vector<glm::vec2> cutters;
   std::vector<float> slopes_sq;           // of those from farther away
@@ -139,14 +75,13 @@ struct SurfaceCells::Scratch {
   bool has_measures = false;
   std::array<float, SurfaceFitLanes::kLanes> sheet_thickness{};  // as of SurfaceCell
 
-  Flat flatten(const glm::vec3& place) const {
+  FlatNeighbour flatten(const glm::vec3& place) const {
     const glm::vec3 offset = place / unit;
     return {{glm::dot(offset, frame.tangent), glm::dot(offset, frame.bitangent)},
             glm::dot(offset, normal),
             0};
   }
-  // Not on the other side of something thin.
-  // Not around an edge: there the surface ends, whatever lies beyond.
+  // Not around an edge, where the surface ends, nor on the other side of something thin.
   bool mayShareSheet(const Neighbour& n) const {
     const bool are_known = own_normal != glm::vec3(0) && n.normal != glm::vec3(0);
     return !are_known || glm::dot(n.normal, own_normal) >= kLeastCosine;
@@ -215,11 +150,7 @@ SurfacePlane SurfaceCells::planeOf(std::size_t lane) const {
 
 glm::vec3 SurfaceCells::heightOf(std::size_t lane) const {
   const SurfaceFitLanes& fits = scratch_->fits;
-  const glm::vec3 own = scratch_->places[lane].normal;
-  const glm::vec3 normal = own != glm::vec3(0) ? own
-                                               : glm::vec3(fits.normal_x[lane], fits.normal_y[lane],
-                                                           fits.normal_z[lane]);
-  return fits.surface_height[lane] * fits.unit[lane] * normal;
+  return fits.surface_height[lane] * fits.unit[lane] * normalIn(fits, lane);
 }
 
 void SurfaceCells::Scratch::begin(std::size_t of_lane) {
@@ -227,9 +158,7 @@ void SurfaceCells::Scratch::begin(std::size_t of_lane) {
   unit = fits.unit[lane];
   spacing = spacingOf(fits.count[lane]);
   own_normal = places[lane].normal;
-  normal = own_normal != glm::vec3(0)
-               ? own_normal
-               : glm::vec3(fits.normal_x[lane], fits.normal_y[lane], fits.normal_z[lane]);
+  normal = normalIn(fits, lane);
   open = kOpen;
   begin();
 }
@@ -256,11 +185,7 @@ void SurfaceCells::Scratch::flattenAll(std::span<const Neighbour> neighbours) {
   flat.resize(count);
   sheet_thickness[lane] = count < neighbours.size() ? thicknessOfSheet(neighbours) : -1;
   if (fits.highest[lane] <= kNarrowGap * spacing) return;  // there is no gap below anything
-  const SideGaps gaps = gapsIn(flat, kNarrowGap * spacing);
-  if (!gaps.above && !gaps.below) return;
-  const float thickness = thicknessOf(flat, heights);
-  if (gaps.above) dropSheet(1, spacing, thickness, flat, heights);
-  if (gaps.below) dropSheet(-1, spacing, thickness, flat, heights);
+  dropOtherSheets(spacing, flat, heights);
 }
 
 // How thick the own sheet is, root mean square, over its spacing, where neighbours that face
@@ -273,7 +198,7 @@ float SurfaceCells::Scratch::thicknessOfSheet(std::span<const Neighbour> neighbo
   }
   if (std::min(-low, high) > kNarrowGap * spacing) return -1;
   if (flat.empty()) return 0;
-  for (const Flat& n : flat) sum += n.above * n.above;
+  for (const FlatNeighbour& n : flat) sum += n.above * n.above;
   return std::sqrt(sum / float(flat.size())) / spacingOf(float(flat.size()));
 }
 
@@ -288,7 +213,8 @@ void SurfaceCells::Scratch::dropOthers() {
   for (std::size_t i = 0; i < count; ++i) {
     fits.half_sq[i][lane] = kInfinity;
   }
-  for (const Flat& n : flat) fits.half_sq[n.index][lane] = 0.5f * glm::dot(n.beside, n.beside);
+  for (const FlatNeighbour& n : flat)
+    fits.half_sq[n.index][lane] = 0.5f * glm::dot(n.beside, n.beside);
 }
 
 void SurfaceCells::measure() {
@@ -306,7 +232,7 @@ void SurfaceCells::measure() {
 // By those of the own sheet, which are flattened.
 void SurfaceCells::Scratch::cutByNeighbours() {
   const float coincident_sq = (kCoincident * spacing) * (kCoincident * spacing);
-  for (const Flat& n : flat) {
+  for (const FlatNeighbour& n : flat) {
     if (glm::dot(n.beside, n.beside) < coincident_sq) {
       ++sharers;
     } else if (polygon.cut(n.beside)) {
@@ -383,14 +309,14 @@ bool SurfaceCells::mayCut(const glm::vec3& centre, float radius) const {
 
 bool SurfaceCells::wouldCut(const Neighbour& place) const {
   const Scratch& at = *scratch_;
-  const Flat flat = at.flatten(place.offset);
+  const FlatNeighbour flat = at.flatten(place.offset);
   return at.mayShareSheet(place) && std::abs(flat.above) < kSteep * glm::length(flat.beside) &&
          at.polygon.wouldCut(flat.beside);
 }
 
 bool SurfaceCells::cut(const Neighbour& place) {
   Scratch& at = *scratch_;
-  const Flat flat = at.flatten(place.offset);
+  const FlatNeighbour flat = at.flatten(place.offset);
   if (!at.polygon.cut(flat.beside)) return false;
   at.cutters.push_back(flat.beside);
   at.cutting.push_back(place);
@@ -419,7 +345,7 @@ SurfaceCell SurfaceCells::closed() {
     if (at.own_normal == glm::vec3(0)) {
       at.sheet.assign(place.neighbours.begin(), place.neighbours.end());
     } else {
-      for (const Flat& n : at.flat) at.sheet.push_back(place.neighbours[n.index]);
+      for (const FlatNeighbour& n : at.flat) at.sheet.push_back(place.neighbours[n.index]);
     }
     const bool is_known = at.own_normal != glm::vec3(0) && !at.isLoose();
     at.neighbour_spacing = cell.neighbour_spacing =

@@ -235,6 +235,8 @@ class Fit {
     const Vector3 own{At(at_.own_x + lane_), At(at_.own_y + lane_), At(at_.own_z + lane_)};
     const M is_given = hn::Gt(Dot(own, own), hn::Zero(D()));
     const Vector3 normal = Where(is_given, own, plane.normal);
+    Put(normal.x, at_.own_x + lane_), Put(normal.y, at_.own_y + lane_);
+    Put(normal.z, at_.own_z + lane_);
     const Frame frame(normal);
     const V count = At(at_.count + lane_);
     V highest = hn::Zero(D());

@@ -27,7 +27,7 @@ struct SurfaceFitLanes {
   std::size_t most_neighbours = 0;  // of any lane
   alignas(64) Lanes count;          // of neighbours
   Lanes unit;                       // distance of the farthest neighbour
-  Lanes own_x, own_y, own_z;        // the place's own normal; zero: that of the plane counts
+  Lanes own_x, own_y, own_z;        // the place's own normal; zero: becomes that of the plane
   bool with_quadrics = false;       // whether quadrics are fitted
 
   // Found
