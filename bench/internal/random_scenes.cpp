@@ -29,6 +29,7 @@ enum class Against { kExact, kEmbree, kAlone };
 
 struct RandomScenesOptions {
   std::uint64_t first = 0, last = 199;
+  RandomSampling sampling;
   GatherOptions gather;
   Against against = Against::kExact;
   bool mixes_sides = false;
@@ -123,7 +124,7 @@ SeedResult runSeed(const RandomScenesOptions& options, std::uint64_t seed) {
   SeedResult result;
   result.seed = seed;
   result.sides = sidesOf(seed, options);
-  RandomScene scene = makeRandomScene(seed);
+  RandomScene scene = makeRandomScene(seed, options.sampling);
   if (options.kept != ~std::uint64_t{0}) scene = scene.only(options.kept);
   result.status = judge(options, scene, result);
   if (!options.write.empty() && result.status.ok()) {
@@ -260,6 +261,10 @@ void addSeedOptions(CLI::App& app, RandomScenesOptions& options) {
          },
          "Ingredients to keep, as --describe numbers them [all]")
       ->delimiter(',');
+  app.add_option("--density", options.sampling.density, "Times as many surfels of each surface")
+      ->capture_default_str();
+  app.add_flag("--no-noise", options.sampling.leaves_noise,
+               "Positions and normals of surfels are those of the surfaces");
   app.add_flag("--describe", options.describes, "Print what the scenes are made of");
   app.add_option("--worst", options.worst, "Seeds to print, the worst first")
       ->capture_default_str();

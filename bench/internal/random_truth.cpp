@@ -143,7 +143,7 @@ Result<std::vector<float>> traceOcclusion(const RandomScene& scene, GatherSides 
   std::vector<float> occlusion;
   for (const RandomReceiver& one : scene.receivers) {
     const LocalReceiver& receiver = one.receiver;
-    if (receiver.isSpherical() && isOnSpheres(scene, receiver)) {
+    if (one.is_on_border || (receiver.isSpherical() && isOnSpheres(scene, receiver))) {
       occlusion.push_back(-1);
       continue;
     }

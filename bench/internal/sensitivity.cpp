@@ -52,7 +52,6 @@ const std::vector<Number>& allNumbers() {
       {"hull_widening", &F::hull_widening, 0},
       {"most_in_hull", &F::most_in_hull, 0},
       {"soft_disk_area", &F::soft_disk_area, 1},
-      {"bias_height", &F::bias_height, kNever},
       {"least_axis", &F::least_axis, 0.01f},
       {"least_spread", &F::least_spread, 1e-6f},
   };

@@ -18,6 +18,8 @@ constexpr int kFewestSurfels = 500, kMostSurfels = 30'000;
 constexpr int kFewestReceivers = 32, kMostReceivers = 96;
 constexpr float kContact = .05f;  // receivers this near to planes of others, in radii, are left out
 
+constexpr double kBorder = .02;  // cells
+
 constexpr int kMostTries = 1000;  // to put receivers on surfaces
 
 // Where the units of the shapes go: scaled, turned, moved.
@@ -57,7 +59,8 @@ struct Part {
 
 class SceneMaker {
  public:
-  explicit SceneMaker(std::uint64_t seed) : random_(seed) {
+  SceneMaker(std::uint64_t seed, const RandomSampling& sampling)
+      : random_(seed), sampling_(sampling) {
     scene_.seed = seed;
     RandomNumbers random = random_.fork(1);
     setting_ = randomSetting(random, scene_.setting);
@@ -88,6 +91,7 @@ class SceneMaker {
   void addFreeReceiver(bool is_spherical, RandomNumbers& random);
 
   RandomNumbers random_;
+  RandomSampling sampling_;
   Setting setting_;
   std::vector<Part> parts_;
   std::vector<int> wanted_;  // surfels of each part
@@ -119,8 +123,8 @@ void SceneMaker::makeGrids(int surfels, RandomNumbers& random, Part& part) const
   const bool has_long_cells = random.chance(.15);
   const double aspect = has_long_cells ? random.logBetween(.25, 4) : 1;
   for (const ShapePatch& patch : part.shape.patches) {
-    const double count =
-        std::max(1.0, surfels * patch.length_u * patch.length_v * patch.density / area);
+    const double share = patch.length_u * patch.length_v * patch.density / area;
+    const double count = std::max(1.0, sampling_.density * surfels * share);
     const double columns = std::sqrt(count * patch.length_u / patch.length_v * aspect);
     const int whole = std::max(1, int(std::lround(std::min(columns, count))));
     const int rows = std::max(1, int(std::lround(count / whole)));
@@ -153,6 +157,7 @@ void SceneMaker::chooseParts() {
     part.shape = makeShape(kind, place, own);
     if (part.shape.is_light) wanted_.back() = std::min(wanted_.back(), 200);
     part.look = randomLook(part.shape.may_be_two_sided && mixes_sides, own);
+    if (sampling_.leaves_noise) part.look.position_noise = part.look.normal_noise = 0;
     if (part.shape.is_light) part.look.color *= own.logBetween(10, 1000), part.look.waves = {};
     makeGrids(wanted_.back(), own, part);
     has_ground_ |= isGroundKind(kind) && i == 0;
@@ -256,6 +261,7 @@ bool SceneMaker::isInContact(const glm::vec3& position, int number) const {
 
 void SceneMaker::addReceiver(const SurfaceSite& site, const char* place, int number) {
   RandomReceiver one;
+  one.is_on_border = site.is_on_border;
   one.receiver.position = setting_.position(site.position);
   one.receiver.normal = glm::normalize(setting_.direction(site.normal));
   one.place = place;
@@ -305,6 +311,8 @@ void SceneMaker::addSurfaceReceivers(int number, RandomNumbers& random) {
     const double column = near_u * grid.columns(), row = near_v * grid.rows();
     SurfaceSite site =
         grid.site(int(column), int(row), column - std::floor(column), row - std::floor(row));
+    const double aside = std::min({column, grid.columns() - column, row, grid.rows() - row});
+    site.is_on_border = aside < kBorder;
     if (turns) site.normal = -site.normal;
     if (turns && !is_two_sided) site.position += .3 * site.spacing * site.normal;
     addReceiver(site,
@@ -375,6 +383,8 @@ std::vector<LocalReceiver> RandomScene::plainReceivers() const {
   return plain;
 }
 
-RandomScene makeRandomScene(std::uint64_t seed) { return SceneMaker(seed).make(); }
+RandomScene makeRandomScene(std::uint64_t seed, const RandomSampling& sampling) {
+  return SceneMaker(seed, sampling).make();
+}
 
 }  // namespace surfeit

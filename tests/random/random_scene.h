@@ -32,6 +32,7 @@ struct RandomReceiver {
   const char* place = "";  // "on a surface", "at an edge", "in a cavity", "in the open", ...
   int ingredient = -1;     // that it is on; -1: on none
   float ray_offset = 0;    // how far above it rays on the true geometry begin, scene units
+  bool is_on_border = false;  // of a patch: rounding decides what it sees of the next one
 };
 
 // Of which a scene can be made without, to see what a failure needs.
@@ -61,7 +62,12 @@ struct RandomScene {
 
 inline constexpr int kMostIngredients = 8;
 
-// From 500 to 30,000 surfels, and 32 to 96 receivers.
-RandomScene makeRandomScene(std::uint64_t seed);
+struct RandomSampling {
+  double density = 1;         // times as many surfels of the same surfaces
+  bool leaves_noise = false;  // positions and normals are those of the surfaces
+};
+
+// From 500 to 30,000 surfels, times the density, and 32 to 96 receivers.
+RandomScene makeRandomScene(std::uint64_t seed, const RandomSampling& sampling = {});
 
 }  // namespace surfeit

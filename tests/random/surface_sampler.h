@@ -33,6 +33,7 @@ struct SurfaceSite {
   glm::dvec3 position{0}, normal{0};
   double spacing = 0;  // of the surfels there
   bool is_two_sided = false;
+  bool is_on_border = false;  // of the patch
 };
 
 // A patch as a grid of cells with flat middles; each is a surfel, and two true triangles.

@@ -167,6 +167,18 @@ inline V NearPart(const Patch& patch, const Sight& sight) {
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
 }
 
+// How much a two-sided disk counts as the receiver's own surface, at which the bias is `most`: its
+// normal has no sign, so that tells half of what another's does, by twice the angle. The rest tells
+// its plane, which passes the receiver within the bias, and is none of the receiver's at twice
+// that.
+HWY_INLINE V OwnSheet(V cosine, V plane_distance, float most) {
+  const V zero = hn::Zero(D());
+  const V aligned = hn::MulSub(hn::Mul(Splat(2), cosine), cosine, Splat(1));
+  const V inverse = Splat(1 / std::max(most, std::numeric_limits<float>::min()));
+  const V close = hn::NegMulAdd(hn::Abs(plane_distance), inverse, Splat(2));
+  return hn::Mul(hn::Max(zero, aligned), hn::Min(Splat(1), hn::Max(zero, close)));
+}
+
 HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers& receivers) {
   const D d;
   const V zero = hn::Zero(d), one = Splat(1);
@@ -193,22 +205,20 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   if (hn::AllFalse(d, is_near)) return sight;
 
   // The bias keeps disks of the receiver's own surface from covering it. What faces the receiver
-  // closely is none of those, nor what rises above its plane and is seen from both sides: either
-  // would be looked through. So the bias fades out with the normal, and of two-sided surfels with
-  // the height. (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 fading with the
-  // normal.) Ribbons are as rough as they are wide. (AO RMSE of hair .0088; .0117 with radii.)
-  // Along the receiver's normal a disk reaches radius * sin(angle of normals) above its middle. It
-  // must rise above the horizon of the rays, which the receiver's own surface does not
+  // closely is none of those, and would be looked through. So the bias fades out with the normal.
+  // (A dragon on a plane: AO RMSE .0254 with a constant bias, .0218 so.) Ribbons are as rough as
+  // they are wide. (AO RMSE of hair .0088; .0117 with radii.)
   const V cosine = Dot(receivers.normal, patch.normal);
   const GatherQuality& quality = canvas.rules->quality;
   const bool is_turned = patch.seen == Patch::Seen::kFront && quality.sides == GatherSides::kBack;
   const float size = patch.is_ribbon ? patch.ribbon_width : patch.radius;
-  V part = is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine);
-  if (patch.seen == Patch::Seen::kBoth) {
-    part =
-        hn::Max(zero, hn::NegMulAdd(sight.height, Splat(1 / (kFidelity.bias_height * size)), one));
-  }
-  sight.bias = hn::Mul(Splat(quality.bias * size), hn::Min(one, part));
+  const float most = quality.bias * size;
+  const V part = patch.seen == Patch::Seen::kBoth
+                     ? OwnSheet(cosine, sight.facing, most)
+                     : (is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine));
+  sight.bias = hn::Mul(Splat(most), hn::Min(one, part));
+  // Along the receiver's normal a disk reaches radius * sin(angle of normals) above its middle. It
+  // must rise above the horizon of the rays, which the receiver's own surface does not
   const V rise =
       hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
   const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));

@@ -320,8 +320,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     if (surfel.isLoose() && !ribbon.isEmpty()) patch.reach = 0.7071f * ribbon.width;
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
-      // Only what is opaque may cover more than it should to leave no gaps
-      const bool is_exact = surfel.isTwoSided() || lets_through;
+      // Only opaque tiles may cover more than they should to leave no gaps
+      const bool is_exact = surfel.isLoose() || lets_through;
       patch.soft_peak = softDiskPeak(patch.radius, piece_area, is_exact);
     } else {
       patch.shape = ribbon.shape();

@@ -83,13 +83,9 @@ struct Fidelity {
   // --- The near field ("The raster cube") ---
 
   // Times the area of a surfel that its soft disk covers, so that disks of a surface leave no gaps;
-  // two-sided ones lie alone. (AO RMSE with disks that cover fully, 1, 1.6, 2: lion .0164, .0115,
+  // loose and translucent ones cover their area. (AO RMSE with disks that cover fully, 1, 1.6, 2: lion .0164, .0115,
   // .0108, .0110; bunny .0050, .0070, .0031, .0031.)
   float soft_disk_area = 1.7f;
-
-  // Radii. A two-sided surfel whose middle is so far above the horizon has no bias. (AO RMSE of
-  // leaves .0081, with a full bias .0110; .02 to .1 do the same.)
-  float bias_height = 0.05f;
 
   // --- Footprints ("The raster cube") ---
 
