@@ -29,9 +29,9 @@ struct RandomSphere {
 
 struct RandomReceiver {
   LocalReceiver receiver;
-  const char* place = "";  // "on a surface", "at an edge", "in a cavity", "in the open", ...
-  int ingredient = -1;     // that it is on; -1: on none
-  float ray_offset = 0;    // how far above it rays on the true geometry begin, scene units
+  const char* place = "";     // "on a surface", "at an edge", "in a cavity", "in the open", ...
+  int ingredient = -1;        // that it is on; -1: on none
+  float ray_offset = 0;       // how far above it rays on the true geometry begin, scene units
   bool is_on_border = false;  // of a patch: rounding decides what it sees of the next one
 };
 

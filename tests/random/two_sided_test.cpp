@@ -138,6 +138,33 @@ TEST(TwoSided, ANoisySheetDoesNotHideTheSkyFromItself) {
   }
 }
 
+// From one wall, the other hides everything. Walls a tenth of their spacing apart are closer than
+// the bias; where they are slanted, some cells of the octree do not tell them apart.
+TEST(TwoSided, WallsCloseToEachOtherAreSeenFromBetween) {
+  constexpr int kSide = 60;
+  for (const glm::mat3& turn : {glm::mat3(1), slanted()}) {
+    for (const float gap : {.1f, .3f, 1.f}) {
+      std::vector<Surfel> cloud;
+      for (int i = 0; i < 2 * kSide * kSide; ++i) {
+        const int place = i / 2;
+        const glm::vec3 at((float(place % kSide) + .5f) / kSide,
+                           (float(place / kSide) + .5f) / kSide, float(i % 2) * gap / kSide);
+        cloud.push_back(twoSided(turn * at, turn * glm::vec3(0, 0, 1), 1.f / (kSide * kSide)));
+      }
+      std::vector<LocalReceiver> inside, outside;
+      std::mt19937 random(8);
+      std::uniform_real_distribution<float> place(.3f, .7f);
+      for (int i = 0; i < 100; ++i) {
+        const glm::vec3 at(place(random), place(random), 0);
+        inside.push_back({turn * at, turn * glm::vec3(0, 0, 1)});
+        outside.push_back({turn * at, turn * glm::vec3(0, 0, -1)});
+      }
+      EXPECT_GE(occlusionOf(cloud, inside).mean, gap < .2f ? .8 : .99) << gap;
+      EXPECT_LE(occlusionOf(cloud, outside).mean, .01) << gap;
+    }
+  }
+}
+
 // Leaves that fill the unit ball evenly, so that a way from the middle meets `depth` of them.
 std::vector<Surfel> leaves(int count, float depth) {
   std::mt19937 random(6);

@@ -49,10 +49,11 @@ struct alignas(64) Patch {
   // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
   // alone
   bool is_solid = true;
-  bool is_spread = false;  // a facet that may have gaps: it is spread evenly over its outline
-  bool is_ribbon = false;  // a ray traced surfel is a rectangle, not a disk
-  bool is_alone = false;   // it belongs to no thing, but hides at random: a leaf, a drop of smoke
-  bool is_hull = false;    // it covers nothing, but closes what others leave open
+  bool is_spread = false;   // a facet that may have gaps: it is spread evenly over its outline
+  bool is_layered = false;  // another sheet lies close before or behind it
+  bool is_ribbon = false;   // a ray traced surfel is a rectangle, not a disk
+  bool is_alone = false;    // it belongs to no thing, but hides at random: a leaf, a drop of smoke
+  bool is_hull = false;     // it covers nothing, but closes what others leave open
   // From where it is seen: before its front alone; from both sides of a two-sided disk or facet;
   // from both, though it sends light from its front alone; or as something else says
   enum class Seen : std::uint8_t { kFront, kBoth, kDarkBack, kAllAround };

@@ -18,6 +18,7 @@
 #include "gather/cut/vectors_of_3-inl.h"
 #include "gather/packet/packet_kernel.h"
 #include "gather/rules/coverage_rules.h"
+#include "octree/node/hidden_layers.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {
@@ -167,16 +168,17 @@ inline V NearPart(const Patch& patch, const Sight& sight) {
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
 }
 
-// How much a two-sided disk counts as the receiver's own surface, at which the bias is `most`: its
-// normal has no sign, so that tells half of what another's does, by twice the angle. The rest tells
-// its plane, which passes the receiver within the bias, and is none of the receiver's at twice
-// that.
-HWY_INLINE V OwnSheet(V cosine, V plane_distance, float most) {
-  const V zero = hn::Zero(D());
-  const V aligned = hn::MulSub(hn::Mul(Splat(2), cosine), cosine, Splat(1));
-  const V inverse = Splat(1 / std::max(most, std::numeric_limits<float>::min()));
-  const V close = hn::NegMulAdd(hn::Abs(plane_distance), inverse, Splat(2));
-  return hn::Mul(hn::Max(zero, aligned), hn::Min(Splat(1), hn::Max(zero, close)));
+// A two-sided disk within 45 degrees of the receiver's plane that is no higher than the bias is of
+// the receiver's own sheet, and is seen from the side of the receiver's normal alone. A sheet that
+// lies closer than the bias to another one is thinner than their gap, by kClearGap. All others have
+// no bias. Lanes that may see it.
+HWY_INLINE M ShowsOfTwoSided(Sight& sight, V cosine, float most, bool is_layered) {
+  const V thickness = Splat(is_layered ? most / kClearGap : most);
+  const M is_own =
+      hn::And(hn::Gt(hn::Mul(cosine, cosine), Splat(0.5f)), hn::Le(sight.height, thickness));
+  sight.bias = hn::IfThenElseZero(is_own, Splat(most));
+  const V facing = hn::NegMulAdd(sight.bias, cosine, sight.facing);  // where rays begin
+  return hn::Or(hn::Not(is_own), hn::Lt(hn::Mul(facing, cosine), hn::Zero(D())));
 }
 
 HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Receivers& receivers) {
@@ -211,18 +213,19 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const V cosine = Dot(receivers.normal, patch.normal);
   const GatherQuality& quality = canvas.rules->quality;
   const bool is_turned = patch.seen == Patch::Seen::kFront && quality.sides == GatherSides::kBack;
-  const float size = patch.is_ribbon ? patch.ribbon_width : patch.radius;
-  const float most = quality.bias * size;
-  const V part = patch.seen == Patch::Seen::kBoth
-                     ? OwnSheet(cosine, sight.facing, most)
-                     : (is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine));
+  const float most = quality.bias * (patch.is_ribbon ? patch.ribbon_width : patch.radius);
+  const V part = is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine);
   sight.bias = hn::Mul(Splat(most), hn::Min(one, part));
+  M shows = hn::Eq(zero, zero);
+  if (patch.seen == Patch::Seen::kBoth) {
+    shows = ShowsOfTwoSided(sight, cosine, most, patch.is_layered);
+  }
   // Along the receiver's normal a disk reaches radius * sin(angle of normals) above its middle. It
   // must rise above the horizon of the rays, which the receiver's own surface does not
   const V rise =
       hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
   const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));
-  sight.traced = hn::And(is_near, rises);
+  sight.traced = hn::And(hn::And(is_near, shows), rises);
 
   // ... and show its front, or the sphere its outside, to where the rays begin
   if (patch.seen == Patch::Seen::kFront) {

@@ -339,6 +339,7 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.lets_through = lets_through;
     patch.is_alone = surfel.isLone() || (lets_through && surfel.isSphere());
     patch.is_solid = !surfel.isSphere() && !surfel.isLoose();
+    patch.is_layered = hiddenSidesOf(stored) != 0;
     // Positive, for a surfel may be at a receiver; then it is near at any setting
     const float radii = surfel.isSphere() ? near_sphere_radii_ : near_disk_radii_;
     patch.near_distance = std::max(radii * patch.radius, std::numeric_limits<float>::min());

@@ -24,8 +24,6 @@ namespace {
 // Fewer places tell nothing: by chance, heights of six surfels of a rough surface look like sheets
 // 1 time in 25, of twelve 1 time in 1000.
 constexpr std::size_t kFewestPlaces = 12;
-// A gap is clear that is so many times as wide as every sheet is thick.
-constexpr float kClearGap = 3;
 constexpr std::size_t kMostSheets = 6;
 // Sheets are looked for where so much of the area of a cell lies behind the rest.
 constexpr float kLeastHidden = 0.125f;

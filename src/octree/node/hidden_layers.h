@@ -8,9 +8,11 @@
 
 namespace surfeit {
 
-// Roots of the area of a surfel. A sheet that is no farther before it hides it; of others, distances
-// tell which is in front.
+// Roots of the area of a surfel. A sheet that is no farther before it hides it; of others,
+// distances tell which is in front.
 inline constexpr float kClosestLayers = 5;
+// Sheets are told apart by gaps so many times as wide as either is thick.
+inline constexpr float kClearGap = 3;
 
 // The sides that are hidden, where a normal points to and where it points away from, as bits.
 enum HiddenSides : std::uint8_t { kHiddenFront = 1, kHiddenBack = 2, kHiddenSides = 3 };
