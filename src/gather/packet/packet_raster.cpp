@@ -321,7 +321,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
       // Only opaque tiles may cover more than they should to leave no gaps
-      const bool is_exact = surfel.isLoose() || lets_through;
+      const bool is_part = surfel.isTwoSided() && coversInPart(patch.radius, piece_area);
+      const bool is_exact = surfel.isLoose() || is_part || lets_through;
       patch.soft_peak = softDiskPeak(patch.radius, piece_area, is_exact);
     } else {
       patch.shape = ribbon.shape();

@@ -27,6 +27,12 @@ inline float layersOpacity(float opacity, float depth) {
   return opacity < 1 ? 1 - std::pow(1 - opacity, std::max(1.f, depth)) : 1;
 }
 
+// Whether a disk is not even filled by all that may close gaps: it covers a part of its place, as a
+// splat does, or a leaf.
+inline bool coversInPart(float radius, float area) {
+  return kFidelity.soft_disk_area * area < kPi * radius * radius;
+}
+
 // Coverage in the middle of a soft disk, which falls off as 1 - (distance / radius)^2 and is
 // limited to 1, such that the whole disk covers `area`, or, where gaps are worse, more.
 inline float softDiskPeak(float radius, float area, bool is_exact) {
