@@ -262,8 +262,9 @@ void addSeedOptions(CLI::App& app, RandomScenesOptions& options) {
          "Ingredients to keep, as --describe numbers them [all]")
       ->delimiter(',');
   app.add_option("--density", options.sampling.density, "Times as many surfels of each surface")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_flag("--no-noise", options.sampling.leaves_noise,
+  app.add_flag("--no-noise", options.sampling.without_noise,
                "Positions and normals of surfels are those of the surfaces");
   app.add_flag("--describe", options.describes, "Print what the scenes are made of");
   app.add_option("--worst", options.worst, "Seeds to print, the worst first")

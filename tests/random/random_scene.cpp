@@ -157,7 +157,7 @@ void SceneMaker::chooseParts() {
     part.shape = makeShape(kind, place, own);
     if (part.shape.is_light) wanted_.back() = std::min(wanted_.back(), 200);
     part.look = randomLook(part.shape.may_be_two_sided && mixes_sides, own);
-    if (sampling_.leaves_noise) part.look.position_noise = part.look.normal_noise = 0;
+    if (sampling_.without_noise) part.look.position_noise = part.look.normal_noise = 0;
     if (part.shape.is_light) part.look.color *= own.logBetween(10, 1000), part.look.waves = {};
     makeGrids(wanted_.back(), own, part);
     has_ground_ |= isGroundKind(kind) && i == 0;

@@ -63,8 +63,8 @@ struct RandomScene {
 inline constexpr int kMostIngredients = 8;
 
 struct RandomSampling {
-  double density = 1;         // times as many surfels of the same surfaces
-  bool leaves_noise = false;  // positions and normals are those of the surfaces
+  double density = 1;          // times as many surfels of the same surfaces
+  bool without_noise = false;  // positions and normals are those of the surfaces
 };
 
 // From 500 to 30,000 surfels, times the density, and 32 to 96 receivers.

@@ -31,8 +31,7 @@ SamplingLook randomLook(bool may_be_two_sided, RandomNumbers& random);
 // A place on a surface, in the units of the shapes.
 struct SurfaceSite {
   glm::dvec3 position{0}, normal{0};
-  double spacing = 0;  // of the surfels there
-  bool is_two_sided = false;
+  double spacing = 0;         // of the surfels there
   bool is_on_border = false;  // of the patch
 };
 

@@ -122,19 +122,22 @@ TEST(TwoSided, ANoisySheetDoesNotHideTheSkyFromItself) {
   std::mt19937 random(5);
   std::normal_distribution<float> bell;
   std::uniform_real_distribution<float> place(.3f, .7f);
-  for (const float noise : {.02f, .05f}) {
-    std::vector<Surfel> cloud;
-    constexpr int kSide = 100;
-    for (int i = 0; i < kSide * kSide; ++i) {
-      const glm::vec3 at(float(i % kSide) / kSide, float(i / kSide) / kSide,
-                         noise / kSide * bell(random));
-      cloud.push_back(twoSided(at, {0, 0, 1}, 1.f / (kSide * kSide)));
+  for (const glm::mat3& turn : {glm::mat3(1), slanted()}) {
+    for (const float noise : {.02f, .05f}) {
+      std::vector<Surfel> cloud;
+      constexpr int kSide = 100;
+      for (int i = 0; i < kSide * kSide; ++i) {
+        const glm::vec3 at(float(i % kSide) / kSide, float(i / kSide) / kSide,
+                           noise / kSide * bell(random));
+        cloud.push_back(twoSided(turn * at, turn * glm::vec3(0, 0, 1), 1.f / (kSide * kSide)));
+      }
+      std::vector<LocalReceiver> receivers;
+      for (int i = 0; i < 200; ++i) {
+        const glm::vec3 at{place(random), place(random), 0};
+        receivers.push_back({turn * at, turn * glm::vec3(0, 0, i % 2 == 0 ? 1 : -1)});
+      }
+      EXPECT_LE(occlusionOf(cloud, receivers).mean, .05) << noise;
     }
-    std::vector<LocalReceiver> receivers;
-    for (int i = 0; i < 200; ++i) {
-      receivers.push_back({{place(random), place(random), 0}, {0, 0, i % 2 == 0 ? 1.f : -1.f}});
-    }
-    EXPECT_LE(occlusionOf(cloud, receivers).mean, .05) << noise;
   }
 }
 

@@ -168,10 +168,10 @@ inline V NearPart(const Patch& patch, const Sight& sight) {
   return hn::Min(Splat(1), hn::Max(hn::Zero(D()), part));
 }
 
-// A two-sided disk within 45 degrees of the receiver's plane that is no higher than the bias is of
-// the receiver's own sheet, and is seen from the side of the receiver's normal alone. A sheet that
-// lies closer than the bias to another one is thinner than their gap, by kClearGap. All others have
-// no bias. Lanes that may see it.
+// Gives a two-sided disk its bias, and tells the lanes that may see it. One within 45 degrees of
+// the receiver's plane that is no higher than the bias is of the receiver's own sheet. That is seen
+// from the side of the receiver's normal alone; all others have no bias. Layers are told apart by
+// gaps kClearGap times as wide as they are thick, so of layers that part of the bias decides.
 HWY_INLINE M ShowsOfTwoSided(Sight& sight, V cosine, float most, bool is_layered) {
   const V thickness = Splat(is_layered ? most / kClearGap : most);
   const M is_own =
@@ -214,18 +214,19 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
   const GatherQuality& quality = canvas.rules->quality;
   const bool is_turned = patch.seen == Patch::Seen::kFront && quality.sides == GatherSides::kBack;
   const float most = quality.bias * (patch.is_ribbon ? patch.ribbon_width : patch.radius);
-  const V part = is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine);
-  sight.bias = hn::Mul(Splat(most), hn::Min(one, part));
-  M shows = hn::Eq(zero, zero);
+  M shows = is_near;
   if (patch.seen == Patch::Seen::kBoth) {
-    shows = ShowsOfTwoSided(sight, cosine, most, patch.is_layered);
+    shows = hn::And(is_near, ShowsOfTwoSided(sight, cosine, most, patch.is_layered));
+  } else {
+    const V part = is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine);
+    sight.bias = hn::Mul(Splat(most), hn::Min(one, part));
   }
   // Along the receiver's normal a disk reaches radius * sin(angle of normals) above its middle. It
   // must rise above the horizon of the rays, which the receiver's own surface does not
   const V rise =
       hn::Mul(Splat(patch.radius), hn::Sqrt(hn::Max(zero, hn::NegMulAdd(cosine, cosine, one))));
   const M rises = hn::Or(receivers.spherical, hn::Gt(hn::Add(sight.height, rise), sight.bias));
-  sight.traced = hn::And(hn::And(is_near, shows), rises);
+  sight.traced = hn::And(shows, rises);
 
   // ... and show its front, or the sphere its outside, to where the rays begin
   if (patch.seen == Patch::Seen::kFront) {
