@@ -26,12 +26,15 @@ namespace surfeit {
 namespace {
 
 enum class Against { kExact, kEmbree, kAlone };
+// What the clouds bring.
+enum class Sizes { kGiven, kAreas, kNone };
 
 struct RandomScenesOptions {
   std::uint64_t first = 0, last = 199;
   RandomSampling sampling;
   GatherOptions gather;
   Against against = Against::kExact;
+  Sizes sizes = Sizes::kGiven;
   bool mixes_sides = false;
   bool full_precision = false;
   std::uint64_t kept = ~std::uint64_t{0};
@@ -126,6 +129,7 @@ SeedResult runSeed(const RandomScenesOptions& options, std::uint64_t seed) {
   result.sides = sidesOf(seed, options);
   RandomScene scene = makeRandomScene(seed, options.sampling);
   if (options.kept != ~std::uint64_t{0}) scene = scene.only(options.kept);
+  if (options.sizes != Sizes::kGiven) scene = scene.withoutSizes(options.sizes == Sizes::kAreas);
   result.status = judge(options, scene, result);
   if (!options.write.empty() && result.status.ok()) {
     const std::string directory = fmt::format("{}/{}", options.write, seed);
@@ -278,6 +282,7 @@ void addSeedOptions(CLI::App& app, RandomScenesOptions& options) {
 
 int main(int argc, char** argv) {
   using surfeit::Against;
+  using surfeit::Sizes;
   CLI::App app("The gather on scenes by chance");
   surfeit::RandomScenesOptions options;
   options.gather.mode = surfeit::GatherMode::kBleeding;
@@ -288,6 +293,9 @@ int main(int argc, char** argv) {
   surfeit::addChoice<Against>(
       app, "--against", options.against, "What errors are measured by",
       {{"exact", Against::kExact}, {"embree", Against::kEmbree}, {"alone", Against::kAlone}});
+  surfeit::addChoice<Sizes>(
+      app, "--sizes", options.sizes, "Sizes that the clouds bring",
+      {{"given", Sizes::kGiven}, {"areas", Sizes::kAreas}, {"none", Sizes::kNone}});
   app.add_flag("--full-precision", options.full_precision, "Index with floats");
   app.add_option("--rays", options.rays, "Rays of a receiver with --against embree, (4 n)^2")
       ->capture_default_str();
@@ -296,6 +304,8 @@ int main(int argc, char** argv) {
       "exact: the gather with max solid angle 0, each receiver by itself.\n"
       "embree: occlusion by rays on the true triangles.\n"
       "alone: the same gather, each receiver by itself instead of with all others.\n"
+      "--sizes areas, none: without radii, or without areas as well, which index finds; scenes have\n"
+      "no leaves, hair or points, whose sizes places do not tell.\n"
       "Examples:\n"
       "  random_scenes --seeds 0..399\n"
       "  random_scenes --seeds 17 --describe --write /tmp/scenes\n"

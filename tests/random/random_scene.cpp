@@ -199,7 +199,7 @@ void SceneMaker::addPart(std::uint8_t number) {
   const std::size_t pieces = std::max<std::size_t>(1, part.shape.patches.size());
   scene_.ingredients.push_back({fmt::format("{}, {} surfels in {} pieces{}", part.shape.name,
                                             surfels, pieces, part.look.describe()),
-                                surfels});
+                                surfels, part.shape.leaves.empty() && part.shape.points.empty()});
 }
 
 void SceneMaker::addSurfels(const std::vector<SampledSurfel>& sampled, std::uint8_t number,
@@ -373,6 +373,19 @@ RandomScene RandomScene::only(std::uint64_t kept) const {
   std::erase_if(scene.spheres, [&](const RandomSphere& one) { return !keeps(one.ingredient); });
   for (std::size_t i = 0; i < ingredients.size(); ++i) {
     if (!keeps(std::uint8_t(i))) scene.ingredients[i].surfels = 0;
+  }
+  return scene;
+}
+
+RandomScene RandomScene::withoutSizes(bool keeps_areas) const {
+  std::uint64_t kept = 0;
+  for (std::size_t i = 0; i < ingredients.size(); ++i) {
+    if (ingredients[i].is_surface) kept |= std::uint64_t{1} << i;
+  }
+  RandomScene scene = only(kept);
+  for (Surfel& surfel : scene.surfels) {
+    surfel.radius = 0;
+    if (!keeps_areas) surfel.area = 0;
   }
   return scene;
 }

@@ -39,6 +39,7 @@ struct RandomReceiver {
 struct RandomIngredient {
   std::string text;  // "floors 3 x 1,200 surfels, two-sided, noisy"
   std::size_t surfels = 0;
+  bool is_surface = true;  // not leaves, hair or points, whose sizes places do not tell
 };
 
 struct RandomScene {
@@ -57,6 +58,8 @@ struct RandomScene {
   // Surfels and true geometry of the ingredients in `kept`, a set; receivers stay where they are.
   // Numbers of ingredients stay as well.
   RandomScene only(std::uint64_t kept) const;
+  // Without leaves, hair and points, and with surfels whose radii, or areas too, are not known.
+  RandomScene withoutSizes(bool keeps_areas) const;
   std::vector<LocalReceiver> plainReceivers() const;
 };
 

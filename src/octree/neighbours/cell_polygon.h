@@ -64,6 +64,12 @@ class CellPolygon {
     return false;
   }
   bool wouldCut(const glm::vec2& there) const { return mayCut(there, -kTouching); }
+  // Whether the halfway line to `other` is one of its sides, or goes through a corner.
+  bool isOnSide(const glm::vec2& other) const {
+    const float limit = (0.5f - kTouching) * glm::dot(other, other);
+    return std::any_of(corners_.begin(), corners_.begin() + std::ptrdiff_t(count_),
+                       [&](const glm::vec2& corner) { return glm::dot(corner, other) > limit; });
+  }
   // Whether any side of the first square is left, which had corners at (+-size, +-size).
   bool touches(float size) const {
     for (std::size_t i = 0; i < count_; ++i) {

@@ -24,34 +24,48 @@ struct FlatNeighbour {
   std::uint32_t index = 0;  // of the neighbour
 };
 
+// Below and above the first gap above the plane; 0: there is none.
+struct SheetGap {
+  float below = 0, above = 0;
+};
+
+// Of heights in ascending order.
+inline SheetGap firstGap(const std::vector<float>& heights, float spacing, float thickness) {
+  float below = 0;
+  for (const float height : heights) {
+    const float gap = height - below;
+    if (gap > kWideGap * spacing ||
+        (gap > kNarrowGap * spacing && gap > kGapOverThickness * thickness)) {
+      return {below, height};
+    }
+    below = height;
+  }
+  return {};
+}
+
 // Drops what lies above (`side` 1) or below (-1) the first gap on that side. What lies only far
 // beside the place may belong to a slope: a sheet that goes has something steeply above the place.
-inline void dropSheet(float side, float spacing, float thickness, std::vector<FlatNeighbour>& flat,
-                      std::vector<float>& heights) {
+// A few places are strays of their surface, not a sheet, unless they `may_be_few`: then all that is
+// beyond must be thin beside the gap.
+inline void dropSheet(float side, float spacing, float thickness, bool may_be_few,
+                      std::vector<FlatNeighbour>& flat, std::vector<float>& heights) {
   heights.clear();
   for (const FlatNeighbour& n : flat) {
     if (side * n.above > 0) heights.push_back(side * n.above);
   }
   std::sort(heights.begin(), heights.end());
-  float below = 0, limit = 0;
-  for (const float height : heights) {
-    const float gap = height - below;
-    if (gap > kWideGap * spacing ||
-        (gap > kNarrowGap * spacing && gap > kGapOverThickness * thickness)) {
-      limit = height;
-      break;
-    }
-    below = height;
-  }
+  const SheetGap gap = firstGap(heights, spacing, thickness);
+  const float limit = gap.above;
   if (limit == 0) return;
   const auto is_beyond = [&](const FlatNeighbour& n) { return side * n.above >= limit; };
   const bool is_sheet = std::any_of(flat.begin(), flat.end(), [&](const FlatNeighbour& n) {
     return is_beyond(n) && std::abs(n.above) > kSteep * glm::length(n.beside);
   });
   const auto beyond = std::count_if(flat.begin(), flat.end(), is_beyond);
-  // A few places are strays of their surface, not a sheet
   const std::ptrdiff_t fewest = std::ptrdiff_t(flat.size()) / 6;
-  if (is_sheet && beyond >= fewest && std::ptrdiff_t(flat.size()) - beyond >= fewest) {
+  const bool are_few = std::ptrdiff_t(flat.size()) - beyond < fewest;
+  const bool is_clear = limit - gap.below > kGapOverThickness * thickness;
+  if (is_sheet && beyond >= fewest && (!are_few || (may_be_few && is_clear))) {
     std::erase_if(flat, is_beyond);
   }
 }
@@ -73,23 +87,30 @@ inline SideGaps gapsIn(const std::vector<FlatNeighbour>& flat, float narrow) {
   return {hasFree(above), hasFree(below)};
 }
 
-// How thick the own sheet is: a quarter of the neighbours lie nearer to the plane.
+// How thick the own sheet is: a quarter of the neighbours lie nearer to the plane. Where the own
+// sheet has fewer, half of the others lie between heights that are twice that apart.
 inline float thicknessOf(const std::vector<FlatNeighbour>& flat, std::vector<float>& heights) {
-  heights.clear();
-  for (const FlatNeighbour& n : flat) heights.push_back(std::abs(n.above));
-  const auto middle = heights.begin() + std::ptrdiff_t(heights.size() / 4);
-  std::nth_element(heights.begin(), middle, heights.end());
-  return heights.empty() ? 0 : *middle;
+  if (flat.empty()) return 0;
+  const auto quartile = [&](std::size_t quarters, auto height) {
+    heights.clear();
+    for (const FlatNeighbour& n : flat) heights.push_back(height(n.above));
+    const auto at = heights.begin() + std::ptrdiff_t(heights.size() * quarters / 4);
+    std::nth_element(heights.begin(), at, heights.end());
+    return *at;
+  };
+  const auto signed_height = [](float above) { return above; };
+  const float half = quartile(1, [](float above) { return std::abs(above); });
+  return std::min(half, .5f * (quartile(3, signed_height) - quartile(1, signed_height)));
 }
 
 // Drops what lies on other sheets. Lengths are in any unit; `heights` is scratch.
-inline void dropOtherSheets(float spacing, std::vector<FlatNeighbour>& flat,
+inline void dropOtherSheets(float spacing, bool may_be_few, std::vector<FlatNeighbour>& flat,
                             std::vector<float>& heights) {
   const SideGaps gaps = gapsIn(flat, kNarrowGap * spacing);
   if (!gaps.above && !gaps.below) return;
   const float thickness = thicknessOf(flat, heights);
-  if (gaps.above) dropSheet(1, spacing, thickness, flat, heights);
-  if (gaps.below) dropSheet(-1, spacing, thickness, flat, heights);
+  if (gaps.above) dropSheet(1, spacing, thickness, may_be_few, flat, heights);
+  if (gaps.below) dropSheet(-1, spacing, thickness, may_be_few, flat, heights);
 }
 
 }  // namespace surfeit

@@ -11,6 +11,7 @@
 
 #include "core/spherical_harmonics.h"
 #include "core/tangent_frame.h"
+#include "octree/neighbours/cell_cutters.h"
 #include "octree/neighbours/cell_polygon.h"
 #include "octree/neighbours/sheet_gaps.h"
 #include "octree/neighbours/surface_fits.h"
@@ -19,6 +20,9 @@
 namespace surfeit {
 namespace {
 
+// A surfel with a wrong normal is so many times as far from what faces as it does as from the third
+// nearest place of any sheet.
+constexpr float kFarOff = 4;
 // What lies so close beside a place, in spacings, has no mirror image.
 constexpr float kSharing = 0.05f;
 // What lies so close beside a place, in spacings, shares its cell.
@@ -60,6 +64,7 @@ struct SurfaceCells::Scratch {
   std::vector<glm::vec2> cutters;
   std::vector<float> slopes_sq;           // of those from farther away
   std::vector<Neighbour> cutting, sheet;  // the cutters; all on the place's own sheet
+  std::vector<Neighbour> bounding;        // of the cutters, those at its sides
   ThirdNearest third_nearest;
 
   // Of the cell in the making. Lengths are in units of the farthest neighbour.
@@ -68,12 +73,14 @@ struct SurfaceCells::Scratch {
   glm::vec3 own_normal{0}, normal{0};
   TangentFrame frame{glm::vec3(0, 0, 1)};  // of cells that are cut one by one
   CellPolygon polygon;
+  std::size_t far_count = 0;  // of the sheet, places from farther away
   float neighbour_spacing = 0;
   bool was_touching = false;  // of the cell that was closed last
   float open = kOpen;         // the polygon begins as a square of twice that
-
   bool has_measures = false;
   std::array<float, SurfaceFitLanes::kLanes> sheet_thickness{};  // as of SurfaceCell
+  std::array<bool, SurfaceFitLanes::kLanes> is_lone{};           // as of SurfaceCell
+  std::array<bool, SurfaceFitLanes::kLanes> is_apart{};  // whether hardly any are on its sheet
 
   FlatNeighbour flatten(const glm::vec3& place) const {
     const glm::vec3 offset = place / unit;
@@ -94,10 +101,12 @@ struct SurfaceCells::Scratch {
   void cutByNeighbours();
   bool isLoose() const;
   bool isFull(const SurfaceCell& cell) const;
-  bool isSparse() const;
+  bool isSparse();
+  bool isLost() const;
+  void measureSpacing();
   void flattenAll(std::span<const Neighbour> neighbours);
-  float thicknessOfSheet(std::span<const Neighbour> neighbours) const;
-  float usualCutter();
+  float thicknessOfSheet() const;
+  bool isAmid(std::span<const Neighbour> neighbours) const;
   SurfaceCell cell() const;
   SurfaceCell cell(float area, const CellMoments& moments) const;
   glm::vec3 longSide(float area, const CellMoments& moments, const TangentFrame& plane) const;
@@ -170,6 +179,7 @@ void SurfaceCells::Scratch::begin() {
   slopes_sq.clear();
   cutting.clear();
   sheet.clear();
+  far_count = 0;
 }
 
 // Of the place's own sheet.
@@ -183,21 +193,29 @@ void SurfaceCells::Scratch::flattenAll(std::span<const Neighbour> neighbours) {
         {fits.beside_u[i][lane], fits.beside_v[i][lane]}, fits.above[i][lane], std::uint32_t(i)};
   }
   flat.resize(count);
-  sheet_thickness[lane] = count < neighbours.size() ? thicknessOfSheet(neighbours) : -1;
-  if (fits.highest[lane] <= kNarrowGap * spacing) return;  // there is no gap below anything
-  dropOtherSheets(spacing, flat, heights);
+  // Without a gap below anything there are no other sheets
+  if (fits.highest[lane] > kNarrowGap * spacing) {
+    dropOtherSheets(spacing, has_normal, flat, heights);
+  }
+  is_apart[lane] = flat.size() < neighbours.size() / 6;
+  sheet_thickness[lane] = count < neighbours.size() ? thicknessOfSheet() : -1;
+  is_lone[lane] = is_apart[lane] || (count < neighbours.size() && isAmid(neighbours));
 }
 
-// How thick the own sheet is, root mean square, over its spacing, where neighbours that face
-// elsewhere all lie on one side of it, as those around an edge. Else they lie all around.
-float SurfaceCells::Scratch::thicknessOfSheet(std::span<const Neighbour> neighbours) const {
-  float low = 0, high = 0, sum = 0;
+// Whether neighbours that face elsewhere lie on both sides: around an edge they lie on one.
+bool SurfaceCells::Scratch::isAmid(std::span<const Neighbour> neighbours) const {
+  float low = 0, high = 0;
   for (std::size_t i = 0; i < neighbours.size(); ++i) {
     if (mayShareSheet(neighbours[i])) continue;
     low = std::min(low, fits.above[i][lane]), high = std::max(high, fits.above[i][lane]);
   }
-  if (std::min(-low, high) > kNarrowGap * spacing) return -1;
+  return std::min(-low, high) > kNarrowGap * spacing;
+}
+
+// How thick the own sheet is, root mean square, over its spacing.
+float SurfaceCells::Scratch::thicknessOfSheet() const {
   if (flat.empty()) return 0;
+  float sum = 0;
   for (const FlatNeighbour& n : flat) sum += n.above * n.above;
   return std::sqrt(sum / float(flat.size())) / spacingOf(float(flat.size()));
 }
@@ -206,6 +224,7 @@ float SurfaceCells::Scratch::thicknessOfSheet(std::span<const Neighbour> neighbo
 void SurfaceCells::Scratch::dropOthers() {
   const bool may_have_sheets = fits.highest[lane] > kNarrowGap * spacing;
   sheet_thickness[lane] = -1;
+  is_lone[lane] = is_apart[lane] = false;
   if (own_normal == glm::vec3(0) && !may_have_sheets) return;
   const std::size_t count = places[lane].neighbours.size();
   flattenAll(places[lane].neighbours);
@@ -242,6 +261,34 @@ void SurfaceCells::Scratch::cutByNeighbours() {
   }
 }
 
+SurfaceCell SurfaceCells::cellOfNearest() {
+  Scratch& at = *scratch_;
+  at.begin(at.lane);
+  at.flattenAll(at.places[at.lane].neighbours);
+  at.cutByNeighbours();
+  SurfaceCell cell = closed();
+  if (at.is_apart[at.lane] || at.isLost()) {
+    cell = at.cell(at.spacing * at.spacing, {.square = at.spacing * at.spacing / 6});
+    cell.neighbour_spacing = at.spacing * at.unit;
+  }
+  cell.is_settled = false;
+  return cell;
+}
+
+std::span<const Neighbour> SurfaceCells::cutters() {
+  Scratch& at = *scratch_;
+  at.bounding.clear();
+  for (std::size_t i = 0; i < at.cutting.size(); ++i) {
+    if (at.polygon.isOnSide(at.cutters[i])) at.bounding.push_back(at.cutting[i]);
+  }
+  return at.bounding;
+}
+
+bool SurfaceCells::isBeside(const Neighbour& place, const Neighbour& other) const {
+  const FlatNeighbour flat = scratch_->flatten(other.offset - place.offset);
+  return scratch_->mayShareSheet(other) && std::abs(flat.above) < kSteep * glm::length(flat.beside);
+}
+
 SurfaceCell SurfaceCells::cellOf(std::size_t lane) {
   Scratch& at = *scratch_;
   at.begin(lane);
@@ -274,14 +321,45 @@ bool SurfaceCells::isOpen() const {
   return at.hasPlane() && !at.cutters.empty();
 }
 
-// Whether places close by cannot tell the size of the cell that was closed last: they are too few,
-// or closer to each other than to the place.
-bool SurfaceCells::Scratch::isSparse() const {
-  if (cutters.size() < 3) return true;
-  const auto nearest = std::min_element(
-      cutters.begin(), cutters.end(),
-      [](const glm::vec2& a, const glm::vec2& b) { return glm::dot(a, a) < glm::dot(b, b); });
-  return glm::length(*nearest) * unit > neighbour_spacing;
+bool SurfaceCells::isSparse() { return scratch_->isSparse(); }
+
+// Surfels with a wrong normal agree by chance with others, far away, and with none beside them.
+bool SurfaceCells::Scratch::isLost() const {
+  const std::span<const Neighbour> neighbours = places[lane].neighbours;
+  if (!is_lone[lane] || neighbours.size() < 3) return false;
+  const float usual = glm::length(neighbours[2].offset) / unit;
+  return cutters.empty() || nearestCutter(cutters) > kFarOff * usual;
+}
+
+bool SurfaceCells::isLost() const { return scratch_->isLost(); }
+
+bool SurfaceCells::isOnRow() const {
+  const Scratch& at = *scratch_;
+  const std::span<const Neighbour> neighbours = at.places[at.lane].neighbours;
+  return !neighbours.empty() && isRow(at.cutters, glm::length(neighbours.front().offset) / at.unit);
+}
+
+// How far the places that cut the cell are from others.
+void SurfaceCells::Scratch::measureSpacing() {
+  // The normal tells the sheet; without one a stray may have any
+  const CellPlace& place = places[lane];
+  const bool has_normal = own_normal != glm::vec3(0);
+  sheet.resize(far_count);
+  if (has_normal) {
+    for (const FlatNeighbour& n : flat) sheet.push_back(place.neighbours[n.index]);
+  } else {
+    sheet.insert(sheet.end(), place.neighbours.begin(), place.neighbours.end());
+  }
+  const bool is_known = has_normal && !isLoose();
+  neighbour_spacing = third_nearest.median(is_known ? cutting : sheet, sheet, unit);
+}
+
+// Whether places close by cannot tell the size of the cell: they are too few, or closer to each
+// other than to the place.
+bool SurfaceCells::Scratch::isSparse() {
+  if (cutters.empty()) return true;
+  measureSpacing();
+  return sheet.size() <= 3 || nearestCutter(cutters) * unit > neighbour_spacing;
 }
 
 bool SurfaceCells::widen(float radius) {
@@ -320,7 +398,9 @@ bool SurfaceCells::cut(const Neighbour& place) {
   if (!at.polygon.cut(flat.beside)) return false;
   at.cutters.push_back(flat.beside);
   at.cutting.push_back(place);
+  at.sheet.resize(at.far_count);
   at.sheet.push_back(place);
+  at.far_count = at.sheet.size();
   const float slope = flat.above / glm::length(flat.beside);
   at.slopes_sq.push_back(slope * slope);
   return true;
@@ -329,8 +409,9 @@ bool SurfaceCells::cut(const Neighbour& place) {
 SurfaceCell SurfaceCells::closed() {
   Scratch& at = *scratch_;
   at.was_touching = at.polygon.touches(at.open);
-  const bool is_open = !at.cutters.empty() && (at.was_touching || at.isLoose() ||
-                                               at.polygon.reach() > kSpike * at.usualCutter());
+  const bool is_open =
+      !at.cutters.empty() && (at.was_touching || at.isLoose() ||
+                              at.polygon.reach() > kSpike * usualCutter(at.cutters, at.heights));
   if (is_open) {
     // One close by shares the cell rather than telling its size
     for (const glm::vec2& cutter : at.cutters) {
@@ -340,16 +421,8 @@ SurfaceCell SurfaceCells::closed() {
   SurfaceCell cell = at.cell();
   cell.is_settled = !is_open;
   if (is_open) {
-    // The normal tells the sheet; without one a stray may have any
-    const CellPlace& place = at.places[at.lane];
-    if (at.own_normal == glm::vec3(0)) {
-      at.sheet.assign(place.neighbours.begin(), place.neighbours.end());
-    } else {
-      for (const FlatNeighbour& n : at.flat) at.sheet.push_back(place.neighbours[n.index]);
-    }
-    const bool is_known = at.own_normal != glm::vec3(0) && !at.isLoose();
-    at.neighbour_spacing = cell.neighbour_spacing =
-        at.third_nearest.median(is_known ? at.cutting : at.sheet, at.sheet, at.unit);
+    at.measureSpacing();
+    cell.neighbour_spacing = at.neighbour_spacing;
   }
   return cell;
 }
@@ -387,14 +460,6 @@ bool SurfaceCells::Scratch::isFull(const SurfaceCell& cell) const {
   return true;
 }
 
-float SurfaceCells::Scratch::usualCutter() {
-  heights.clear();
-  for (const glm::vec2& cutter : cutters) heights.push_back(glm::length(cutter));
-  const auto middle = heights.begin() + std::ptrdiff_t(heights.size() * 3 / 4);
-  std::nth_element(heights.begin(), middle, heights.end());
-  return *middle;
-}
-
 SurfaceCell SurfaceCells::Scratch::cell() const {
   if (cutters.empty()) return {};
   // Of a line all that is known is a width: the piece is a square of it
@@ -414,6 +479,7 @@ SurfaceCell SurfaceCells::Scratch::cell(float area, const CellMoments& moments) 
   cell.middle = unit * (moments.middle.x * plane.tangent + moments.middle.y * plane.bitangent);
   cell.long_side = longSide(area, moments, plane);
   cell.sheet_thickness = sheet_thickness[lane];
+  cell.is_lone = is_lone[lane];
   return cell;
 }
 

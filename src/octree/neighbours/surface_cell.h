@@ -48,6 +48,9 @@ struct SurfaceCell {
   float neighbour_spacing = 0;
   // As of SurfacePlane, of the place's own sheet where normals tell it from others; else negative.
   float sheet_thickness = -1;
+  // Whether it may be one of many leaves and no sheet: neighbours that face elsewhere lie on both
+  // sides of it, or hardly any are on it.
+  bool is_lone = false;
 };
 
 // One thread at a time: it keeps memory, and the cell that it made last.
@@ -75,6 +78,12 @@ class SurfaceCells {
   // nearer than reach(): a place, or one within a sphere.
   bool isOpen() const;
   float reach() const;
+  // Whether places close by cannot tell the size of the cell.
+  bool isSparse();
+  // Whether all that cuts the cell is much farther away than places all around that face elsewhere.
+  bool isLost() const;
+  // Whether one or two places cut the cell from much closer than all others: a row of a scan.
+  bool isOnRow() const;
   // Opens the cell that was closed last, to be cut by places farther than twice the last neighbour,
   // up to twice `radius`. False where these are not needed.
   bool widen(float radius);
@@ -84,6 +93,15 @@ class SurfaceCells {
   bool wouldCut(const Neighbour& place) const;
   // False when it does not after all.
   bool cut(const Neighbour& place);
+
+  // The places at the sides of the cell; and whether another place is on the sheet of one of them.
+  // Offsets are from the place.
+  std::span<const Neighbour> cutters();
+  bool isBeside(const Neighbour& place, const Neighbour& other) const;
+
+  // The cell when what is farther away is no guide: among the nearest of the own sheet, or a square
+  // as wide as the spacing of all neighbours, where hardly any are on that.
+  SurfaceCell cellOfNearest();
 
   // The cell when nothing else cuts it: where it is still open, at the edge of a surface, it is
   // closed by the mirror images of the places that cut it.

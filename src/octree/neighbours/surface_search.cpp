@@ -23,6 +23,8 @@ constexpr int kMostFarther = 32;
 // Strays: radii of open cells are limited to this many times the distance of the neighbours from
 // each other.
 constexpr float kOpenLimit = 4;
+// Of the distance to a place: where others are nearer to it than this, places are denser there.
+constexpr float kAsSparse = 0.25f;
 
 glm::vec3 normalOf(const Surfel& surfel) {
   return surfel.isSphere() ? glm::vec3(0) : surfel.normal;
@@ -31,7 +33,8 @@ glm::vec3 normalOf(const Surfel& surfel) {
 }  // namespace
 
 SurfaceSearch::SurfaceSearch(PagedOctree& octree)
-    : reader_(std::make_unique<PagedOctree::Reader>(octree)) {}
+    : reader_(std::make_unique<PagedOctree::Reader>(octree)),
+      widest_(float(octree.file().header().cube.size)) {}
 
 std::size_t SurfaceSearch::memoryBytes() {
   return PlaceIndex::memoryBytes() + 2 * sizeof(SurfaceFitLanes);
@@ -150,15 +153,26 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
   const bool has_normal = place.normal != glm::vec3(0);
   const bool is_doubtful = !cell.is_settled && !has_normal;
   if (!cell.is_settled) {
-    SURFEIT_RETURN_IF_ERROR(cutByFarther(place.spot.position, reach, cells));
+    const bool is_on_row = place.is_line || cells.isOnRow();
+    if (is_on_row || cells.isSparse()) {
+      SURFEIT_RETURN_IF_ERROR(cutByFarther(place.spot.position, reach, cells));
+    }
     cell = cells.closed();
     if (has_normal && (!cell.is_settled || cell.area == 0)) {
       SURFEIT_RETURN_IF_ERROR(findWide(place.spot.position, cells, cell));
     }
+    // Along a row places are close to each other, but not across
+    if (has_normal && !is_on_row) {
+      SURFEIT_ASSIGN_OR_RETURN(const bool are_alike,
+                               areAsSparse(place.spot.position, reach, cells));
+      const bool is_lost = !cell.is_settled && cells.isLost();
+      if (!are_alike || is_lost || cell.area == 0) cell = cells.cellOfNearest();
+    }
   }
   SurfaceAt surface = place.surface;
-  if (cell.sheet_thickness >= 0) surface.thickness = cell.sheet_thickness;
-  limit(cell, is_doubtful, surface.thickness);
+  const bool is_sheet_known = cell.sheet_thickness >= 0;
+  limit(cell, is_doubtful, is_sheet_known ? cell.sheet_thickness : surface.thickness);
+  if (is_sheet_known && !cell.is_lone) surface.thickness = cell.sheet_thickness;
   // There is no plane to move in
   const bool has_plane = has_normal || surface.thickness <= kLooseThickness;
   if (!has_plane) cell.middle = cell.long_side = surface.height = glm::vec3(0);
@@ -173,12 +187,13 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
   return {};
 }
 
-// What is open may be a stray, far from neighbours that are close to each other; and strays may lie
-// all around each other.
+// What is open may be a stray, far from neighbours that are close to each other or with hardly any;
+// and strays may lie all around each other.
 void SurfaceSearch::limit(SurfaceCell& cell, bool is_doubtful, float thickness) const {
   float largest = std::numeric_limits<float>::infinity();
   if (!cell.is_settled) largest = kOpenLimit * cell.neighbour_spacing;
-  if (!cell.is_settled || is_doubtful) largest = std::min(largest, largest_sparse_radius_);
+  if (is_doubtful || std::isinf(cell.neighbour_spacing))
+    largest = std::min(largest, largest_sparse_radius_);
   if (thickness > kLooseThickness) largest = std::min(largest, largest_loose_radius_);
   if (cell.radius <= largest) return;
   cell.middle = glm::vec3(0);
@@ -206,7 +221,7 @@ Status SurfaceSearch::cutByFarther(const glm::vec3& position, float reach, Surfa
 // Of a place beside something much denser all its neighbours may be of that, or of another sheet.
 // What is found farther away counts where it is all around.
 Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, SurfaceCell& cell) {
-  if (std::isinf(largest_sparse_radius_) || !cells.widen(largest_sparse_radius_)) return {};
+  if (!cells.widen(widest_)) return {};
   for (int i = 0; i < kMostFarther; ++i) {
     const glm::vec3 corner = cells.farthestCorner();
     SURFEIT_ASSIGN_OR_RETURN(
@@ -227,6 +242,51 @@ Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, S
   const SurfaceCell wide = cells.closedWide();
   if (wide.is_settled || cell.area == 0) cell = wide;
   return {};
+}
+
+// Whether three places, since scans come in pairs, lie near to one on its sheet beside its
+// distance.
+Result<bool> SurfaceSearch::isDenseAt(const glm::vec3& position, const Neighbour& place,
+                                      const SurfaceCells& cells) {
+  const float reach = kAsSparse * glm::length(place.offset);
+  std::array<std::uint64_t, 3> found{};
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    SURFEIT_ASSIGN_OR_RETURN(
+        const std::optional<Neighbour> other,
+        findPlace(
+            position + place.offset, reach, *reader_,
+            [&](const glm::vec3& centre, float radius) {
+              return glm::length(centre) < reach + radius;
+            },
+            [&](const Neighbour& one) {
+              const bool is_new = std::find(found.begin(), found.begin() + std::ptrdiff_t(i),
+                                            one.id) == found.begin() + std::ptrdiff_t(i);
+              return is_new &&
+                     cells.isBeside(place, {one.offset + place.offset, one.normal, one.id});
+            }));
+    if (!other) return false;
+    found[i] = other->id;
+  }
+  return true;
+}
+
+// Whether places that cut the cell from far away are on its sheet: a third of them are about as far
+// from others there as from the place. Those of something dense say nothing about what is between.
+Result<bool> SurfaceSearch::areAsSparse(const glm::vec3& position, float reach,
+                                        SurfaceCells& cells) {
+  const std::span<const Neighbour> cutters = cells.cutters();
+  float farthest = 0;
+  for (const Neighbour& cutter : cutters) {
+    farthest = std::max(farthest, glm::length(cutter.offset));
+  }
+  if (farthest <= reach) return true;
+  int sparse = 0, count = 0;
+  for (const Neighbour& cutter : cutters) {
+    if (glm::length(cutter.offset) <= kAsSparse * farthest) continue;
+    SURFEIT_ASSIGN_OR_RETURN(const bool is_dense, isDenseAt(position, cutter, cells));
+    sparse += is_dense ? 0 : 1, ++count;
+  }
+  return sparse >= 2 || 3 * sparse >= count;
 }
 
 Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,

@@ -61,8 +61,8 @@ class SurfaceSearch {
   Status find(std::span<const Surfel> places, const Wants& wants, const Take& take,
               const Progress& progress);
 
-  // Of places off a surface; and of those that only places farther away tell the size of (sparse
-  // beside dense), at the edge of a surface or without a normal: no radius becomes larger.
+  // Of places off a surface; and of those without a normal, or with hardly any neighbours, that
+  // only places farther away tell the size of: no radius becomes larger.
   void limitRadii(float largest_loose, float largest_sparse) {
     largest_loose_radius_ = largest_loose;
     largest_sparse_radius_ = largest_sparse;
@@ -91,9 +91,13 @@ class SurfaceSearch {
                 const Take& take);
   Status findWide(const glm::vec3& position, SurfaceCells& cells, SurfaceCell& cell);
   Status cutByFarther(const glm::vec3& position, float reach, SurfaceCells& cells);
+  Result<bool> isDenseAt(const glm::vec3& position, const Neighbour& place,
+                         const SurfaceCells& cells);
+  Result<bool> areAsSparse(const glm::vec3& position, float reach, SurfaceCells& cells);
   void limit(SurfaceCell& cell, bool is_doubtful, float thickness) const;
 
   std::unique_ptr<PagedOctree::Reader> reader_;
+  float widest_ = 0;  // of the root cube
   PlaceIndex index_;
   std::array<CellPlace, PlaceIndex::kGroup> group_, wider_group_;
   SurfaceCells cells_, wider_cells_;  // of a group; with more neighbours
