@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <limits>
 #include <vector>
 
 namespace surfeit {
@@ -46,9 +47,10 @@ inline SheetGap firstGap(const std::vector<float>& heights, float spacing, float
 // Drops what lies above (`side` 1) or below (-1) the first gap on that side. What lies only far
 // beside the place may belong to a slope: a sheet that goes has something steeply above the place.
 // A few places are strays of their surface, not a sheet, unless they `may_be_few`: then all that is
-// beyond must be thin beside the gap.
-inline void dropSheet(float side, float spacing, float thickness, bool may_be_few,
-                      std::vector<FlatNeighbour>& flat, std::vector<float>& heights) {
+// beyond must be thin beside the gap. Returns the height from which on all went; infinity: none
+// did.
+inline float dropSheet(float side, float spacing, float thickness, bool may_be_few,
+                       std::vector<FlatNeighbour>& flat, std::vector<float>& heights) {
   heights.clear();
   for (const FlatNeighbour& n : flat) {
     if (side * n.above > 0) heights.push_back(side * n.above);
@@ -56,7 +58,7 @@ inline void dropSheet(float side, float spacing, float thickness, bool may_be_fe
   std::sort(heights.begin(), heights.end());
   const SheetGap gap = firstGap(heights, spacing, thickness);
   const float limit = gap.above;
-  if (limit == 0) return;
+  if (limit == 0) return std::numeric_limits<float>::infinity();
   const auto is_beyond = [&](const FlatNeighbour& n) { return side * n.above >= limit; };
   const bool is_sheet = std::any_of(flat.begin(), flat.end(), [&](const FlatNeighbour& n) {
     return is_beyond(n) && std::abs(n.above) > kSteep * glm::length(n.beside);
@@ -65,9 +67,10 @@ inline void dropSheet(float side, float spacing, float thickness, bool may_be_fe
   const std::ptrdiff_t fewest = std::ptrdiff_t(flat.size()) / 6;
   const bool are_few = std::ptrdiff_t(flat.size()) - beyond < fewest;
   const bool is_clear = limit - gap.below > kGapOverThickness * thickness;
-  if (is_sheet && beyond >= fewest && (!are_few || (may_be_few && is_clear))) {
-    std::erase_if(flat, is_beyond);
-  }
+  const bool goes = is_sheet && beyond >= fewest && (!are_few || (may_be_few && is_clear));
+  if (!goes) return std::numeric_limits<float>::infinity();
+  std::erase_if(flat, is_beyond);
+  return limit;
 }
 
 struct SideGaps {
@@ -103,14 +106,29 @@ inline float thicknessOf(const std::vector<FlatNeighbour>& flat, std::vector<flo
   return std::min(half, .5f * (quartile(3, signed_height) - quartile(1, signed_height)));
 }
 
+// Root mean square of their heights.
+inline float spreadOf(const std::vector<FlatNeighbour>& flat) {
+  float sum = 0;
+  for (const FlatNeighbour& n : flat) sum += n.above * n.above;
+  return flat.empty() ? 0 : std::sqrt(sum / float(flat.size()));
+}
+
+// How far above and below other sheets begin.
+struct OtherSheets {
+  float above = std::numeric_limits<float>::infinity();
+  float below = std::numeric_limits<float>::infinity();
+};
+
 // Drops what lies on other sheets. Lengths are in any unit; `heights` is scratch.
-inline void dropOtherSheets(float spacing, bool may_be_few, std::vector<FlatNeighbour>& flat,
-                            std::vector<float>& heights) {
+inline OtherSheets dropOtherSheets(float spacing, bool may_be_few, std::vector<FlatNeighbour>& flat,
+                                   std::vector<float>& heights) {
   const SideGaps gaps = gapsIn(flat, kNarrowGap * spacing);
-  if (!gaps.above && !gaps.below) return;
+  OtherSheets others;
+  if (!gaps.above && !gaps.below) return others;
   const float thickness = thicknessOf(flat, heights);
-  if (gaps.above) dropSheet(1, spacing, thickness, may_be_few, flat, heights);
-  if (gaps.below) dropSheet(-1, spacing, thickness, may_be_few, flat, heights);
+  if (gaps.above) others.above = dropSheet(1, spacing, thickness, may_be_few, flat, heights);
+  if (gaps.below) others.below = dropSheet(-1, spacing, thickness, may_be_few, flat, heights);
+  return others;
 }
 
 }  // namespace surfeit

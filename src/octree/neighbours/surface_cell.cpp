@@ -73,6 +73,7 @@ struct SurfaceCells::Scratch {
   glm::vec3 own_normal{0}, normal{0};
   TangentFrame frame{glm::vec3(0, 0, 1)};  // of cells that are cut one by one
   CellPolygon polygon;
+  OtherSheets others;         // that neighbours are on
   std::size_t far_count = 0;  // of the sheet, places from farther away
   float neighbour_spacing = 0;
   bool was_touching = false;  // of the cell that was closed last
@@ -105,7 +106,6 @@ struct SurfaceCells::Scratch {
   bool isLost() const;
   void measureSpacing();
   void flattenAll(std::span<const Neighbour> neighbours);
-  float thicknessOfSheet() const;
   bool isAmid(std::span<const Neighbour> neighbours) const;
   SurfaceCell cell() const;
   SurfaceCell cell(float area, const CellMoments& moments) const;
@@ -194,12 +194,14 @@ void SurfaceCells::Scratch::flattenAll(std::span<const Neighbour> neighbours) {
   }
   flat.resize(count);
   // Without a gap below anything there are no other sheets
+  others = {};
   if (fits.highest[lane] > kNarrowGap * spacing) {
-    dropOtherSheets(spacing, has_normal, flat, heights);
+    others = dropOtherSheets(spacing, has_normal, flat, heights);
   }
   is_apart[lane] = flat.size() < neighbours.size() / 6;
-  sheet_thickness[lane] = count < neighbours.size() ? thicknessOfSheet() : -1;
-  is_lone[lane] = is_apart[lane] || (count < neighbours.size() && isAmid(neighbours));
+  const bool is_known = has_normal && flat.size() < neighbours.size();
+  sheet_thickness[lane] = is_known ? spreadOf(flat) / spacingOf(float(flat.size())) : -1;
+  is_lone[lane] = is_apart[lane] || (is_known && isAmid(neighbours));
 }
 
 // Whether neighbours that face elsewhere lie on both sides: around an edge they lie on one.
@@ -210,14 +212,6 @@ bool SurfaceCells::Scratch::isAmid(std::span<const Neighbour> neighbours) const 
     low = std::min(low, fits.above[i][lane]), high = std::max(high, fits.above[i][lane]);
   }
   return std::min(-low, high) > kNarrowGap * spacing;
-}
-
-// How thick the own sheet is, root mean square, over its spacing.
-float SurfaceCells::Scratch::thicknessOfSheet() const {
-  if (flat.empty()) return 0;
-  float sum = 0;
-  for (const FlatNeighbour& n : flat) sum += n.above * n.above;
-  return std::sqrt(sum / float(flat.size())) / spacingOf(float(flat.size()));
 }
 
 // Neighbours on other sheets are infinitely far.
@@ -388,8 +382,10 @@ bool SurfaceCells::mayCut(const glm::vec3& centre, float radius) const {
 bool SurfaceCells::wouldCut(const Neighbour& place) const {
   const Scratch& at = *scratch_;
   const FlatNeighbour flat = at.flatten(place.offset);
+  // Alone before a denser sheet, a place must not take what that has farther away for its own
+  const bool is_nearer = flat.above < .5f * at.others.above && -flat.above < .5f * at.others.below;
   return at.mayShareSheet(place) && std::abs(flat.above) < kSteep * glm::length(flat.beside) &&
-         at.polygon.wouldCut(flat.beside);
+         (is_nearer || !at.is_apart[at.lane]) && at.polygon.wouldCut(flat.beside);
 }
 
 bool SurfaceCells::cut(const Neighbour& place) {
