@@ -23,10 +23,6 @@ constexpr int kMostFarther = 32;
 // Strays: radii of open cells are limited to this many times the distance of the neighbours from
 // each other.
 constexpr float kOpenLimit = 4;
-// Of the reach of the neighbours: a part of the scene to look in first. All of it is looked in
-// where fewer places cut a cell.
-constexpr float kWide = 4;
-constexpr std::size_t kEnoughCutters = 3;
 // Of the distance to a place: where others are nearer to it than this, places are denser there.
 constexpr float kAsSparse = 0.25f;
 
@@ -163,7 +159,7 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
     }
     cell = cells.closed();
     if (has_normal && (!cell.is_settled || cell.area == 0)) {
-      SURFEIT_RETURN_IF_ERROR(findWide(place.spot.position, reach, cells, cell));
+      SURFEIT_RETURN_IF_ERROR(findWide(place.spot.position, cells, cell));
     }
     // Along a row places are close to each other, but not across
     if (has_normal && !is_on_row) {
@@ -223,23 +219,9 @@ Status SurfaceSearch::cutByFarther(const glm::vec3& position, float reach, Surfa
 }
 
 // Of a place beside something much denser all its neighbours may be of that, or of another sheet.
-// What is found farther away counts where it is all around: in a part of the scene, and in all of
-// it where that tells too little.
-Status SurfaceSearch::findWide(const glm::vec3& position, float reach, SurfaceCells& cells,
-                               SurfaceCell& cell) {
-  for (const float radius : {kWide * reach, widest_}) {
-    if (!cells.widen(std::min(radius, widest_))) return {};
-    SURFEIT_RETURN_IF_ERROR(cutAtCorners(position, cells));
-    SURFEIT_RETURN_IF_ERROR(cutByFarther(position, 0, cells));
-    const SurfaceCell wide = cells.closedWide();
-    if (wide.is_settled || cell.area == 0) cell = wide;
-    if (wide.is_settled || cells.cutters().size() >= kEnoughCutters) return {};
-  }
-  return {};
-}
-
-// Cuts the farthest corner of the cell by the nearest place there, as long as there is one.
-Status SurfaceSearch::cutAtCorners(const glm::vec3& position, SurfaceCells& cells) {
+// What is found farther away counts where it is all around.
+Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, SurfaceCell& cell) {
+  if (!cells.widen(widest_)) return {};
   for (int i = 0; i < kMostFarther; ++i) {
     const glm::vec3 corner = cells.farthestCorner();
     SURFEIT_ASSIGN_OR_RETURN(
@@ -256,6 +238,9 @@ Status SurfaceSearch::cutAtCorners(const glm::vec3& position, SurfaceCells& cell
     place->offset += corner;
     if (!cells.cut(*place)) break;
   }
+  SURFEIT_RETURN_IF_ERROR(cutByFarther(position, 0, cells));
+  const SurfaceCell wide = cells.closedWide();
+  if (wide.is_settled || cell.area == 0) cell = wide;
   return {};
 }
 

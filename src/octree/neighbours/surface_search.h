@@ -89,8 +89,7 @@ class SurfaceSearch {
   Status findOpen(const Take& take);
   Status finish(const OpenPlace& place, SurfaceCell cell, float reach, SurfaceCells& cells,
                 const Take& take);
-  Status findWide(const glm::vec3& position, float reach, SurfaceCells& cells, SurfaceCell& cell);
-  Status cutAtCorners(const glm::vec3& position, SurfaceCells& cells);
+  Status findWide(const glm::vec3& position, SurfaceCells& cells, SurfaceCell& cell);
   Status cutByFarther(const glm::vec3& position, float reach, SurfaceCells& cells);
   Result<bool> isDenseAt(const glm::vec3& position, const Neighbour& place,
                          const SurfaceCells& cells);
