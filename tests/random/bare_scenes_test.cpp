@@ -25,11 +25,7 @@ TEST(BareScenes, ComeCloseToTheSameWithSizes) {
     const RandomScene sized = makeRandomScene(seed, {.density = 2, .without_noise = true});
     const RandomScene bare = sized.withoutSizes(false);
     if (bare.surfels.empty()) continue;
-    std::uint64_t surfaces = 0;
-    for (std::size_t i = 0; i < sized.ingredients.size(); ++i) {
-      if (sized.ingredients[i].is_surface) surfaces |= std::uint64_t{1} << i;
-    }
-    const auto right = IndexedScene::make(sized.only(surfaces).surfels);
+    const auto right = IndexedScene::make(sized.onlySurfaces().surfels);
     const auto found = IndexedScene::make(bare.surfels);
     ASSERT_TRUE(right.ok() && found.ok()) << seed;
     const std::vector<LocalReceiver> receivers = sized.plainReceivers();

@@ -377,12 +377,16 @@ RandomScene RandomScene::only(std::uint64_t kept) const {
   return scene;
 }
 
-RandomScene RandomScene::withoutSizes(bool keeps_areas) const {
+RandomScene RandomScene::onlySurfaces() const {
   std::uint64_t kept = 0;
   for (std::size_t i = 0; i < ingredients.size(); ++i) {
     if (ingredients[i].is_surface) kept |= std::uint64_t{1} << i;
   }
-  RandomScene scene = only(kept);
+  return only(kept);
+}
+
+RandomScene RandomScene::withoutSizes(bool keeps_areas) const {
+  RandomScene scene = onlySurfaces();
   for (Surfel& surfel : scene.surfels) {
     surfel.radius = 0;
     if (!keeps_areas) surfel.area = 0;

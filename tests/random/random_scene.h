@@ -58,7 +58,9 @@ struct RandomScene {
   // Surfels and true geometry of the ingredients in `kept`, a set; receivers stay where they are.
   // Numbers of ingredients stay as well.
   RandomScene only(std::uint64_t kept) const;
-  // Without leaves, hair and points, and with surfels whose radii, or areas too, are not known.
+  // Without leaves, hair and points.
+  RandomScene onlySurfaces() const;
+  // The same of surfels whose radii, or areas too, are not known.
   RandomScene withoutSizes(bool keeps_areas) const;
   std::vector<LocalReceiver> plainReceivers() const;
 };

@@ -369,9 +369,7 @@ bool SurfaceCells::widen(float radius) {
 glm::vec3 SurfaceCells::farthestCorner() const {
   const Scratch& at = *scratch_;
   const std::span<const glm::vec2> corners = at.polygon.corners();
-  const glm::vec2 corner = *std::max_element(
-      corners.begin(), corners.end(),
-      [](const glm::vec2& a, const glm::vec2& b) { return glm::dot(a, a) < glm::dot(b, b); });
+  const glm::vec2 corner = *std::max_element(corners.begin(), corners.end(), isNearer);
   return at.unit * (corner.x * at.frame.tangent + corner.y * at.frame.bitangent);
 }
 

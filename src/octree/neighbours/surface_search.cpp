@@ -192,8 +192,9 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
 void SurfaceSearch::limit(SurfaceCell& cell, bool is_doubtful, float thickness) const {
   float largest = std::numeric_limits<float>::infinity();
   if (!cell.is_settled) largest = kOpenLimit * cell.neighbour_spacing;
-  if (is_doubtful || std::isinf(cell.neighbour_spacing))
+  if (is_doubtful || std::isinf(cell.neighbour_spacing)) {
     largest = std::min(largest, largest_sparse_radius_);
+  }
   if (thickness > kLooseThickness) largest = std::min(largest, largest_loose_radius_);
   if (cell.radius <= largest) return;
   cell.middle = glm::vec3(0);
@@ -244,8 +245,8 @@ Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, S
   return {};
 }
 
-// Whether three places, since scans come in pairs, lie near to one on its sheet beside its
-// distance.
+// Whether the sheet of a place far away is dense there: three others lie closer to it than a part
+// of its distance. Three, since scans come in pairs.
 Result<bool> SurfaceSearch::isDenseAt(const glm::vec3& position, const Neighbour& place,
                                       const SurfaceCells& cells) {
   const float reach = kAsSparse * glm::length(place.offset);
@@ -270,8 +271,8 @@ Result<bool> SurfaceSearch::isDenseAt(const glm::vec3& position, const Neighbour
   return true;
 }
 
-// Whether places that cut the cell from far away are on its sheet: a third of them are about as far
-// from others there as from the place. Those of something dense say nothing about what is between.
+// Whether places that cut the cell from far away are on its sheet: two of them, or a third, are
+// about as far from others there as from the place. Dense ones say nothing about what is between.
 Result<bool> SurfaceSearch::areAsSparse(const glm::vec3& position, float reach,
                                         SurfaceCells& cells) {
   const std::span<const Neighbour> cutters = cells.cutters();
