@@ -20,7 +20,7 @@ struct Ribbon {
 
   static Ribbon of(const Surfel& surfel) {
     Ribbon ribbon;
-    if (surfel.long_side == kNoLongSide || surfel.isSphere()) return ribbon;
+    if (!hasLongSide(surfel) || surfel.isSphere()) return ribbon;
     const glm::vec3 side = directionOf(surfel.long_side);
     const glm::vec3 in_plane = side - glm::dot(side, surfel.normal) * surfel.normal;
     const float cosine = glm::length(in_plane);

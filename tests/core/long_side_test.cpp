@@ -40,7 +40,7 @@ TEST(LongSide, EveryCodeThatAPageMayHoldComesBack) {
   for (std::uint32_t code = 0; code < 0x10000; ++code) {
     const auto direction = static_cast<std::uint16_t>(code);
     const auto elongation = static_cast<std::uint8_t>(code * 7 >> 3);
-    if (direction == kNoLongSide || !isLongSide(direction)) continue;
+    if (!isDirection(direction) || !isLongSide(direction)) continue;
     surfel.long_side = direction;
     surfel.elongation = elongation;
     Surfel again;
@@ -66,7 +66,6 @@ TEST(LongSide, ElongationIsLengthOverWidth) {
 
 TEST(LongSide, PagesHoldNoHalfDirections) {
   EXPECT_TRUE(isLongSide(kNoLongSide));
-  EXPECT_FALSE(isLongSide(0x0100));
   EXPECT_FALSE(isLongSide(0x0001));
   EXPECT_TRUE(isLongSide(0x0101));
 }
@@ -89,14 +88,41 @@ TEST(LongSide, DisksMaySharePieces) {
   EXPECT_EQ(sharersOf(surfel), 1);
 }
 
+// Of disks the direction's bytes are the cell that a tile of a surface hides.
+TEST(LongSide, DisksMayBeTilesOfACell) {
+  Surfel surfel;
+  surfel.area = 0.5f;
+  EXPECT_FALSE(isTile(surfel));
+  EXPECT_EQ(tileShare(surfel), 1);
+  for (const float cell : {0.05f, 0.4f, 0.5f, 1.3f, 6.f}) {
+    setTile(cell, surfel);
+    EXPECT_TRUE(isTile(surfel) && isLongSide(surfel.long_side));
+    EXPECT_NEAR(tileShare(surfel) * surfel.area, cell, 0.011f * cell);
+    EXPECT_FALSE(hasLongSide(surfel));
+    EXPECT_EQ(directionOf(surfel.long_side), glm::vec3(0));
+    EXPECT_EQ(longSideOf(surfel), glm::vec3(0));
+    EXPECT_EQ(sharersOf(surfel), 1);
+  }
+  setTile(1e9f, surfel);
+  EXPECT_NEAR(tileShare(surfel), 16, 0.5f);
+  setTile(1e-9f, surfel);
+  EXPECT_NEAR(tileShare(surfel), 1 / 16.f, 0.01f);
+  setSharers(4, surfel);  // both
+  EXPECT_EQ(sharersOf(surfel), 4);
+  EXPECT_NEAR(tileShare(surfel), 1 / 16.f, 0.01f);
+}
+
 TEST(LongSide, RectanglesShareNothing) {
   Surfel surfel;
   surfel.area = 0.2f;
   setLongSide({0, 2, 0}, surfel);
   const Surfel before = surfel;
   setSharers(4, surfel);
+  setTile(3, surfel);
   EXPECT_EQ(surfel.elongation, before.elongation);
+  EXPECT_EQ(surfel.long_side, before.long_side);
   EXPECT_EQ(sharersOf(surfel), 1);
+  EXPECT_FALSE(isTile(surfel));
 }
 
 }  // namespace

@@ -77,7 +77,7 @@ TEST(SurfelGroup, LongSidesAreExactWhenQuantized) {
 
 TEST(SurfelGroup, DecodeRejectsLongSidesThatThereAreNot) {
   const PageForm form = {false, false, false, true};
-  for (const auto& [direction, elongation] : {std::pair{0x0100, 0}, {0x0007, 3}}) {
+  for (const auto& [direction, elongation] : {std::pair{0x0001, 0}, {0x0007, 3}}) {
     std::vector<Surfel> cloud = withLongSides(randomCloud(20));
     cloud[7].long_side = static_cast<std::uint16_t>(direction);
     cloud[7].elongation = static_cast<std::uint8_t>(elongation);
@@ -89,15 +89,26 @@ TEST(SurfelGroup, DecodeRejectsLongSidesThatThereAreNot) {
   }
 }
 
-TEST(SurfelGroup, DecodeRejectsSpheresThatShareAPiece) {
+TEST(SurfelGroup, DecodeRejectsSpheresThatShareAPieceOrAreTiles) {
   const PageForm form = {false, false, false, true};
-  std::vector<Surfel> cloud = randomCloud(20), found(20);
-  for (Surfel& surfel : cloud) surfel.long_side = 0, surfel.elongation = 64;
-  cloud[7].flags = kSurfelSphere;
-  std::vector<std::byte> payload;
-  encodeSurfelGroup(cloud, form, payload);
-  EXPECT_EQ(decodeSurfelGroup(payload, form, found).status().message(),
-            "surfel group: damaged field long_side");
+  for (const auto& [tile, elongation] : {std::pair{0x0000, 64}, {0x8000, 0}}) {
+    std::vector<Surfel> cloud = randomCloud(20), found(20);
+    ASSERT_FALSE(cloud[7].isSphere());
+    for (Surfel& surfel : cloud) {
+      if (surfel.isSphere()) continue;
+      surfel.long_side = static_cast<std::uint16_t>(tile);
+      surfel.elongation = static_cast<std::uint8_t>(elongation);
+    }
+    std::vector<std::byte> payload;
+    encodeSurfelGroup(cloud, form, payload);
+    EXPECT_TRUE(decodeSurfelGroup(payload, form, found).ok());
+    EXPECT_EQ(found[7].long_side, tile);
+    cloud[7].flags = kSurfelSphere;
+    payload.clear();
+    encodeSurfelGroup(cloud, form, payload);
+    EXPECT_EQ(decodeSurfelGroup(payload, form, found).status().message(),
+              "surfel group: damaged field long_side");
+  }
 }
 
 TEST(SurfelGroup, DecodeRejectsGroupsThatThereAreNot) {

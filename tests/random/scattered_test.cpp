@@ -130,29 +130,35 @@ void expectCovering(const std::vector<Surfel>& cloud, const glm::mat3& turn,
   }
 }
 
-// Sizes that index finds: each disk stands in the middle of its cell, so they leave fewer holes.
+// Sizes that index finds: each disk stands in the middle of its cell and hides all of it.
 TEST(Scattered, SquaresWithoutSizesCoverFromTheirSurfaceOn) {
   for (const glm::mat3& turn : {glm::mat3(1), slanted()}) {
-    std::vector<Surfel> cloud = scatteredSquare(4000, false, turn);
-    for (Surfel& surfel : cloud) surfel.area = surfel.radius = 0;
-    // At the places that were given .07, .05, .035, .013
-    expectCovering(cloud, turn, {{.3f, .016}, {1.f, .009}, {3.f, .006}, {8.f, .003}}, .007);
+    for (const bool is_two_sided : {false, true}) {
+      std::vector<Surfel> cloud = scatteredSquare(4000, is_two_sided, turn);
+      for (Surfel& surfel : cloud) surfel.area = surfel.radius = 0;
+      // At the places that were given .07, .05, .035, .013; of disks that cover their areas .075,
+      // .07, .06, .006
+      expectCovering(cloud, turn, {{.3f, .016}, {1.f, .009}, {3.f, .006}, {8.f, .006}}, .007);
+    }
   }
 }
 
-// Areas that are not those of the cells: each surfel has the same part of the square. Disks reach
-// as far as the cells, but cover as much as their areas, and some cells are larger.
+// Areas that are not those of the cells: each surfel has the same part of the square, and hides its
+// cell all the same.
 TEST(Scattered, SquaresWithAreasAloneLeaveFewHoles) {
   for (const glm::mat3& turn : {glm::mat3(1), slanted()}) {
-    std::vector<Surfel> cloud = scatteredSquare(4000, false, turn);
-    for (Surfel& surfel : cloud) surfel.radius = 0;
-    // Disks of twice the area around the places: .32, .23, .18, .10
-    expectCovering(cloud, turn, {{.3f, .12}, {1.f, .09}, {3.f, .065}, {8.f, .042}}, .06);
+    for (const bool is_two_sided : {false, true}) {
+      std::vector<Surfel> cloud = scatteredSquare(4000, is_two_sided, turn);
+      for (Surfel& surfel : cloud) surfel.radius = 0;
+      // Disks of twice the area around the places: .32, .23, .18, .10; of disks that cover their
+      // areas .10, .07, .06, .03, if two-sided .29, .24, .18, .07
+      expectCovering(cloud, turn, {{.3f, .023}, {1.f, .012}, {3.f, .009}, {8.f, .013}}, .012);
+    }
   }
 }
 
-// Surfels at one place share its cell: each is a disk of all of it that hides its part. (Leaves hold
-// fewer places then, and hold the disks back.)
+// Surfels at one place share its cell: each is a disk of all of it that hides its part. (Leaves
+// hold fewer places then, and hold the disks back.)
 TEST(Scattered, PlacesThatComeSeveralTimesCoverAsOnce) {
   for (const glm::mat3& turn : {glm::mat3(1), slanted()}) {
     for (const int times : {2, 4}) {
@@ -164,7 +170,28 @@ TEST(Scattered, PlacesThatComeSeveralTimesCoverAsOnce) {
       for (Surfel& surfel : with_areas) surfel.area /= float(times), surfel.radius = 0;
       std::printf("%d times\n", times);
       expectCovering(bare, turn, {{.3f, .016}, {1.f, .012}, {3.f, .012}, {8.f, .006}}, .011);
-      expectCovering(with_areas, turn, {{.3f, .13}, {1.f, .095}, {3.f, .08}, {8.f, .042}}, .075);
+      expectCovering(with_areas, turn, {{.3f, .05}, {1.f, .028}, {3.f, .024}, {8.f, .02}}, .022);
+    }
+  }
+}
+
+// The light of disks that hide cells is that of their areas: so much as of the true square.
+TEST(Scattered, SquaresWithAreasAloneSendWhatTheirAreasSend) {
+  for (const bool is_two_sided : {false, true}) {
+    std::vector<Surfel> cloud = scatteredSquare(4000, is_two_sided, slanted());
+    for (Surfel& surfel : cloud) surfel.radius = 0, surfel.radiosity = glm::vec3(1, 2, 3);
+    const auto scene = IndexedScene::make(cloud);
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    for (const float distance : {.03f, .1f, .3f, 1.f, 10.f}) {
+      const glm::vec3 eye(0, -distance, 1);
+      const std::vector<LocalReceiver> receivers = {
+          {slanted() * eye, slanted() * glm::vec3(0, 1, 0)}};
+      const auto found = (*scene)->gatherAlone(receivers, {GatherMode::kBleeding, {}});
+      ASSERT_TRUE(found.ok());
+      const double truth = trueOcclusion(eye);
+      std::printf("%.2f away: %.3f of the light\n", double(distance),
+                  double((*found)[0].irradiance.y) / (2 * truth));
+      EXPECT_NEAR(double((*found)[0].irradiance.y) / (2 * truth), 1, .03) << distance;
     }
   }
 }

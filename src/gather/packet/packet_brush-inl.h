@@ -197,7 +197,7 @@ class Brush {
         hn::MulAdd(Splat(patch.disk_area), cosine, hn::Mul(Splat(patch.round_area), distance)),
         hn::Mul(Splat(patch.most_area), distance));
     const V inverse_w = Reciprocal(hn::IfThenElse(seen, offset.z, Splat(1)));
-    V part = hn::Sub(Splat(1), sight.near_part);
+    V part = hn::NegMulAdd(Splat(patch.filled), sight.near_part, Splat(patch.filled));
     const Parallelogram shape =
         OnFace(patch, offset, hn::IfThenElseZero(seen, area), inverse_w, part);
     DrawShape(shape, seen, MakeCover(patch, sight, distance, part), patch.is_hull);

@@ -45,6 +45,7 @@ struct alignas(64) Patch {
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
   float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
+  float filled = 1;   // of its outline in pixels: less of a tile that is larger than its area
   bool lets_through = false;  // it is translucent, or a fence: nothing closes what it leaves open
   // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
   // alone

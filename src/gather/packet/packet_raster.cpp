@@ -315,15 +315,19 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     patch.position = surfel.position;
     patch.normal = surfel.normal;
     const Ribbon ribbon = Ribbon::of(surfel);
-    const float sharers = sharersOf(surfel), piece_area = sharers * surfel.area;
+    const float sharers = sharersOf(surfel);
+    float piece_area = sharers * surfel.area;
     patch.radius = patch.reach = std::max(surfel.radius, ribbon.radius());
     if (surfel.isLoose() && !ribbon.isEmpty()) patch.reach = 0.7071f * ribbon.width;
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
       // Only opaque tiles may cover more than they should to leave no gaps
-      const bool is_part = surfel.isTwoSided() && coversInPart(patch.radius, piece_area);
+      const bool is_part =
+          surfel.isTwoSided() && !isTile(surfel) && coversInPart(patch.radius, piece_area);
       const bool is_exact = surfel.isLoose() || is_part || lets_through;
-      patch.soft_peak = softDiskPeak(patch.radius, piece_area, is_exact);
+      const float share = is_exact ? 1 : tileShare(surfel);
+      patch.soft_peak = softDiskPeak(patch.radius, share * piece_area, is_exact);
+      if (share > 1) piece_area *= share, patch.filled = 1 / share;
     } else {
       patch.shape = ribbon.shape();
       patch.is_ribbon = true;

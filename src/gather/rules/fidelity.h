@@ -83,7 +83,8 @@ struct Fidelity {
   // --- The near field ("The raster cube") ---
 
   // Times the area of a surfel that its soft disk covers, so that disks of a surface leave no gaps;
-  // loose and translucent ones cover their area, and two-sided ones that even this does not fill.
+  // loose and translucent ones cover their area, and two-sided ones that even this does not fill
+  // and that are no tiles (core/long_side.h).
   // (AO RMSE with disks that cover fully, 1, 1.6, 2: lion .0164, .0115, .0108, .0110; bunny .0050,
   // .0070, .0031, .0031.)
   float soft_disk_area = 1.7f;

@@ -29,6 +29,7 @@ GroupPlace SceneWriter::addSiblings(int level, std::span<const LevelNode> siblin
     header_.has_layers |= (node.marks & kSurfelHiddenSides) != 0;
     header_.has_loose |= (node.marks & kSurfelLoose) != 0;
     header_.has_sharers |= (node.marks & kNodeShares) != 0;
+    header_.has_tiles |= (node.marks & kNodeTiles) != 0;
   }
   return place;
 }

@@ -182,6 +182,7 @@ void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& lea
   for (const Surfel& surfel : surfels) {
     leaf.node.marks |= surfel.flags & kSurfelMarks;
     if (sharersOf(surfel) > 1) leaf.node.marks |= kNodeShares;
+    if (isTile(surfel)) leaf.node.marks |= kNodeTiles;
   }
   const GroupPlace place = placeSurfels(begin, end);
   node.page = place.page;

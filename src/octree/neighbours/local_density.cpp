@@ -272,6 +272,8 @@ void SizedSurfelStream::take(std::size_t i, const SurfaceAt& surface) {
   moveToMiddle(i, surface.middle);
   moveToSurface(i, surface.height);
   setSharers(surface.sharers, surfel);
+  // One-sided disks are tiles anyway
+  if (surfel.isTwoSided() && surface.area > 0) setTile(surface.area, surfel);
 }
 
 // The disks of surfels with an area alone, when the cells of all are known.
@@ -295,10 +297,11 @@ void SizedSurfelStream::shapeGiven() {
       moveToMiddle(i, cell.middle);
       moveToSurface(i, cell.height);
       setSharers(cell.sharers, surfel);
+      setTile(cell.area, surfel);
     }
     const float radius = radiusOfArea(pieceArea(surfel), overlap_);
     if (!(cell.area > 0)) surfel.radius = radius;
-    if (surfel.long_side == kNoLongSide) {
+    if (!hasLongSide(surfel)) {
       surfel.radius = std::min(surfel.radius, std::sqrt(kMostOverArea) * radius);
     }
   }

@@ -34,7 +34,8 @@ enum FeatureBits : std::uint32_t {
   kHasLoose = 8,
   kHasRectangles = 16,
   kHasSharers = 32,
-  kAllFeatures = 63
+  kHasTiles = 64,
+  kAllFeatures = 127
 };
 
 // Largest groups that a reader accepts: they bound what a page can make it allocate.
@@ -143,7 +144,7 @@ std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
   writer.put((header.full_precision ? kFullPrecision : 0u) | (header.has_lobes ? kHasLobes : 0u) |
              (header.has_layers ? kHasLayers : 0u) | (header.has_loose ? kHasLoose : 0u) |
              (header.has_rectangles ? kHasRectangles : 0u) |
-             (header.has_sharers ? kHasSharers : 0u));
+             (header.has_sharers ? kHasSharers : 0u) | (header.has_tiles ? kHasTiles : 0u));
   writer.put(channelBits(header.channels));
   writer.put(header.surfel_count);
   writer.put(header.node_count);
@@ -177,6 +178,7 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
   header.has_loose = (features & kHasLoose) != 0;
   header.has_rectangles = (features & kHasRectangles) != 0;
   header.has_sharers = (features & kHasSharers) != 0;
+  header.has_tiles = (features & kHasTiles) != 0;
   const std::uint32_t channels = reader.get<std::uint32_t>();
   if ((channels & ~kAllChannels) != 0) {
     return wrongField("channel bits", fmt::format("{:#x}", channels), "known channels");

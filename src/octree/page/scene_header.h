@@ -48,6 +48,7 @@ struct SceneHeader {
   // Covariances take surfels with a long side for rectangles, not for disks. Set by SceneWriter.
   bool has_rectangles = false;
   bool has_sharers = false;  // some surfels share their piece of surface (core/long_side.h)
+  bool has_tiles = false;    // of some disks neighbours tell how much they hide (the same)
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 

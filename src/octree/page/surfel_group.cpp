@@ -161,7 +161,8 @@ Status decodeOptional(PayloadReader& reader, const PageForm& form, const Columns
     for (std::size_t i = 0; i < columns.group.size(); ++i) {
       const std::uint16_t side = columns.longSideAt(i);
       const bool is_sphere = (columns.flags[i] & kSurfelSphere) != 0;
-      const bool is_shared = side == kNoLongSide && columns.long_side[2][i] != 0;
+      const bool is_shared =
+          !isDirection(side) && (side != kNoLongSide || columns.long_side[2][i] != 0);
       if (!isLongSide(side) || (is_sphere && is_shared)) return damaged("long_side");
     }
   }

@@ -10,8 +10,8 @@ namespace surfeit {
 // What the builder finds of a surfel and of those around it.
 inline constexpr std::uint16_t kSurfelHiddenSides = kSurfelHiddenFront | kSurfelHiddenBack;
 inline constexpr std::uint16_t kSurfelMarks = kSurfelHiddenSides | kSurfelLoose | kSurfelLone;
-// Of a node alone: surfels below share pieces (core/long_side.h).
-inline constexpr std::uint16_t kNodeShares = 1u << 15;
+// Of a node alone: surfels below share pieces, or are tiles (core/long_side.h).
+inline constexpr std::uint16_t kNodeShares = 1u << 15, kNodeTiles = 1u << 14;
 inline constexpr std::uint32_t kSurfelNeedsSize = 1u << 7, kSurfelNeedsSide = 1u << 6;
 // Radius and area of such a surfel meanwhile: positive, because pages hold nothing else.
 inline constexpr float kPlaceholderSize = 1e-30f;
