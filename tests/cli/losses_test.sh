@@ -169,6 +169,27 @@ whatIsSkippedIsToldOnce() {
   run 3 index far.csv -o strict.sft --strict
 }
 
+# Clouds have no column for it; index finds it again.
+whatDisksHideIsTold() {
+  local loss="how much of its disk each surfel hides"
+  generate city.ply --surfels 3k
+  run 0 index city.ply -o sized.sft
+  run 0 convert sized.sft -o sized.ply
+  saysNot "$loss"
+  # Areas that are not those of the neighbourhood, and places that come twice
+  run 0 index city.ply -o tiles.sft --channels radius=-
+  run 0 index city.ply city.ply -o twice.sft --channels area=-,radius=-
+  for scene in tiles twice; do
+    run 0 verify $scene.sft
+    run 0 convert $scene.sft -o $scene.ply
+    saysOnce "$loss"
+    says "index --channels radius=- finds it again"
+    run 0 index $scene.ply -o again.sft --channels radius=-
+    run 0 convert again.sft -o again.ply
+    says "$loss"
+  done
+}
+
 scenesUnderNamesOfCloudsAreTold() {
   generate city.ply --surfels 100
   run 0 index city.ply -o odd.PLY.gz

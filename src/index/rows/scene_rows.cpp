@@ -60,6 +60,11 @@ class SceneRowReader final : public RowReader {
       notes.emplace_back(
           "lobes of glossy bounces are left out: radiosity is that of all directions together");
     }
+    if (scene_.header().has_sharers || scene_.header().has_tiles) {
+      notes.emplace_back(
+          "how much of its disk each surfel hides, where several share a place or areas are not "
+          "those of the neighbourhood, is left out; index --channels radius=- finds it again");
+    }
     return notes;
   }
 
