@@ -169,16 +169,13 @@ inline V NearPart(const Patch& patch, const Sight& sight) {
 }
 
 // Gives a two-sided disk its bias, and tells the lanes that may see it. One within 45 degrees of
-// the receiver's plane is of the receiver's own sheet if it is no higher than the bias, or if its
-// plane is closer to the receiver than half of that: than to where rays begin. It is seen from the
-// side of the receiver's normal alone; all others have no bias. Layers are told apart by gaps
-// kClearGap times as wide as they are thick, so of layers that part of the bias decides.
+// the receiver's plane that is no higher than the bias is of the receiver's own sheet. That is seen
+// from the side of the receiver's normal alone; all others have no bias. Layers are told apart by
+// gaps kClearGap times as wide as they are thick, so of layers that part of the bias decides.
 HWY_INLINE M ShowsOfTwoSided(Sight& sight, V cosine, float most, bool is_layered) {
-  const float thickness = is_layered ? most / kClearGap : most;
-  const M is_below = hn::Le(sight.height, Splat(thickness));
-  const M holds_it = hn::Le(hn::Abs(sight.facing), Splat(0.5f * thickness));
+  const V thickness = Splat(is_layered ? most / kClearGap : most);
   const M is_own =
-      hn::And(hn::Gt(hn::Mul(cosine, cosine), Splat(0.5f)), hn::Or(is_below, holds_it));
+      hn::And(hn::Gt(hn::Mul(cosine, cosine), Splat(0.5f)), hn::Le(sight.height, thickness));
   sight.bias = hn::IfThenElseZero(is_own, Splat(most));
   const V facing = hn::NegMulAdd(sight.bias, cosine, sight.facing);  // where rays begin
   return hn::Or(hn::Not(is_own), hn::Lt(hn::Mul(facing, cosine), hn::Zero(D())));

@@ -62,8 +62,9 @@ class SceneRowReader final : public RowReader {
     }
     if (scene_.header().has_sharers || scene_.header().has_tiles) {
       notes.emplace_back(
-          "how much of its disk each surfel hides, where several share a place or areas are not "
-          "those of the neighbourhood, is left out; index --channels radius=- finds it again");
+          "how much of its disk each surfel hides, as index found from its neighbours, is left "
+          "out; "
+          "index --channels radius=- finds it again");
     }
     return notes;
   }
