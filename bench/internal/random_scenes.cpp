@@ -36,6 +36,7 @@ struct RandomScenesOptions {
   Against against = Against::kExact;
   Sizes sizes = Sizes::kGiven;
   bool mixes_sides = false;
+  bool has_opacities = false;
   bool full_precision = false;
   std::uint64_t kept = ~std::uint64_t{0};
   int rays = 4096;
@@ -129,6 +130,7 @@ SeedResult runSeed(const RandomScenesOptions& options, std::uint64_t seed) {
   result.sides = sidesOf(seed, options);
   RandomScene scene = makeRandomScene(seed, options.sampling);
   if (options.kept != ~std::uint64_t{0}) scene = scene.only(options.kept);
+  if (options.has_opacities) scene = scene.withOpacities();
   if (options.sizes != Sizes::kGiven) scene = scene.withoutSizes(options.sizes == Sizes::kAreas);
   result.status = judge(options, scene, result);
   if (!options.write.empty() && result.status.ok()) {
@@ -270,6 +272,7 @@ void addSeedOptions(CLI::App& app, RandomScenesOptions& options) {
       ->capture_default_str();
   app.add_flag("--no-noise", options.sampling.without_noise,
                "Positions and normals of surfels are those of the surfaces");
+  app.add_flag("--opacities", options.has_opacities, "Some surfaces are translucent");
   app.add_flag("--describe", options.describes, "Print what the scenes are made of");
   app.add_option("--worst", options.worst, "Seeds to print, the worst first")
       ->capture_default_str();

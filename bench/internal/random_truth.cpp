@@ -17,15 +17,31 @@ namespace {
 // Spheres closer than so many of their radii are a receiver's own surface (docs/algorithm.md).
 constexpr float kOwnRadii = 3;
 
-// Keeps hits of fronts, or of backs.
-template <bool kFronts>
-void keepSide(const RTCFilterFunctionNArguments* hits) {
+// A ray, and how much of its light passes what it has met.
+struct RayContext {
+  RTCIntersectContext embree;  // first: filters get a pointer to it
+  glm::vec3 open;  // rgb
+};
+
+// What the rays meet, as the user data of a geometry.
+struct MetSurfaces {
+  GatherSides sides = GatherSides::kBoth;
+  std::vector<glm::vec3> opacities;  // of the primitives, rgb
+};
+
+// Keeps hits of the sides that hide, if nothing is seen through them.
+void filterHits(const RTCFilterFunctionNArguments* hits) {
+  const auto& met = *static_cast<const MetSurfaces*>(hits->geometryUserPtr);
+  glm::vec3& open = reinterpret_cast<RayContext*>(hits->context)->open;
   for (unsigned i = 0; i < hits->N; ++i) {
     const float facing =
         RTCRayN_dir_x(hits->ray, hits->N, i) * RTCHitN_Ng_x(hits->hit, hits->N, i) +
         RTCRayN_dir_y(hits->ray, hits->N, i) * RTCHitN_Ng_y(hits->hit, hits->N, i) +
         RTCRayN_dir_z(hits->ray, hits->N, i) * RTCHitN_Ng_z(hits->hit, hits->N, i);
-    if ((facing < 0) != kFronts) hits->valid[i] = 0;
+    const GatherSides side = facing < 0 ? GatherSides::kFront : GatherSides::kBack;
+    const bool counts = met.sides == GatherSides::kBoth || met.sides == side;
+    if (counts) open *= 1.f - met.opacities[RTCHitN_primID(hits->hit, hits->N, i)];
+    if (open != glm::vec3(0)) hits->valid[i] = 0;
   }
 }
 
@@ -51,20 +67,23 @@ class TruthScene {
     return {};
   }
 
-  bool isOpen(const glm::vec3& origin, const glm::vec3& direction) const {
+  // Of all colors together, as occlusion has it.
+  float openPart(const glm::vec3& origin, const glm::vec3& direction) const {
     RTCRay ray{};
     ray.org_x = origin.x, ray.org_y = origin.y, ray.org_z = origin.z;
     ray.dir_x = direction.x, ray.dir_y = direction.y, ray.dir_z = direction.z;
     ray.tfar = std::numeric_limits<float>::infinity();
     ray.mask = ~0u;
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcOccluded1(scene_, &context, &ray);
-    return ray.tfar >= 0;
+    RayContext context{{}, glm::vec3(1)};
+    rtcInitIntersectContext(&context.embree);
+    rtcOccluded1(scene_, &context.embree, &ray);
+    return (context.open.x + context.open.y + context.open.z) / 3;
   }
 
  private:
-  void attach(RTCGeometry geometry) {
+  void attach(RTCGeometry geometry, MetSurfaces& met) {
+    rtcSetGeometryUserData(geometry, &met);
+    rtcSetGeometryOccludedFilterFunction(geometry, filterHits);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene_, geometry);
     rtcReleaseGeometry(geometry);
@@ -88,12 +107,12 @@ class TruthScene {
       std::memcpy(corners + 9 * i, chosen[i]->corners, 3 * sizeof(glm::vec3));
       for (unsigned j = 0; j < 3; ++j) indices[3 * i + j] = unsigned(3 * i) + j;
     }
-    if (sides == GatherSides::kFront) {
-      rtcSetGeometryOccludedFilterFunction(geometry, keepSide<true>);
-    } else if (sides == GatherSides::kBack) {
-      rtcSetGeometryOccludedFilterFunction(geometry, keepSide<false>);
+    MetSurfaces& met = met_[are_two_sided ? 1 : 0];
+    met.sides = sides;
+    for (const RandomTriangle* triangle : chosen) {
+      met.opacities.push_back(scene.ingredients[triangle->ingredient].opacity);
     }
-    attach(geometry);
+    attach(geometry, met);
   }
 
   void addSpheres(const RandomScene& scene) {
@@ -106,12 +125,15 @@ class TruthScene {
       const RandomSphere& sphere = scene.spheres[i];
       const float row[] = {sphere.centre.x, sphere.centre.y, sphere.centre.z, sphere.radius};
       std::copy_n(row, 4, values + 4 * i);
+      met_[2].opacities.push_back(scene.ingredients[sphere.ingredient].opacity);
     }
-    attach(geometry);
+    met_[2].sides = GatherSides::kFront;  // rays leave where they have met already
+    attach(geometry, met_[2]);
   }
 
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
+  MetSurfaces met_[3];  // one-sided triangles, two-sided ones, spheres
 };
 
 bool isOnSpheres(const RandomScene& scene, const LocalReceiver& receiver) {
@@ -150,14 +172,14 @@ Result<std::vector<float>> traceOcclusion(const RandomScene& scene, GatherSides 
     const TangentFrame frame(receiver.isSpherical() ? glm::vec3(0, 0, 1) : receiver.normal);
     const glm::vec3 origin = receiver.position + one.ray_offset * receiver.normal;
     const std::vector<glm::vec3> hemisphere = stratifiedCosineDirections(side, occlusion.size());
-    int hits = 0;
+    double open = 0;
     for (const glm::vec3& local : receiver.isSpherical() ? whole_sphere : hemisphere) {
       const glm::vec3 direction = receiver.isSpherical() ? local
                                                          : local.x * frame.x + local.y * frame.y +
                                                                local.z * receiver.normal;
-      hits += truth.isOpen(origin, direction) ? 0 : 1;
+      open += double(truth.openPart(origin, direction));
     }
-    occlusion.push_back(float(hits) / float(side * side));
+    occlusion.push_back(float(1 - open / (double(side) * side)));
   }
   return occlusion;
 }

@@ -86,6 +86,8 @@ CloudChannels channelsOf(std::span<const Surfel> cloud) {
   channels.two_sided = has([](const Surfel& surfel) { return surfel.isTwoSided(); });
   channels.group = has([](const Surfel& surfel) { return surfel.group != 0; });
   channels.long_side = has([](const Surfel& surfel) { return surfel.long_side != 0; });
+  channels.tint = has([](const Surfel& surfel) { return surfel.isTinted(); });
+  channels.opacity = channels.tint || has([](const auto& one) { return one.transparency != 0; });
   return channels;
 }
 

@@ -394,6 +394,27 @@ RandomScene RandomScene::withoutSizes(bool keeps_areas) const {
   return scene;
 }
 
+RandomScene RandomScene::withOpacities() const {
+  constexpr double kLeast = .05, kMost = .95;
+  RandomScene scene = *this;
+  RandomNumbers random = RandomNumbers(seed).fork(4);
+  const std::size_t always = std::size_t(random.below(int(ingredients.size())));
+  for (std::size_t i = 0; i < ingredients.size(); ++i) {
+    RandomIngredient& one = scene.ingredients[i];
+    const bool is_translucent = random.chance(.6) || i == always, is_tinted = random.chance(.25);
+    const glm::vec3 tint(random.color(kLeast, kMost));
+    if (!is_translucent) continue;
+    one.opacity = is_tinted ? tint : glm::vec3(tint.x);
+    one.text += is_tinted ? fmt::format(", opacity {:.2f} {:.2f} {:.2f}", tint.x, tint.y, tint.z)
+                          : fmt::format(", opacity {:.2f}", tint.x);
+  }
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    const glm::vec3& opacity = scene.ingredients[surfel_ingredients[i]].opacity;
+    scene.surfels[i].setOpacity(opacity.x, opacity.y, opacity.z);
+  }
+  return scene;
+}
+
 std::vector<LocalReceiver> RandomScene::plainReceivers() const {
   std::vector<LocalReceiver> plain;
   for (const RandomReceiver& one : receivers) plain.push_back(one.receiver);

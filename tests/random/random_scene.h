@@ -40,6 +40,7 @@ struct RandomIngredient {
   std::string text;  // "floors 3 x 1,200 surfels, two-sided, noisy"
   std::size_t surfels = 0;
   bool is_surface = true;  // not leaves, hair or points, whose sizes places do not tell
+  glm::vec3 opacity{1};    // rgb
 };
 
 struct RandomScene {
@@ -62,6 +63,8 @@ struct RandomScene {
   RandomScene onlySurfaces() const;
   // The same of surfels whose radii, or areas too, are not known.
   RandomScene withoutSizes(bool keeps_areas) const;
+  // The same with some ingredients, at least one, translucent, a quarter of these tinted.
+  RandomScene withOpacities() const;
   std::vector<LocalReceiver> plainReceivers() const;
 };
 
