@@ -20,7 +20,7 @@ constexpr float kOwnRadii = 3;
 // A ray, and how much of its light passes what it has met.
 struct RayContext {
   RTCIntersectContext embree;  // first: filters get a pointer to it
-  glm::vec3 open;  // rgb
+  glm::vec3 open;              // rgb
 };
 
 // What the rays meet, as the user data of a geometry.

@@ -18,9 +18,11 @@ struct SheetOfDisks {
   float distance = 1, side = .8f, scatter = .3f, half = 8, aside = 0;
   bool is_solid = true;
   bool has_hull = true;
+  float opacity = 1;
+  unsigned seed = 4;
 
   void drawTo(OneRaster& raster, const glm::vec3& radiosity) const {
-    std::mt19937 random(4);
+    std::mt19937 random(seed);
     std::uniform_real_distribution<float> uniform(-1, 1);
     const float step = side * distance / 8;
     const int count = int(2 * half / side);
@@ -33,7 +35,8 @@ struct SheetOfDisks {
       Patch patch = patchAt(direction, {-1, 0, 0}, step * step * direction.x / glm::dot(to, to), 0,
                             .99f * distance, 1.01f * distance);
       patch.is_solid = is_solid;
-      patch.lets_through = !has_hull;
+      patch.has_gaps = !has_hull;
+      patch.opacity = opacity, patch.clear = 1 - opacity;
       patch.radiosity = radiosity;
       raster.add(patch);
     }
@@ -68,6 +71,49 @@ TEST_F(Closing, NothingShinesThroughTheGapsOfASheet) {
     SheetOfDisks{.distance = 3}.drawTo(raster_, kWhite);
     EXPECT_LT(seen(4).x, .003f) << side;
     EXPECT_NEAR(seen(4).y, 1, .003f) << side;
+  }
+}
+
+// A translucent sheet has no gaps, and no places that hide more than it does.
+TEST_F(Closing, TranslucentSheetsHideTheirOpacity) {
+  for (const float side : {.1f, .3f, .8f, 1.7f}) {
+    for (const float opacity : {.1f, .5f, .9f}) {
+      raster_.clear();
+      SheetOfDisks{.side = side, .opacity = opacity}.drawTo(raster_, kWhite);
+      EXPECT_NEAR(seen(4).x, opacity, .01f) << side;
+      EXPECT_NEAR(seen(4).y, opacity, .01f) << side;
+    }
+  }
+}
+
+// Also where two are too close to each other to be two things. (Their areas scatter, and in some
+// pixels they are taken for fewer layers.)
+TEST_F(Closing, SeveralTranslucentSheetsMultiply) {
+  for (const float distance : {1.001f, 3.f}) {
+    for (const float side : {.1f, .3f, .8f}) {
+      for (const float opacity : {.1f, .5f, .9f}) {
+        raster_.clear();
+        SheetOfDisks{.side = side, .opacity = opacity}.drawTo(raster_, kWhite);
+        SheetOfDisks{.distance = distance, .side = side, .opacity = opacity, .seed = 5}.drawTo(
+            raster_, kWhite);
+        EXPECT_NEAR(seen(4).y, 1 - (1 - opacity) * (1 - opacity), distance < 2 ? .05f : .01f)
+            << distance << ' ' << side << ' ' << opacity;
+      }
+    }
+  }
+}
+
+// An opaque one behind a translucent one, or before it, has no gaps either.
+TEST_F(Closing, OpaqueSheetsCloseBeforeAndBehindTranslucentOnes) {
+  for (const float distance : {1.001f, 3.f}) {
+    for (const bool is_first : {true, false}) {
+      raster_.clear();
+      SheetOfDisks{.opacity = is_first ? .5f : 1.f}.drawTo(raster_, dark_);
+      SheetOfDisks{.distance = distance, .opacity = is_first ? 1.f : .5f}.drawTo(raster_, dark_);
+      SheetOfDisks{.distance = 5}.drawTo(raster_, kWhite);
+      EXPECT_LT(seen(4).x, .003f) << distance << ' ' << is_first;
+      EXPECT_NEAR(seen(4).y, 1, .003f) << distance << ' ' << is_first;
+    }
   }
 }
 

@@ -85,7 +85,7 @@ TEST(RasterPixels, PatchesKeepTheirSolidAngleEverywhere) {
       for (const float solid_angle : {1e-4f, .01f, .05f}) {
         raster.clear();
         Patch patch = patchAt(direction, kRound, solid_angle, solid_angle);
-        patch.lets_through = true;  // nothing is closed
+        patch.has_gaps = true;  // nothing is closed
         raster.add(patch);
         // What spills over an edge is drawn as a rectangle instead of a trapezoid, and the part
         // of a pixel that is covered is measured on the face
@@ -183,7 +183,7 @@ Patch quarterPatch(float amount, float begin, float end, const glm::vec3& radios
 TEST(RasterPixels, ThingsCoverEachOtherInsteadOfAdding) {
   OneRaster raster(2);
   Patch without_hull = quarterPatch(.5f, 1, 2, {1, 0, 0});
-  without_hull.lets_through = true;
+  without_hull.has_gaps = true;
   raster.add(without_hull);
   EXPECT_NEAR(raster.coverage(kQuarter), .5f, 1e-5);
   raster.add(quarterPatch(.5f, 2.01f, 3, {0, 1, 0}));  // half of the rest
@@ -239,7 +239,7 @@ double gapsOfFloor(float side_x, float side_y, const SymmetricMatrix& shape) {
       Patch patch = patchAt(direction, {0, 0, 1}, spread * -direction.z, spread);
       patch.shape = shape;
       patch.is_solid = false;
-      patch.lets_through = true;
+      patch.has_gaps = true;
       raster.add(patch);
     }
   }

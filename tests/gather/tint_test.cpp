@@ -164,7 +164,9 @@ TEST_F(Tint, PlatesBehindEachOtherMultiplyInEachColor) {
     for (std::size_t c = 0; c < 3; ++c) {
       const double open = (1 - first[c]) * (1 - second[c]);
       covered += (1 - open) / 3;
-      EXPECT_NEAR(found.irradiance[c], first[c] + (1 - first[c]) * second[c] * 2, .03) << c;
+      // Towards the horizon nodes hold both, and know the mean of their opacities
+      const double limit = max_solid_angle == 0 ? .015 : .045;
+      EXPECT_NEAR(found.irradiance[c], first[c] + (1 - first[c]) * second[c] * 2, limit) << c;
     }
     EXPECT_NEAR(found.occlusion, covered, .01) << max_solid_angle;
   }

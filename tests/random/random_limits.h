@@ -24,6 +24,7 @@ inline constexpr FidelityLimits kFinalLimits = {.002, .008, 0, 0, .0012};
 inline constexpr FidelityLimits kGlossyLimits = {.0075, .045, 0, 0, .007};
 inline constexpr FidelityLimits kConeLimits = {.0045, .02, 0, 0, .007};
 inline constexpr FidelityLimits kFalloffLimits = {.006, .025, 0, 0, .015};
+inline constexpr FidelityLimits kTranslucentLimits = {.0075, .025, 0, 0, .006};
 inline constexpr FidelityLimits kSubsetLimits = {.0045, .025, 0, 0, .0145};
 
 // One bounce, by default against exactly: RMS of irradiance over its mean. Goal: .02.

@@ -109,6 +109,13 @@ TEST_P(RandomScenes, FadingComesCloseToExact) {
   expectFidelity(smallScenes(first(), kFew), "falloff", options, kFalloffLimits);
 }
 
+TEST_P(RandomScenes, TranslucentSurfacesComeCloseToExact) {
+  const auto options = [](const RandomScene& scene) {
+    return bleeding(scene.seed % 3 == 0 ? GatherSides::kBoth : GatherSides::kFront);
+  };
+  expectFidelity(smallScenes(first(), kSome), "opacities", options, kTranslucentLimits, true);
+}
+
 // Every second ingredient is a group that is seen.
 TEST_P(RandomScenes, SubsetsComeCloseToExact) {
   const auto options = [](const RandomScene&) {

@@ -58,13 +58,14 @@ inline std::uint64_t neededIngredients(const RandomScene& scene,
 }
 
 // What to type to see a failure.
-inline std::string reproduction(const RandomScene& scene, std::uint64_t kept) {
+inline std::string reproduction(const RandomScene& scene, std::uint64_t kept, bool has_opacities) {
   std::string numbers;
   for (std::size_t i = 0; i < scene.ingredients.size(); ++i) {
     if ((kept >> i & 1) != 0) numbers += (numbers.empty() ? "" : ",") + std::to_string(i);
   }
   return scene.only(kept).describe() + "random_scenes --seeds " + std::to_string(scene.seed) +
-         " --ingredients " + numbers + " --describe --write DIRECTORY\n";
+         " --ingredients " + numbers + (has_opacities ? " --opacities" : "") +
+         " --describe --write DIRECTORY\n";
 }
 
 // The first scenes from a seed on that are quick to gather exactly.
@@ -93,11 +94,13 @@ inline void dropTurnedAway(RandomScene& scene, const GatherOptions& options) {
 }
 
 inline void expectFidelity(const std::vector<std::uint64_t>& seeds, const char* name,
-                           const SceneOptionsOf& optionsOf, const FidelityLimits& limits) {
+                           const SceneOptionsOf& optionsOf, const FidelityLimits& limits,
+                           bool has_opacities = false) {
   std::vector<double> rms, light;
   double worst = 0;
   for (const std::uint64_t seed : seeds) {
     RandomScene scene = makeRandomScene(seed);
+    if (has_opacities) scene = scene.withOpacities();
     dropTurnedAway(scene, optionsOf(scene));
     const auto fails = [&](const ResultDifferences& found) {
       return !(found.rms <= limits.rms) || !(found.worst <= limits.worst);
@@ -112,7 +115,7 @@ inline void expectFidelity(const std::vector<std::uint64_t>& seeds, const char* 
     });
     ADD_FAILURE() << name << ": rms " << found.rms << ", worst " << found.worst << " at receiver "
                   << found.worst_receiver << '\n'
-                  << reproduction(scene, needed);
+                  << reproduction(scene, needed, has_opacities);
   }
   const auto above = [&](double limit) {
     return int(std::count_if(rms.begin(), rms.end(), [=](double one) { return one > limit; }));

@@ -40,6 +40,7 @@ class Brush {
       : canvas_(canvas),
         lane_(lane),
         resolution_(canvas.geometry->resolution()),
+        channels_(PacketCanvas::channels(*canvas.rules, canvas.is_translucent)),
         scale_(canvas.geometry->pixelsPerSlope()),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane) {}
@@ -49,9 +50,9 @@ class Brush {
     face_ = face;
     face_pixels_ = canvas_.geometry->pixels().data() + face * resolution_ * resolution_;
     seen_ = &canvas_.seen->faces[std::size_t(face)];
-    pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, kChannels);
+    pixels_ = FaceLanes(canvas_.pixels, canvas_, std::size_t(face), lane_, channels_);
     recorder_ = FaceRecorder(canvas_, std::size_t(face), lane_);
-    things_ = Things(pixels_, *seen_, resolution_, recorder_);
+    things_ = Things(pixels_, *seen_, resolution_, canvas_.is_translucent, recorder_);
     open_.Begin(*seen_);
     if constexpr (!Kind::kFrame) weights_ = FaceWeights(canvas_, receivers_, face);
     ClearFace();
@@ -100,7 +101,6 @@ class Brush {
   }
 
   using Things = FaceThings<Kind::kChannels>;
-  static constexpr std::size_t kChannels = Things::kAll;
   // Of a patch, in the frame of the raster.
   using Normal = std::conditional_t<Kind::kFrame, V3, glm::vec3>;
   Normal InRaster(const glm::vec3& normal) const {
@@ -144,7 +144,7 @@ class Brush {
     const V3 up = InRaster(receivers_.normal);
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t pixel) HWY_ATTR {
       float* const at = pixels_.at(pixel);
-      for (std::size_t i = 0; i < kChannels; ++i) hn::Store(zero, d, at + i * kStep);
+      for (std::size_t i = 0; i < channels_; ++i) hn::Store(zero, d, at + i * kStep);
       const M above = hn::Gt(Dot(up, face_pixels_[pixel].direction), zero);
       const V open = hn::IfThenElseZero(hn::Or(receivers_.spherical, above), one);
       for (const std::size_t i :
@@ -167,8 +167,12 @@ class Brush {
     cover.depth_end = hn::MulAdd(Splat(kRounding), distance, hn::Add(distance, Splat(patch.reach)));
     cover.is_all_lit = patch.seen != Patch::Seen::kDarkBack;
     cover.is_alone = patch.is_alone;
-    cover.has_hull = !patch.is_alone && !patch.lets_through;
+    cover.has_hull = !patch.is_alone && !patch.has_gaps;
     cover.is_solid = patch.is_solid;
+    cover.is_translucent = patch.clear > 0;
+    cover.tile_opacity = 1 - patch.clear;
+    if (cover.is_translucent) cover.tile_depth = -std::log(patch.clear);
+    cover.layer_part = 1 / cover.tile_opacity;
     cover.opacity = hn::Mul(part, hn::Mul(Splat(patch.opacity), PartsOf(canvas_, patch, lane_)));
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
@@ -294,17 +298,21 @@ class Brush {
       const M meets = hn::Or(covers, has_samples);
       if (hn::AllFalse(d, meets)) return true;
       things_.Meet(at, meets, cover.depth_begin, cover.depth_end);
-      if (cover.has_hull) things_.AddHull(at, samples, widening);
+      if (cover.has_hull) things_.AddHull(at, samples, widening, !cover.is_translucent);
     }
     if (hn::AllFalse(d, covers)) return true;
-    V room = hn::Load(d, pixel + PacketCanvas::kRoom * kStep);
+    V room = hn::Load(d, pixel + PacketCanvas::kRoom * kStep), least = hn::Zero(d);
     if (!cover.is_alone) {
+      if (cover.is_translucent) {
+        const V layers = hn::Mul(Splat(cover.layer_part), amount);
+        least = hn::Mul(room, things_.AddLayers(at, layers, cover.tile_opacity, cover.tile_depth));
+      }
       const VU held = Things::HeldOf(pixel);
       if (!hn::AllTrue(DU(), hn::Eq(held, hn::Zero(DU())))) {
         room = RoomAt(partIn(held), PartOf(held), room);
       }
     }
-    CoverPixel<Kind>(pixel, amount, weight, cover, room);
+    CoverPixel<Kind>(pixel, amount, weight, cover, room, least);
     return true;
   }
 
@@ -314,8 +322,12 @@ class Brush {
     const V3 to_centre = RayStartTo(sight, receivers_);
     Sight from_ray = sight;
     from_ray.facing = Dot(to_centre, patch.normal);
+    Cover cover = MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part);
+    if (!patch.isRound() && !patch.is_ribbon) {
+      cover.layer_part *= patch.disk_area / softDiskArea(patch.radius, patch.soft_peak);
+    }
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
-             MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part));
+             cover);
   }
 
   void TraceBox(const Patch& patch, const V3& centre, const Normal& normal, M traced, V c_n,
@@ -452,6 +464,7 @@ class Brush {
   const PacketCanvas& canvas_;
   const std::size_t lane_;
   const int resolution_;
+  const std::size_t channels_;
   const float scale_;  // pixels for a slope of 1
   const Receivers receivers_;
   const Frames frames_;

@@ -37,6 +37,10 @@ struct Cover {
   bool has_hull;
   bool is_solid;  // its hull is widened
   V opacity;
+  bool is_translucent;  // and not alone
+  float tile_opacity;   // what it hides where it fills a pixel
+  float tile_depth;     // the optical depth of that; of what is translucent
+  float layer_part;     // of what it covers: how much of a layer of it that is
   glm::vec3 radiosity;
   const float* lights;  // instead of it, PacketLights of these lanes; null: none
   V fade;               // only when something fades
@@ -80,25 +84,25 @@ HWY_INLINE V RoomAt(V behind, V held, V room) {
   return hn::Min(one, hn::Max(zero, hn::MulAdd(behind, hn::Sub(inside, beside), beside)));
 }
 
-// What is left open of a pixel of which something covers so much.
-HWY_INLINE V LeftOpen(float* pixel, V amount, V open, const Cover& cover, V room) {
+// What is left open of a pixel of which something covers so much. `least`: where it is not alone.
+HWY_INLINE V LeftOpen(float* pixel, V amount, V open, const Cover& cover, V room, V least) {
   const D d;
   if (cover.is_alone) {  // before all others, and behind them
     const V clear = hn::Sub(Splat(1), amount);
     hn::Store(hn::Mul(room, clear), d, pixel + PacketCanvas::kRoom * kStep);
     return hn::Mul(open, clear);
   }
-  return hn::Max(hn::Zero(d), hn::NegMulAdd(room, amount, open));
+  return hn::Max(hn::Min(open, least), hn::NegMulAdd(room, amount, open));
 }
 
-// Covers so much of a pixel where `amount` is positive. `weight`: of the middle of what covers it,
-// over that of its own.
+// Covers so much of a pixel where `amount` is positive, but leaves `least` of it open. `weight`: of
+// the middle of what covers it, over that of its own.
 template <typename Kind>
-HWY_INLINE void CoverPixel(float* pixel, V amount, V weight, const Cover& cover, V room) {
+HWY_INLINE void CoverPixel(float* pixel, V amount, V weight, const Cover& cover, V room, V least) {
   const D d;
   float* const open_at = pixel + PacketCanvas::kOpen * kStep;
   const V open = hn::Load(d, open_at);
-  const V left = LeftOpen(pixel, amount, open, cover, room);
+  const V left = LeftOpen(pixel, amount, open, cover, room, least);
   const V covered = hn::IfThenElseZero(hn::Gt(amount, hn::Zero(d)), hn::Sub(open, left));
   hn::Store(hn::Sub(open, covered), d, open_at);
   float* const rest_at = pixel + PacketCanvas::kRest * kStep;

@@ -11,13 +11,9 @@
 // The hulls that nodes leave which are looked into (docs/algorithm.md, "Closing").
 namespace surfeit {
 
-bool PacketRaster::mayLeaveHull(const Node& node) {
-  if (node.isRough() || float(node.surfel_count) > kFidelity.most_in_hull ||
-      (node.groups & ~rules_.groups) != 0) {
-    return false;
-  }
-  has_tints_ |= node.isTinted();  // it may be opaque in another color
-  return transparencyOf(node.transparency, node.tint, color_) == 0;
+bool PacketRaster::mayLeaveHull(const Node& node) const {
+  return !node.isRough() && float(node.surfel_count) <= kFidelity.most_in_hull &&
+         (node.groups & ~rules_.groups) == 0;
 }
 
 // Receivers that are at least so far from a place, in the frame of what is added.

@@ -41,7 +41,7 @@ class Integral {
       : canvas_(canvas),
         rules_(*canvas.rules),
         lane_(lane),
-        channels_(PacketCanvas::channels(rules_)),
+        channels_(PacketCanvas::channels(rules_, canvas.is_translucent)),
         receivers_(*canvas.lanes, lane),
         frames_(*canvas.lanes, lane),
         by_brightness_(rules_.weights.by_brightness && rules_.environment != nullptr) {

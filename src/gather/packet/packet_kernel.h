@@ -44,9 +44,10 @@ struct alignas(64) Patch {
   float most_area = 0;  // and no more than this
   // Of a facet that some receiver may see at its rim: normalRange, by which disk_area shows more
   float range = 0;
-  float opacity = 1;  // what it hides of what it covers, itself behind itself left out: 0..1
-  float filled = 1;   // of its outline in pixels: less of a tile that is larger than its area
-  bool lets_through = false;  // it is translucent, or a fence: nothing closes what it leaves open
+  float opacity = 1;      // what it hides of what it covers, itself behind itself left out: 0..1
+  float filled = 1;       // of its outline in pixels: less of a tile that is larger than its area
+  float clear = 0;        // what shows through it where it fills a pixel; 0: opaque, or alone
+  bool has_gaps = false;  // it is a fence: nothing closes what it leaves open
   // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
   // alone
   bool is_solid = true;
@@ -124,8 +125,10 @@ struct PacketCanvas {
   // Places: what all but the last thing leave open; what is open; and what is open of the weight
   static constexpr std::size_t kRoom = 0, kOpen = 1, kRest = 2;
   static constexpr std::size_t kCoverageChannels = 3, kThingChannels = 6;
-  static std::size_t channels(const GatherRules& rules) {
-    return kCoverageChannels + kThingChannels + 2 * rules.channels();
+  static constexpr std::size_t kTranslucentChannels = 4;  // where something is
+  static std::size_t channels(const GatherRules& rules, bool is_translucent) {
+    return kCoverageChannels + kThingChannels + 2 * rules.channels() +
+           (is_translucent ? kTranslucentChannels : 0);
   }
 
   const PacketLanes* lanes;
@@ -140,6 +143,7 @@ struct PacketCanvas {
   // Faces that were drawn to; the pixels of others hold nothing of this packet.
   std::array<bool, RasterGeometry::kFaces>* is_face_used;
   const SeenPixels* seen;
+  bool is_translucent;                  // a patch may be, other than those that are alone
   const PacketParts* parts;             // of the patches
   const PacketLights* lights;           // of the patches
   PixelRecorder* recorder;              // of what the first receiver sees; null: nobody's

@@ -56,7 +56,7 @@ PacketRaster::PacketRaster(const GatherRules& rules, const PacketKernel& kernel)
       geometry_(rasterGeometry(rules)),
       weights_(rules, 1 / geometry_.pixelsPerSlope()),
       pixels_(hwy::AllocateAligned<float>(geometry_.pixels().size() * kPacketReceivers *
-                                          PacketCanvas::channels(rules_))) {
+                                          PacketCanvas::channels(rules_, true))) {
   if (pixels_ == nullptr) throw std::bad_alloc();
   patches_.reserve(kReservedPatches);
   parts_.reserve(kReservedParts);
@@ -96,7 +96,7 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
   parts_.resize(1);   // that of what counts wholly
   lights_.resize(1);  // of what sends evenly
   order_count_ = 0;
-  has_tints_ = false;
+  has_tints_ = is_translucent_ = false;
   setFrame(nullptr);
 }
 
@@ -127,6 +127,7 @@ void PacketRaster::bringToWorld(Patch& patch) const {
 void PacketRaster::orderLastPatch(const PacketCanvas& canvas) {
   std::uint32_t faces = seen_faces_ & kernel_.facesThatSee(canvas, patches_.back());
   if (faces == 0) return patches_.pop_back();
+  is_translucent_ |= patches_.back().clear > 0;
   SURFEIT_CHECK(patches_.size() < std::numeric_limits<std::uint32_t>::max());
   const auto index = static_cast<std::uint32_t>(patches_.size() - 1);
   const glm::vec3 middle = patches_.back().position - view_.centre;
@@ -222,17 +223,18 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.radius = patch.reach = facet.radius;
   patch.normal = facet.is_two_sided ? facet.normal : side * facet.normal;
   patch.is_alone = facet.is_thicket;
-  patch.lets_through = facet.opacity[color_] < 1;
-  if (patch.lets_through) patch.opacity = facetOpacity(facet, color_);
   patch.is_solid = is_hull || (!facet.is_thicket && isFilled(node, facet));
-  patch.lets_through = patch.lets_through || !patch.is_solid;
+  patch.has_gaps = !patch.is_solid;
   patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);
-  patch.disk_area = facet.area;
-  patch.area = facet.area;
+  const FacetLayers layers = facetLayers(facet, color_);
+  patch.opacity = layers.opacity;
+  if (!patch.is_alone) patch.clear = 1 - layers.opacity;
+  patch.disk_area = facet.area / layers.count;
+  patch.area = patch.disk_area;
   // The root of two principal moments is at most half of the trace
   if (patch.is_spread) patch.area = std::max(patch.area, 2 * kPi * facet.covariance.trace());
-  patch.most_area = std::min(facet.area, kPi * facet.radius * facet.radius);
+  patch.most_area = std::min(patch.disk_area, kPi * facet.radius * facet.radius);
   const float gain = rules_.gains.ofAlike(node.groups);  // the cut opens others
   if (sides != GatherSides::kBack) patch.radiosity = gain * facet.radiosity;
   const bool shows_both = facet.is_two_sided || sides == GatherSides::kBoth;
@@ -278,8 +280,8 @@ void PacketRaster::addRoughNode(const Node& node, const glm::vec3& eye, std::uin
   patch.radius = node.radius;
   patch.reach = partWithoutSides(node) * node.radius;
   patch.normal = node.flatness * node.normal;
-  patch.lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
-  patch.is_alone = isThicket(node) || patch.lets_through;
+  const bool lets_through = transparencyOf(node.transparency, node.tint, color_) != 0;
+  patch.is_alone = isThicket(node) || lets_through;
   patch.shape = shapeOf(node.covariance);
   patch.is_solid = false;
   const RoughCover cover = roughCover(node, direction, visible.perspective * round_area, color_);
@@ -321,10 +323,10 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
     if (surfel.isLoose() && !ribbon.isEmpty()) patch.reach = 0.7071f * ribbon.width;
     if (ribbon.isEmpty()) {
       patch.shape = withoutDirection(surfel.normal);
-      // Only opaque tiles may cover more than they should to leave no gaps
+      // Only tiles may cover more than they should to leave no gaps
       const bool is_part =
           surfel.isTwoSided() && !isTile(surfel) && coversInPart(patch.radius, piece_area);
-      const bool is_exact = surfel.isLoose() || is_part || lets_through;
+      const bool is_exact = surfel.isLoose() || is_part;
       const float share = is_exact ? 1 : tileShare(surfel);
       patch.soft_peak = softDiskPeak(patch.radius, share * piece_area, is_exact);
       if (share > 1) piece_area *= share, patch.filled = 1 / share;
@@ -341,8 +343,8 @@ void PacketRaster::addSurfels(std::span<const Surfel> surfels, const LaneParts* 
                  : rules_.quality.sides == GatherSides::kBoth ? Patch::Seen::kDarkBack
                                                               : Patch::Seen::kFront;
     patch.opacity = surfel.opacity(color_) / sharers;
-    patch.lets_through = lets_through;
-    patch.is_alone = surfel.isLone() || (lets_through && surfel.isSphere());
+    patch.is_alone = surfel.isLone() || (lets_through && (surfel.isSphere() || surfel.isLoose()));
+    if (!patch.is_alone) patch.clear = 1 - surfel.opacity(color_);
     patch.is_solid = !surfel.isSphere() && !surfel.isLoose();
     patch.is_layered = hiddenSidesOf(stored) != 0;
     // Positive, for a surfel may be at a receiver; then it is near at any setting
@@ -372,6 +374,7 @@ PacketCanvas PacketRaster::canvas() const {
           .pixels = pixels_.get(),
           .is_face_used = &is_face_used_,
           .seen = &seen_,
+          .is_translucent = is_translucent_,
           .parts = parts_.data(),
           .lights = lights_.data(),
           .recorder = recorder_,
@@ -391,8 +394,9 @@ std::size_t PacketRaster::tracedCount() const {
 }
 
 std::size_t PacketRaster::memoryBytes(const GatherRules& rules) {
-  const std::size_t pixel_bytes = sizeof(RasterGeometry::Pixel) +
-                                  PacketCanvas::channels(rules) * kPacketReceivers * sizeof(float);
+  const std::size_t pixel_bytes =
+      sizeof(RasterGeometry::Pixel) +
+      PacketCanvas::channels(rules, true) * kPacketReceivers * sizeof(float);
   return sizeof(PacketRaster) +
          RasterGeometry::pixelCount(rules.quality.raster_resolution) * pixel_bytes +
          kReservedPatches * sizeof(Patch) + kReservedParts * sizeof(PacketParts) +

@@ -104,7 +104,7 @@ class PacketRaster {
   // Adds a facet of the node, or all of a flat one, or the hull of that alone.
   void addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
                 const Lobe* lobe);
-  bool mayLeaveHull(const Node& node);
+  bool mayLeaveHull(const Node& node) const;
   std::uint32_t lanesBeyond(const glm::vec3& position, float distance) const;
   // Adds a hull for those of these lanes that see it, and says which need no other.
   std::uint32_t addFacetHull(const Node& node, const Facet& facet, const LaneParts* parts,
@@ -144,6 +144,7 @@ class PacketRaster {
   float local_radius_ = 0;
   int color_ = 0;
   bool has_tints_ = false;
+  bool is_translucent_ = false;          // PacketCanvas::is_translucent
   glm::vec3 luminance_{0};               // PacketCanvas::luminance
   std::vector<PixelContent> of_colors_;  // with a recorder: what readPixels() tells of all colors
   std::vector<Patch> patches_;

@@ -8,6 +8,8 @@
 #endif
 
 #include <hwy/highway.h>
+// Needs the instruction set that the former chose
+#include <hwy/contrib/math/math-inl.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -32,6 +34,25 @@ inline VU SplatU(std::uint32_t value) { return hn::Set(DU(), value); }
 inline VU InEveryColumn(VU column) {
   column = hn::Or(column, hn::ShiftLeft<kHullSide>(column));
   return hn::Or(column, hn::ShiftLeft<2 * kHullSide>(column));
+}
+
+// Translucent tiles of a thing: how many layers they are, that times their opacities, and the
+// optical depth.
+struct Layers {
+  V count, hidden, depth;
+};
+// What shows through them, at least one. Of one layer opacities add up, several multiply
+// (partOfSeveral).
+inline V ShownThrough(const Layers& layers) {
+  const D d;
+  const V one = Splat(1), zero = hn::Zero(d);
+  const V opacity = hn::Div(layers.hidden, hn::Max(layers.count, Splat(1e-30f)));
+  const V through_one = hn::Max(zero, hn::Sub(one, opacity));
+  const V several = hn::Sub(hn::Add(layers.count, layers.count), Splat(3));
+  if (hn::AllFalse(d, hn::Gt(several, zero))) return through_one;
+  const V part = hn::Min(one, hn::Max(zero, several));
+  const V through_all = hn::Exp(d, hn::Neg(layers.depth));
+  return hn::MulAdd(part, hn::Sub(through_all, through_one), through_one);
 }
 
 // What the first receiver of a vector sees on a face, told to a recorder if there is one.
@@ -71,18 +92,25 @@ class FaceThings {
  public:
   // Places in a pixel: samples of the hull of the last thing, and in the upper half of all things
   // before it; where the last thing begins and ends in depth; what was left before it; samples that
-  // the things before it hold; where these end; and their color.
+  // the things before it hold; where these end; and the color before it. Where something is
+  // translucent, of the last thing those samples of the hull that are opaque, and its Layers.
   static constexpr std::size_t kHull = PacketCanvas::kCoverageChannels + kChannels;
   static constexpr std::size_t kBegin = kHull + 1, kEnd = kHull + 2, kRestBefore = kHull + 3;
   static constexpr std::size_t kHeld = kHull + 4, kEndBefore = kHull + 5;
-  static constexpr std::size_t kColorBefore = kHull + 6, kAll = kColorBefore + kChannels;
-  static_assert(kAll ==
+  static constexpr std::size_t kColorBefore = kHull + 6, kOpaque = kColorBefore + kChannels;
+  static constexpr std::size_t kLayers = kOpaque + 1, kHidden = kOpaque + 2, kDepth = kOpaque + 3;
+  static_assert(kOpaque ==
                 PacketCanvas::kCoverageChannels + PacketCanvas::kThingChannels + 2 * kChannels);
 
   FaceThings() = default;
+  // `is_translucent`: something of what is drawn may be.
   FaceThings(const FaceLanes& pixels, const SeenPixels::Face& seen, int resolution,
-             FaceRecorder recorder)
-      : pixels_(pixels), seen_(&seen), resolution_(resolution), recorder_(recorder) {}
+             bool is_translucent, FaceRecorder recorder)
+      : pixels_(pixels),
+        seen_(&seen),
+        resolution_(resolution),
+        is_translucent_(is_translucent),
+        recorder_(recorder) {}
 
   // Something between these depths meets the pixel in lanes of `meets`: it belongs to the last
   // thing there, or to a new one behind it.
@@ -96,7 +124,7 @@ class FaceThings {
   }
 
   // Adds samples to the hull of the last thing. `widening` in samples.
-  HWY_INLINE void AddHull(std::size_t at, VU samples, VU widening) const {
+  HWY_INLINE void AddHull(std::size_t at, VU samples, VU widening, bool is_opaque) const {
     const D d;
     const DU du;
     float* const pixel = pixels_.at(at);
@@ -108,6 +136,23 @@ class FaceThings {
         hn::Max(hn::And(begin, SplatU(kWidening)), hn::IfThenElseZero(has_some, widening));
     hn::Store(hn::BitCast(d, hn::Or(hn::AndNot(SplatU(kWidening), begin), widest)), d,
               pixel + kBegin * kStep);
+    if (!is_translucent_ || !is_opaque) return;
+    hn::Store(hn::BitCast(d, hn::Or(OpaqueOf(pixel), samples)), d, pixel + kOpaque * kStep);
+  }
+
+  // Adds translucent tiles of this opacity and optical depth to the last thing. What shows through
+  // it then.
+  HWY_INLINE V AddLayers(std::size_t at, V count, float opacity, float depth) const {
+    const D d;
+    float* const pixel = pixels_.at(at);
+    Layers layers = LayersOf(pixel);
+    layers.count = hn::Add(layers.count, count);
+    layers.hidden = hn::MulAdd(count, Splat(opacity), layers.hidden);
+    layers.depth = hn::MulAdd(count, Splat(depth), layers.depth);
+    hn::Store(layers.count, d, pixel + kLayers * kStep);
+    hn::Store(layers.hidden, d, pixel + kHidden * kStep);
+    hn::Store(layers.depth, d, pixel + kDepth * kStep);
+    return ShownThrough(layers);
   }
 
   // Closes the last things of all pixels.
@@ -116,11 +161,7 @@ class FaceThings {
     seen_->forEachPixel(std::size_t(resolution_), [&](std::size_t at) HWY_ATTR {
       const float* const pixel = pixels_.at(at);
       const M lanes = hn::And(BringSome(pixel), IsWhole(hn::Or(HeldOf(pixel), HullOf(pixel))));
-      if (hn::AllFalse(d, lanes)) return;
-      const V end = hn::Load(d, pixel + kEnd * kStep);
-      const VU own = hn::And(HullOf(pixel), SplatU(kHullSamples));
-      const M held = hn::And(lanes, IsWhole(hn::Or(HeldOf(pixel), Narrowed(at, own, end))));
-      if (!hn::AllFalse(d, held)) Close(at, held);
+      if (!hn::AllFalse(d, lanes)) CloseThing(at, lanes, hn::Load(d, pixel + kEnd * kStep));
     });
   }
 
@@ -140,15 +181,19 @@ class FaceThings {
     const VU own =
         hn::IfThenElseZero(hn::RebindMask(du, lanes), hn::And(hull, SplatU(kHullSamples)));
     if (!hn::AllTrue(du, hn::Eq(own, hn::Zero(du)))) {
-      const VU samples = hn::Or(HeldOf(pixel), Narrowed(at, own, end));
-      hn::Store(hn::BitCast(d, samples), d, pixel + kHeld * kStep);
-      const M held = hn::And(lanes, hn::And(BringSome(pixel), IsWhole(samples)));
-      if (!hn::AllFalse(d, held)) Close(at, held);
+      const VU held = CloseThing(at, lanes, end);
+      hn::Store(hn::BitCast(d, held), d, pixel + kHeld * kStep);
     }
     if (recorder_) recorder_.BeginThing(at, lanes);
     const auto is_new = hn::RebindMask(du, lanes);
     const VU before = hn::AndNot(SplatU(kHullSamples), hn::Or(hull, hn::ShiftLeft<16>(hull)));
     hn::Store(hn::BitCast(d, hn::IfThenElse(is_new, before, hull)), d, pixel + kHull * kStep);
+    if (is_translucent_) {
+      for (const std::size_t i : {kOpaque, kLayers, kHidden, kDepth}) {
+        float* const last = pixel + i * kStep;
+        hn::Store(hn::IfThenZeroElse(lanes, hn::Load(d, last)), d, last);
+      }
+    }
     Move(pixel, lanes, kEnd, kEndBefore);
     Move(pixel, lanes, PacketCanvas::kOpen, PacketCanvas::kRoom);
     Move(pixel, lanes, PacketCanvas::kRest, kRestBefore);
@@ -167,6 +212,35 @@ class FaceThings {
   static VU HullOf(const float* pixel) {
     return hn::BitCast(DU(), hn::Load(D(), pixel + kHull * kStep));
   }
+  static VU OpaqueOf(const float* pixel) {
+    return hn::BitCast(DU(), hn::Load(D(), pixel + kOpaque * kStep));
+  }
+  static Layers LayersOf(const float* pixel) {
+    const D d;
+    return {hn::Load(d, pixel + kLayers * kStep), hn::Load(d, pixel + kHidden * kStep),
+            hn::Load(d, pixel + kDepth * kStep)};
+  }
+  // Closes the last thing, which ends at `end`, in some of these lanes. The samples that it and
+  // what is before it hold: what something shows through holds none.
+  VU CloseThing(std::size_t at, M lanes, V end) const {
+    const D d;
+    const DU du;
+    const float* const pixel = pixels_.at(at);
+    const M some = hn::And(lanes, BringSome(pixel));
+    const auto holds = [&](bool is_opaque) HWY_ATTR {
+      const VU own = is_opaque ? OpaqueOf(pixel) : hn::And(HullOf(pixel), SplatU(kHullSamples));
+      const VU counts = hn::IfThenElseZero(hn::RebindMask(du, lanes), own);
+      return hn::Or(HeldOf(pixel), Narrowed(at, counts, end, is_opaque));
+    };
+    const VU held = holds(is_translucent_);
+    const M is_whole = hn::And(some, IsWhole(held));
+    if (!hn::AllFalse(d, is_whole)) Close(at, is_whole, hn::Zero(d));
+    if (!is_translucent_) return held;
+    const M is_shown_through = hn::AndNot(is_whole, hn::And(some, IsWhole(holds(false))));
+    if (hn::AllFalse(d, is_shown_through)) return held;
+    Close(at, is_shown_through, ShownThrough(LayersOf(pixel)));
+    return held;
+  }
   // Lanes whose last thing covers some of what is still open.
   static M BringSome(const float* pixel) {
     const D d;
@@ -180,10 +254,10 @@ class FaceThings {
     return hn::RebindMask(D(), hn::Eq(hn::AndNot(hull, SplatU(kHullSamples)), hn::Zero(du)));
   }
 
-  // Of these samples of the last thing in the pixel, those around which it has all others, as far
-  // as anything there was widened. In neighbours, things count that reach from where it begins to
-  // `end`.
-  VU Narrowed(std::size_t at, VU own, V end) const {
+  // Of these samples of the last thing in the pixel, or of what is opaque of it, those around which
+  // it has all others, as far as anything there was widened. In neighbours, things count that reach
+  // from where it begins to `end`.
+  VU Narrowed(std::size_t at, VU own, V end, bool is_opaque) const {
     const D d;
     const DU du;
     const float* const pixel = pixels_.at(at);
@@ -194,14 +268,16 @@ class FaceThings {
     for (int y = 0; y < 3; ++y) {
       VU masks[3];
       for (int x = 0; x < 3; ++x) {
-        masks[x] = x == 1 && y == 1 ? own : OfNeighbour(column + x - 1, row + y - 1, begin, end);
+        masks[x] = x == 1 && y == 1
+                       ? own
+                       : OfNeighbour(column + x - 1, row + y - 1, begin, end, is_opaque);
       }
       rows[y] = NarrowedAcross(masks, widening);
     }
     return NarrowedAlong(rows, widening);
   }
   // What is not looked at lacks none, nor what is covered.
-  VU OfNeighbour(int column, int row, V begin, V end) const {
+  VU OfNeighbour(int column, int row, V begin, V end, bool is_opaque) const {
     const D d;
     const VU all = SplatU(kHullSamples);
     if (row < seen_->row_begin || row >= seen_->row_end) return all;
@@ -216,9 +292,9 @@ class FaceThings {
     const M is_later = hn::Gt(last_begin, end), is_near = hn::Ge(last_end, begin);
     const M has_last = hn::AndNot(is_later, is_near);
     const M has_before = hn::Or(is_later, hn::Ge(end_before, begin));
-    const VU hull = HullOf(other);
+    const VU hull = HullOf(other), last = is_opaque ? OpaqueOf(other) : hn::And(hull, all);
     const VU found =
-        hn::Or(hn::IfThenElseZero(hn::RebindMask(DU(), has_last), hn::And(hull, all)),
+        hn::Or(hn::IfThenElseZero(hn::RebindMask(DU(), has_last), last),
                hn::IfThenElseZero(hn::RebindMask(DU(), has_before), hn::ShiftRight<16>(hull)));
     return hn::IfThenElse(hn::RebindMask(DU(), is_full), all, found);
   }
@@ -258,23 +334,24 @@ class FaceThings {
     return hn::And(held, all);
   }
 
-  // What is closed belongs to what the last thing has brought.
-  void Close(std::size_t at, M lanes) const {
+  // What is closed belongs to what the last thing has brought. `clear` of it stays open.
+  void Close(std::size_t at, M lanes, V clear) const {
     const D d;
-    const V zero = hn::Zero(d), one = Splat(1);
+    const V one = Splat(1);
     float* const pixel = pixels_.at(at);
     const V rest = hn::Load(d, pixel + PacketCanvas::kRest * kStep);
     const V before = hn::Load(d, pixel + kRestBefore * kStep);
     const V brought = hn::IfThenElse(lanes, hn::Sub(before, rest), one);
-    const V scale = hn::Div(hn::IfThenElseZero(lanes, rest), brought);
+    const V left = hn::Min(rest, hn::Mul(clear, before));
+    const V scale = hn::Div(hn::IfThenElseZero(lanes, hn::Sub(rest, left)), brought);
     if (recorder_) {
       recorder_.Close(at, lanes, hn::Load(d, pixel + kBegin * kStep),
                       hn::Load(d, pixel + kEnd * kStep));
     }
-    for (const std::size_t i : {PacketCanvas::kOpen, PacketCanvas::kRest}) {
-      float* const left = pixel + i * kStep;
-      hn::Store(hn::IfThenElse(lanes, zero, hn::Load(d, left)), d, left);
-    }
+    float* const open_at = pixel + PacketCanvas::kOpen * kStep;
+    const V open = hn::Load(d, open_at), room = hn::Load(d, pixel + PacketCanvas::kRoom * kStep);
+    hn::Store(hn::IfThenElse(lanes, hn::Min(open, hn::Mul(clear, room)), open), d, open_at);
+    hn::Store(hn::IfThenElse(lanes, left, rest), d, pixel + PacketCanvas::kRest * kStep);
     for (std::size_t c = 0; c < kChannels; ++c) {
       float* const to = pixel + (PacketCanvas::kCoverageChannels + c) * kStep;
       const V all = hn::Load(d, to), early = hn::Load(d, pixel + (kColorBefore + c) * kStep);
@@ -285,6 +362,7 @@ class FaceThings {
   FaceLanes pixels_;
   const SeenPixels::Face* seen_ = nullptr;
   int resolution_ = 0;
+  bool is_translucent_ = false;
   FaceRecorder recorder_;
 };
 

@@ -109,9 +109,9 @@ float ellipseArea(const Node& node, const glm::vec3& direction) {
   return ellipseArea(spread, direction);
 }
 
-// The area of a facet over that of the ellipse that spreads as it does: about 1 for a piece of
-// surface, less where it has gaps, more where it lies behind itself.
-float facetLayers(const Facet& facet) {
+// The area of a facet over that of the ellipse that spreads as it does: 3 / pi of a rectangle, less
+// where it has gaps, more where it lies behind itself.
+float filledPart(const Facet& facet) {
   const float ellipse = ellipseArea(facet.covariance, glm::normalize(facet.normal));
   return ellipse > 0 ? facet.area / ellipse : 1;
 }
@@ -140,20 +140,22 @@ bool isFilled(const Node& node, const Facet& facet) {
   const float doubt =
       facet.is_two_sided ? 0 : kFidelity.fill_doubt / std::sqrt(std::max(1.f, surfels));
   const float least = kFidelity.least_filled * std::max(0.f, 1 - doubt);
-  const float layers = facetLayers(facet);
-  if (layers >= least) return true;
+  const float filled = filledPart(facet);
+  if (filled >= least) return true;
   const glm::vec3 direction = glm::normalize(facet.normal);
   float shown = 0;
   for (std::size_t i = 0; i < node.facet_count; ++i) {
     const float cosine = glm::dot(direction, node.facets[i].meanNormal());
     if (node.isTwoSided(i) || cosine > 0) shown += float(node.facets[i].area) * std::abs(cosine);
   }
-  return layers * node.area * (1.f / 65535) * shown >= least * facet.area;
+  return filled * node.area * (1.f / 65535) * shown >= least * facet.area;
 }
 
-float facetOpacity(const Facet& facet, int color) {
-  const float depth = std::max(1.f, facetLayers(facet));
-  return layersOpacity(facet.opacity[color], depth) / depth;
+FacetLayers facetLayers(const Facet& facet, int color) {
+  const float opacity = facet.opacity[color];
+  if (opacity == 1) return {1, 1};
+  const float layers = kPi / 3 * filledPart(facet), part = partOfSeveral(layers);
+  return {1 + part * (layers - 1), opacity + part * (layersOpacity(opacity, layers) - opacity)};
 }
 
 // Half of it two-sided, or a sixth spheres, whose outlines are a fourth of their areas.

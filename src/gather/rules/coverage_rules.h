@@ -27,6 +27,10 @@ inline float layersOpacity(float opacity, float depth) {
   return opacity < 1 ? 1 - std::pow(1 - opacity, std::max(1.f, depth)) : 1;
 }
 
+// How much what areas say to be so many layers is taken for several, not for one. Areas of tiles
+// scatter: a second layer counts from half of it on.
+inline float partOfSeveral(float layers) { return std::clamp(2 * layers - 3, 0.f, 1.f); }
+
 // Whether a disk is not even filled by all that may close gaps: it covers a part of its place, as a
 // splat does, or a leaf.
 inline bool coversInPart(float radius, float area) {
@@ -39,6 +43,11 @@ inline float softDiskPeak(float radius, float area, bool is_exact) {
   const float covered = (is_exact ? 1 : kFidelity.soft_disk_area) * area;
   const float share = std::min(0.95f, covered / (kPi * radius * radius));
   return share < 0.5f ? 2 * share : 1 / (2 * (1 - share));
+}
+
+// The area that a soft disk of such a peak covers.
+inline float softDiskArea(float radius, float peak) {
+  return kPi * radius * radius * (peak < 1 ? peak / 2 : 1 - 1 / (2 * peak));
 }
 
 }  // namespace surfeit
