@@ -20,7 +20,7 @@ TEST_F(EngineThreadsTest, CallersThreadsDoNotDisturbEachOther) {
       valueOrFail(alone.gatherer(valueOrFail(alone.open(path)), bleedingSettings()));
   const std::vector<GatherResult> expected = gatherAt(expected_gatherer, receivers);
 
-  Engine engine = makeEngine(52 * kMiB, kThreads);
+  Engine engine = makeEngine(56 * kMiB, kThreads);
   const Scene scene = valueOrFail(engine.open(path));
   Gatherer first = valueOrFail(engine.gatherer(scene, bleedingSettings()));
   std::vector<std::jthread> threads;

@@ -230,6 +230,7 @@ class FaceThings {
     const auto holds = [&](bool is_opaque) HWY_ATTR {
       const VU own = is_opaque ? OpaqueOf(pixel) : hn::And(HullOf(pixel), SplatU(kHullSamples));
       const VU counts = hn::IfThenElseZero(hn::RebindMask(du, lanes), own);
+      if (hn::AllTrue(du, hn::Eq(counts, hn::Zero(du)))) return HeldOf(pixel);
       return hn::Or(HeldOf(pixel), Narrowed(at, counts, end, is_opaque));
     };
     const VU held = holds(is_translucent_);
