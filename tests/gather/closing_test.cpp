@@ -36,7 +36,7 @@ struct SheetOfDisks {
                             .99f * distance, 1.01f * distance);
       patch.is_solid = is_solid;
       patch.has_gaps = !has_hull;
-      patch.opacity = opacity, patch.clear = 1 - opacity;
+      patch.opacity = opacity, patch.clear = 1 - opacity, patch.layers = 1;
       patch.radiosity = radiosity;
       raster.add(patch);
     }

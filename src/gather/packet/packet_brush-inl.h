@@ -171,8 +171,10 @@ class Brush {
     cover.is_solid = patch.is_solid;
     cover.is_translucent = patch.clear > 0;
     cover.tile_opacity = 1 - patch.clear;
-    if (cover.is_translucent) cover.tile_depth = -std::log(patch.clear);
-    cover.layer_part = 1 / cover.tile_opacity;
+    if (cover.is_translucent) {
+      cover.tile_depth = -std::log(patch.clear);
+      cover.layer_part = patch.isNode() ? patch.layers / patch.opacity : 1 / cover.tile_opacity;
+    }
     cover.opacity = hn::Mul(part, hn::Mul(Splat(patch.opacity), PartsOf(canvas_, patch, lane_)));
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;

@@ -38,9 +38,9 @@ struct Cover {
   bool is_solid;  // its hull is widened
   V opacity;
   bool is_translucent;  // and not alone
-  float tile_opacity;   // what it hides where it fills a pixel
-  float tile_depth;     // the optical depth of that; of what is translucent
-  float layer_part;     // of what it covers: how much of a layer of it that is
+  float tile_opacity;   // what a layer of it hides where it fills a pixel
+  float tile_depth;     // the optical depth of a layer; of what is translucent
+  float layer_part;     // how many layers there are where it covers all of a pixel; as before
   glm::vec3 radiosity;
   const float* lights;  // instead of it, PacketLights of these lanes; null: none
   V fade;               // only when something fades

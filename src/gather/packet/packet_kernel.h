@@ -46,7 +46,7 @@ struct alignas(64) Patch {
   float range = 0;
   float opacity = 1;      // what it hides of what it covers, itself behind itself left out: 0..1
   float filled = 1;       // of its outline in pixels: less of a tile that is larger than its area
-  float clear = 0;        // what shows through it where it fills a pixel; 0: opaque, or alone
+  float clear = 0;        // what shows through a layer of it; 0: opaque, or alone
   bool has_gaps = false;  // it is a fence: nothing closes what it leaves open
   // A tile of a surface, of which the hull is widened; spheres, leaves and rough nodes may stand
   // alone
@@ -66,12 +66,14 @@ struct alignas(64) Patch {
   glm::vec3 radiosity{0};    // in all directions together
   float near_distance = 0;   // closer than this it is ray traced; 0: a node, which never is
   float reach = 0;           // how far before and behind its middle it meets others
-  union {                    // as it is ray traced:
-    float soft_peak = 0;     // of a disk, softDiskPeak
-    float ribbon_width;      // of a ribbon
+  union {
+    float soft_peak = 0;  // of a disk, as it is ray traced: softDiskPeak
+    float ribbon_width;   // of a ribbon
+    float layers;         // of a node: how many it is behind itself
   };
 
   bool isRound() const { return disk_area == 0; }
+  bool isNode() const { return near_distance == 0; }
   bool showsBoth() const { return seen == Seen::kBoth || seen == Seen::kDarkBack; }
 };
 static_assert(sizeof(Patch) == 128);

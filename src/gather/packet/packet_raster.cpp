@@ -227,10 +227,11 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.has_gaps = !patch.is_solid;
   patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);
-  const FacetLayers layers = facetLayers(facet, color_);
-  patch.opacity = layers.opacity;
-  if (!patch.is_alone) patch.clear = 1 - layers.opacity;
-  patch.disk_area = facet.area / layers.count;
+  const float opacity = facet.opacity[color_];
+  patch.layers = opacity < 1 ? facetLayers(facet) : 1;
+  patch.opacity = layersOpacity(opacity, patch.layers);
+  if (!patch.is_alone) patch.clear = 1 - opacity;
+  patch.disk_area = facet.area / patch.layers;
   patch.area = patch.disk_area;
   // The root of two principal moments is at most half of the trace
   if (patch.is_spread) patch.area = std::max(patch.area, 2 * kPi * facet.covariance.trace());

@@ -41,14 +41,14 @@ inline VU InEveryColumn(VU column) {
 struct Layers {
   V count, hidden, depth;
 };
-// What shows through them, at least one. Of one layer opacities add up, several multiply
-// (partOfSeveral).
+// What shows through them, at least one. Of one layer opacities add up, several multiply. Areas of
+// tiles scatter: a second layer counts from half of it on, and wholly from three quarters.
 inline V ShownThrough(const Layers& layers) {
   const D d;
   const V one = Splat(1), zero = hn::Zero(d);
   const V opacity = hn::Div(layers.hidden, hn::Max(layers.count, Splat(1e-30f)));
   const V through_one = hn::Max(zero, hn::Sub(one, opacity));
-  const V several = hn::Sub(hn::Add(layers.count, layers.count), Splat(3));
+  const V several = hn::MulAdd(Splat(4), layers.count, Splat(-6));
   if (hn::AllFalse(d, hn::Gt(several, zero))) return through_one;
   const V part = hn::Min(one, hn::Max(zero, several));
   const V through_all = hn::Exp(d, hn::Neg(layers.depth));

@@ -151,12 +151,7 @@ bool isFilled(const Node& node, const Facet& facet) {
   return filled * node.area * (1.f / 65535) * shown >= least * facet.area;
 }
 
-FacetLayers facetLayers(const Facet& facet, int color) {
-  const float opacity = facet.opacity[color];
-  if (opacity == 1) return {1, 1};
-  const float layers = kPi / 3 * filledPart(facet), part = partOfSeveral(layers);
-  return {1 + part * (layers - 1), opacity + part * (layersOpacity(opacity, layers) - opacity)};
-}
+float facetLayers(const Facet& facet) { return std::max(1.f, kPi / 3 * filledPart(facet)); }
 
 // Half of it two-sided, or a sixth spheres, whose outlines are a fourth of their areas.
 bool isThicket(const Node& node) { return node.isLoose() && partsOfBand0(node) > 1.5f; }

@@ -48,13 +48,9 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
 // Whether a facet of a node, or a flat node, has no gaps, seen head-on: with all that other facets
 // show in that direction it fills its outline, as the slopes of folds do together.
 bool isFilled(const Node& node, const Facet& facet);
-// A translucent facet with more area than the rectangle that spreads as it does lies behind itself:
-// it is so many layers, at least one, which together hide so much in a color (0 red, 1 green, 2
-// blue). Opaque ones are one.
-struct FacetLayers {
-  float count, opacity;
-};
-FacetLayers facetLayers(const Facet& facet, int color);
+// A facet with more area than the rectangle that spreads as it does lies behind itself: it is so
+// many layers, at least one.
+float facetLayers(const Facet& facet);
 
 // What a rough node covers in a color that shows `shown` of its area in unit direction `direction`
 // (or its opposite): an area, and what it hides of that. A surface fills what it shows, a thicket

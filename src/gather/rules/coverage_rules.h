@@ -27,10 +27,6 @@ inline float layersOpacity(float opacity, float depth) {
   return opacity < 1 ? 1 - std::pow(1 - opacity, std::max(1.f, depth)) : 1;
 }
 
-// How much what areas say to be so many layers is taken for several, not for one. Areas of tiles
-// scatter: a second layer counts from half of it on.
-inline float partOfSeveral(float layers) { return std::clamp(2 * layers - 3, 0.f, 1.f); }
-
 // Whether a disk is not even filled by all that may close gaps: it covers a part of its place, as a
 // splat does, or a leaf.
 inline bool coversInPart(float radius, float area) {
