@@ -29,7 +29,7 @@ struct MetSurfaces {
   std::vector<glm::vec3> opacities;  // of the primitives, rgb
 };
 
-// Keeps hits of the sides that hide, if nothing is seen through them.
+// Takes what the hits hide from the light that passes, and keeps one where none is left.
 void filterHits(const RTCFilterFunctionNArguments* hits) {
   const auto& met = *static_cast<const MetSurfaces*>(hits->geometryUserPtr);
   glm::vec3& open = reinterpret_cast<RayContext*>(hits->context)->open;

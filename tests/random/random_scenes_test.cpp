@@ -49,6 +49,12 @@ std::unique_ptr<IndexedScene> indexed(const std::vector<Surfel>& surfels,
   return scene.ok() ? std::move(*scene) : nullptr;
 }
 
+// Every second scene has translucent surfaces.
+RandomScene everySecondTranslucent(std::uint64_t seed) {
+  const RandomScene scene = makeRandomScene(seed);
+  return seed % 2 == 1 ? scene.withOpacities() : scene;
+}
+
 class RandomScenes : public testing::TestWithParam<int> {
  protected:
   std::uint64_t first() const { return std::uint64_t(GetParam()) * kBatch; }
@@ -142,7 +148,7 @@ TEST_P(RandomScenes, OcclusionIsTheSameWithoutLight) {
 TEST_P(RandomScenes, CompanyChangesLittle) {
   std::vector<double> steps, light;
   for (std::uint64_t seed = first(); seed < first() + kBatch; ++seed) {
-    const RandomScene scene = makeRandomScene(seed);
+    const RandomScene scene = everySecondTranslucent(seed);
     const auto cloud = indexed(scene.surfels);
     ASSERT_NE(cloud, nullptr);
     const GatherRules rules(bleeding(seed % 3 == 0 ? GatherSides::kBoth : GatherSides::kFront));
@@ -209,7 +215,7 @@ RandomScene changed(RandomScene scene, const Change& change) {
 TEST_P(RandomScenes, PlaceTurnAndScaleHardlyMatter) {
   double most_fast[std::size(kChanges)] = {}, most_exact[std::size(kChanges)] = {};
   for (const std::uint64_t seed : smallScenes(first(), kFew)) {
-    const RandomScene scene = makeRandomScene(seed);
+    const RandomScene scene = everySecondTranslucent(seed);
     GatherOptions options = bleeding();
     const GatherRules fast(options);
     options.quality.max_solid_angle = 0;
@@ -245,7 +251,7 @@ TEST_P(RandomScenes, PlaceTurnAndScaleHardlyMatter) {
 
 TEST_P(RandomScenes, OrderFilesThreadsAndMemoryDoNotMatter) {
   for (const std::uint64_t seed : allScenes(first(), kFew)) {
-    const RandomScene scene = makeRandomScene(seed);
+    const RandomScene scene = everySecondTranslucent(seed);
     std::vector<Surfel> shuffled = scene.surfels;
     RandomNumbers random(seed);
     for (std::size_t i = shuffled.size(); i > 1; --i) {

@@ -169,12 +169,7 @@ class Brush {
     cover.is_alone = patch.is_alone;
     cover.has_hull = !patch.is_alone && !patch.has_gaps;
     cover.is_solid = patch.is_solid;
-    cover.is_translucent = patch.clear > 0;
-    cover.tile_opacity = 1 - patch.clear;
-    if (cover.is_translucent) {
-      cover.tile_depth = -std::log(patch.clear);
-      cover.layer_part = patch.isNode() ? patch.layers / patch.opacity : 1 / cover.tile_opacity;
-    }
+    cover.layers = TileLayersOf(patch, 1);
     cover.opacity = hn::Mul(part, hn::Mul(Splat(patch.opacity), PartsOf(canvas_, patch, lane_)));
     cover.is_lit = hn::Lt(sight.facing, hn::Zero(D()));
     cover.radiosity = patch.radiosity;
@@ -300,15 +295,12 @@ class Brush {
       const M meets = hn::Or(covers, has_samples);
       if (hn::AllFalse(d, meets)) return true;
       things_.Meet(at, meets, cover.depth_begin, cover.depth_end);
-      if (cover.has_hull) things_.AddHull(at, samples, widening, !cover.is_translucent);
+      if (cover.has_hull) things_.AddHull(at, samples, widening, cover.layers.count == 0);
     }
     if (hn::AllFalse(d, covers)) return true;
     V room = hn::Load(d, pixel + PacketCanvas::kRoom * kStep), least = hn::Zero(d);
     if (!cover.is_alone) {
-      if (cover.is_translucent) {
-        const V layers = hn::Mul(Splat(cover.layer_part), amount);
-        least = hn::Mul(room, things_.AddLayers(at, layers, cover.tile_opacity, cover.tile_depth));
-      }
+      if (cover.layers.count > 0) least = hn::Mul(room, things_.AddTiles(at, amount, cover.layers));
       const VU held = Things::HeldOf(pixel);
       if (!hn::AllTrue(DU(), hn::Eq(held, hn::Zero(DU())))) {
         room = RoomAt(partIn(held), PartOf(held), room);
@@ -326,7 +318,8 @@ class Brush {
     from_ray.facing = Dot(to_centre, patch.normal);
     Cover cover = MakeCover(patch, from_ray, hn::Sqrt(sight.distance_sq), sight.near_part);
     if (!patch.isRound() && !patch.is_ribbon) {
-      cover.layer_part *= patch.disk_area / softDiskArea(patch.radius, patch.soft_peak);
+      const float covered = softDiskArea(patch.radius, patch.soft_peak);
+      cover.layers = TileLayersOf(patch, patch.disk_area / covered);
     }
     TraceBox(patch, InRaster(to_centre), InRaster(patch.normal), sight.traced, from_ray.facing,
              cover);

@@ -37,10 +37,7 @@ struct Cover {
   bool has_hull;
   bool is_solid;  // its hull is widened
   V opacity;
-  bool is_translucent;  // and not alone
-  float tile_opacity;   // what a layer of it hides where it fills a pixel
-  float tile_depth;     // the optical depth of a layer; of what is translucent
-  float layer_part;     // how many layers there are where it covers all of a pixel; as before
+  TileLayers<float> layers;  // TileLayersOf
   glm::vec3 radiosity;
   const float* lights;  // instead of it, PacketLights of these lanes; null: none
   V fade;               // only when something fades
@@ -84,7 +81,8 @@ HWY_INLINE V RoomAt(V behind, V held, V room) {
   return hn::Min(one, hn::Max(zero, hn::MulAdd(behind, hn::Sub(inside, beside), beside)));
 }
 
-// What is left open of a pixel of which something covers so much. `least`: where it is not alone.
+// What is left open of a pixel of which something covers so much: at least `least`, unless it is
+// alone.
 HWY_INLINE V LeftOpen(float* pixel, V amount, V open, const Cover& cover, V room, V least) {
   const D d;
   if (cover.is_alone) {  // before all others, and behind them

@@ -228,6 +228,7 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.is_spread = !node.isFlat() || !patch.is_solid;
   patch.shape = shapeOf(facet.covariance);
   const float opacity = facet.opacity[color_];
+  // What is opaque keeps all of its area, and so its power
   patch.layers = opacity < 1 ? facetLayers(facet) : 1;
   patch.opacity = layersOpacity(opacity, patch.layers);
   if (!patch.is_alone) patch.clear = 1 - opacity;

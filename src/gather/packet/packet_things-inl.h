@@ -12,6 +12,7 @@
 #include <hwy/contrib/math/math-inl.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -36,14 +37,24 @@ inline VU InEveryColumn(VU column) {
   return hn::Or(column, hn::ShiftLeft<2 * kHullSide>(column));
 }
 
-// Translucent tiles of a thing: how many layers they are, that times their opacities, and the
-// optical depth.
-struct Layers {
-  V count, hidden, depth;
+// Translucent tiles: how many layers they are, that times their opacities, and their optical depth.
+template <typename T>
+struct TileLayers {
+  T count, hidden, depth;
 };
-// What shows through them, at least one. Of one layer opacities add up, several multiply. Areas of
-// tiles scatter: a second layer counts from half of it on, and wholly from three quarters.
-inline V ShownThrough(const Layers& layers) {
+
+// What of all of a pixel such a patch covers: so many layers. `soft_part`: of a disk as it is ray
+// traced, its area over what it covers; else 1. None of what is opaque or alone.
+inline TileLayers<float> TileLayersOf(const Patch& patch, float soft_part) {
+  if (!(patch.clear > 0)) return {0, 0, 0};
+  const float opacity = 1 - patch.clear;
+  const float count = soft_part * (patch.isNode() ? patch.layers / patch.opacity : 1 / opacity);
+  return {count, count * opacity, -count * std::log(patch.clear)};
+}
+
+// What shows through so many layers, at least one. Of one layer opacities add up, several multiply.
+// Areas of tiles scatter: a second layer counts from half of it on, and wholly from three quarters.
+inline V ShownThrough(const TileLayers<V>& layers) {
   const D d;
   const V one = Splat(1), zero = hn::Zero(d);
   const V opacity = hn::Div(layers.hidden, hn::Max(layers.count, Splat(1e-30f)));
@@ -93,7 +104,7 @@ class FaceThings {
   // Places in a pixel: samples of the hull of the last thing, and in the upper half of all things
   // before it; where the last thing begins and ends in depth; what was left before it; samples that
   // the things before it hold; where these end; and the color before it. Where something is
-  // translucent, of the last thing those samples of the hull that are opaque, and its Layers.
+  // translucent, of the last thing those samples of the hull that are opaque, and its TileLayers.
   static constexpr std::size_t kHull = PacketCanvas::kCoverageChannels + kChannels;
   static constexpr std::size_t kBegin = kHull + 1, kEnd = kHull + 2, kRestBefore = kHull + 3;
   static constexpr std::size_t kHeld = kHull + 4, kEndBefore = kHull + 5;
@@ -140,15 +151,14 @@ class FaceThings {
     hn::Store(hn::BitCast(d, hn::Or(OpaqueOf(pixel), samples)), d, pixel + kOpaque * kStep);
   }
 
-  // Adds translucent tiles of this opacity and optical depth to the last thing. What shows through
-  // it then.
-  HWY_INLINE V AddLayers(std::size_t at, V count, float opacity, float depth) const {
+  // Adds this part of these tiles to the last thing. What shows through it then.
+  HWY_INLINE V AddTiles(std::size_t at, V part, const TileLayers<float>& tiles) const {
     const D d;
     float* const pixel = pixels_.at(at);
-    Layers layers = LayersOf(pixel);
-    layers.count = hn::Add(layers.count, count);
-    layers.hidden = hn::MulAdd(count, Splat(opacity), layers.hidden);
-    layers.depth = hn::MulAdd(count, Splat(depth), layers.depth);
+    TileLayers<V> layers = LayersOf(pixel);
+    layers.count = hn::MulAdd(part, Splat(tiles.count), layers.count);
+    layers.hidden = hn::MulAdd(part, Splat(tiles.hidden), layers.hidden);
+    layers.depth = hn::MulAdd(part, Splat(tiles.depth), layers.depth);
     hn::Store(layers.count, d, pixel + kLayers * kStep);
     hn::Store(layers.hidden, d, pixel + kHidden * kStep);
     hn::Store(layers.depth, d, pixel + kDepth * kStep);
@@ -215,13 +225,13 @@ class FaceThings {
   static VU OpaqueOf(const float* pixel) {
     return hn::BitCast(DU(), hn::Load(D(), pixel + kOpaque * kStep));
   }
-  static Layers LayersOf(const float* pixel) {
+  static TileLayers<V> LayersOf(const float* pixel) {
     const D d;
     return {hn::Load(d, pixel + kLayers * kStep), hn::Load(d, pixel + kHidden * kStep),
             hn::Load(d, pixel + kDepth * kStep)};
   }
-  // Closes the last thing, which ends at `end`, in some of these lanes. The samples that it and
-  // what is before it hold: what something shows through holds none.
+  // Closes the last thing, which ends at `end`, in those of these lanes where its hull is whole.
+  // Returns the samples that it and the things before it hold; translucent tiles hold none.
   VU CloseThing(std::size_t at, M lanes, V end) const {
     const D d;
     const DU du;
