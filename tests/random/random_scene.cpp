@@ -272,6 +272,12 @@ void SceneMaker::addReceiver(const SurfaceSite& site, const char* place, int num
   if (!isInContact(one.receiver.position, number)) scene_.receivers.push_back(one);
 }
 
+// A place beyond the border of a patch, mirrored at it. On the border itself a place may lie in
+// another patch of its part, and what it sees is a matter of rounding.
+double withinUnit(double place) {
+  return std::min(place > 1 ? 2 - place : std::abs(place), .99999);
+}
+
 // One or some neighbours on a part.
 void SceneMaker::addSurfaceReceivers(int number, RandomNumbers& random) {
   const Part& part = parts_[std::size_t(number)];
@@ -304,10 +310,8 @@ void SceneMaker::addSurfaceReceivers(int number, RandomNumbers& random) {
   const bool is_two_sided = part.look.is_two_sided || patch.always_two_sided;
   const bool turns = random.chance(is_two_sided ? .5 : .03);
   for (int i = 0; i < neighbours; ++i) {
-    const double near_u =
-        std::clamp(u + (i > 0 ? spread * random.between(-.5, .5) : 0), 0., .99999);
-    const double near_v =
-        std::clamp(v + (i > 0 ? spread * random.between(-.5, .5) : 0), 0., .99999);
+    const double near_u = withinUnit(u + (i > 0 ? spread * random.between(-.5, .5) : 0));
+    const double near_v = withinUnit(v + (i > 0 ? spread * random.between(-.5, .5) : 0));
     const double column = near_u * grid.columns(), row = near_v * grid.rows();
     SurfaceSite site =
         grid.site(int(column), int(row), column - std::floor(column), row - std::floor(row));
