@@ -21,12 +21,26 @@ inline glm::vec3 normalOf(const Surfel& surfel) {
   return surfel.isSphere() ? glm::vec3(0) : surfel.normal;
 }
 
+// What a node refers to, without what else it holds: a reader may drop the page of a node.
+struct NodeLink {
+  NodeRange children;
+  LeafRange leaf;
+
+  NodeLink() = default;
+  explicit NodeLink(const Node& node) : children(childrenOf(node)), leaf(surfelsOf(node)) {}
+  bool isLeaf() const { return children.count == 0; }
+};
+
+inline PlaceBounds boundsOf(const Node& node) {
+  return {node.position, node.radius, node.normal, node.normal_cosine};
+}
+
 // Calls visit(surfel, id) for all of a leaf.
 template <typename Visit>
-Status visitLeaf(const Node& leaf, const SceneFile& file, PagedOctree::Reader& reader,
+Status visitLeaf(const LeafRange& leaf, const SceneFile& file, PagedOctree::Reader& reader,
                  const Visit& visit) {
   std::uint32_t page = leaf.page, first = leaf.first;
-  for (std::uint64_t left = leaf.surfel_count; left > 0; ++page, first = 0) {
+  for (std::uint64_t left = leaf.count; left > 0; ++page, first = 0) {
     SURFEIT_ASSIGN_OR_RETURN(const std::span<const Surfel> run, reader.surfels(page, first, left));
     for (std::size_t i = 0; i < run.size(); ++i) {
       visit(run[i], surfelId(file, page, first + std::uint32_t(i)));
@@ -37,16 +51,16 @@ Status visitLeaf(const Node& leaf, const SceneFile& file, PagedOctree::Reader& r
 }
 
 // Calls visit(surfel, id) for the surfels of a leaf: of a large one for those of the runs alone of
-// which not isBeyond(distanceTo(position, radius)), the nearest first.
+// which not isBeyond(distanceTo(bounds)), the nearest first.
 template <typename DistanceTo, typename IsBeyond, typename Visit>
 class LeafVisit {
  public:
-  LeafVisit(const Node& leaf, PagedOctree::Reader& reader, const DistanceTo& distanceTo,
+  LeafVisit(const LeafRange& leaf, PagedOctree::Reader& reader, const DistanceTo& distanceTo,
             const IsBeyond& isBeyond, const Visit& visit)
       : leaf_(leaf), reader_(reader), distanceTo_(distanceTo), isBeyond_(isBeyond), visit_(visit) {}
 
   Status run() {
-    if (leaf_.surfel_count <= reader_.file().header().surfel_group_capacity) {
+    if (leaf_.count <= reader_.file().header().surfel_group_capacity) {
       return visitLeaf(leaf_, reader_.file(), reader_, visit_);
     }
     SURFEIT_ASSIGN_OR_RETURN(runs_, reader_.leafRuns(leaf_));
@@ -61,7 +75,7 @@ class LeafVisit {
     std::array<std::pair<float, std::size_t>, LeafRuns::kFanOut> candidates;
     for (std::size_t i = 0; i < count; ++i) {
       const LeafRuns::Sphere& sphere = spheres[begin + i];
-      candidates[i] = {distanceTo_(sphere.position, sphere.radius), begin + i};
+      candidates[i] = {distanceTo_(PlaceBounds{sphere.position, sphere.radius}), begin + i};
     }
     const auto order = std::span(candidates).first(count);
     std::sort(order.begin(), order.end());
@@ -83,7 +97,7 @@ class LeafVisit {
     return {};
   }
 
-  const Node& leaf_;
+  const LeafRange leaf_;
   PagedOctree::Reader& reader_;
   const DistanceTo& distanceTo_;
   const IsBeyond& isBeyond_;

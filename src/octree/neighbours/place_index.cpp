@@ -113,30 +113,29 @@ Result<bool> PlaceIndex::State::read(PagedOctree::Reader& reader) {
 
 Result<bool> PlaceIndex::State::addRange(const NodeRange& range, PagedOctree::Reader& reader) {
   SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(range));
-  const auto distanceTo = [&](const glm::vec3& position, float radius) {
-    const float reach = (margin + radius) * 1.00001f;
-    return kernel.isAnyBoxWithin(boxes, &position.x, &position.x, reach * reach) ? 0.f : 1.f;
+  const auto distanceTo = [&](const PlaceBounds& bounds) {
+    const float reach = (margin + bounds.radius) * 1.00001f, *at = &bounds.centre.x;
+    return kernel.isAnyBoxWithin(boxes, at, at, reach * reach) ? 0.f : 1.f;
   };
   const auto isBeyond = [&](float distance) { return distance > 0 || places.size() > kMostPlaces; };
   // Small leaves are taken whole
   bool is_large = false;
   const auto visit = [&](const Surfel& surfel, std::uint64_t id) {
-    if (!is_large || distanceTo(surfel.position, 0) == 0) take(surfel, id);
+    if (!is_large || distanceTo({surfel.position, 0}) == 0) take(surfel, id);
   };
-  // The reader may drop their page
-  std::array<Node, 8> copies;
+  std::array<NodeLink, 8> links;
   std::size_t near = 0;
   for (const Node& node : nodes) {
-    if (!isBeyond(distanceTo(node.position, node.radius))) copies[near++] = node;
+    if (!isBeyond(distanceTo(boundsOf(node)))) links[near++] = NodeLink(node);
   }
-  for (const Node& node : std::span(copies).first(near)) {
+  for (const NodeLink& link : std::span(links).first(near)) {
     bool fits = true;
-    if (node.isLeaf()) {
-      is_large = node.surfel_count > kBoxed;
-      SURFEIT_RETURN_IF_ERROR(LeafVisit(node, reader, distanceTo, isBeyond, visit).run());
+    if (link.isLeaf()) {
+      is_large = link.leaf.count > kBoxed;
+      SURFEIT_RETURN_IF_ERROR(LeafVisit(link.leaf, reader, distanceTo, isBeyond, visit).run());
       fits = places.size() <= kMostPlaces;
     } else {
-      SURFEIT_ASSIGN_OR_RETURN(fits, addRange(childrenOf(node), reader));
+      SURFEIT_ASSIGN_OR_RETURN(fits, addRange(link.children, reader));
     }
     if (!fits) return false;
   }

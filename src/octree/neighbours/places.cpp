@@ -40,21 +40,20 @@ void dropFarthest(NearestPlaces& found) {
 
 namespace {
 
-// Calls visit(surfel, id), depth first and the nearest child first: distanceTo(position, radius)
-// tells, and what isBeyond(distance) is left out. Nodes are copied because the reader may drop
-// their page.
+// Calls visit(surfel, id), depth first and the nearest child first: distanceTo(bounds) tells, and
+// what isBeyond(distance) is left out.
 template <typename DistanceTo, typename IsBeyond, typename Visit>
 Status visitNearestFirst(const NodeRange& range, PagedOctree::Reader& reader,
                          const DistanceTo& distanceTo, const IsBeyond& isBeyond,
                          const Visit& visit) {
   SURFEIT_ASSIGN_OR_RETURN(const std::span<const Node> nodes, reader.nodes(range));
-  std::array<Node, 8> copies;
+  std::array<NodeLink, 8> links;
   std::array<std::pair<float, std::size_t>, 8> candidates;
   std::size_t count = 0;
   for (const Node& node : nodes) {
-    const float distance = distanceTo(node.position, node.radius);
+    const float distance = distanceTo(boundsOf(node));
     if (isBeyond(distance)) continue;
-    copies[count] = node;
+    links[count] = NodeLink(node);
     std::size_t place = count++;
     for (; place > 0 && candidates[place - 1].first > distance; --place) {
       candidates[place] = candidates[place - 1];
@@ -63,12 +62,12 @@ Status visitNearestFirst(const NodeRange& range, PagedOctree::Reader& reader,
   }
   for (const auto& [distance, i] : std::span(candidates).first(count)) {
     if (isBeyond(distance)) break;
-    const Node& node = copies[i];
-    if (node.isLeaf()) {
-      SURFEIT_RETURN_IF_ERROR(LeafVisit(node, reader, distanceTo, isBeyond, visit).run());
+    const NodeLink& link = links[i];
+    if (link.isLeaf()) {
+      SURFEIT_RETURN_IF_ERROR(LeafVisit(link.leaf, reader, distanceTo, isBeyond, visit).run());
     } else {
       SURFEIT_RETURN_IF_ERROR(
-          visitNearestFirst(childrenOf(node), reader, distanceTo, isBeyond, visit));
+          visitNearestFirst(link.children, reader, distanceTo, isBeyond, visit));
     }
   }
   return {};
@@ -84,8 +83,8 @@ class PlaceSearch {
   Status run() {
     SURFEIT_RETURN_IF_ERROR(visitNearestFirst(
         kRootRange, reader_,
-        [&](const glm::vec3& position, float radius) {
-          return std::max(0.f, glm::length(position - position_) - radius);
+        [&](const PlaceBounds& bounds) {
+          return std::max(0.f, glm::length(bounds.centre - position_) - bounds.radius);
         },
         // Positions count, not disks; a slack of one part in a million covers rounding
         [&](float distance) { return distance * distance > limit_sq_ * 1.000001f; },
@@ -137,7 +136,7 @@ namespace {
 // Finds the nearest of some.
 class WantedSearch {
  public:
-  using MayHold = std::function<bool(const glm::vec3&, float)>;
+  using MayHold = std::function<bool(const PlaceBounds&)>;
   using IsWanted = std::function<bool(const Neighbour&)>;
 
   WantedSearch(const glm::vec3& position, float most_distance, PagedOctree::Reader& reader,
@@ -151,10 +150,10 @@ class WantedSearch {
   Status run() {
     return visitNearestFirst(
         kRootRange, reader_,
-        [&](const glm::vec3& position, float node_radius) {
-          const glm::vec3 offset = position - position_;
-          const float radius = node_radius * 1.000001f;
-          return mayHold_(offset, radius) ? glm::length(offset) - radius : kInfinity;
+        [&](PlaceBounds bounds) {
+          bounds.centre -= position_;
+          bounds.radius *= 1.000001f;
+          return mayHold_(bounds) ? glm::length(bounds.centre) - bounds.radius : kInfinity;
         },
         [&](float distance) { return distance > limit_; },
         [&](const Surfel& surfel, std::uint64_t id) { consider(surfel, id); });
@@ -182,10 +181,10 @@ class WantedSearch {
 
 }  // namespace
 
-Result<std::optional<Neighbour>> findPlace(
-    const glm::vec3& position, float most_distance, PagedOctree::Reader& reader,
-    const std::function<bool(const glm::vec3&, float)>& mayHold,
-    const std::function<bool(const Neighbour&)>& isWanted) {
+Result<std::optional<Neighbour>> findPlace(const glm::vec3& position, float most_distance,
+                                           PagedOctree::Reader& reader,
+                                           const std::function<bool(const PlaceBounds&)>& mayHold,
+                                           const std::function<bool(const Neighbour&)>& isWanted) {
   WantedSearch search(position, most_distance, reader, mayHold, isWanted);
   SURFEIT_RETURN_IF_ERROR(search.run());
   return search.found();

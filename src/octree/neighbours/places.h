@@ -42,10 +42,10 @@ Status findPlaces(const glm::vec3& position, std::size_t count, PagedOctree::Rea
                   NearestPlaces& found);
 
 // The nearest place that isWanted(place), nearer than `most_distance`; none where there is none.
-// Offsets are from `position`. Spheres around places are visited where mayHold(centre, radius).
-Result<std::optional<Neighbour>> findPlace(
-    const glm::vec3& position, float most_distance, PagedOctree::Reader& reader,
-    const std::function<bool(const glm::vec3&, float)>& mayHold,
-    const std::function<bool(const Neighbour&)>& isWanted);
+// Offsets are from `position`. What lies in bounds is visited where mayHold(bounds).
+Result<std::optional<Neighbour>> findPlace(const glm::vec3& position, float most_distance,
+                                           PagedOctree::Reader& reader,
+                                           const std::function<bool(const PlaceBounds&)>& mayHold,
+                                           const std::function<bool(const Neighbour&)>& isWanted);
 
 }  // namespace surfeit

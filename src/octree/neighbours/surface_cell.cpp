@@ -23,14 +23,14 @@ namespace {
 // A surfel with a wrong normal is so many times as far from what faces as it does as from the third
 // nearest place of any sheet.
 constexpr float kFarOff = 4;
-// What lies so close beside a place, in spacings, has no mirror image.
-constexpr float kSharing = 0.05f;
-// What lies so close beside a place, in spacings, shares its cell.
-constexpr float kCoincident = 1e-3f;
+// What lies so close beside a place, in spacings, has no mirror image; and shares its cell.
+constexpr float kSharing = 0.05f, kCoincident = 1e-3f;
 
 // Neighbours whose normals differ by more than 60 degrees are of another surface, which meets this
 // one at an edge (as of photons, photons/nearest_photons.h).
 constexpr float kLeastCosine = 0.5f;
+// Bounds and places round otherwise.
+constexpr float kBoundsSlack = 1e-3f;
 // At the edge of a surface cells are closed by other places of the edge, far outside: they reach
 // farther than this, in distances of the places that cut them.
 constexpr float kSpike = 2;
@@ -310,10 +310,7 @@ SurfaceCell SurfaceCells::cellOf(std::size_t lane) {
 
 float SurfaceCells::reach() const { return 2 * scratch_->polygon.reach() * scratch_->unit; }
 
-bool SurfaceCells::isOpen() const {
-  const Scratch& at = *scratch_;
-  return at.hasPlane() && !at.cutters.empty();
-}
+bool SurfaceCells::isOpen() const { return scratch_->hasPlane() && !scratch_->cutters.empty(); }
 
 bool SurfaceCells::isSparse() { return scratch_->isSparse(); }
 
@@ -373,8 +370,15 @@ glm::vec3 SurfaceCells::farthestCorner() const {
   return at.unit * (corner.x * at.frame.tangent + corner.y * at.frame.bitangent);
 }
 
-bool SurfaceCells::mayCut(const glm::vec3& centre, float radius) const {
-  return scratch_->polygon.mayCut(scratch_->flatten(centre).beside, radius / scratch_->unit);
+bool SurfaceCells::mayCut(const PlaceBounds& bounds) const {
+  const Scratch& at = *scratch_;
+  const bool is_known = at.own_normal != glm::vec3(0);
+  if (is_known && bounds.mostCosine(at.own_normal) < kLeastCosine - kBoundsSlack) return false;
+  const FlatNeighbour middle = at.flatten(bounds.centre);
+  const float radius = bounds.radius / at.unit, beside = glm::length(middle.beside) + radius;
+  const float above = std::abs(middle.above) - radius;
+  return above <= kSteep * beside + kBoundsSlack * (beside + above) &&
+         at.polygon.mayCut(middle.beside, radius);
 }
 
 bool SurfaceCells::wouldCut(const Neighbour& place) const {

@@ -9,6 +9,8 @@
 #include <memory>
 #include <span>
 
+#include "octree/neighbours/place_bounds.h"
+
 namespace surfeit {
 
 // Another place, from the one in question.
@@ -75,7 +77,7 @@ class SurfaceCells {
   SurfaceCell cellOf(std::size_t lane);
 
   // A cell that is not settled may be cut by places farther away. Whether any could, which would be
-  // nearer than reach(): a place, or one within a sphere.
+  // nearer than reach(): a place, or one within bounds.
   bool isOpen() const;
   float reach() const;
   // Whether places close by cannot tell the size of the cell.
@@ -89,7 +91,7 @@ class SurfaceCells {
   bool widen(float radius);
   // From the place.
   glm::vec3 farthestCorner() const;
-  bool mayCut(const glm::vec3& centre, float radius) const;
+  bool mayCut(const PlaceBounds& bounds) const;
   bool wouldCut(const Neighbour& place) const;
   // False when it does not after all.
   bool cut(const Neighbour& place);

@@ -208,12 +208,11 @@ void SurfaceSearch::limit(SurfaceCell& cell, bool is_doubtful, float thickness) 
 Status SurfaceSearch::cutByFarther(const glm::vec3& position, float reach, SurfaceCells& cells) {
   if (std::isinf(reach)) return {};  // there is nothing
   for (int i = 0; i < kMostFarther && cells.isOpen(); ++i) {
-    SURFEIT_ASSIGN_OR_RETURN(
-        const std::optional<Neighbour> place,
-        findPlace(
-            position, cells.reach(), *reader_,
-            [&](const glm::vec3& centre, float radius) { return cells.mayCut(centre, radius); },
-            [&](const Neighbour& other) { return cells.wouldCut(other); }));
+    SURFEIT_ASSIGN_OR_RETURN(const std::optional<Neighbour> place,
+                             findPlace(
+                                 position, cells.reach(), *reader_,
+                                 [&](const PlaceBounds& bounds) { return cells.mayCut(bounds); },
+                                 [&](const Neighbour& other) { return cells.wouldCut(other); }));
     if (!place || !cells.cut(*place)) break;
   }
   return {};
@@ -229,8 +228,9 @@ Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, S
         std::optional<Neighbour> place,
         findPlace(
             position + corner, glm::length(corner), *reader_,
-            [&](const glm::vec3& centre, float radius) {
-              return cells.mayCut(centre + corner, radius);
+            [&](PlaceBounds bounds) {
+              bounds.centre += corner;
+              return cells.mayCut(bounds);
             },
             [&](const Neighbour& other) {
               return cells.wouldCut({other.offset + corner, other.normal, other.id});
@@ -256,8 +256,8 @@ Result<bool> SurfaceSearch::isDenseAt(const glm::vec3& position, const Neighbour
         const std::optional<Neighbour> other,
         findPlace(
             position + place.offset, reach, *reader_,
-            [&](const glm::vec3& centre, float radius) {
-              return glm::length(centre) < reach + radius;
+            [&](const PlaceBounds& bounds) {
+              return glm::length(bounds.centre) < reach + bounds.radius;
             },
             [&](const Neighbour& one) {
               const bool is_new = std::find(found.begin(), found.begin() + std::ptrdiff_t(i),

@@ -133,4 +133,12 @@ inline constexpr NodeRange kRootRange = {0, 0, 1};
 
 inline NodeRange childrenOf(const Node& node) { return {node.page, node.first, node.child_count}; }
 
+// The surfels of a leaf: `count` from index `first` of a surfel page on, into the following pages.
+struct LeafRange {
+  std::uint32_t page = 0, first = 0;
+  std::uint64_t count = 0;
+};
+
+inline LeafRange surfelsOf(const Node& leaf) { return {leaf.page, leaf.first, leaf.surfel_count}; }
+
 }  // namespace surfeit

@@ -341,7 +341,7 @@ std::span<const Lobe> PagedOctree::Reader::lobesOf(std::span<const Surfel> surfe
   return first != nullptr ? std::span(first, surfels.size()) : std::span<const Lobe>();
 }
 
-Result<std::shared_ptr<const LeafRuns>> PagedOctree::Reader::leafRuns(const Node& leaf) {
+Result<std::shared_ptr<const LeafRuns>> PagedOctree::Reader::leafRuns(const LeafRange& leaf) {
   const std::uint64_t key = std::uint64_t{leaf.page} << 32 | leaf.first;
   if (state_->last_runs != nullptr && state_->last_leaf == key) return state_->last_runs;
   // Who waits for the lock holds no page that its holder may be waiting for
@@ -351,7 +351,7 @@ Result<std::shared_ptr<const LeafRuns>> PagedOctree::Reader::leafRuns(const Node
   if (runs == nullptr) {
     auto found = std::make_shared<LeafRuns>();
     found->levels.emplace_back();
-    SURFEIT_RETURN_IF_ERROR(visitLeaf(leaf, [&](std::span<const Surfel> surfels) {
+    SURFEIT_RETURN_IF_ERROR(visitSurfels(leaf, [&](std::span<const Surfel> surfels) {
       Bounds3 box;
       for (const Surfel& surfel : surfels) box.add(surfel.position);
       found->surfels.push_back(static_cast<std::uint32_t>(surfels.size()));

@@ -134,12 +134,11 @@ class PagedOctree {
     // It returns nothing, or a Status, whose failure ends the visit.
     template <typename Visit>
     Status visitLeaf(const Node& leaf, Visit&& visit) {
-      return visitSurfels(leaf.page, leaf.first, leaf.surfel_count, visit);
+      return visitSurfels(surfelsOf(leaf), visit);
     }
-    // The same of `count` surfels from index `first` of a page on, into the following pages.
     template <typename Visit>
-    Status visitSurfels(std::uint32_t page, std::uint32_t first, std::uint64_t count,
-                        Visit&& visit) {
+    Status visitSurfels(LeafRange leaf, Visit&& visit) {
+      auto& [page, first, count] = leaf;
       for (; count > 0; ++page, first = 0) {
         SURFEIT_ASSIGN_OR_RETURN(const std::span<const Surfel> run, surfels(page, first, count));
         if constexpr (std::is_void_v<decltype(visit(run))>) {
@@ -154,7 +153,7 @@ class PagedOctree {
 
     // The runs of a leaf, found when they are first asked for; the octree's readers share them.
     // Invalidates what the other calls returned.
-    Result<std::shared_ptr<const LeafRuns>> leafRuns(const Node& leaf);
+    Result<std::shared_ptr<const LeafRuns>> leafRuns(const LeafRange& leaf);
 
    private:
     struct State;
