@@ -45,10 +45,8 @@ struct InvarianceLimits {
 };
 // Nodes decide which two-sided surfels are of a sheet, and their hulls close gaps between surfels;
 // another place has other nodes. (.0247 is of seed 29, a two-sided bowl with skins closer than the
-// bias, some of which cells of the octree tell apart. .0322 is of seed 31, whose opaque terrain,
-// roof, cloth and shells differ by more; an opaque room around them hides that, a translucent one
-// does not. All others differ by at most .0084.)
-inline constexpr InvarianceLimits kMovedLimits = {.033, .033}, kTurnedLimits = {.025, .025};
+// bias, some of which cells of the octree tell apart.)
+inline constexpr InvarianceLimits kMovedLimits = {.025, .025}, kTurnedLimits = {.025, .025};
 inline constexpr InvarianceLimits kScaledLimits = {0, 0};
 
 }  // namespace surfeit
