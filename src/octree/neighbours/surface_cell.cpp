@@ -29,7 +29,7 @@ constexpr float kSharing = 0.05f, kCoincident = 1e-3f;
 // Neighbours whose normals differ by more than 60 degrees are of another surface, which meets this
 // one at an edge (as of photons, photons/nearest_photons.h).
 constexpr float kLeastCosine = 0.5f;
-// Bounds and places round otherwise.
+// For rounding, of bounds: of the cosine, and of lengths.
 constexpr float kBoundsSlack = 1e-3f;
 // At the edge of a surface cells are closed by other places of the edge, far outside: they reach
 // farther than this, in distances of the places that cut them.
