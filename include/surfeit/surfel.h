@@ -75,6 +75,8 @@ struct Surfel {
   bool isLoose() const { return (flags & kSurfelLoose) != 0; }
   bool isLone() const { return (flags & kSurfelLone) != 0; }
   bool isTinted() const { return tint != Tint{}; }
+  // In some color.
+  bool isTranslucent() const { return transparency != 0 || isTinted(); }
   // How much of its area covers what lies behind in a color, and sends its radiosity: above 0, up
   // to 1.
   float opacity(int color = 0) const {

@@ -212,6 +212,28 @@ TEST(NodeSums, TwoSidedSurfelsHaveFacetsOfTheirOwn) {
   EXPECT_NEAR(two_sided.area, node.area / 4, 1e-4f * node.area);
 }
 
+// The mean of a wall and a pane would hide as neither does, however they face.
+TEST(NodeSums, OpaqueAndTranslucentSurfelsHaveFacetsOfTheirOwn) {
+  for (const int flags : {0, int(kSurfelTwoSided)}) {
+    for (const float opacity : {.1f, .5f, .99f}) {
+      std::vector<Surfel> cloud = planeCloud(8, .1f);
+      for (Surfel& surfel : cloud) surfel.flags = std::uint16_t(flags);
+      const Node opaque = sumsOf(cloud).toNode(.97f, 1);
+      EXPECT_TRUE(opaque.isFlat() && !opaque.isTranslucent());
+      for (std::size_t i = 0; i < 16; ++i) cloud[i].setOpacity(opacity, opacity, 1);
+      const Node node = sumsOf(cloud).toNode(.97f, 1);
+      ASSERT_EQ(node.facet_count, 2);
+      const std::size_t clear = node.facets[0].isTranslucent() ? 0 : 1;
+      EXPECT_EQ(node.facets[1 - clear].opacity(), glm::vec3(1));
+      EXPECT_NEAR(node.facets[clear].opacity().x, opacity, 1e-4f);
+      EXPECT_EQ(node.facets[clear].opacity().z, 1);
+      EXPECT_NEAR(node.facet(clear).area, node.area / 4, 1e-4f * node.area);
+      for (Surfel& surfel : cloud) surfel.setOpacity(opacity, opacity, 1);
+      EXPECT_TRUE(sumsOf(cloud).toNode(.97f, 1).isFlat());
+    }
+  }
+}
+
 TEST(NodeSums, AFlatNodeHasNoFrontMoment) {
   const Node node = sumsOf(planeCloud(8, .1f)).toNode(.97f, 1);
   ASSERT_TRUE(node.isFlat());

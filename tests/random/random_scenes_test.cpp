@@ -122,6 +122,15 @@ TEST_P(RandomScenes, TranslucentSurfacesComeCloseToExact) {
   expectFidelity(smallScenes(first(), kSome), "opacities", options, kTranslucentLimits, true);
 }
 
+// Walls beside panes, in one node: the walls let through light while nodes knew one opacity of
+// both.
+TEST(KeptScenes, WallsBesidePanesHideWhatIsBehindThem) {
+  FidelityLimits limits = kTranslucentLimits;
+  limits.median_light = .02;
+  const auto options = [](const RandomScene&) { return bleeding(); };
+  expectFidelity({284, 1050, 1157}, "kept", options, limits, true);
+}
+
 // Every second ingredient is a group that is seen.
 TEST_P(RandomScenes, SubsetsComeCloseToExact) {
   const auto options = [](const RandomScene&) {

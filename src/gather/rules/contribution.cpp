@@ -145,6 +145,7 @@ bool isFilled(const Node& node, const Facet& facet) {
   const glm::vec3 direction = glm::normalize(facet.normal);
   float shown = 0;
   for (std::size_t i = 0; i < node.facet_count; ++i) {
+    if (node.facets[i].isTranslucent() != facet.isTranslucent()) continue;
     const float cosine = glm::dot(direction, node.facets[i].meanNormal());
     if (node.isTwoSided(i) || cosine > 0) shown += float(node.facets[i].area) * std::abs(cosine);
   }

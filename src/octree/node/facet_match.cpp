@@ -14,6 +14,7 @@ bool isFacet(const FacetGroup& group, const double (&origin)[3], double node_are
              std::size_t k) {
   const NodeFacet& facet = node.facets[k];
   if (node.isTwoSided(k) != group.is_two_sided) return false;
+  if (facet.isTranslucent() != group.is_translucent) return false;
   if (!group.is_two_sided && facet.hidden != group.hidden) return false;
   if (std::abs(double(facet.area) / 65535 - group.area / node_area) > kAreaSlack) return false;
   const glm::vec3 normal = facet.meanNormal();

@@ -31,6 +31,10 @@ double facingDot(const FacetGroup& a, const FacetGroup& b) {
   return areTurned(a, b) ? -dot : dot;
 }
 
+bool areOneKind(const FacetGroup& a, const FacetGroup& b) {
+  return a.is_two_sided == b.is_two_sided && a.is_translucent == b.is_translucent;
+}
+
 bool areLayers(const FacetGroup& a, const FacetGroup& b) {
   if ((a.hidden | b.hidden) == 0 || a.is_two_sided != b.is_two_sided) return false;
   return a.hidden != (areTurned(a, b) ? turnedSides(b.hidden) : b.hidden);
@@ -38,7 +42,7 @@ bool areLayers(const FacetGroup& a, const FacetGroup& b) {
 
 // Within 10 degrees, and hidden alike.
 bool faceAlike(const FacetGroup& a, const FacetGroup& b) {
-  if (a.is_two_sided != b.is_two_sided || areLayers(a, b)) return false;
+  if (!areOneKind(a, b) || areLayers(a, b)) return false;
   const double dot = facingDot(a, b);
   return dot > 0 && dot * dot > kAlikeCosineSq * dotOfNormals(a, a) * dotOfNormals(b, b);
 }
@@ -46,7 +50,10 @@ bool faceAlike(const FacetGroup& a, const FacetGroup& b) {
 }  // namespace
 
 FacetGroup::FacetGroup(const AreaSums& sums, const Surfel& surfel)
-    : AreaSums(sums), is_two_sided(surfel.isTwoSided()), hidden(hiddenSidesOf(surfel)) {
+    : AreaSums(sums),
+      is_two_sided(surfel.isTwoSided()),
+      is_translucent(surfel.isTranslucent()),
+      hidden(hiddenSidesOf(surfel)) {
   for (int axis = 0; axis < 3; ++axis) normal[axis] = sums.area * double(surfel.normal[axis]);
 }
 
@@ -66,7 +73,7 @@ void FacetSums::add(const FacetGroup& facet) {
     if (faceAlike(groups_[i], facet)) return groups_[i].add(facet);
   }
   groups_[count_++] = facet;
-  if (count_ > kMostFacets) merge(*closest());  // of seven groups, four are of one kind
+  if (count_ > kMostFacets) merge(*closest());  // of seven groups, two are of one of four kinds
 }
 
 void FacetSums::add(const FacetSums& child, const double (&shift)[3]) {
@@ -89,7 +96,7 @@ std::optional<FacetSums::Pair> FacetSums::closest() const {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count_; ++i) {
     for (std::size_t j = i + 1; j < count_; ++j) {
-      if (groups_[i].is_two_sided != groups_[j].is_two_sided) continue;
+      if (!areOneKind(groups_[i], groups_[j])) continue;
       const double both_sq =
           lengths[i] * lengths[i] + lengths[j] * lengths[j] + 2 * facingDot(groups_[i], groups_[j]);
       double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
@@ -109,9 +116,10 @@ void FacetSums::merge(const Pair& pair) {
   groups_[pair.second] = groups_[count_];
 }
 
-bool FacetSums::hasLayers() const {
+bool FacetSums::hideDifferently() const {
   for (std::size_t i = 0; i < count_; ++i) {
     for (std::size_t j = i + 1; j < count_; ++j) {
+      if (groups_[i].is_translucent != groups_[j].is_translucent) return true;
       if (areLayers(groups_[i], groups_[j])) return true;
     }
   }

@@ -18,7 +18,8 @@ inline constexpr double kAlikeCosineSq = 0.97;
 // Surfels that face about one way; two-sided ones of a plane may face the other way as well.
 struct FacetGroup : AreaSums {
   bool is_two_sided = false;  // `normal` is the sum of those turned to one side, within a plane
-  std::uint8_t hidden = 0;    // HiddenSides of all of them, by that normal
+  bool is_translucent = false;
+  std::uint8_t hidden = 0;  // HiddenSides of all of them, by that normal
 
   FacetGroup() = default;
   // One surfel; it has a normal. `sums` are its own.
@@ -30,7 +31,8 @@ struct FacetGroup : AreaSums {
 // when there are too many, the two groups become one that lose least by it: the loss is the area
 // that faces one way less, |N_a| + |N_b| - |N_a + N_b| with N = sum A n, or all of the smaller one
 // where one has hidden sides that the other has not. The order of adding decides what is grouped
-// with what. One-sided and two-sided surfels stay apart. Plain data.
+// with what. One-sided and two-sided surfels stay apart, and so do opaque and translucent ones: the
+// mean of a wall and a pane hides as neither does. Plain data.
 class FacetSums {
  public:
   void add(const FacetGroup& facet);
@@ -42,8 +44,9 @@ class FacetSums {
   // As few groups as hold together more than `flatness` of the area, as sum |N| over sum A, and are
   // hidden alike; none when all do not.
   FacetSums fewest(float flatness) const;
-  // Some of one kind are hidden otherwise than others.
-  bool hasLayers() const;
+  // One piece would hide otherwise than they do: some of one kind have other hidden sides than
+  // others, or some are translucent and others opaque.
+  bool hideDifferently() const;
   // Sides that are hidden of all.
   std::uint8_t hiddenSides() const;
   std::span<const FacetGroup> groups() const { return std::span(groups_).first(count_); }

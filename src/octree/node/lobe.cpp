@@ -12,19 +12,26 @@
 namespace surfeit {
 namespace {
 
-// The piece of a node that faces most as this normal does, of those of its kind and hidden alike,
-// if there are some; 0 where there is none.
-std::size_t pieceThatFaces(const Node& node, const glm::vec3& normal, bool is_two_sided,
-                           std::uint8_t hidden) {
+// What a surfel, or a piece of a child, must have in common with a piece of a node.
+struct PieceKind {
+  glm::vec3 normal;
+  bool is_two_sided, is_translucent;
+  std::uint8_t hidden;
+};
+
+// The piece of a node that faces most as this one does, of those of its kind, as opaque and hidden
+// alike, if there are some; 0 where there is none.
+std::size_t pieceThatFaces(const Node& node, const PieceKind& kind) {
   std::size_t nearest = 0;
-  float most = -4;
+  float most = -8;
   for (std::size_t k = 0; k < node.facet_count; ++k) {
-    if (node.isTwoSided(k) != is_two_sided) continue;
+    if (node.isTwoSided(k) != kind.is_two_sided) continue;
     const glm::vec3 facing = node.facets[k].meanNormal();
     const float length = glm::length(facing);
-    float cosine = length > 0 ? glm::dot(facing, normal) / length : 0;
-    if (is_two_sided) cosine = std::abs(cosine);
-    if (node.facets[k].hidden != hidden) cosine -= 2;
+    float cosine = length > 0 ? glm::dot(facing, kind.normal) / length : 0;
+    if (kind.is_two_sided) cosine = std::abs(cosine);
+    if (node.facets[k].hidden != kind.hidden) cosine -= 2;
+    if (node.facets[k].isTranslucent() != kind.is_translucent) cosine -= 4;
     if (cosine > most) {
       most = cosine;
       nearest = k;
@@ -33,8 +40,12 @@ std::size_t pieceThatFaces(const Node& node, const glm::vec3& normal, bool is_tw
   return nearest;
 }
 
-glm::vec3 normalOfPiece(const Node& node, std::size_t piece) {
-  return node.hasFacets() ? node.facets[piece].meanNormal() : node.normal;
+PieceKind kindOfPiece(const Node& node, std::size_t piece) {
+  if (pieceCount(node) == 0) return {node.normal, false, node.isTranslucent(), 0};
+  const bool is_facet = node.hasFacets();
+  return {is_facet ? node.facets[piece].meanNormal() : node.normal, node.isTwoSided(piece),
+          is_facet ? node.facets[piece].isTranslucent() : node.isTranslucent(),
+          node.hiddenSides(piece)};
 }
 
 // Two sides have two mirror directions, and a rough node has many.
@@ -73,7 +84,8 @@ Lobe LobeSums::toLobe() const {
 }
 
 void addToPiece(const Node& node, const Surfel& surfel, const Lobe& lobe, PieceSums& sums) {
-  const bool is_two_sided = surfel.isTwoSided() && !surfel.isSphere();
+  const PieceKind kind = {surfel.normal, surfel.isTwoSided() && !surfel.isSphere(),
+                          surfel.isTranslucent(), hiddenSidesOf(surfel)};
   const glm::vec3 shares = lobe.shares(), direction = lobe.meanDirection();
   LobeSums one;
   for (int c = 0; c < 3; ++c) {
@@ -83,7 +95,7 @@ void addToPiece(const Node& node, const Surfel& surfel, const Lobe& lobe, PieceS
   // One direction stands for all colors
   one.weight = luminance(glm::dvec3(one.lobe[0], one.lobe[1], one.lobe[2]));
   for (int c = 0; c < 3; ++c) one.mean[c] = one.weight * double(direction[c]);
-  sums[pieceThatFaces(node, surfel.normal, is_two_sided, hiddenSidesOf(surfel))].add(one);
+  sums[pieceThatFaces(node, kind)].add(one);
 }
 
 void addToPieces(const Node& node, const Node& child, const PieceSums& of_child, PieceSums& sums) {
@@ -96,9 +108,7 @@ void addToPieces(const Node& node, const Node& child, const PieceSums& of_child,
       one = {};
       std::copy(std::begin(all.power), std::end(all.power), std::begin(one.power));
     }
-    const bool is_two_sided = pieceCount(child) > 0 && child.isTwoSided(piece);
-    const std::uint8_t hidden = pieceCount(child) > 0 ? child.hiddenSides(piece) : std::uint8_t{0};
-    sums[pieceThatFaces(node, normalOfPiece(child, piece), is_two_sided, hidden)].add(one);
+    sums[pieceThatFaces(node, kindOfPiece(child, piece))].add(one);
   }
 }
 

@@ -101,6 +101,7 @@ struct Node {
   void findOffPlane();
 
   bool isTinted() const { return tint != Tint{}; }
+  bool isTranslucent() const { return transparency != 0 || isTinted(); }  // in some color
   float opacity(int color = 0) const {
     return opacityOf(transparencyOf(transparency, tint, color));
   }

@@ -28,6 +28,8 @@ struct Facet {
   bool is_two_sided = false;   // seen from both sides; the normal is one of two
   bool is_thicket = false;     // two-sided and loose: of leaves, or hair
   glm::vec3 opacity{1};        // area-weighted mean, by color
+
+  bool isTranslucent() const { return opacity != glm::vec3(1); }
 };
 
 // A facet in codes, relative to its node, as pages hold it in either precision: six take less room
@@ -68,6 +70,7 @@ struct NodeFacet {
     return {opacityOf(transparency), opacityOf(transparencyOf(transparency, tint, 1)),
             opacityOf(transparencyOf(transparency, tint, 2))};
   }
+  bool isTranslucent() const { return transparency != 0 || tint != Tint{}; }
   bool operator==(const NodeFacet&) const = default;
 };
 static_assert(sizeof(NodeFacet) == 36);

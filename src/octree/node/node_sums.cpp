@@ -146,7 +146,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   setNormal(*this, node);
   if (loose_area > 0) node.flags = kNodeLoose;
   const bool is_flat = node.flatness > flatness_limit;
-  if (is_flat && !facets.hasLayers()) {
+  if (is_flat && !facets.hideDifferently()) {
     node.flags |= kNodeFlat;
     node.hidden = facets.hiddenSides();
     return node;
