@@ -60,25 +60,34 @@ inline bool contains(const RootCube& cube, const Bounds3& bounds) {
   return true;
 }
 
-// The cube for a box: its size is a power of two and its origin a multiple of a 16th of that, so
-// that a sample of a cloud nearly always gives the cube of the whole. A box of size zero gets 1.
-inline RootCube rootCube(const Bounds3d& bounds) {
+// The least power of two that is at least the longest side of a box; 1 for a box of size zero.
+inline double cubeSize(const Bounds3d& bounds) {
   const double extent = bounds.longestSide();
+  if (!(extent > 0)) return 1;
+  int exponent = 0;
+  const double mantissa = std::frexp(extent, &exponent);  // in [1/2, 1)
+  return std::ldexp(1, mantissa == 0.5 ? exponent - 1 : exponent);
+}
+
+// Part of a step by which corners of cubes lie beside round numbers: a third, in 14 binary digits,
+// so that cells down to a 2^17th of the cube do. Floors and walls are built at round numbers; a
+// border of cells there would put half of a noisy floor into one cell and half into another.
+inline constexpr double kBesideRound = 5461. / (1 << 14);
+
+// The cube for a box: its size is a power of two and its corner lies a third of a step after a
+// multiple of the step, a 16th of the size, so that a sample of a cloud nearly always gives the
+// cube of the whole.
+inline RootCube rootCube(const Bounds3d& bounds) {
   RootCube cube;
-  if (extent > 0) {
-    int exponent = 0;
-    const double mantissa = std::frexp(extent, &exponent);  // in [1/2, 1)
-    cube.size = std::ldexp(1, mantissa == 0.5 ? exponent - 1 : exponent);
-  }
-  for (;;) {
+  for (cube.size = cubeSize(bounds);; cube.size *= 2) {
+    const double step = cube.size / 16;
     bool fits = true;
     for (int axis = 0; axis < 3; ++axis) {
-      const double step = cube.size / 16;
-      cube.origin[axis] = std::floor(bounds.min[axis] / step) * step;
+      const double before = std::floor(bounds.min[axis] / step - kBesideRound);
+      cube.origin[axis] = (before + kBesideRound) * step;
       fits = fits && bounds.max[axis] <= cube.origin[axis] + cube.size;
     }
     if (fits) return cube;
-    cube.size *= 2;
   }
 }
 inline RootCube rootCube(const Bounds3& bounds) {
@@ -93,14 +102,14 @@ inline double floatStep(const Bounds3d& bounds) {
 }
 
 // Where the places of a cloud with this box are counted from. Floats about 0 serve a box that is no
-// farther from 0 than twice its root cube is wide: they have all but two bits of the digits that
-// they could have. Others, on a map or a globe, are counted from a corner of their cube, so that a
-// cloud that is moved by steps of the cube keeps every coordinate.
+// farther from 0 than twice its size as a power of two: they have all but two bits of the digits
+// that they could have. Others, on a map or a globe, are counted from the multiple of a 16th of
+// that size before them, so that a cloud that is moved by such steps keeps every coordinate.
 inline glm::dvec3 originFor(const Bounds3d& bounds) {
-  const RootCube cube = rootCube(bounds);
+  const double size = cubeSize(bounds);
   const glm::dvec3 farthest = glm::max(glm::abs(bounds.min), glm::abs(bounds.max));
-  if (std::max({farthest.x, farthest.y, farthest.z}) <= 3 * cube.size) return glm::dvec3(0);
-  return {cube.origin[0], cube.origin[1], cube.origin[2]};
+  if (std::max({farthest.x, farthest.y, farthest.z}) <= 3 * size) return glm::dvec3(0);
+  return glm::floor(bounds.min * (16 / size)) * (size / 16);
 }
 
 }  // namespace surfeit

@@ -2,8 +2,8 @@
 # One case of the end-to-end tests of scenes that share a root cube.
 source "$(dirname "${BASH_SOURCE[0]}")/cli_steps.sh"
 
-# Two frames: a city, and the same with one surfel that has flown away. Without it the cube is a
-# fourth as wide.
+# Two frames: a city, and the same with one surfel that has flown away. Without it the cube is half
+# as wide.
 makeFrames() {
   generate near.ply --surfels 5000
   generate far.ply --surfels 5000 --outlier 3000
@@ -46,12 +46,12 @@ pinnedCubesAreNumbersOrScenes() {
   makeFrames
   local frame
   run 0 info far.sft
-  says "cube           0,0,-256,4096"
+  says "cube           -170.671875,-170.671875,-170.671875,4096"
   run 0 index near.ply -o like.sft --cube far.sft --quiet
-  run 0 index near.ply -o numbers.sft --cube "0 0 -256 4096" --quiet --threads 3
+  run 0 index near.ply -o numbers.sft --cube "-170.671875 -170.671875 -170.671875 4096" --quiet --threads 3
   sameBytes like.sft numbers.sft
   run 0 info like.sft
-  says "cube           0,0,-256,4096" '"cube":[0.0,0.0,-256.0,4096.0]'
+  says "cube           -170.671875,-170.671875,-170.671875,4096" '"cube":[-170.671875,-170.671875,-170.671875,4096.0]'
   run 0 verify like.sft
   run 0 index far.ply -o far_again.sft --cube far.sft --quiet
   sameBytes far.sft far_again.sft
@@ -64,7 +64,7 @@ pinnedCubesAreNumbersOrScenes() {
   run 0 index map.csv -o map.sft --cube map_far.sft --quiet
   for frame in map map_far; do
     run 0 info $frame.sft
-    says "origin         499968 4999936 -256" "cube           499968,4999936,-256,4096"
+    says "origin         499968 4999936 -256" "cube           499797.328125,4999765.328125,-170.671875,4096"
   done
   run 0 index near.ply -o curve.sft --cube=-3000,-3000.5,-3000,8192 --precision full --quiet
   run 0 verify curve.sft
@@ -73,8 +73,8 @@ pinnedCubesAreNumbersOrScenes() {
 cubesThatDoNotHoldAreRefused() {
   makeFrames
   run 2 index far.ply -o out.sft --cube near.sft
-  says "1 of 5001 surfels lie outside of the cube 0,0,-64,1024" "to 3500 " \
-    "with one cube that holds all: --cube 0,0,-256,4096"
+  says "1 of 5001 surfels lie outside of the cube -85.3359375,-85.3359375,-85.3359375,2048" "to 3500 " \
+    "with one cube that holds all: --cube -170.671875,-170.671875,-170.671875,4096"
   leavesNothing out.sft
   run 0 index far.ply -o fits.sft --cube 0,0,-256,4096 --quiet
   run 2 index far.ply -o out.sft --cube 1,2,3

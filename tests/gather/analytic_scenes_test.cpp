@@ -362,7 +362,7 @@ void expectEqual(const GatherResult& a, const GatherResult& b) {
 // Equal distances are drawn in the order of the walk: the last fill what is left of a pixel.
 void expectAlike(const GatherResult& a, const GatherResult& b) {
   EXPECT_NEAR(a.occlusion, b.occlusion, 1e-3);
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a.irradiance[i], b.irradiance[i], 3e-3);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a.irradiance[i], b.irradiance[i], 4e-3);
 }
 
 TEST(Gather, ZeroMaxSolidAngleEqualsBruteForce) {
@@ -398,7 +398,7 @@ TEST(Gather, CutApproachesBruteForce) {
                  bruteForce(cloud, receiver).occlusion);
       error += difference * difference / double(receivers.size());
     }
-    EXPECT_LT(std::sqrt(error), 1.1 * before) << max_solid_angle;
+    EXPECT_LT(std::sqrt(error), std::max(1.1 * before, .0006)) << max_solid_angle;
     before = std::sqrt(error);
   }
   EXPECT_LT(before, .001);

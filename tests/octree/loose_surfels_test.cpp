@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "core/long_side.h"
@@ -210,6 +211,20 @@ TEST(LooseSurfels, BordersOfACellAreNoEdges) {
   const Bounds3 more = {2.f * kCube.min, 2.f * kCube.max};
   EXPECT_FALSE(found(cloud.surfels, more).is_loose);
   EXPECT_TRUE(found(cloud.surfels, kCube).is_loose);
+}
+
+// A part may hold the last row of a sheet alone, and of a small leaf what it will.
+TEST(LooseSurfels, ThePartThatIsTheEdgeOfASheetIsATile) {
+  for (const int rows : {2, 24}) {
+    Cloud sheet(false);
+    sheet.addSheet(glm::vec3(0), {1, 0, 0}, {0, 1, 0}, 24, rows);
+    LooseSurfels loose;
+    const Bounds3 all = {glm::vec3(-.5f * kHalf), glm::vec3(.5f * kHalf)};
+    ASSERT_TRUE(loose.look(sheet.surfels, kCube, all));
+    const std::span<Surfel> last_row = std::span(sheet.surfels).last(24);
+    loose.mark(sheet.surfels.size() - 24, last_row);
+    for (const Surfel& surfel : last_row) EXPECT_EQ(surfel.isLoose(), rows == 2);
+  }
 }
 
 TEST(LooseSurfels, OneSidedDisksAreNotAsked) {

@@ -1,4 +1,5 @@
 // What a scene says of itself, each thing by itself: verify names what does not hold.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/long_side.h"
 #include "io/page_file_damage.h"
 #include "octree/scene_damage.h"
 #include "octree/test_scenes.h"
@@ -98,6 +100,42 @@ TEST_F(VerifyClaimsTest, CountsOfTheHeaderAreThoseOfThePages) {
     });
     ASSERT_TRUE(status.ok()) << status.message();
     EXPECT_THAT(findingsOf(path("edited.sft")), Contains(HasSubstr("the header says")));
+  }
+}
+
+// Programs that do not know a feature bit must refuse what has it.
+TEST_F(VerifyClaimsTest, MarksOfSurfelsHaveTheirFeatureBits) {
+  const std::string scene = sceneOf(randomCloud(400), kAllAndLongSides);
+  const struct {
+    std::uint32_t bit;
+    std::function<void(Surfel&)> mark;
+  } kinds[] = {{4, [](Surfel& surfel) { surfel.flags = kSurfelHiddenFront; }},
+               {4, [](Surfel& surfel) { surfel.flags = kSurfelTwoSided | kSurfelHiddenBack; }},
+               {8, [](Surfel& surfel) { surfel.flags = kSurfelTwoSided | kSurfelLoose; }},
+               {32, [](Surfel& surfel) { setSharers(4, surfel); }},
+               {64, [](Surfel& surfel) { setTile(2 * surfel.area, surfel); }}};
+  for (const auto& kind : kinds) {
+    const Status marked = editSurfels(scene, path("marked.sft"), 0, [&](auto& surfels) {
+      surfels[7].flags = 0;
+      surfels[7].normal = {0, 0, 1};
+      surfels[7].long_side = kNoLongSide;
+      surfels[7].elongation = 0;
+      kind.mark(surfels[7]);
+    });
+    ASSERT_TRUE(marked.ok()) << marked.message();
+    const auto told = Contains(HasSubstr(fmt::format("expected feature bit {} of", kind.bit)));
+    const auto bits = [&](bool has) {
+      return [&kind, has](std::vector<std::byte>& fields) {
+        std::uint32_t features;  // at the begin
+        std::memcpy(&features, fields.data(), sizeof features);
+        features = has ? features | kind.bit : features & ~kind.bit;
+        std::memcpy(fields.data(), &features, sizeof features);
+      };
+    };
+    ASSERT_TRUE(rewriteScene(path("marked.sft"), path("with.sft"), {}, bits(true)).ok());
+    ASSERT_TRUE(rewriteScene(path("marked.sft"), path("without.sft"), {}, bits(false)).ok());
+    EXPECT_THAT(findingsOf(path("with.sft")), testing::Not(told)) << kind.bit;
+    EXPECT_THAT(findingsOf(path("without.sft")), told) << kind.bit;
   }
 }
 

@@ -170,7 +170,7 @@ TEST(Scattered, PlacesThatComeSeveralTimesCoverAsOnce) {
       for (Surfel& surfel : with_areas) surfel.area /= float(times), surfel.radius = 0;
       std::printf("%d times\n", times);
       expectCovering(bare, turn, {{.3f, .016}, {1.f, .012}, {3.f, .012}, {8.f, .006}}, .011);
-      expectCovering(with_areas, turn, {{.3f, .05}, {1.f, .028}, {3.f, .024}, {8.f, .02}}, .022);
+      expectCovering(with_areas, turn, {{.3f, .053}, {1.f, .03}, {3.f, .026}, {8.f, .02}}, .022);
     }
   }
 }
@@ -191,7 +191,7 @@ TEST(Scattered, SquaresWithAreasAloneSendWhatTheirAreasSend) {
       const double truth = trueOcclusion(eye);
       std::printf("%.2f away: %.3f of the light\n", double(distance),
                   double((*found)[0].irradiance.y) / (2 * truth));
-      EXPECT_NEAR(double((*found)[0].irradiance.y) / (2 * truth), 1, .03) << distance;
+      EXPECT_NEAR(double((*found)[0].irradiance.y) / (2 * truth), 1, .035) << distance;
     }
   }
 }

@@ -225,9 +225,32 @@ LooseSurfels::Vote LooseSurfels::voteOfDisk(std::span<const Surfel> cell, const 
   return beside.count() < kFewestBeside ? Vote::kLone : Vote::kPiece;
 }
 
+LooseSurfels::Votes LooseSurfels::votesAround(std::span<const Surfel> part) const {
+  Bounds3 box;
+  float reach = 0;
+  for (const Surfel& surfel : part) {
+    if (!surfel.isTwoSided() || surfel.isSphere()) continue;
+    box.add(surfel.position);
+    reach = std::max(reach, Frame(surfel).worldReach());
+  }
+  Votes votes;
+  if (reach == 0) return votes;
+  box.min -= glm::vec3(reach);
+  box.max += glm::vec3(reach);
+  auto place =
+      std::lower_bound(places_.begin(), places_.end(), box.min.x,
+                       [](const Place& other, float least) { return other.position.x < least; });
+  for (; place != places_.end() && place->position.x <= box.max.x; ++place) {
+    if (contains(box, place->position)) votes.add(votes_[place->surfel]);
+  }
+  return votes;
+}
+
 void LooseSurfels::mark(std::size_t begin, std::span<Surfel> part) const {
-  std::array<Votes, 2> votes;
-  for (std::size_t i = 0; i < part.size(); ++i) votes[part[i].isSphere()].add(votes_[begin + i]);
+  std::array<Votes, 2> votes = {votesAround(part), {}};
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    if (part[i].isSphere()) votes[1].add(votes_[begin + i]);
+  }
   for (std::size_t kind = 0; kind < 2; ++kind) {
     if (votes[kind].count() < kFewestVotes) votes[kind] = all_[kind];
   }

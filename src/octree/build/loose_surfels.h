@@ -25,8 +25,9 @@ class LooseSurfels {
   bool look(std::span<const Surfel> cell, const Bounds3& cube, const Bounds3& all);
   // Sets kSurfelLoose and kSurfelLone of the spheres and two-sided surfels of a part of the cell:
   // spheres know by themselves. Of others, and of spheres at the border, most of those that were
-  // asked tell: of the part, where it has enough, else of the cell. `begin`: number of the part's
-  // first surfel in the cell.
+  // asked tell: of the part, and of disks those within their neighbours' reach of it, lest a part
+  // with the edge of a sheet alone is loose; where these are too few, of the cell. `begin`: number
+  // of the part's first surfel in the cell.
   void mark(std::size_t begin, std::span<Surfel> part) const;
 
  private:
@@ -52,6 +53,8 @@ class LooseSurfels {
   void ask(std::span<const Surfel> cell, bool spheres, const Bounds3& known);
   Vote voteOfSphere(const Place& place, float reach, const Bounds3& known) const;
   Vote voteOfDisk(std::span<const Surfel> cell, const Place& place, const Bounds3& known) const;
+  // Of the disks of a part and of those around it.
+  Votes votesAround(std::span<const Surfel> part) const;
   template <typename Visit>
   void visitAround(const Place& place, float reach, const Visit& visit) const;
 

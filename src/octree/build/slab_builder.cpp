@@ -179,11 +179,7 @@ void SlabBuilder::makeLeaf(std::size_t begin, std::size_t end, FinishedNode& lea
   boundSurfels(surfels, leaf.node);
   leaf.node.child_level = 0;
   leaf.node.marks = 0;
-  for (const Surfel& surfel : surfels) {
-    leaf.node.marks |= surfel.flags & kSurfelMarks;
-    if (sharersOf(surfel) > 1) leaf.node.marks |= kNodeShares;
-    if (isTile(surfel)) leaf.node.marks |= kNodeTiles;
-  }
+  for (const Surfel& surfel : surfels) leaf.node.marks |= marksOf(surfel);
   const GroupPlace place = placeSurfels(begin, end);
   node.page = place.page;
   node.first = place.first;

@@ -40,9 +40,24 @@ bool areLayers(const FacetGroup& a, const FacetGroup& b) {
   return a.hidden != (areTurned(a, b) ? turnedSides(b.hidden) : b.hidden);
 }
 
-// Within 10 degrees, and hidden alike.
+// How differently they hide, from 0 to 1: the square of the difference of their opacities.
+double hidingDifference(const FacetGroup& a, const FacetGroup& b) {
+  if (a.is_translucent != b.is_translucent || areLayers(a, b)) return 1;
+  double most = 0;
+  for (int c = 0; c < 3; ++c) {
+    const double difference = a.covered[c] / a.area - b.covered[c] / b.area;
+    most = std::max(most, difference * difference);
+  }
+  return most;
+}
+
+bool hideAlike(const FacetGroup& a, const FacetGroup& b) {
+  return hidingDifference(a, b) < kAlikeOpacitySq;
+}
+
+// Within 10 degrees.
 bool faceAlike(const FacetGroup& a, const FacetGroup& b) {
-  if (!areOneKind(a, b) || areLayers(a, b)) return false;
+  if (a.is_two_sided != b.is_two_sided || !hideAlike(a, b)) return false;
   const double dot = facingDot(a, b);
   return dot > 0 && dot * dot > kAlikeCosineSq * dotOfNormals(a, a) * dotOfNormals(b, b);
 }
@@ -100,7 +115,7 @@ std::optional<FacetSums::Pair> FacetSums::closest() const {
       const double both_sq =
           lengths[i] * lengths[i] + lengths[j] * lengths[j] + 2 * facingDot(groups_[i], groups_[j]);
       double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
-      if (areLayers(groups_[i], groups_[j])) loss += std::min(groups_[i].area, groups_[j].area);
+      loss += hidingDifference(groups_[i], groups_[j]) * std::min(groups_[i].area, groups_[j].area);
       if (!closest || loss < least) {
         least = loss;
         closest = Pair{i, j};
@@ -119,8 +134,7 @@ void FacetSums::merge(const Pair& pair) {
 bool FacetSums::hideDifferently() const {
   for (std::size_t i = 0; i < count_; ++i) {
     for (std::size_t j = i + 1; j < count_; ++j) {
-      if (groups_[i].is_translucent != groups_[j].is_translucent) return true;
-      if (areLayers(groups_[i], groups_[j])) return true;
+      if (!hideAlike(groups_[i], groups_[j])) return true;
     }
   }
   return false;
@@ -145,7 +159,7 @@ FacetSums FacetSums::fewest(float flatness) const {
     fewest = fewer;
     const std::optional<Pair> closest = fewer.closest();
     if (!closest) break;
-    if (areLayers(fewer.groups_[closest->first], fewer.groups_[closest->second])) break;
+    if (!hideAlike(fewer.groups_[closest->first], fewer.groups_[closest->second])) break;
     fewer.merge(*closest);
   }
   return fewest;

@@ -14,6 +14,9 @@ namespace surfeit {
 
 // Normals within 10 degrees of each other are alike: the square of their cosine is above this.
 inline constexpr double kAlikeCosineSq = 0.97;
+// So are opacities, in every color: the square of their difference is below that of the sine, .03.
+// Two sheets of a and b let through (1 - a) (1 - b), two of their mean a fourth of the square more.
+inline constexpr double kAlikeOpacitySq = 1 - kAlikeCosineSq;
 
 // Surfels that face about one way; two-sided ones of a plane may face the other way as well.
 struct FacetGroup : AreaSums {
@@ -29,10 +32,11 @@ struct FacetGroup : AreaSums {
 
 // Groups of surfels that face about one way. What is added joins the group that it resembles, and
 // when there are too many, the two groups become one that lose least by it: the loss is the area
-// that faces one way less, |N_a| + |N_b| - |N_a + N_b| with N = sum A n, or all of the smaller one
-// where one has hidden sides that the other has not. The order of adding decides what is grouped
-// with what. One-sided and two-sided surfels stay apart, and so do opaque and translucent ones: the
-// mean of a wall and a pane hides as neither does. Plain data.
+// that faces one way less, |N_a| + |N_b| - |N_a + N_b| with N = sum A n, and the smaller area times
+// the square of the difference of their opacities, or all of it where one has hidden sides that the
+// other has not. The order of adding decides what is grouped with what. One-sided and two-sided
+// surfels stay apart, and so do opaque and translucent ones: the mean of a wall and a pane hides as
+// neither does. Plain data.
 class FacetSums {
  public:
   void add(const FacetGroup& facet);
@@ -44,8 +48,8 @@ class FacetSums {
   // As few groups as hold together more than `flatness` of the area, as sum |N| over sum A, and are
   // hidden alike; none when all do not.
   FacetSums fewest(float flatness) const;
-  // One piece would hide otherwise than they do: some of one kind have other hidden sides than
-  // others, or some are translucent and others opaque.
+  // One piece would hide otherwise than they do: some of one kind have other hidden sides or other
+  // opacities than others, or some are translucent and others opaque.
   bool hideDifferently() const;
   // Sides that are hidden of all.
   std::uint8_t hiddenSides() const;

@@ -11,6 +11,7 @@
 #include "core/program_memory.h"
 #include "core/worker_threads.h"
 #include "octree/node/lobe.h"
+#include "octree/page/surfel_marks.h"
 #include "octree/read/paged_octree.h"
 #include "octree/read/scene_file.h"
 #include "octree/read/verify_bounds.h"
@@ -82,15 +83,17 @@ class PageChecker {
   Result<std::uint64_t> checkSurfelPage(std::uint32_t page) {
     const Result<std::uint32_t> count = file_.decodeSurfels(page, scratch_, surfels_);
     if (!count.ok()) return report(count.status());
-    Status outside;
+    Status outside, marked;
     for (std::uint32_t i = 0; i < *count; ++i) {
       surfel_balance_ += placeHash(page, i);
       noteBrightness(surfels_[i].radiosity);
       if (outside.ok()) outside = checkInBounds(surfels_[i], i);
+      if (marked.ok()) marked = checkMarks(surfels_[i], i);
     }
-    if (!outside.ok()) {
+    for (const Status& status : {outside, marked}) {
+      if (status.ok()) continue;
       const std::uint32_t file_page = file_.nodePageCount() + page;
-      findings_.add(file_.pages().pageError(file_page, outside.message()).message());
+      findings_.add(file_.pages().pageError(file_page, status.message()).message());
     }
     return std::uint64_t{*count};
   }
@@ -195,6 +198,27 @@ class PageChecker {
           fmt::format("surfel {}: {} at {}, expected {} to {}, the header's "
                       "bounds",
                       index, "xyz"[axis], at, bounds.min[axis], bounds.max[axis]));
+    }
+    return {};
+  }
+
+  // Programs that do not know a feature bit refuse the scene, so the header names what it has.
+  Status checkMarks(const Surfel& surfel, std::uint32_t index) const {
+    const SceneHeader& header = file_.header();
+    const struct {
+      std::uint32_t marks;
+      bool is_named;
+      const char* name;
+      int bit;
+    } kinds[] = {{kSurfelHiddenSides, header.has_layers, "has hidden sides", 4},
+                 {kSurfelLoose | kSurfelLone, header.has_loose, "is loose", 8},
+                 {kNodeShares, header.has_sharers, "shares its piece of surface", 32},
+                 {kNodeTiles, header.has_tiles, "is a tile", 64}};
+    const std::uint32_t marks = marksOf(surfel);
+    for (const auto& kind : kinds) {
+      if ((marks & kind.marks) == 0 || kind.is_named) continue;
+      return Status::corruption(fmt::format(
+          "surfel {}: it {}, expected feature bit {} of the header", index, kind.name, kind.bit));
     }
     return {};
   }
