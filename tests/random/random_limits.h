@@ -44,9 +44,9 @@ struct InvarianceLimits {
   double exact, fast;
 };
 // Nodes decide which two-sided surfels are of a sheet, and their hulls close gaps between surfels;
-// another place has other nodes. (.0247 is of seed 29, a two-sided bowl with skins closer than the
+// another place has other nodes. (.0180 is of seed 29, a two-sided bowl with skins closer than the
 // bias, some of which cells of the octree tell apart.)
-inline constexpr InvarianceLimits kMovedLimits = {.025, .025}, kTurnedLimits = {.025, .025};
+inline constexpr InvarianceLimits kMovedLimits = {.02, .02}, kTurnedLimits = {.02, .02};
 inline constexpr InvarianceLimits kScaledLimits = {0, 0};
 
 }  // namespace surfeit
