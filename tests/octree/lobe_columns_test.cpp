@@ -97,5 +97,27 @@ TEST(LobeSums, AreThoseOfTheParts) {
   EXPECT_TRUE(lobesOf(node, all)[0].isEven());
 }
 
+// Of pieces that face the same way, a surfel's lobe is of the one that is as opaque.
+TEST(LobeSums, ArePartedByOpacity) {
+  TestRandom random(7);
+  Node node{};
+  node.facet_count = 3;
+  const float opacities[] = {1, .7f, .3f};
+  for (std::size_t k = 0; k < 3; ++k) {
+    node.facets[k] = {};
+    node.facets[k].normal = {0, 0, 32767};
+    node.facets[k].transparency = transparencyOf(double(opacities[k]));
+  }
+  for (std::size_t k = 0; k < 3; ++k) {
+    Surfel surfel = surfelAt(random.point(), {0, 0, 1}, .1f, random);
+    surfel.setOpacity(opacities[k], opacities[k], opacities[k]);
+    PieceSums sums{};
+    addToPiece(node, surfel, Lobe::encode(glm::vec3(1), {0, 0, .7f}), sums);
+    for (std::size_t piece = 0; piece < 3; ++piece) {
+      EXPECT_EQ(lobesOf(node, sums)[piece].isEven(), piece != k) << piece;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace surfeit

@@ -141,6 +141,35 @@ TEST_F(RadiosityRewriterTest, LayersHaveLightOfTheirOwn) {
   }
 }
 
+// One pane of patches whose opacities differ, all around the same place.
+TEST_F(RadiosityRewriterTest, FacetsOfEachOpacityHaveLightOfTheirOwn) {
+  const auto lightOfOpacity = [](const Surfel& surfel) {
+    return glm::vec3(surfel.opacity() > .5f ? 3.f : .5f);
+  };
+  for (const bool full_precision : {true, false}) {
+    IndexOptions options;
+    options.full_precision = full_precision;
+    CloudChannels channels = kAllChannels;
+    channels.opacity = true;
+    std::vector<Surfel> cloud = layeredCloud();
+    cloud.resize(cloud.size() / 2);
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      const float opacity = (i % 60 + i / 60) % 2 == 0 ? .3f : .7f;
+      cloud[i].setOpacity(opacity, opacity, opacity);
+    }
+    const std::string scene = index(cloud, channels, options);
+    const std::string rewritten = rewrite(scene, "lit.sft", lightOfOpacity);
+    EXPECT_TRUE(findingsOf(rewritten).empty());
+    std::size_t facets = 0;
+    for (const auto& [node, first] : read(rewritten).nodes) {
+      for (std::size_t k = 0; k < node.facet_count; ++k, ++facets) {
+        EXPECT_NEAR(node.facets[k].radiosity.x, node.facets[k].opacity().x > .5f ? 3 : .5f, .02f);
+      }
+    }
+    EXPECT_GT(facets, 100u);
+  }
+}
+
 TEST_F(RadiosityRewriterTest, AtFullPrecisionItIsWhatIndexingGives) {
   IndexOptions options;
   options.full_precision = true;

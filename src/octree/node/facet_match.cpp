@@ -7,14 +7,16 @@ namespace surfeit {
 namespace {
 
 // Codes of facets and of surfels leave a part of these: of the node's area, of a unit normal, of
-// the node's radius.
+// the node's radius, of the square of an opacity.
 constexpr double kAreaSlack = 4e-3, kNormalSlack = 5e-3, kPlaceSlack = 2e-2;
+constexpr float kHidingSlack = 1e-6f;
 
 bool isFacet(const FacetGroup& group, const double (&origin)[3], double node_area, const Node& node,
              std::size_t k) {
   const NodeFacet& facet = node.facets[k];
   if (node.isTwoSided(k) != group.is_two_sided) return false;
   if (facet.isTranslucent() != group.is_translucent) return false;
+  if (hidingDifference(facet.opacity(), group.opacity()) > kHidingSlack) return false;
   if (!group.is_two_sided && facet.hidden != group.hidden) return false;
   if (std::abs(double(facet.area) / 65535 - group.area / node_area) > kAreaSlack) return false;
   const glm::vec3 normal = facet.meanNormal();

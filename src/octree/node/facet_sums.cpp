@@ -40,19 +40,14 @@ bool areLayers(const FacetGroup& a, const FacetGroup& b) {
   return a.hidden != (areTurned(a, b) ? turnedSides(b.hidden) : b.hidden);
 }
 
-// How differently they hide, from 0 to 1: the square of the difference of their opacities.
-double hidingDifference(const FacetGroup& a, const FacetGroup& b) {
+// From 0 to 1.
+double differenceOfHiding(const FacetGroup& a, const FacetGroup& b) {
   if (a.is_translucent != b.is_translucent || areLayers(a, b)) return 1;
-  double most = 0;
-  for (int c = 0; c < 3; ++c) {
-    const double difference = a.covered[c] / a.area - b.covered[c] / b.area;
-    most = std::max(most, difference * difference);
-  }
-  return most;
+  return a.is_translucent ? double(hidingDifference(a.opacity(), b.opacity())) : 0;
 }
 
 bool hideAlike(const FacetGroup& a, const FacetGroup& b) {
-  return hidingDifference(a, b) < kAlikeOpacitySq;
+  return differenceOfHiding(a, b) < kAlikeOpacitySq;
 }
 
 // Within 10 degrees.
@@ -115,7 +110,8 @@ std::optional<FacetSums::Pair> FacetSums::closest() const {
       const double both_sq =
           lengths[i] * lengths[i] + lengths[j] * lengths[j] + 2 * facingDot(groups_[i], groups_[j]);
       double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
-      loss += hidingDifference(groups_[i], groups_[j]) * std::min(groups_[i].area, groups_[j].area);
+      loss +=
+          differenceOfHiding(groups_[i], groups_[j]) * std::min(groups_[i].area, groups_[j].area);
       if (!closest || loss < least) {
         least = loss;
         closest = Pair{i, j};

@@ -28,6 +28,10 @@ struct FacetGroup : AreaSums {
   // One surfel; it has a normal. `sums` are its own.
   FacetGroup(const AreaSums& sums, const Surfel& surfel);
   void add(const FacetGroup& other);
+  // Area-weighted mean, by color.
+  glm::vec3 opacity() const {
+    return glm::vec3(glm::dvec3(covered[0], covered[1], covered[2]) / area);
+  }
 };
 
 // Groups of surfels that face about one way. What is added joins the group that it resembles, and

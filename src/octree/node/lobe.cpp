@@ -14,22 +14,23 @@ namespace {
 
 // What a surfel, or a piece of a child, must have in common with a piece of a node.
 struct PieceKind {
-  glm::vec3 normal;
+  glm::vec3 normal, opacity;
   bool is_two_sided, is_translucent;
   std::uint8_t hidden;
 };
 
-// The piece of a node that faces most as this one does, of those of its kind, as opaque and hidden
-// alike, if there are some; 0 where there is none.
+// The piece of a node that faces and hides most as this one does, of those of its kind, as opaque
+// and hidden alike, if there are some; 0 where there is none.
 std::size_t pieceThatFaces(const Node& node, const PieceKind& kind) {
   std::size_t nearest = 0;
-  float most = -8;
+  float most = -9;
   for (std::size_t k = 0; k < node.facet_count; ++k) {
     if (node.isTwoSided(k) != kind.is_two_sided) continue;
     const glm::vec3 facing = node.facets[k].meanNormal();
     const float length = glm::length(facing);
     float cosine = length > 0 ? glm::dot(facing, kind.normal) / length : 0;
     if (kind.is_two_sided) cosine = std::abs(cosine);
+    cosine -= hidingDifference(node.facets[k].opacity(), kind.opacity);
     if (node.facets[k].hidden != kind.hidden) cosine -= 2;
     if (node.facets[k].isTranslucent() != kind.is_translucent) cosine -= 4;
     if (cosine > most) {
@@ -40,12 +41,19 @@ std::size_t pieceThatFaces(const Node& node, const PieceKind& kind) {
   return nearest;
 }
 
+// By color.
+template <typename Record>
+glm::vec3 opacityOfAll(const Record& record) {
+  return {record.opacity(0), record.opacity(1), record.opacity(2)};
+}
+
 PieceKind kindOfPiece(const Node& node, std::size_t piece) {
-  if (pieceCount(node) == 0) return {node.normal, false, node.isTranslucent(), 0};
-  const bool is_facet = node.hasFacets();
-  return {is_facet ? node.facets[piece].meanNormal() : node.normal, node.isTwoSided(piece),
+  const bool has_sides = pieceCount(node) > 0, is_facet = node.hasFacets();
+  return {is_facet ? node.facets[piece].meanNormal() : node.normal,
+          is_facet ? node.facets[piece].opacity() : opacityOfAll(node),
+          has_sides && node.isTwoSided(piece),
           is_facet ? node.facets[piece].isTranslucent() : node.isTranslucent(),
-          node.hiddenSides(piece)};
+          has_sides ? node.hiddenSides(piece) : std::uint8_t{0}};
 }
 
 // Two sides have two mirror directions, and a rough node has many.
@@ -84,8 +92,9 @@ Lobe LobeSums::toLobe() const {
 }
 
 void addToPiece(const Node& node, const Surfel& surfel, const Lobe& lobe, PieceSums& sums) {
-  const PieceKind kind = {surfel.normal, surfel.isTwoSided() && !surfel.isSphere(),
-                          surfel.isTranslucent(), hiddenSidesOf(surfel)};
+  const PieceKind kind = {surfel.normal, opacityOfAll(surfel),
+                          surfel.isTwoSided() && !surfel.isSphere(), surfel.isTranslucent(),
+                          hiddenSidesOf(surfel)};
   const glm::vec3 shares = lobe.shares(), direction = lobe.meanDirection();
   LobeSums one;
   for (int c = 0; c < 3; ++c) {

@@ -2,6 +2,7 @@
 // as the flat pieces that it is made of, and exactly so from near and far.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -31,6 +32,13 @@ struct Facet {
 
   bool isTranslucent() const { return opacity != glm::vec3(1); }
 };
+
+// How differently surfels of two opacities hide, from 0 to 1: the square of the greatest difference
+// of a color.
+inline float hidingDifference(const glm::vec3& a, const glm::vec3& b) {
+  const glm::vec3 difference = a - b, squares = difference * difference;
+  return std::max({squares.r, squares.g, squares.b});
+}
 
 // A facet in codes, relative to its node, as pages hold it in either precision: six take less room
 // than the harmonics of a rough node.

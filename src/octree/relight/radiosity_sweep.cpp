@@ -21,8 +21,8 @@ int levelOf(const SceneHeader& header, std::uint32_t node_page) {
          1;
 }
 
-// The facet of a node that faces most as a group of surfels does, of those of its kind, hidden
-// alike and as opaque if there are some.
+// The facet of a node that faces and hides most as a group of surfels does, of those of its kind,
+// hidden alike and as opaque if there are some.
 std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
   std::size_t nearest = 0;
   double most = -std::numeric_limits<double>::infinity();
@@ -36,6 +36,7 @@ std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
     }
     if (group.is_two_sided) dot = std::abs(dot);
     double alike = dot / std::sqrt(length_sq);
+    alike -= group.area * double(hidingDifference(node.facets[k].opacity(), group.opacity()));
     if (node.facets[k].hidden != group.hidden) alike -= 2 * group.area;
     if (node.facets[k].isTranslucent() != group.is_translucent) alike -= 4 * group.area;
     if (alike > most) {
