@@ -35,8 +35,9 @@ constexpr LitMesh kMeshes[] = {
     {"igea", "meshes/igea.ply", false, 1'000'000, .04, .021, .016},
     {"koala", "meshes/koala.ply", false, 1'000'000, .042, .02, .01},
     {"dragon", "meshes/dragon_res2.ply", false, 1'000'000, .05, .032, .01},
-    // One receiver of 426, under a ledge beside a wall, gets half of its light, at any quality; the
-    // cause is not known. Without it the sun's limits would be .11 and .06.
+    // One receiver of 426, under a ledge, gets half of its light at any quality: faces in its plane
+    // look the other way and are not marked as hidden (hidden_surfels.h), as they are where cells
+    // begin at round numbers. Without it the sun's limits would be .11 and .06.
     {"sponza", "scenes/sponza/sponza.obj", true, 4'000'000, .33, .32, .035}};
 
 class UnderHardLight : public Fidelity,
