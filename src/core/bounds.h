@@ -76,15 +76,15 @@ inline constexpr double kBesideRound = 5461. / (1 << 14);
 
 // The cube for a box: its size is a power of two and its corner lies a third of a step after a
 // multiple of the step, a 16th of the size, so that a sample of a cloud nearly always gives the
-// cube of the whole.
-inline RootCube rootCube(const Bounds3d& bounds) {
+// cube of the whole. `beside`: another part of a step, 0 to 1.
+inline RootCube rootCube(const Bounds3d& bounds, double beside = kBesideRound) {
   RootCube cube;
   for (cube.size = cubeSize(bounds);; cube.size *= 2) {
     const double step = cube.size / 16;
     bool fits = true;
     for (int axis = 0; axis < 3; ++axis) {
-      const double before = std::floor(bounds.min[axis] / step - kBesideRound);
-      cube.origin[axis] = (before + kBesideRound) * step;
+      const double before = std::floor(bounds.min[axis] / step - beside);
+      cube.origin[axis] = (before + beside) * step;
       fits = fits && bounds.max[axis] <= cube.origin[axis] + cube.size;
     }
     if (fits) return cube;

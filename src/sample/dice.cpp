@@ -273,23 +273,9 @@ std::uint64_t TriangleDice::pieceNear(const glm::dvec3& target) const {
   return ((slab + 1) * piece_count_ + slabs_ - 1) / slabs_ - 1;
 }
 
-namespace {
-// As a root cube, but with its corner at a round number: the mesh of a box has each side in one row
-// of cells, and its triangles follow each other.
-RootCube roundCube(const Bounds3& bounds) {
-  RootCube cube;
-  for (cube.size = cubeSize({glm::dvec3(bounds.min), glm::dvec3(bounds.max)});; cube.size *= 2) {
-    const double step = cube.size / 16;
-    for (int axis = 0; axis < 3; ++axis) {
-      cube.origin[axis] = std::floor(double(bounds.min[axis]) / step) * step;
-    }
-    if (contains(cube, bounds)) return cube;
-  }
-}
-}  // namespace
-
 std::vector<std::uint32_t> trianglesAlongCurve(const Mesh& mesh) {
-  const RootCube cube = roundCube(mesh.bounds());
+  // From a round number: another order gives other surfels
+  const RootCube cube = rootCube(movedBounds(mesh.bounds(), glm::dvec3(0)), 0);
   std::vector<std::pair<CurveKey, std::uint32_t>> keys;
   keys.reserve(mesh.triangle.size());
   for (std::size_t i = 0; i < mesh.triangle.size(); ++i) {

@@ -124,7 +124,7 @@ TEST_P(RandomScenes, TranslucentSurfacesComeCloseToExact) {
 
 // Walls beside panes, in one node: the walls let through light while nodes knew one opacity of
 // both.
-TEST(KeptScenes, WallsBesidePanesHideWhatIsBehindThem) {
+TEST(KeptSeeds, WallsBesidePanesHideWhatIsBehindThem) {
   FidelityLimits limits = kTranslucentLimits;
   limits.median_light = .02;
   const auto options = [](const RandomScene&) { return bleeding(); };

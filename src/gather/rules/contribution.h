@@ -46,7 +46,8 @@ SeenPart seenPart(const Node& node, const glm::vec3& to_node, const FacingAreas&
                   GatherSides sides);
 
 // Whether a facet of a node, or a flat node, has no gaps, seen head-on: with all that other facets,
-// as opaque as it, show in that direction it fills its outline, as the slopes of folds do together.
+// opaque or translucent as it is, show in that direction it fills its outline, as the slopes of
+// folds do together.
 bool isFilled(const Node& node, const Facet& facet);
 // A facet with more area than the rectangle that spreads as it does lies behind itself: it is so
 // many layers, at least one.

@@ -41,13 +41,13 @@ bool areLayers(const FacetGroup& a, const FacetGroup& b) {
 }
 
 // From 0 to 1.
-double differenceOfHiding(const FacetGroup& a, const FacetGroup& b) {
+double differenceOf(const FacetGroup& a, const FacetGroup& b) {
   if (a.is_translucent != b.is_translucent || areLayers(a, b)) return 1;
   return a.is_translucent ? double(hidingDifference(a.opacity(), b.opacity())) : 0;
 }
 
 bool hideAlike(const FacetGroup& a, const FacetGroup& b) {
-  return differenceOfHiding(a, b) < kAlikeOpacitySq;
+  return differenceOf(a, b) < kAlikeOpacitySq;
 }
 
 // Within 10 degrees.
@@ -110,8 +110,7 @@ std::optional<FacetSums::Pair> FacetSums::closest() const {
       const double both_sq =
           lengths[i] * lengths[i] + lengths[j] * lengths[j] + 2 * facingDot(groups_[i], groups_[j]);
       double loss = lengths[i] + lengths[j] - std::sqrt(std::max(0.0, both_sq));
-      loss +=
-          differenceOfHiding(groups_[i], groups_[j]) * std::min(groups_[i].area, groups_[j].area);
+      loss += differenceOf(groups_[i], groups_[j]) * std::min(groups_[i].area, groups_[j].area);
       if (!closest || loss < least) {
         least = loss;
         closest = Pair{i, j};

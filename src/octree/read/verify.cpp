@@ -204,6 +204,8 @@ class PageChecker {
 
   // Programs that do not know a feature bit refuse the scene, so the header names what it has.
   Status checkMarks(const Surfel& surfel, std::uint32_t index) const {
+    const std::uint32_t marks = marksOf(surfel);
+    if (marks == 0) return {};
     const SceneHeader& header = file_.header();
     const struct {
       std::uint32_t marks;
@@ -214,7 +216,6 @@ class PageChecker {
                  {kSurfelLoose | kSurfelLone, header.has_loose, "is loose", 8},
                  {kNodeShares, header.has_sharers, "shares its piece of surface", 32},
                  {kNodeTiles, header.has_tiles, "is a tile", 64}};
-    const std::uint32_t marks = marksOf(surfel);
     for (const auto& kind : kinds) {
       if ((marks & kind.marks) == 0 || kind.is_named) continue;
       return Status::corruption(fmt::format(
