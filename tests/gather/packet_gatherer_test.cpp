@@ -205,6 +205,37 @@ TEST(PacketGatherer, WhatHangsOverAReceiverIsNotLookedThrough) {
   EXPECT_NEAR(double(gatherPacket(gatherer, scene, packet)[0].occlusion), expected, .05);
 }
 
+// Half a plane of disks that face the receiver, which lies in that plane, just beside its edge.
+// Disks end past the edge. Places are rounded to either side of the plane, which must not decide
+// whether all is dark.
+TEST(PacketGatherer, RoundingPutsNothingInAPlaneBeforeAReceiverInIt) {
+  const glm::vec3 turned = glm::normalize(glm::vec3(.3f, -.5f, .8f));
+  for (const glm::vec3& normal : {glm::vec3(0, 0, 1), turned}) {
+    const glm::vec3 u = glm::normalize(glm::cross(normal, glm::vec3(0, 1, 0)));
+    const glm::vec3 v = glm::cross(normal, u);
+    for (const float scale : {1e-3f, 1.f, 1e4f}) {
+      const auto occlusionBelow = [&](float radii) {
+        Cloud plane;
+        for (int i = 0; i < 40 * 40; ++i) {
+          Surfel& piece = plane.emplace_back();
+          piece.radius = .71f * scale;
+          const float x = float(i % 40) + .4f, y = float(i / 40) - 20;
+          piece.position = scale * (x * u + y * v) + radii * piece.radius * normal;
+          piece.normal = -normal;
+          piece.area = scale * scale;
+        }
+        TestScene scene(plane);
+        return scene.gather({{0, 0, 0}, normal}, GatherQuality()).occlusion;
+      };
+      for (const float radii : {-.001f, -.0001f, 0.f, .0001f, .001f}) {
+        EXPECT_NEAR(occlusionBelow(radii), 0, 1e-6) << radii << " radii, scale " << scale;
+      }
+      // It may still lie close before it
+      EXPECT_GT(occlusionBelow(.01f), .3f) << scale;
+    }
+  }
+}
+
 // What lies anywhere is not met by exp(-1) of the rays.
 TEST(PacketGatherer, LeavesAndRibbonsCoverAsMuchAsWhatIsSpreadAtRandom) {
   const float expected = 1 - std::exp(-1.f);

@@ -19,6 +19,7 @@
 #include "gather/packet/packet_kernel.h"
 #include "gather/rules/coverage_rules.h"
 #include "octree/node/hidden_layers.h"
+#include "octree/node/stored_loss.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace surfeit {
@@ -219,7 +220,9 @@ HWY_INLINE Sight See(const PacketCanvas& canvas, const Patch& patch, const Recei
     shows = hn::And(is_near, ShowsOfTwoSided(sight, cosine, most, patch.is_layered));
   } else {
     const V part = is_turned ? hn::Sub(one, cosine) : hn::Add(one, cosine);
-    sight.bias = hn::Mul(Splat(most), hn::Min(one, part));
+    // Where a disk and the receiver lie in one plane, rounding of their places decides nothing
+    const float rounding = std::min(most, 2 * kPositionTolerance * patch.radius);
+    sight.bias = hn::Max(Splat(rounding), hn::Mul(Splat(most), hn::Min(one, part)));
   }
   // Along the receiver's normal a disk reaches radius * sin(angle of normals) above its middle. It
   // must rise above the horizon of the rays, which the receiver's own surface does not
