@@ -58,6 +58,28 @@ TEST(HiddenSurfels, SheetBehindAnotherIsHidden) {
   }
 }
 
+// A border of cells may lie between sheets, or cut both.
+TEST(HiddenSurfels, WhatLiesAroundACellHidesToo) {
+  std::vector<Surfel> behind = together(sheet(16, -.2f), sheet(16, 0));
+  markHidden(behind, 256);
+  EXPECT_EQ(hiddenCount(std::span(behind).first(256)), 256);
+  EXPECT_EQ(hiddenCount(behind), 256);
+
+  std::vector<Surfel> corner, around;
+  for (const Surfel& surfel : together(sheet(16, -4), sheet(16, 0))) {
+    const bool is_own = surfel.position.x > 2 && surfel.position.y > 2;
+    (is_own ? corner : around).push_back(surfel);
+  }
+  std::vector<Surfel> cut = together(corner, around);
+  markHidden(cut, corner.size());
+  std::vector<Surfel> whole = cut;
+  markHidden(whole);
+  for (std::size_t i = 0; i < cut.size(); ++i) {
+    EXPECT_EQ(hiddenSidesOf(cut[i]), i < corner.size() ? hiddenSidesOf(whole[i]) : 0) << i;
+  }
+  EXPECT_GT(hiddenCount(cut), 0);
+}
+
 TEST(HiddenSurfels, TwoSidedSheetsHideEachOther) {
   std::vector<Surfel> cell = together(sheet(8, 0), sheet(8, -.2f));
   for (std::size_t i = 0; i < cell.size(); ++i) {
@@ -251,6 +273,21 @@ TEST_F(HiddenNodes, AreStoredAndVerified) {
       }
     }
     EXPECT_GT(pieces, 10);
+  }
+}
+
+// Cells of 16 spacings end between the sheets somewhere, at one height or another.
+TEST_F(HiddenNodes, AreFoundAcrossCells) {
+  for (const float gap : {.5f, 2.f, 4.f}) {
+    // Who looks aslant sees those as near to the edge as the sheets are apart
+    const double side = gap < 1.5f ? 40 : 40 - 2 * double(gap);
+    for (float height = .1f; height < 16; height += .9f * gap) {
+      std::vector<Surfel> cloud = together(sheet(40, height), sheet(40, height - gap));
+      for (const float end : {-20.f, 40.f}) cloud = together(cloud, sheet(1, end));  // of the cube
+      const Result<ReadScene> scene = readScene(index(cloud));
+      ASSERT_TRUE(scene.ok()) << scene.status().message();
+      EXPECT_GE(double(hiddenCount(scene->surfels)), .95 * side * side) << height << ' ' << gap;
+    }
   }
 }
 

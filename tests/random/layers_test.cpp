@@ -121,15 +121,15 @@ std::vector<Layers> allLayers() {
   return all;
 }
 
-// The goal is .02 for all. Sheets four spacings apart and more share no cells at their borders, and
-// nodes of both are drawn by distance. Seen aslant, as far apart, both have the same distances
-// within a pixel, and some of its edge lies behind the front one's; of boards not just half shows.
+// The goal is .02 for all. Seen aslant, as far apart as the sheets are, both have the same
+// distances within a pixel, and some of the back one's edge lies behind the front one's; of boards
+// not just half shows.
 struct Limits {
-  double light = .1, exact = .065, occlusion = .045;
+  double light = .07, exact = .045, occlusion = .03;
 };
 Limits limitsOf(const Layers& layers) {
-  if (layers.board > 0) return {.25, .22, .1};
-  if (layers.gap > .05f) return {.34, .045, .065};
+  if (layers.board > 0) return {.25, .22, .02};
+  if (layers.gap > .05f) return {.08, .03, .065};
   return {};
 }
 

@@ -25,7 +25,7 @@ namespace {
 // 1 time in 25, of twelve 1 time in 1000.
 constexpr std::size_t kFewestPlaces = 12;
 constexpr std::size_t kMostSheets = 6;
-// Sheets are looked for where so much of the area of a cell lies behind the rest.
+// Sheets are looked for where so much of the area lies behind the rest.
 constexpr float kLeastHidden = 0.125f;
 // Of its outline, a sheet without gaps fills so much: as Fidelity::least_filled.
 constexpr float kLeastFilled = 0.7f;
@@ -35,6 +35,8 @@ constexpr std::size_t kMostFacings = 8;
 struct Height {
   float height;
   std::uint32_t surfel;
+  float area = 0;
+  glm::vec2 aside{0};  // its place along the sheets
   bool operator<(const Height& other) const { return height > other.height; }  // front first
 };
 
@@ -108,15 +110,17 @@ struct Direction {
   }
 };
 
-// The surfels of a cell that face in one direction.
+// The surfels of a cell and around it that face in one direction.
 class Facing {
  public:
   // Heights are found in `members`.
-  Facing(std::span<Surfel> cell, const Direction& direction, std::vector<Height>& members)
-      : cell_(cell),
+  Facing(std::span<Surfel> surfels, std::size_t own, const Direction& direction,
+         std::vector<Height>& members)
+      : surfels_(surfels),
+        own_(own),
         direction_(direction),
         heights_(members),
-        origin_(cell[members.front().surfel].position) {}
+        origin_(surfels[members.front().surfel].position) {}
   void mark();
 
  private:
@@ -132,14 +136,12 @@ class Facing {
   float outlineOf(const SymmetricMatrix& spread) const;
   float widthOf(const AreaSums& sums) const;
   Sheet sheetOf(std::span<const Height> heights) const;
-  float asideSq(const Surfel& a, const Surfel& b) const;
-  float areaAround(const Surfel& surfel, float distance, std::span<const Height> sheet) const;
-  bool isCovered(const Surfel& surfel, std::span<const Height> by) const;
-  bool covers(const Sheet& sheet, const Sheet& own, const Height& of) const;
+  static bool covers(const Sheet& sheet, const Sheet& own, const Height& of);
   bool areLayers(const Sheet& a, const Sheet& b) const;
   void hide(const Sheet& sheet, const Sheet& by, bool is_behind);
 
-  const std::span<Surfel> cell_;
+  const std::span<Surfel> surfels_;
+  const std::size_t own_;  // so many are the cell's, the others lie around it
   const Direction& direction_;
   std::vector<Height>& heights_;
   const glm::vec3 origin_;
@@ -147,9 +149,9 @@ class Facing {
 };
 
 bool Facing::findNormal() {
-  const float first = cell_[heights_.front().surfel].area;
+  const float first = surfels_[heights_.front().surfel].area;
   for (const Height& each : heights_) {
-    const Surfel& surfel = cell_[each.surfel];
+    const Surfel& surfel = surfels_[each.surfel];
     normal_ += surfel.area / first * direction_.sideOf(surfel) * surfel.normal;
   }
   const float length = glm::length(normal_);
@@ -164,9 +166,9 @@ bool Facing::isPiled() const {
   glm::vec3 mean(0);
   std::array<float, SymmetricMatrix::kEntries> second{};
   // In units of the first surfel: a cloud may be of any scale
-  const float first = cell_[heights_.front().surfel].area, unit = 1 / std::sqrt(first);
+  const float first = surfels_[heights_.front().surfel].area, unit = 1 / std::sqrt(first);
   for (const Height& each : heights_) {
-    const Surfel& surfel = cell_[each.surfel];
+    const Surfel& surfel = surfels_[each.surfel];
     const glm::vec3 x = unit * (surfel.position - origin_), n = surfel.normal;
     const float a = surfel.area / first, spread = a * a / (4 * kPi);
     area += a;
@@ -194,12 +196,12 @@ void Facing::findHeights() {
       glm::cross(w, std::abs(w.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0)));
   const glm::dvec3 v = glm::cross(w, u);
   glm::dvec3 mean(0);
-  for (const Height& each : heights_) mean += glm::dvec3(cell_[each.surfel].position - origin_);
+  for (const Height& each : heights_) mean += glm::dvec3(surfels_[each.surfel].position - origin_);
   mean /= double(heights_.size());
   double uu = 0, uv = 0, vv = 0;
   glm::dvec2 slope(0), slope_by_u(0), slope_by_v(0);
   for (const Height& each : heights_) {
-    const Surfel& surfel = cell_[each.surfel];
+    const Surfel& surfel = surfels_[each.surfel];
     const glm::dvec3 at = glm::dvec3(surfel.position - origin_) - mean, n(surfel.normal);
     const double x = glm::dot(at, u), y = glm::dot(at, v);
     const glm::dvec2 one = glm::dvec2(glm::dot(n, u), glm::dot(n, v)) / -glm::dot(n, w);
@@ -219,9 +221,11 @@ void Facing::findHeights() {
   }
   const double twist = 0.5 * (by_u.y + by_v.x);
   for (Height& each : heights_) {
-    const glm::dvec3 at = glm::dvec3(cell_[each.surfel].position - origin_) - mean;
+    const glm::dvec3 at = glm::dvec3(surfels_[each.surfel].position - origin_) - mean;
     const double x = glm::dot(at, u), y = glm::dot(at, v);
     const double bend = 0.5 * (by_u.x * x * x + by_v.y * y * y) + twist * x * y;
+    each.area = surfels_[each.surfel].area;
+    each.aside = {x, y};
     each.height = float(glm::dot(at, w) - slope.x * x - slope.y * y - bend);
   }
 }
@@ -230,7 +234,7 @@ void Facing::findHeights() {
 std::size_t Facing::placeCount() const {
   std::size_t count = 1;
   for (std::size_t i = 1; i < heights_.size(); ++i) {
-    count += cell_[heights_[i - 1].surfel].position != cell_[heights_[i].surfel].position;
+    count += surfels_[heights_[i - 1].surfel].position != surfels_[heights_[i].surfel].position;
   }
   return count;
 }
@@ -256,34 +260,30 @@ float Facing::widthOf(const AreaSums& sums) const {
 Facing::Sheet Facing::sheetOf(std::span<const Height> heights) const {
   const double origin[3] = {double(origin_.x), double(origin_.y), double(origin_.z)};
   Sheet sheet{heights, {}, false};
-  for (const Height& each : heights) sheet.sums.add(AreaSums(cell_[each.surfel], origin));
+  for (const Height& each : heights) sheet.sums.add(AreaSums(surfels_[each.surfel], origin));
   sheet.is_filled = float(sheet.sums.area) >= kLeastFilled * outlineOf(sheet.sums.covariance());
   return sheet;
 }
 
 // Of their places along the normal.
-float Facing::asideSq(const Surfel& a, const Surfel& b) const {
-  const glm::vec3 offset = a.position - b.position;
-  const float along = glm::dot(offset, normal_);
-  return glm::dot(offset, offset) - along * along;
+float asideSq(const Height& a, const Height& b) {
+  const glm::vec2 offset = a.aside - b.aside;
+  return glm::dot(offset, offset);
 }
 
 // Of the surfels of a sheet that lie so near to a line along the normal.
-float Facing::areaAround(const Surfel& surfel, float distance,
-                         std::span<const Height> sheet) const {
+float areaAround(const Height& surfel, float distance, std::span<const Height> sheet) {
   float area = 0;
-  for (const Height& each : sheet) {
-    const Surfel& other = cell_[each.surfel];
+  for (const Height& other : sheet) {
     if (asideSq(surfel, other) <= distance * distance) area += other.area;
   }
   return area;
 }
 
 // Whether a surfel of a sheet lies right behind or before the surfel.
-bool Facing::isCovered(const Surfel& surfel, std::span<const Height> by) const {
+bool isCovered(const Height& surfel, std::span<const Height> by) {
   constexpr float kCellSq = 0.75f * 0.75f;  // half of its diagonal is .71
-  return std::any_of(by.begin(), by.end(), [&](const Height& each) {
-    const Surfel& other = cell_[each.surfel];
+  return std::any_of(by.begin(), by.end(), [&](const Height& other) {
     return asideSq(surfel, other) <= kCellSq * other.area;
   });
 }
@@ -292,17 +292,15 @@ bool Facing::isCovered(const Surfel& surfel, std::span<const Height> by) const {
 // scattered its surfels are, has half as much area around it at least, which is what there is at an
 // edge. As far from the edge as the sheets are apart, it has to go on, for who looks aslant sees
 // below the edge.
-bool Facing::covers(const Sheet& sheet, const Sheet& own, const Height& of) const {
-  const Surfel& surfel = cell_[of.surfel];
+bool Facing::covers(const Sheet& sheet, const Sheet& own, const Height& of) {
   const float gap = std::min(std::abs(sheet.heights.front().height - of.height),
                              std::abs(sheet.heights.back().height - of.height));
-  if (!(gap <= kClosestLayers * std::sqrt(surfel.area))) return false;
+  if (!(gap <= kClosestLayers * std::sqrt(of.area))) return false;
   const auto has = [&](float distance, float part) {
-    return areaAround(surfel, distance, sheet.heights) >=
-           part * areaAround(surfel, distance, own.heights);
+    return areaAround(of, distance, sheet.heights) >= part * areaAround(of, distance, own.heights);
   };
-  const float near = 3 * std::sqrt(std::max(cell_[sheet.heights.front().surfel].area, surfel.area));
-  if (!(sheet.is_filled && has(near, 0.5f)) && !isCovered(surfel, sheet.heights)) return false;
+  const float near = 3 * std::sqrt(std::max(sheet.heights.front().area, of.area));
+  if (!(sheet.is_filled && has(near, 0.5f)) && !isCovered(of, sheet.heights)) return false;
   return 2 * gap < near || has(2 * gap, 0.8f);
 }
 
@@ -341,7 +339,8 @@ void Facing::hide(const Sheet& sheet, const Sheet& by, bool is_behind) {
   const auto& covered = by.sums.covered;
   if (std::min({covered[0], covered[1], covered[2]}) < by.sums.area) return;
   for (const Height& each : sheet.heights) {
-    Surfel& surfel = cell_[each.surfel];
+    if (each.surfel >= own_) continue;
+    Surfel& surfel = surfels_[each.surfel];
     if (!covers(by, sheet, each)) continue;
     const bool is_front = is_behind == (direction_.sideOf(surfel) > 0);
     surfel.flags |= is_front ? kSurfelHiddenFront : kSurfelHiddenBack;
@@ -350,23 +349,24 @@ void Facing::hide(const Sheet& sheet, const Sheet& by, bool is_behind) {
 
 }  // namespace
 
-void markHidden(std::span<Surfel> cell) {
+void markHidden(std::span<Surfel> surfels, std::size_t own) {
   std::array<std::vector<Height>, kMostFacings>& members =
       threadScratch<std::array<std::vector<Height>, kMostFacings>>([] {});
   std::array<Direction, kMostFacings> directions;
   std::size_t count = 0;
-  for (std::size_t i = 0; i < cell.size(); ++i) {
-    if (cell[i].isSphere()) continue;
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    if (surfels[i].isSphere()) continue;
     std::size_t at = 0;
-    while (at < count && !directions[at].holds(cell[i])) ++at;
+    while (at < count && !directions[at].holds(surfels[i])) ++at;
     if (at == kMostFacings) continue;
     if (at == count) {
-      directions[count++] = {cell[i].normal, cell[i].isTwoSided()};
+      directions[count++] = {surfels[i].normal, surfels[i].isTwoSided()};
       members[at].clear();
     }
     members[at].push_back({0, std::uint32_t(i)});
   }
-  for (std::size_t at = 0; at < count; ++at) Facing(cell, directions[at], members[at]).mark();
+  for (std::size_t at = 0; at < count; ++at)
+    Facing(surfels, own, directions[at], members[at]).mark();
 }
 
 }  // namespace surfeit

@@ -10,12 +10,15 @@
 
 namespace surfeit {
 
-// Cells that are looked at have up to so many surfels. Borders of cells cut sheets apart, so the
-// large ones; and bent sheets have no clear gaps, so the small ones, too.
-inline constexpr std::size_t kLayerCells[] = {1024, 64};
+// Cells of up to kLayerCell surfels are looked at with what lies around them, for borders of cells
+// cut sheets apart. Then cells of up to kBentCell surfels, for large bent sheets have no clear
+// gaps.
+inline constexpr std::size_t kLayerCell = 1024, kBentCell = 64;
 
-// Sets kSurfelHiddenFront and kSurfelHiddenBack of those surfels of a cell that another sheet of it
-// hides, and leaves all others as they are.
-void markHidden(std::span<Surfel> cell);
+// Sets kSurfelHiddenFront and kSurfelHiddenBack of the surfels of a cell that another sheet hides,
+// and leaves all others as they are. The cell has the first `own` surfels; the others lie around
+// it.
+void markHidden(std::span<Surfel> surfels, std::size_t own);
+inline void markHidden(std::span<Surfel> cell) { markHidden(cell, cell.size()); }
 
 }  // namespace surfeit

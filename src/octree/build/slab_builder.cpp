@@ -1,12 +1,17 @@
 #include "octree/build/slab_builder.h"
 
 #include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <span>
 
 #include "core/long_side.h"
 #include "core/thread_scratch.h"
 #include "octree/build/curve_cells.h"
 #include "octree/build/hidden_surfels.h"
 #include "octree/build/loose_surfels.h"
+#include "octree/node/hidden_layers.h"
 #include "octree/page/node_bounds.h"
 #include "octree/page/surfel_group.h"
 #include "octree/page/surfel_marks.h"
@@ -29,6 +34,19 @@ class SlabSiblings : public SiblingSink {
 
  private:
   BuiltSlab& built_;
+};
+
+// A cell in which sheets are looked for that hide each other.
+struct LayerCell {
+  std::span<Surfel> surfels;
+  Bounds3 box;
+  float reach = 0;  // as far apart as such sheets are at most
+
+  bool reaches(const Bounds3& other) const {
+    const glm::vec3 apart =
+        glm::max(glm::max(other.min - box.max, box.min - other.max), glm::vec3(0));
+    return glm::dot(apart, apart) <= reach * reach;
+  }
 };
 
 class SlabBuilder {
@@ -59,6 +77,8 @@ class SlabBuilder {
   void fetchSurfels();
   void buildBrick(std::size_t begin, const Brick& brick);
   void markSurfels(std::size_t first, const Brick& brick);
+  void markLayers(std::size_t first, const Brick& brick);
+  void addAround(const LayerCell& cell, const LayerCell& other);
   void markLoose(const Cell& cell);
   template <typename Visit>
   void visitCells(std::size_t begin, std::size_t end, int boundary_level, std::size_t capacity,
@@ -77,6 +97,8 @@ class SlabBuilder {
   SlabSiblings sink_;
   CellSweep sweep_;
   LooseSurfels loose_;
+  std::vector<LayerCell> layer_cells_;
+  std::vector<Surfel> around_;  // those of a layer cell, then those around it
   std::vector<Surfel>& surfels_ = surfelScratch();
   std::vector<CurveKey>& keys_ = keyScratch();
   std::vector<std::size_t> page_begins_;  // surfels at which pages begin
@@ -132,12 +154,40 @@ void SlabBuilder::markSurfels(std::size_t first, const Brick& brick) {
   for (std::size_t i = first; i < brick.end; ++i) {
     surfels_[i].flags &= static_cast<std::uint16_t>(~kSurfelMarks);
   }
-  for (const std::size_t most : kLayerCells) {
-    visitCells(first, brick.end, brick.level, most, [&](const Cell& cell) {
-      markHidden(std::span(surfels_).subspan(cell.begin, cell.size));
-    });
-  }
+  markLayers(first, brick);
+  visitCells(first, brick.end, brick.level, kBentCell, [&](const Cell& cell) {
+    markHidden(std::span(surfels_).subspan(cell.begin, cell.size));
+  });
   visitCells(first, brick.end, brick.level, kLooseCell, [&](const Cell& cell) { markLoose(cell); });
+}
+
+// In the cells of a brick, each with what lies around it in the brick.
+void SlabBuilder::markLayers(std::size_t first, const Brick& brick) {
+  layer_cells_.clear();
+  visitCells(first, brick.end, brick.level, kLayerCell, [&](const Cell& cell) {
+    LayerCell& added = layer_cells_.emplace_back();
+    added.surfels = std::span(surfels_).subspan(cell.begin, cell.size);
+    float area = 0;
+    for (const Surfel& surfel : added.surfels) {
+      added.box.add(surfel.position);
+      area += surfel.area / float(cell.size);
+    }
+    added.reach = kClosestLayers * std::sqrt(area);
+  });
+  for (const LayerCell& cell : layer_cells_) {
+    around_.assign(cell.surfels.begin(), cell.surfels.end());
+    for (const LayerCell& other : layer_cells_) {
+      if (&other != &cell && cell.reaches(other.box)) addAround(cell, other);
+    }
+    markHidden(around_, cell.surfels.size());
+    for (std::size_t i = 0; i < cell.surfels.size(); ++i) cell.surfels[i].flags = around_[i].flags;
+  }
+}
+
+void SlabBuilder::addAround(const LayerCell& cell, const LayerCell& other) {
+  for (const Surfel& surfel : other.surfels) {
+    if (cell.reaches({surfel.position, surfel.position})) around_.push_back(surfel);
+  }
 }
 
 void SlabBuilder::markLoose(const Cell& cell) {
