@@ -258,6 +258,32 @@ TEST_F(SamplingTest, SparseFloorsHaveTheirAreaBesideWhatIsDense) {
   expectFloor("a slope over it");
 }
 
+// Dense places have small cells at the border of theirs, so sparse ones have all that lies between.
+// Cut halfway, they had .86 of a frame three spacings wide.
+TEST_F(SamplingTest, SparsePlacesReachUpToWhatIsDense) {
+  for (const double width : {.15, .3, .5, .8}) {
+    const double low = .5 - width / 2, high = .5 + width / 2;
+    double sum = 0, expected = 0;
+    for (int i = 0; i < 4; ++i) {
+      const glm::dvec3 corner(low, low, 0), u(width, 0, 0), v(0, width, 0);
+      add(scattered(int(400'000 * width * width)), corner, u, v);
+      const std::size_t dense = surfels_.size();
+      for (const glm::dvec2& place : scattered(1000)) {
+        const glm::dvec2 apart = glm::abs(place - .5);
+        if (std::max(apart.x, apart.y) > width / 2) add({place}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0});
+      }
+      for (std::size_t k = dense; k < surfels_.size(); ++k) surfels_[k].group = 1;
+      for (const Surfel& surfel : indexed({.normal = true, .group = true})) {
+        if (surfel.group == 1) sum += double(surfel.area);
+      }
+      surfels_.clear();
+      expected += 1 - width * width;
+    }
+    std::printf("%.2f wide: %.3f\n", high - low, sum / expected);
+    EXPECT_NEAR(sum / expected, 1, .05) << width;
+  }
+}
+
 // Squares of 40,000 places, ten times as far from each other as wide: the middle between them is
 // nobody's.
 TEST_F(SamplingTest, EdgesDoNotReachForOtherThings) {

@@ -47,4 +47,25 @@ inline bool isRow(std::span<const glm::vec2> cutters, float nearest_place) {
   return are_opposite && (count == 2 || glm::length(nearest[2]) > kBesideRow * second);
 }
 
+// Where something dense ends a cell: lines through its places, across the way to them.
+class CellEnds {
+ public:
+  void clear() { ends_.clear(); }
+  void add(const glm::vec2& end) { ends_.push_back(end); }
+  std::size_t count() const { return ends_.size(); }
+
+  // Whether all within `radius` of there lies behind an end. Its places are scattered about it, so
+  // whether it lies at least three quarters of the way there.
+  bool areBefore(const glm::vec2& there, float radius) const {
+    constexpr float kWay = 0.75f;
+    return std::any_of(ends_.begin(), ends_.end(), [&](const glm::vec2& end) {
+      const float length = glm::length(end);
+      return glm::dot(there, end) - radius * length > kWay * length * length;
+    });
+  }
+
+ private:
+  std::vector<glm::vec2> ends_;
+};
+
 }  // namespace surfeit

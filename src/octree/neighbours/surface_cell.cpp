@@ -38,12 +38,6 @@ constexpr float kSpike = 2;
 constexpr float kLooseSlope = 0.3f;
 constexpr float kOpen = SurfaceFitLanes::kOpen;
 
-// A cell so many times as long as wide is a rectangle. Disks along the line of a scan would
-// overlap, and leave gaps between the lines; rectangles of random places would leave gaps at the
-// corners of their cells. (Occlusion one spacing before random places with 2, 2.5 and 3: .0074,
-// .0051, .0048 rms; before rows 3:1 as disks .016.)
-constexpr float kLongCell = 2.5f;
-
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 // Of the plane that its cell lies in.
@@ -65,6 +59,7 @@ struct SurfaceCells::Scratch {
   std::vector<float> slopes_sq;           // of those from farther away
   std::vector<Neighbour> cutting, sheet;  // the cutters; all on the place's own sheet
   std::vector<Neighbour> bounding;        // of the cutters, those at its sides
+  CellEnds ends;
   ThirdNearest third_nearest;
 
   // Of the cell in the making. Lengths are in units of the farthest neighbour.
@@ -109,7 +104,6 @@ struct SurfaceCells::Scratch {
   bool isAmid(std::span<const Neighbour> neighbours) const;
   SurfaceCell cell() const;
   SurfaceCell cell(float area, const CellMoments& moments) const;
-  glm::vec3 longSide(float area, const CellMoments& moments, const TangentFrame& plane) const;
   void dropOthers();
   bool isSettled(float reach_sq) const {
     const float reach = places[lane].reach / unit;  // beyond which places are not known
@@ -179,6 +173,7 @@ void SurfaceCells::Scratch::begin() {
   slopes_sq.clear();
   cutting.clear();
   sheet.clear();
+  ends.clear();
   far_count = 0;
 }
 
@@ -365,8 +360,7 @@ bool SurfaceCells::widen(float radius) {
 
 glm::vec3 SurfaceCells::farthestCorner() const {
   const Scratch& at = *scratch_;
-  const std::span<const glm::vec2> corners = at.polygon.corners();
-  const glm::vec2 corner = *std::max_element(corners.begin(), corners.end(), isNearer);
+  const glm::vec2 corner = at.polygon.farthestCorner();
   return at.unit * (corner.x * at.frame.tangent + corner.y * at.frame.bitangent);
 }
 
@@ -378,7 +372,7 @@ bool SurfaceCells::mayCut(const PlaceBounds& bounds) const {
   const float radius = bounds.radius / at.unit, beside = glm::length(middle.beside) + radius;
   const float above = std::abs(middle.above) - radius;
   return above <= kSteep * beside + kBoundsSlack * (beside + above) &&
-         at.polygon.mayCut(middle.beside, radius);
+         !at.ends.areBefore(middle.beside, radius) && at.polygon.mayCut(middle.beside, radius);
 }
 
 bool SurfaceCells::wouldCut(const Neighbour& place) const {
@@ -387,7 +381,8 @@ bool SurfaceCells::wouldCut(const Neighbour& place) const {
   // Alone before a denser sheet, a place must not take what that has farther away for its own
   const bool is_nearer = flat.above < .5f * at.others.above && -flat.above < .5f * at.others.below;
   return at.mayShareSheet(place) && std::abs(flat.above) < kSteep * glm::length(flat.beside) &&
-         (is_nearer || !at.is_apart[at.lane]) && at.polygon.wouldCut(flat.beside);
+         (is_nearer || !at.is_apart[at.lane]) && !at.ends.areBefore(flat.beside, 0) &&
+         at.polygon.wouldCut(flat.beside);
 }
 
 bool SurfaceCells::cut(const Neighbour& place) {
@@ -402,6 +397,32 @@ bool SurfaceCells::cut(const Neighbour& place) {
   const float slope = flat.above / glm::length(flat.beside);
   at.slopes_sq.push_back(slope * slope);
   return true;
+}
+
+std::size_t SurfaceCells::endAt(std::span<const Neighbour> dense) {
+  Scratch& at = *scratch_;
+  const auto isDense = [&](const Neighbour& place) {
+    return std::any_of(dense.begin(), dense.end(),
+                       [&](const Neighbour& one) { return one.id == place.id; });
+  };
+  const float sharers = at.sharers;
+  at.begin();
+  at.sharers = sharers;
+  std::sort(at.bounding.begin(), at.bounding.end(), [](const Neighbour& a, const Neighbour& b) {
+    return glm::dot(a.offset, a.offset) < glm::dot(b.offset, b.offset);
+  });
+  for (const Neighbour& place : at.bounding) {
+    if (!isDense(place)) cut(place);
+  }
+  for (const Neighbour& place : at.bounding) {
+    const glm::vec2 end = at.flatten(place.offset).beside;
+    // Halfway to what is twice as far away
+    if (!isDense(place) || at.ends.areBefore(end, 0) || !at.polygon.cut(2.f * end)) continue;
+    at.ends.add(end);
+    at.cutters.push_back(2.f * end);
+    at.cutting.push_back(place);
+  }
+  return at.ends.count();
 }
 
 SurfaceCell SurfaceCells::closed() {
@@ -439,23 +460,10 @@ bool SurfaceCells::Scratch::isLoose() const {
 }
 
 // Whether places lie all around a cell that is cut by places near and far, as at the border of
-// something dense. A corner is as far from those that cut it as from the place. Where the surface
-// ends these lie on either side of the place, and the corner lies farther away than both. Across
-// a hole in something dense cells are long.
+// something dense. Across a hole in something dense cells are long.
 bool SurfaceCells::Scratch::isFull(const SurfaceCell& cell) const {
-  constexpr float kRounding = 1e-3f;
   if (cutters.empty() || polygon.touches(open) || isLoose()) return false;
-  if (cell.long_side != glm::vec3(0)) return false;
-  for (const glm::vec2& corner : polygon.corners()) {
-    float farthest_sq = 0;
-    for (const glm::vec2& cutter : cutters) {
-      const float square = glm::dot(cutter, cutter);
-      const bool is_at_corner = glm::dot(corner, cutter) > (0.5f - kRounding) * square;
-      if (is_at_corner) farthest_sq = std::max(farthest_sq, square);
-    }
-    if (glm::dot(corner, corner) > farthest_sq) return false;
-  }
-  return true;
+  return cell.long_side == glm::vec3(0) && polygon.isSurroundedBy(cutters);
 }
 
 SurfaceCell SurfaceCells::Scratch::cell() const {
@@ -475,23 +483,11 @@ SurfaceCell SurfaceCells::Scratch::cell(float area, const CellMoments& moments) 
   cell.radius = std::sqrt(2 * (moments.square + to_middle_sq)) * unit;
   const TangentFrame plane(normal);
   cell.middle = unit * (moments.middle.x * plane.tangent + moments.middle.y * plane.bitangent);
-  cell.long_side = longSide(area, moments, plane);
+  const glm::vec2 side = sharers > 1 ? glm::vec2(0) : unit * moments.longSide(area);
+  cell.long_side = side.x * plane.tangent + side.y * plane.bitangent;
   cell.sheet_thickness = sheet_thickness[lane];
   cell.is_lone = is_lone[lane];
   return cell;
-}
-
-// Of the rectangle with this area and these moments; zero of what shares it.
-glm::vec3 SurfaceCells::Scratch::longSide(float area, const CellMoments& moments,
-                                          const TangentFrame& plane) const {
-  const float apart = std::hypot(moments.difference, 2 * moments.product);
-  const float along = std::sqrt(0.5f * std::max(moments.square + apart, 0.f));
-  const float across = std::sqrt(0.5f * std::max(moments.square - apart, 0.f));
-  const bool is_long = along > kLongCell * across && across > 0;
-  if (!is_long || sharers > 1) return glm::vec3(0);
-  const float angle = 0.5f * std::atan2(2 * moments.product, moments.difference);
-  return std::sqrt(along / across * area) * unit *
-         (std::cos(angle) * plane.tangent + std::sin(angle) * plane.bitangent);
 }
 
 }  // namespace surfeit

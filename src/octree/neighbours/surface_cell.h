@@ -101,6 +101,10 @@ class SurfaceCells {
   std::span<const Neighbour> cutters();
   bool isBeside(const Neighbour& place, const Neighbour& other) const;
 
+  // Begins the cell again, cut by what cutters() found. The dense ones of these end it where they
+  // are, the nearest first; what lies beyond an end does not count. The number of ends.
+  std::size_t endAt(std::span<const Neighbour> dense);
+
   // The cell when what is farther away is no guide: among the nearest of the own sheet, or a square
   // as wide as the spacing of all neighbours, where hardly any are on that.
   SurfaceCell cellOfNearest();

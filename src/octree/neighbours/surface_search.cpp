@@ -164,7 +164,7 @@ Status SurfaceSearch::finish(const OpenPlace& place, SurfaceCell cell, float rea
     // Along a row places are close to each other, but not across
     if (has_normal && !is_on_row) {
       SURFEIT_ASSIGN_OR_RETURN(const bool are_alike,
-                               areAsSparse(place.spot.position, reach, cells));
+                               cutBesideDense(place.spot.position, reach, cells, cell));
       const bool is_lost = !cell.is_settled && cells.isLost();
       if (!are_alike || is_lost || cell.area == 0) cell = cells.cellOfNearest();
     }
@@ -222,6 +222,14 @@ Status SurfaceSearch::cutByFarther(const glm::vec3& position, float reach, Surfa
 // What is found farther away counts where it is all around.
 Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, SurfaceCell& cell) {
   if (!cells.widen(widest_)) return {};
+  SURFEIT_RETURN_IF_ERROR(cutFromCorners(position, cells));
+  const SurfaceCell wide = cells.closedWide();
+  if (wide.is_settled || cell.area == 0) cell = wide;
+  return {};
+}
+
+// By the nearest place to the farthest corner, until there is none; then as an open cell.
+Status SurfaceSearch::cutFromCorners(const glm::vec3& position, SurfaceCells& cells) {
   for (int i = 0; i < kMostFarther; ++i) {
     const glm::vec3 corner = cells.farthestCorner();
     SURFEIT_ASSIGN_OR_RETURN(
@@ -239,10 +247,7 @@ Status SurfaceSearch::findWide(const glm::vec3& position, SurfaceCells& cells, S
     place->offset += corner;
     if (!cells.cut(*place)) break;
   }
-  SURFEIT_RETURN_IF_ERROR(cutByFarther(position, 0, cells));
-  const SurfaceCell wide = cells.closedWide();
-  if (wide.is_settled || cell.area == 0) cell = wide;
-  return {};
+  return cutByFarther(position, 0, cells);
 }
 
 // Whether the sheet of a place far away is dense there: three others lie closer to it than a part
@@ -271,23 +276,37 @@ Result<bool> SurfaceSearch::isDenseAt(const glm::vec3& position, const Neighbour
   return true;
 }
 
-// Whether places that cut the cell from far away are on its sheet: two of them, or a third, are
-// about as far from others there as from the place. Dense ones say nothing about what is between.
-Result<bool> SurfaceSearch::areAsSparse(const glm::vec3& position, float reach,
-                                        SurfaceCells& cells) {
+// What is dense says nothing about what lies between it and the place, but that the cell ends
+// there. Whether places that cut the cell from far away are on its sheet: two of them, or a third,
+// are about as far from others there as from the place.
+Result<bool> SurfaceSearch::cutBesideDense(const glm::vec3& position, float reach,
+                                           SurfaceCells& cells, SurfaceCell& cell) {
   const std::span<const Neighbour> cutters = cells.cutters();
   float farthest = 0;
   for (const Neighbour& cutter : cutters) {
     farthest = std::max(farthest, glm::length(cutter.offset));
   }
   if (farthest <= reach) return true;
-  int sparse = 0, count = 0;
+  std::size_t sparse = 0;
+  float nearest_sparse = std::numeric_limits<float>::infinity();
+  dense_.clear();
   for (const Neighbour& cutter : cutters) {
-    if (glm::length(cutter.offset) <= kAsSparse * farthest) continue;
+    const float distance = glm::length(cutter.offset);
     SURFEIT_ASSIGN_OR_RETURN(const bool is_dense, isDenseAt(position, cutter, cells));
-    sparse += is_dense ? 0 : 1, ++count;
+    if (is_dense) {
+      dense_.push_back(cutter);
+    } else if (distance > kAsSparse * farthest) {
+      ++sparse;
+      nearest_sparse = std::min(nearest_sparse, distance);
+    }
   }
-  return sparse >= 2 || 3 * sparse >= count;
+  if (dense_.empty()) return true;
+  const std::size_t ends = cells.endAt(dense_);
+  if (sparse < 2 && 2 * sparse < ends) return false;
+  SURFEIT_RETURN_IF_ERROR(cutFromCorners(position, cells));
+  cell = cells.closed();
+  if (!cell.is_settled) cell.neighbour_spacing = std::max(cell.neighbour_spacing, nearest_sparse);
+  return true;
 }
 
 Status findOnThreads(std::span<SurfaceSearch> searches, std::span<const Surfel> places,

@@ -93,7 +93,9 @@ class SurfaceSearch {
   Status cutByFarther(const glm::vec3& position, float reach, SurfaceCells& cells);
   Result<bool> isDenseAt(const glm::vec3& position, const Neighbour& place,
                          const SurfaceCells& cells);
-  Result<bool> areAsSparse(const glm::vec3& position, float reach, SurfaceCells& cells);
+  Result<bool> cutBesideDense(const glm::vec3& position, float reach, SurfaceCells& cells,
+                              SurfaceCell& cell);
+  Status cutFromCorners(const glm::vec3& position, SurfaceCells& cells);
   void limit(SurfaceCell& cell, bool is_doubtful, float thickness) const;
 
   std::unique_ptr<PagedOctree::Reader> reader_;
@@ -103,6 +105,7 @@ class SurfaceSearch {
   SurfaceCells cells_, wider_cells_;  // of a group; with more neighbours
   std::vector<OpenPlace> open_;       // up to a group
   std::array<NearestPlaces, PlaceIndex::kGroup> wider_;
+  std::vector<Neighbour> dense_;  // at the sides of a cell
   float largest_loose_radius_ = std::numeric_limits<float>::infinity();
   float largest_sparse_radius_ = std::numeric_limits<float>::infinity();
 };
