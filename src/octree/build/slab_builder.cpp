@@ -36,6 +36,11 @@ class SlabSiblings : public SiblingSink {
   BuiltSlab& built_;
 };
 
+// Surfels of a cell and around it. There are more only where they lie on each other or are many
+// times as large as their spacing; then the cell is looked at alone, for time grows with the
+// square.
+constexpr std::size_t kMostAround = 4 * kLayerCell;
+
 // A cell in which sheets are looked for that hide each other.
 struct LayerCell {
   std::span<Surfel> surfels;
@@ -179,6 +184,7 @@ void SlabBuilder::markLayers(std::size_t first, const Brick& brick) {
     for (const LayerCell& other : layer_cells_) {
       if (&other != &cell && cell.reaches(other.box)) addAround(cell, other);
     }
+    if (around_.size() > kMostAround) around_.resize(cell.surfels.size());
     markHidden(around_, cell.surfels.size());
     for (std::size_t i = 0; i < cell.surfels.size(); ++i) cell.surfels[i].flags = around_[i].flags;
   }
