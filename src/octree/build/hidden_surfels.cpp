@@ -365,8 +365,10 @@ void markHidden(std::span<Surfel> surfels, std::size_t own) {
     }
     members[at].push_back({0, std::uint32_t(i)});
   }
-  for (std::size_t at = 0; at < count; ++at)
-    Facing(surfels, own, directions[at], members[at]).mark();
+  for (std::size_t at = 0; at < count; ++at) {
+    const bool has_own = members[at].front().surfel < own;
+    if (has_own) Facing(surfels, own, directions[at], members[at]).mark();
+  }
 }
 
 }  // namespace surfeit

@@ -14,6 +14,10 @@ namespace surfeit {
 // cut sheets apart. Then cells of up to kBentCell surfels, for large bent sheets have no clear
 // gaps.
 inline constexpr std::size_t kLayerCell = 1024, kBentCell = 64;
+// More surfels than this are in and around a large cell only where they lie on each other, or are
+// many times as large as their spacing. Then the cell is looked at alone, for time grows with the
+// square.
+inline constexpr std::size_t kMostAround = 4 * kLayerCell;
 
 // Sets kSurfelHiddenFront and kSurfelHiddenBack of the surfels of a cell that another sheet hides,
 // and leaves all others as they are. The cell has the first `own` surfels; the others lie around

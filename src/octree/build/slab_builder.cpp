@@ -36,11 +36,6 @@ class SlabSiblings : public SiblingSink {
   BuiltSlab& built_;
 };
 
-// Surfels of a cell and around it. There are more only where they lie on each other or are many
-// times as large as their spacing; then the cell is looked at alone, for time grows with the
-// square.
-constexpr std::size_t kMostAround = 4 * kLayerCell;
-
 // A cell in which sheets are looked for that hide each other.
 struct LayerCell {
   std::span<Surfel> surfels;

@@ -69,11 +69,6 @@ class CellPolygon {
   }
 
   std::span<const glm::vec2> corners() const { return std::span(corners_).first(count_); }
-  glm::vec2 farthestCorner() const {
-    return *std::max_element(
-        corners_.begin(), corners_.begin() + std::ptrdiff_t(count_),
-        [](const glm::vec2& a, const glm::vec2& b) { return glm::dot(a, a) < glm::dot(b, b); });
-  }
   // Whether of the places that cut each corner one is at least as far from the place as the corner.
   // Where the surface ends they lie on either side of the place, and the corner lies farther away.
   bool isSurroundedBy(std::span<const glm::vec2> cutters) const {

@@ -360,7 +360,8 @@ bool SurfaceCells::widen(float radius) {
 
 glm::vec3 SurfaceCells::farthestCorner() const {
   const Scratch& at = *scratch_;
-  const glm::vec2 corner = at.polygon.farthestCorner();
+  const std::span<const glm::vec2> corners = at.polygon.corners();
+  const glm::vec2 corner = *std::max_element(corners.begin(), corners.end(), isNearer);
   return at.unit * (corner.x * at.frame.tangent + corner.y * at.frame.bitangent);
 }
 

@@ -288,7 +288,7 @@ Result<bool> SurfaceSearch::cutBesideDense(const glm::vec3& position, float reac
   }
   if (farthest <= reach) return true;
   std::size_t sparse = 0;
-  float nearest_sparse = std::numeric_limits<float>::infinity();
+  float nearest_sparse = 0;
   dense_.clear();
   for (const Neighbour& cutter : cutters) {
     const float distance = glm::length(cutter.offset);
@@ -296,8 +296,7 @@ Result<bool> SurfaceSearch::cutBesideDense(const glm::vec3& position, float reac
     if (is_dense) {
       dense_.push_back(cutter);
     } else if (distance > kAsSparse * farthest) {
-      ++sparse;
-      nearest_sparse = std::min(nearest_sparse, distance);
+      nearest_sparse = sparse++ == 0 ? distance : std::min(nearest_sparse, distance);
     }
   }
   if (dense_.empty()) return true;
