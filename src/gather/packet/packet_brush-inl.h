@@ -266,21 +266,25 @@ class Brush {
       if (!has_area && !cover.has_hull) continue;
       if (cover.has_hull) hull.BeginRow(row);
       const FaceWeights::Row weights(weights_, row, has_area ? area.middleY() : hn::Zero(D()));
-      open_.DrawRow(box.range, row, resolution_, [&](std::size_t pixel, int column) HWY_ATTR {
+      const auto draw = [&](std::size_t pixel, int column) HWY_ATTR __attribute__((always_inline)) {
         V amount = hn::Zero(D()), middle = amount;
         if (has_area) amount = area.Amount(column, middle);
         const VU samples = cover.has_hull ? hull.Samples(column) : hn::Zero(DU());
-        const V weight = Kind::kFrame || !has_area ? Splat(1) : weights.At(column, middle);
+        const auto weight = [&]() HWY_ATTR __attribute__((always_inline)) {
+          return Kind::kFrame || !has_area ? Splat(1) : weights.At(column, middle);
+        };
         return DrawPixel(pixel, amount, weight, samples, widening.samples, cover,
                          [&](VU held) HWY_ATTR { return area.PartIn(held, row, column); });
-      });
+      };
+      open_.DrawRow(box.range, row, resolution_, draw);
     }
   }
 
   // False: the pixel is open to nobody.
-  // `partIn(samples)`: the part that lies in these samples.
-  template <typename PartIn>
-  HWY_INLINE bool DrawPixel(std::size_t at, V amount, V weight, VU samples, VU widening,
+  // `weight()`: of what covers it; `partIn(samples)`: the part that lies in these samples. Few
+  // pixels need them.
+  template <typename Weight, typename PartIn>
+  HWY_INLINE bool DrawPixel(std::size_t at, V amount, const Weight& weight, VU samples, VU widening,
                             const Cover& cover, const PartIn& partIn) {
     const D d;
     float* const pixel = pixels_.at(at);
@@ -306,7 +310,7 @@ class Brush {
         room = RoomAt(partIn(held), PartOf(held), room);
       }
     }
-    CoverPixel<Kind>(pixel, amount, weight, cover, room, least);
+    CoverPixel<Kind>(pixel, amount, weight(), cover, room, least);
     return true;
   }
 
@@ -402,7 +406,8 @@ class Brush {
       const auto is_hull = hn::RebindMask(DU(), hn::Ge(amount, Splat(0.5f)));
       samples = hn::IfThenElseZero(is_hull, SplatU(kHullSamples));
     }
-    return DrawPixel(pixel, hn::Mul(cover.opacity, amount), Splat(1), samples,
+    const auto weight = []() HWY_ATTR { return Splat(1); };
+    return DrawPixel(pixel, hn::Mul(cover.opacity, amount), weight, samples,
                      SplatU(cover.is_solid ? kHullSide / 2 : 0), cover,
                      [](VU held) HWY_ATTR { return PartOf(held); });
   }

@@ -104,7 +104,7 @@ class FaceWeights {
 // open.
 struct SampleRun {
   using VI = hn::Vec<DI>;
-  VI begin, end;
+  VI begin = hn::Zero(DI()), end = begin;
 
   SampleRun() = default;
   SampleRun(V low, V high) {
@@ -247,7 +247,7 @@ class HullRows {
   const V wider_;
   const hn::Mask<DU> seen_;
   const SampleRun across_;
-  VU rows_;
+  VU rows_ = hn::Zero(DU());
   SampleRun run_;
 };
 
