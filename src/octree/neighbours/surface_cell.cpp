@@ -89,6 +89,12 @@ struct SurfaceCells::Scratch {
     const bool are_known = own_normal != glm::vec3(0) && n.normal != glm::vec3(0);
     return !are_known || glm::dot(n.normal, own_normal) >= kLeastCosine;
   }
+  // Whether something within `radius` of this height does. Alone before a denser sheet, a place
+  // must not take what that has farther away for its own.
+  bool mayBeOwn(float above, float radius) const {
+    return !is_apart[lane] ||
+           (above - radius < .5f * others.above && -above - radius < .5f * others.below);
+  }
   bool isLine() const { return fits.is_line[lane] > 0; }
   bool hasPlane() const { return !isLine() || own_normal != glm::vec3(0); }
 
@@ -372,17 +378,16 @@ bool SurfaceCells::mayCut(const PlaceBounds& bounds) const {
   const FlatNeighbour middle = at.flatten(bounds.centre);
   const float radius = bounds.radius / at.unit, beside = glm::length(middle.beside) + radius;
   const float above = std::abs(middle.above) - radius;
-  return above <= kSteep * beside + kBoundsSlack * (beside + above) &&
+  const float slack = kBoundsSlack * (beside + above);
+  return above <= kSteep * beside + slack && at.mayBeOwn(middle.above, radius + slack) &&
          !at.ends.areBefore(middle.beside, radius) && at.polygon.mayCut(middle.beside, radius);
 }
 
 bool SurfaceCells::wouldCut(const Neighbour& place) const {
   const Scratch& at = *scratch_;
   const FlatNeighbour flat = at.flatten(place.offset);
-  // Alone before a denser sheet, a place must not take what that has farther away for its own
-  const bool is_nearer = flat.above < .5f * at.others.above && -flat.above < .5f * at.others.below;
   return at.mayShareSheet(place) && std::abs(flat.above) < kSteep * glm::length(flat.beside) &&
-         (is_nearer || !at.is_apart[at.lane]) && !at.ends.areBefore(flat.beside, 0) &&
+         at.mayBeOwn(flat.above, 0) && !at.ends.areBefore(flat.beside, 0) &&
          at.polygon.wouldCut(flat.beside);
 }
 
