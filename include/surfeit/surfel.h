@@ -45,6 +45,7 @@ constexpr std::uint16_t transparencyOf(double opacity) {
 // Where colors are let through differently: the codes of green and blue less that of red, modulo
 // 65536. Zero where all are let through alike.
 using Tint = std::array<std::uint16_t, 2>;
+constexpr bool isTinted(const Tint& tint) { return (tint[0] | tint[1]) != 0; }
 // The code of a color (0 red, 1 green, 2 blue), from that of red.
 constexpr std::uint16_t transparencyOf(std::uint16_t red, const Tint& tint, int color) {
   return color == 0 ? red : static_cast<std::uint16_t>(red + tint[std::size_t(color - 1)]);
@@ -74,7 +75,7 @@ struct Surfel {
   bool isTwoSided() const { return (flags & kSurfelTwoSided) != 0; }
   bool isLoose() const { return (flags & kSurfelLoose) != 0; }
   bool isLone() const { return (flags & kSurfelLone) != 0; }
-  bool isTinted() const { return tint != Tint{}; }
+  bool isTinted() const { return surfeit::isTinted(tint); }
   // In some color.
   bool isTranslucent() const { return transparency != 0 || isTinted(); }
   // How much of its area covers what lies behind in a color, and sends its radiosity: above 0, up

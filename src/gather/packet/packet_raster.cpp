@@ -164,7 +164,7 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
     const NodeFacet& codes = node.facets[i];
     const glm::vec3 position = codes.positionIn(node.position, node.radius);
     if (node.isTwoSided(i) || !turnsAway(position, codes.meanNormal())) {
-      has_tints_ |= codes.tint != Tint{};
+      has_tints_ |= isTinted(codes.tint);
       add(i, node.facet(i));
     }
   }

@@ -100,7 +100,7 @@ struct Node {
   // Sets off_plane by everything else.
   void findOffPlane();
 
-  bool isTinted() const { return tint != Tint{}; }
+  bool isTinted() const { return surfeit::isTinted(tint); }
   bool isTranslucent() const { return transparency != 0 || isTinted(); }  // in some color
   float opacity(int color = 0) const {
     return opacityOf(transparencyOf(transparency, tint, color));

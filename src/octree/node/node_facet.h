@@ -78,7 +78,7 @@ struct NodeFacet {
     return {opacityOf(transparency), opacityOf(transparencyOf(transparency, tint, 1)),
             opacityOf(transparencyOf(transparency, tint, 2))};
   }
-  bool isTranslucent() const { return transparency != 0 || tint != Tint{}; }
+  bool isTranslucent() const { return transparency != 0 || surfeit::isTinted(tint); }
   bool operator==(const NodeFacet&) const = default;
 };
 static_assert(sizeof(NodeFacet) == 36);
