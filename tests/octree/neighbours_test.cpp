@@ -342,6 +342,62 @@ TEST(SurfaceCells, HaveAMiddleBesideTheirPlace) {
 }
 
 // Two scans of one surface, or a place that comes twice: one has the side, not both
+// A place with two others of its sheet, `height` over a denser one that faces as it does.
+std::vector<Neighbour> aboveDenserSheet(float height, TestRandom& random) {
+  std::vector<Neighbour> neighbours = {{{1, .2f, 0}, {0, 0, 1}, 1},
+                                       {{-.3f, 1.1f, 0}, {0, 0, 1}, 2}};
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    const glm::vec3 place(random.between(-1, 1), random.between(-1, 1), -height);
+    neighbours.push_back({place, {0, 0, 1}, 3 + i});
+  }
+  std::sort(neighbours.begin(), neighbours.end(), isBefore);
+  return neighbours;
+}
+
+TEST(SurfaceCells, BoundsAreVisitedThatHoldWhatWouldCut) {
+  TestRandom random(12);
+  std::size_t wanted = 0, left_out = 0;
+  for (const float height : {0.f, .4f, .6f}) {
+    const std::vector<Neighbour> neighbours = aboveDenserSheet(height, random);
+    const CellPlace place = {neighbours, 1.5f, {0, 0, 1}};
+    SurfaceCells cells;
+    cells.fit({&place, 1}, false);
+    cells.cellOf(0);
+    for (int i = 0; i < 20000; ++i) {
+      Neighbour other;
+      const float away = random.between(0, 5);
+      other.offset = away * glm::normalize(random.direction() * glm::vec3(1, 1, .5f));
+      other.normal =
+          glm::normalize(glm::vec3(0, 0, 1) + random.between(0, 1.2f) * random.direction());
+      PlaceBounds bounds;
+      bounds.radius = random.between(0, 1) * random.between(0, 2);
+      bounds.centre = other.offset + bounds.radius * random.unit() * random.direction();
+      bounds.normal = glm::normalize(other.normal + random.between(0, 1) * random.direction());
+      bounds.normal_cosine = glm::dot(bounds.normal, other.normal);
+      const bool may_cut = cells.mayCut(bounds);
+      left_out += may_cut ? 0 : 1;
+      if (!cells.wouldCut(other)) continue;
+      ++wanted;
+      EXPECT_TRUE(may_cut) << "height " << height << ", try " << i;
+    }
+  }
+  EXPECT_GT(wanted, 1000u);
+  EXPECT_GT(left_out, 10000u);
+}
+
+// What lies past half the way to the other sheet is not the place's own, however far beside it.
+TEST(SurfaceCells, BoundsBeyondHalfTheGapAreLeftOut) {
+  TestRandom random(13);
+  const std::vector<Neighbour> neighbours = aboveDenserSheet(.6f, random);
+  const CellPlace place = {neighbours, 1.5f, {0, 0, 1}};
+  SurfaceCells cells;
+  cells.fit({&place, 1}, false);
+  cells.cellOf(0);
+  EXPECT_TRUE(cells.mayCut({{2, -2, -.2f}, .05f, {0, 0, 1}, 1}));
+  EXPECT_FALSE(cells.mayCut({{2, -2, -.4f}, .05f, {0, 0, 1}, 1}));
+  EXPECT_TRUE(cells.mayCut({{2, -2, -.4f}, .15f, {0, 0, 1}, 1}));
+}
+
 TEST(SurfaceCells, NeighboursAtOnePlaceCutOnce) {
   std::vector<Neighbour> neighbours;
   for (int i = 0; i < 12; ++i) {
