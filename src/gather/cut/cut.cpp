@@ -34,8 +34,9 @@ constexpr float kRoundingSlack = 1e-4f;
 // .080; half a pixel makes nothing better but the city, AO RMSE .0053 instead of .0056, at .6 of
 // its rate.)
 //
-// Inlined into the code of each instruction set: called from there, its own, of the oldest one,
-// would wait for the upper halves of registers at every node (a fifth of the time of a gather).
+// Inlined, so that each instruction set has code of its own. Called from theirs, code of the oldest
+// set waits at every node for the upper halves of registers (a fifth of the time of a gather, on an
+// Intel Xeon).
 HWY_INLINE float wholeDistanceSq(const Node& node, const CutRules& rules) {
   if (!rules.approximates() || rules.isMixed(node)) return std::numeric_limits<float>::infinity();
   const float share = node.isFlat() ? 1 : kFidelity.uneven_share;
