@@ -341,7 +341,6 @@ TEST(SurfaceCells, HaveAMiddleBesideTheirPlace) {
   }
 }
 
-// Two scans of one surface, or a place that comes twice: one has the side, not both
 // A place with two others of its sheet, `height` over a denser one that faces as it does.
 std::vector<Neighbour> aboveDenserSheet(float height, TestRandom& random) {
   std::vector<Neighbour> neighbours = {{{1, .2f, 0}, {0, 0, 1}, 1},
@@ -398,6 +397,7 @@ TEST(SurfaceCells, BoundsBeyondHalfTheGapAreLeftOut) {
   EXPECT_TRUE(cells.mayCut({{2, -2, -.4f}, .15f, {0, 0, 1}, 1}));
 }
 
+// Two scans of one surface, or a place that comes twice: one has the side, not both
 TEST(SurfaceCells, NeighboursAtOnePlaceCutOnce) {
   std::vector<Neighbour> neighbours;
   for (int i = 0; i < 12; ++i) {
