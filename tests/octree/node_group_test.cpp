@@ -188,7 +188,8 @@ TEST_F(NodeGroupTest, PagesOfVersionOneHaveNoBounds) {
 }
 
 TEST_F(NodeGroupTest, ReplacingRadiosityByItselfChangesNoByte) {
-  for (const PageForm& form : kForms) {
+  for (PageForm form : kForms) {
+    form.has_variances = true;
     std::vector<std::byte> payload, replaced;
     encodeNodeGroup(someNodes(50), form, payload);
     ASSERT_TRUE(decode(payload, form).ok());

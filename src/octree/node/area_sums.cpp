@@ -48,6 +48,7 @@ AreaSums::AreaSums(const Surfel& surfel, const double (&origin)[3]) {
     const double o = double(surfel.opacity(axis));
     covered[axis] = a * o;
     radiosity[axis] = a * o * double(surfel.radiosity[axis]);
+    radiosity_sq += radiosity[axis] * double(surfel.radiosity[axis]);
     // Both sides of a two-sided disk face everywhere: it gives a node no direction
     if (!surfel.isTwoSided()) normal[axis] = a * n[axis];
   }
@@ -78,6 +79,7 @@ void AreaSums::add(const AreaSums& other) {
     covered[axis] += other.covered[axis];
     radiosity[axis] += other.radiosity[axis];
   }
+  radiosity_sq += other.radiosity_sq;
 }
 
 double AreaSums::normalLength() const {

@@ -18,6 +18,7 @@ struct AreaSums {
   double normal[3] = {};                                 // sum A n over one-sided disks
   double covered[3] = {};                                // sum A o, by color
   double radiosity[3] = {};                              // sum A o B
+  double radiosity_sq = 0;                               // sum A o B.B
 
   AreaSums() = default;
   // One surfel.

@@ -85,6 +85,7 @@ struct Node {
   // How far surfels lie off the planes that a flat node or one of facets is drawn on, at most or by
   // their moments; 0 in a rough node. Not stored.
   float off_plane;
+  float radiosity_variance;  // RadiosityVariance; 0 where nothing is known
   union {
     RoughNode rough;  // without facets; zero in a flat node
     std::array<NodeFacet, kMostFacets> facets;

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 
+#include "octree/node/radiosity_variance.h"
 #include "octree/node/stored_loss.h"
 
 namespace surfeit {
@@ -16,6 +17,12 @@ namespace {
 const ZonalFactors& lobeOf(const Surfel& surfel) {
   if (surfel.isSphere()) return kConstant;
   return surfel.isTwoSided() ? kAbsoluteCosine : kClampedCosine;
+}
+
+float varianceOfAll(const AreaSums& sums) {
+  RadiosityVariance variance;
+  variance.add(sums);
+  return float(variance.value());
 }
 
 void setNormal(const AreaSums& sums, Node& node) {
@@ -143,6 +150,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   node.tint = tintOf(node.transparency, transparencyOf(covered[1] / area),
                      transparencyOf(covered[2] / area));
   node.covariance = all.covariance;
+  node.radiosity_variance = varianceOfAll(*this);
   setNormal(*this, node);
   if (loose_area > 0) node.flags = kNodeLoose;
   const bool is_flat = node.flatness > flatness_limit;
@@ -163,12 +171,15 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
     return node;
   }
   node.facets = {};
+  RadiosityVariance variance;
   for (const FacetGroup& group : fewest.groups()) {
+    variance.add(group);
     if (group.is_two_sided) node.flags |= std::uint8_t(kNodeTwoSided << node.facet_count);
     NodeFacet& facet = node.facets[node.facet_count++];
     facet = NodeFacet::encode(toFacet(group), node.position, node.radius, node.area);
     facet.hidden = group.hidden;
   }
+  node.radiosity_variance = float(variance.value());
   return node;
 }
 

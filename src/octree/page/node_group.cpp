@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/thread_scratch.h"
+#include "octree/node/radiosity_variance.h"
 #include "octree/node/stored_loss.h"
 #include "octree/page/column_codec.h"
 #include "octree/page/facet_columns.h"
@@ -88,6 +89,7 @@ class Columns {
     transparency.bytes = {column(bytes, 5), column(bytes, 6)};
     tints.differences = {TransparencyColumns{{column(bytes, 7), column(bytes, 8)}},
                          TransparencyColumns{{column(bytes, 9), column(bytes, 10)}}};
+    variance = column(bytes, 11);
     page = column(integers, 0);
     first = column(integers, 1);
     surfel_count = column(integers, 2);
@@ -105,6 +107,7 @@ class Columns {
       radius[i] = node.radius;
       area[i] = node.area;
       flatness[i] = node.flatness;
+      variance[i] = varianceCode(node.radiosity_variance);
       flags[i] = node.flags;
       transparency.set(i, node.transparency);
       tints.set(i, node.tint);
@@ -149,6 +152,7 @@ class Columns {
       node.radiosity = at(radiosity, i);
       node.flatness = flatness[i];
       node.child_count = child_count[i];
+      node.radiosity_variance = form.has_variances ? varianceOf(variance[i]) : 0;
       node.flags = flags[i];
       node.facet_count = 0;
       node.hidden = 0;
@@ -162,13 +166,13 @@ class Columns {
 
   MutableAxes position, normal, radiosity;
   std::span<float> radius, area, flatness;
-  std::span<std::uint8_t> flags, child_count, child_level, thickness, cone;
+  std::span<std::uint8_t> flags, child_count, child_level, thickness, cone, variance;
   TransparencyColumns transparency;
   TintColumns tints;
   std::span<std::uint64_t> page, first, surfel_count, groups;
 
  private:
-  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 11, kIntegerColumns = 4;
+  static constexpr std::size_t kFloatColumns = 12, kByteColumns = 12, kIntegerColumns = 4;
 
   static glm::vec3 at(const MutableAxes& axes, std::size_t i) {
     return {axes[0][i], axes[1][i], axes[2][i]};
@@ -210,6 +214,12 @@ Status decodeGeometry(PayloadReader& reader, const PageForm& form, const Columns
   if (!form.has_bounds) return {};
   if (!getBytes8(reader, columns.thickness)) return damaged("thickness");
   if (!getBytes8(reader, columns.cone)) return damaged("cone");
+  return {};
+}
+
+Status decodeLight(PayloadReader& reader, const PageForm& form, const Columns& columns) {
+  if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
+  if (form.has_variances && !getBytes8(reader, columns.variance)) return damaged("variance");
   return {};
 }
 
@@ -365,6 +375,7 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
     putBytes8(writer, columns.cone);
   }
   putColors(writer, constAxes(columns.radiosity), full_precision);
+  if (form.has_variances) putBytes8(writer, columns.variance);
   putBytes8(writer, columns.flags);
   putBytes8(writer, columns.child_count);
   putBytes8(writer, columns.child_level);
@@ -409,7 +420,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
   const Columns columns(count);
   const std::span<Node> out = nodes.first(count);
   SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, form, columns));
-  if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
+  SURFEIT_RETURN_IF_ERROR(decodeLight(reader, form, columns));
   SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
   columns.scatter(form, out);
   SURFEIT_RETURN_IF_ERROR(checkNodes(out));
@@ -444,13 +455,15 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
   const PayloadReader begin = reader;
   SURFEIT_RETURN_IF_ERROR(decodeGeometry(reader, form, columns));
   copyTaken(begin, reader, writer);
-  if (!getRadiosity(reader, columns.radiosity)) return damaged("radiosity");
+  SURFEIT_RETURN_IF_ERROR(decodeLight(reader, form, columns));
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       columns.radiosity[c][i] = nodes[i].radiosity[static_cast<int>(c)];
     }
+    columns.variance[i] = varianceCode(nodes[i].radiosity_variance);
   }
   putColors(writer, constAxes(columns.radiosity), full_precision);
+  putBytes8(writer, columns.variance);
   const PayloadReader references = reader;
   SURFEIT_RETURN_IF_ERROR(decodeReferences(reader, form, columns));
 

@@ -10,10 +10,11 @@ struct PageForm {
   bool has_albedo = false;
   bool has_groups = false;
   bool has_long_sides = false;
-  bool has_bounds = true;    // slabs and cones of nodes: since format version 2
-  bool has_opacity = false;  // since format version 3
-  bool has_lobes = false;    // since format version 4
-  bool has_tints = false;    // of what has an opacity
+  bool has_bounds = true;      // slabs and cones of nodes: since format version 2
+  bool has_opacity = false;    // since format version 3
+  bool has_lobes = false;      // since format version 4
+  bool has_tints = false;      // of what has an opacity
+  bool has_variances = false;  // of the radiosities of nodes
 };
 
 }  // namespace surfeit

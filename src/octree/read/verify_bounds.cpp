@@ -114,8 +114,8 @@ class BoundsWalk {
       : octree_(octree),
         has_bounds_(octree.file().header().pageForm().has_bounds),
         has_rectangles_(octree.file().header().has_rectangles),
-        tolerance_{octree.file().header().full_precision, octree.file().header().flatness_limit,
-                   brightest},
+        tolerance_{octree.file().header().full_precision, octree.file().header().has_variances,
+                   octree.file().header().flatness_limit, brightest},
         progress_(progress),
         report_(report) {}
 

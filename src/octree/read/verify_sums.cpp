@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "octree/node/facet_match.h"
+#include "octree/node/radiosity_variance.h"
 
 namespace surfeit {
 namespace {
@@ -79,6 +80,7 @@ class NodeCheck {
     checkLoose();
     node_.isFlat() && node_.isTwoSided() ? checkTwoSided() : checkNormal();
     checkCovariance();
+    if (tolerance_.has_variances) checkVariance();
     if (node_.isRough()) checkRough();
     if (node_.hasFacets()) checkFacets();
     return wrong_;
@@ -104,6 +106,7 @@ class NodeCheck {
   void checkNormal();
   void checkTwoSided();
   void checkCovariance();
+  void checkVariance();
   void checkRough();
   void checkPower();
   void checkFacets();
@@ -190,6 +193,20 @@ void NodeCheck::checkCovariance() {
     expect("covariance", kEntryNames[i], double(node_.covariance.entries[i]), moment[i] / area,
            most);
   }
+}
+
+// As the indexer rounds it, and colors. Facets are pieces of their own: within them radiosities
+// vary less than in all of the node.
+void NodeCheck::checkVariance() {
+  RadiosityVariance variance;
+  variance.add(sums_);
+  const double found = 1 + double(node_.radiosity_variance), most = 1 + variance.value();
+  const glm::vec3& mean = node_.radiosity;
+  const double lost = 1e-6 * double(tolerance_.brightest) /
+                      std::max(double(std::max({mean.r, mean.g, mean.b})), kTiny);
+  const double slack = (.05 + lost) * std::min(most, 62761.);
+  if (node_.hasFacets() && found <= most + slack) return;
+  expect("variance of the radiosity", "", found - 1, std::min(most, 62761.) - 1, slack);
 }
 
 void NodeCheck::checkRough() {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "octree/node/facet_match.h"
+#include "octree/node/radiosity_variance.h"
 
 namespace surfeit {
 namespace {
@@ -51,35 +52,33 @@ std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
 // otherwise than the indexer found them: then to the facet that faces most as it does.
 void setFacetRadiosity(const NodeSums& node_sums, float flatness_limit, Node& node) {
   const FacetSums& sums = node_sums.facets;
-  struct Light {
-    double covered[3] = {}, power[3] = {};
-  };
-  std::array<Light, kMostFacets> lights;
+  std::array<AreaSums, kMostFacets> lights;
   const std::span<NodeFacet> facets = std::span(node.facets).first(node.facet_count);
   const FacetSums fewest = sums.fewest(flatness_limit);
   const std::optional<FacetMatch> match = matchFacets(fewest, node_sums.origin, node);
   const std::span<const FacetGroup> groups =
       fewest.groups().empty() ? sums.groups() : fewest.groups();
   for (std::size_t i = 0; i < groups.size(); ++i) {
-    const FacetGroup& group = groups[i];
-    Light& light = lights[match ? (*match)[i] : nearestFacet(node, group)];
-    for (int c = 0; c < 3; ++c) {
-      light.covered[c] += group.covered[c];
-      light.power[c] += group.radiosity[c];
-    }
+    lights[match ? (*match)[i] : nearestFacet(node, groups[i])].add(groups[i]);
   }
+  RadiosityVariance variance;
   for (std::size_t k = 0; k < facets.size(); ++k) {
-    const Light& light = lights[k];
+    const AreaSums& light = lights[k];
+    variance.add(light);
     for (int c = 0; c < 3; ++c) {
       facets[k].radiosity[c] =
-          light.covered[c] > 0 ? float(light.power[c] / light.covered[c]) : node.radiosity[c];
+          light.covered[c] > 0 ? float(light.radiosity[c] / light.covered[c]) : node.radiosity[c];
     }
   }
+  node.radiosity_variance = float(variance.value());
 }
 
 // What the indexer's NodeSums::toNode gives from the same sums; the rest of the node stays.
 void setRadiosity(const NodeSums& sums, float flatness_limit, Node& node) {
   for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.covered[c]);
+  RadiosityVariance variance;
+  variance.add(sums);
+  node.radiosity_variance = float(variance.value());
   if (node.hasFacets()) setFacetRadiosity(sums, flatness_limit, node);
   if (!node.isRough()) return;
   for (int i = 0; i < kShCount; ++i) {
