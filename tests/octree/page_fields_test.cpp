@@ -201,13 +201,16 @@ class NodePageFields : public testing::Test {
   std::vector<Node> found_ = std::vector<Node>(128);
 };
 
-constexpr PageForm kAllOfNodes = {
-    .has_groups = true, .has_opacity = true, .has_lobes = true, .has_tints = true};
+constexpr PageForm kAllOfNodes = {.has_groups = true,
+                                  .has_opacity = true,
+                                  .has_lobes = true,
+                                  .has_tints = true,
+                                  .has_variances = true};
 const std::vector<const char*> kNodeFields = {
-    "position",     "radius", "area",      "normal",       "flatness",
-    "thickness",    "cone",   "radiosity", "flags",        "child count",
-    "child level",  "page",   "first",     "surfel count", "groups",
-    "transparency", "tint",   "facets",    "moments",      "coefficients"};
+    "position", "radius",    "area",         "normal", "flatness",     "thickness",
+    "cone",     "radiosity", "variance",     "flags",  "child count",  "child level",
+    "page",     "first",     "surfel count", "groups", "transparency", "tint",
+    "facets",   "moments",   "coefficients"};
 
 TEST_F(NodePageFields, PageThatEndsWithinOneIsToldByItsName) {
   for (const PageForm& form : {kAllOfNodes, exact(kAllOfNodes)}) {

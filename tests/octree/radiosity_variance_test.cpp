@@ -71,9 +71,7 @@ TEST(RadiosityVariance, WeighsByAreaAndOpacity) {
   const double mean = 5.5 / 3.5, squares = 15.5 / 3.5;
   NodeSums sums;
   for (const Surfel& surfel : two) sums.add(surfel);
-  RadiosityVariance variance;
-  variance.add(sums);
-  EXPECT_NEAR(variance.value(), squares / (mean * mean) - 1, 1e-4);
+  EXPECT_NEAR(RadiosityVariance::of(sums), squares / (mean * mean) - 1, 1e-4);
 }
 
 // Each wall of a corner is drawn in its own color.

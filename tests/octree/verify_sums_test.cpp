@@ -264,6 +264,7 @@ TEST_F(VerifySumsTest, FacetsThatAreNotThoseBelowAreFound) {
                with("covariance of facets", [](Node& n) { n.facets[4].covariance[3] ^= 0x80; }),
                with("covariance of facets", [](Node& n) { n.facets[4].covariance[4] ^= 0x80; }),
                with("covariance of facets", [](Node& n) { n.facets[4].covariance[5] ^= 0x80; }),
+               with("variance of the radiosity", [](Node& n) { n.radiosity_variance = 50; }),
                with("opacity of facets", [](Node& n) { n.facets[4].transparency = 0; }),
                with("facet radiosity in red", [](Node& n) { n.facets[0].radiosity.x *= 1.05f; }),
                with("facet radiosity in red", [](Node& n) { n.facets[5].radiosity.x *= .9f; }),
@@ -352,6 +353,8 @@ TEST_F(VerifySumsTest, PlaceNormalAndSpreadThatAreNotThoseBelowAreFound) {
        [](Node& n) {
          n.normal = {n.normal.y, n.normal.z, n.normal.x};
        }},
+      {"variance of the radiosity", [](Node& n) { n.radiosity_variance += .2f; }},
+      {"variance of the radiosity", [](Node& n) { n.radiosity_variance = 0; }},
       {"flat, expected otherwise", [](Node& n) { n.flags |= kNodeFlat; }}};
   for (std::size_t k = 0; k < SymmetricMatrix::kEntries; ++k) {
     edits.push_back({"covariance", [k](Node& n) {

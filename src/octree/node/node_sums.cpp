@@ -19,12 +19,6 @@ const ZonalFactors& lobeOf(const Surfel& surfel) {
   return surfel.isTwoSided() ? kAbsoluteCosine : kClampedCosine;
 }
 
-float varianceOfAll(const AreaSums& sums) {
-  RadiosityVariance variance;
-  variance.add(sums);
-  return float(variance.value());
-}
-
 void setNormal(const AreaSums& sums, Node& node) {
   const double length = sums.normalLength();
   node.flatness = float(std::min(length / sums.area, 1.0));
@@ -150,7 +144,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   node.tint = tintOf(node.transparency, transparencyOf(covered[1] / area),
                      transparencyOf(covered[2] / area));
   node.covariance = all.covariance;
-  node.radiosity_variance = varianceOfAll(*this);
+  node.radiosity_variance = RadiosityVariance::of(*this);
   setNormal(*this, node);
   if (loose_area > 0) node.flags = kNodeLoose;
   const bool is_flat = node.flatness > flatness_limit;

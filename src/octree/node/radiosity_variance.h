@@ -13,6 +13,12 @@ namespace surfeit {
 // area times opacity, over all colors. 0: each piece shines evenly, or not at all.
 class RadiosityVariance {
  public:
+  // Of a node that is one piece.
+  static float of(const AreaSums& all) {
+    RadiosityVariance variance;
+    variance.add(all);
+    return float(variance.value());
+  }
   void add(const AreaSums& piece) {
     squares_ += piece.radiosity_sq;
     for (int c = 0; c < 3; ++c) {

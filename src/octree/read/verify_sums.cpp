@@ -198,9 +198,8 @@ void NodeCheck::checkCovariance() {
 // As the indexer rounds it, and colors. Facets are pieces of their own: within them radiosities
 // vary less than in all of the node.
 void NodeCheck::checkVariance() {
-  RadiosityVariance variance;
-  variance.add(sums_);
-  const double found = 1 + double(node_.radiosity_variance), most = 1 + variance.value();
+  const double found = 1 + double(node_.radiosity_variance);
+  const double most = 1 + double(RadiosityVariance::of(sums_));
   const glm::vec3& mean = node_.radiosity;
   const double lost = 1e-6 * double(tolerance_.brightest) /
                       std::max(double(std::max({mean.r, mean.g, mean.b})), kTiny);

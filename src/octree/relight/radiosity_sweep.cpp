@@ -76,9 +76,7 @@ void setFacetRadiosity(const NodeSums& node_sums, float flatness_limit, Node& no
 // What the indexer's NodeSums::toNode gives from the same sums; the rest of the node stays.
 void setRadiosity(const NodeSums& sums, float flatness_limit, Node& node) {
   for (int c = 0; c < 3; ++c) node.radiosity[c] = float(sums.radiosity[c] / sums.covered[c]);
-  RadiosityVariance variance;
-  variance.add(sums);
-  node.radiosity_variance = float(variance.value());
+  node.radiosity_variance = RadiosityVariance::of(sums);
   if (node.hasFacets()) setFacetRadiosity(sums, flatness_limit, node);
   if (!node.isRough()) return;
   for (int i = 0; i < kShCount; ++i) {
