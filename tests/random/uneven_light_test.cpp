@@ -102,23 +102,6 @@ TEST_P(UnevenLight, ComesFromWhereItShines) {
   }
 }
 
-// What hides is the same, whatever shines.
-TEST(UnevenLightOfOcclusion, MakesNoDifference) {
-  std::vector<Surfel> cloud = surfelsOf({Uneven::kStripes, 3}, glm::mat3(1));
-  const std::vector<LocalReceiver> receivers = receiversOf({Uneven::kStripes, 3}, glm::mat3(1));
-  const auto occlusionOf = [&] {
-    const auto made = IndexedScene::make(cloud);
-    const GatherRules rules(GatherMode::kOcclusion, {});
-    const auto found = (*made)->gatherTogether(receivers, rules);
-    std::vector<float> occlusion;
-    for (const GatherResult& result : *found) occlusion.push_back(result.occlusion);
-    return occlusion;
-  };
-  const std::vector<float> uneven = occlusionOf();
-  for (Surfel& surfel : cloud) surfel.radiosity = glm::vec3(1);
-  EXPECT_EQ(occlusionOf(), uneven);
-}
-
 INSTANTIATE_TEST_SUITE_P(
     Scenes, UnevenLight,
     testing::Values(UnevenScene{Uneven::kFrontSheet}, UnevenScene{Uneven::kFrontSheet, 3, .05f},

@@ -32,8 +32,9 @@ constexpr float kRoundingSlack = 1e-4f;
 // area, but also opens sparse nodes.) What lies off the plane that it is drawn on by a pixel is
 // seen in another one. (Small lights differ from place to place by .065 of their power, without by
 // .080; half a pixel makes nothing better but the city, AO RMSE .0053 instead of .0056, at .6 of
-// its rate.) A node that shines on one of n parts of it may look 1 / n^2 as large where light is
-// gathered, as long as it is wider than two pixels: receivers see a part of it, lit or dark.
+// its rate.) A node that shines on one of n parts of it may look 1 / n^2 as large, as long as it
+// is wider than two pixels: receivers see a part of it, lit or dark. So also where no light is
+// gathered, for occlusion is the same with light and without.
 //
 // Inlined, so that each instruction set has code of its own. Called from theirs, code of the oldest
 // set waits at every node for the upper halves of registers (a fifth of the time of a gather, on an
@@ -44,7 +45,7 @@ HWY_INLINE float wholeDistanceSq(const Node& node, const CutRules& rules) {
   const float looks = kPi * node.radius * node.radius / (2 * share * rules.max_solid_angle);
   const float off_plane = node.off_plane * rules.pixels_per_slope;
   float whole = std::max(looks, off_plane * off_plane);
-  if (rules.has_light && node.radiosity_variance > 0) {
+  if (node.radiosity_variance > 0) {
     const float half_width = node.radius * rules.pixels_per_slope;
     const float parts = 1 + node.radiosity_variance;
     whole = std::max(whole, std::min(looks * parts * parts, half_width * half_width));

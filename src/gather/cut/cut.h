@@ -51,7 +51,6 @@ struct CutRules {
   std::uint64_t groups = kAllGroups;  // set of the groups that are seen
   float pixels_per_slope = 0;         // of the raster
   float bias = 0;                     // of rays, in radii of surfels
-  bool has_light = false;             // radiosities are gathered, not only what hides
   SendingGains gains{};
 
   bool approximates() const { return max_solid_angle > 0; }
@@ -115,7 +114,6 @@ class CutWalk {
                rules.groups,
                pixelsPerSlope(rules),
                rules.quality.bias,
-               rules.hasLight(),
                rules.hasLight() ? rules.gains : SendingGains()},
         classify_(fastestSiblingClassifier()) {}
 
