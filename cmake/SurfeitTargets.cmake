@@ -16,6 +16,17 @@ add_library(surfeit_internals INTERFACE)
 add_library(surfeit::internals ALIAS surfeit_internals)
 target_include_directories(surfeit_internals INTERFACE ${PROJECT_SOURCE_DIR}/src)
 
+# surfeit_join_sources(<target>): a unity build. Most of the time of a source goes into headers of others. Names
+# at file scope must differ within a target, and from those of its headers, which they would hide from the
+# sources after them. Sources with options of their own stay alone.
+function(surfeit_join_sources target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${SURFEIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 8)
+  if(SURFEIT_UNITY_BUILD)
+    # Takes the sources that are joined for headers, where their classes may not use what only they see
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  endif()
+endfunction()
+
 # surfeit_add_layer(<name> SOURCES ... LINKS ... [PRIVATE_LINKS ...])
 function(surfeit_add_layer name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
@@ -29,13 +40,7 @@ function(surfeit_add_layer name)
   target_link_libraries(surfeit_${name}
     PUBLIC ${ARG_LINKS}
     PRIVATE $<BUILD_INTERFACE:surfeit_build_options> $<BUILD_INTERFACE:surfeit::internals> ${ARG_PRIVATE_LINKS})
-endfunction()
-
-# surfeit_join_sources(<target>): a unity build. Most of the time of small sources goes into headers of CLI11
-# and GoogleTest, so it is worth it for what uses those. Names at file scope must differ within a target, and
-# from those of its headers, which they would hide from the sources after them.
-function(surfeit_join_sources target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ${SURFEIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 8)
+  surfeit_join_sources(surfeit_${name})
 endfunction()
 
 # surfeit_add_test(<layer> SOURCES ... LINKS ...): one GoogleTest program per layer.

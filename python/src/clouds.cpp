@@ -41,7 +41,7 @@ py::list columnsOf(const CloudInput& input) {
   return list;
 }
 
-py::list channelsOf(const CloudInput& input) {
+py::list channelsOfCloud(const CloudInput& input) {
   py::list list;
   for (const CloudChannel& channel : input.channels()) {
     list.append(py::make_tuple(channel.name, channel.properties));
@@ -104,7 +104,7 @@ void addClouds(py::module_& module) {
       .def_property_readonly("format", &CloudInput::format)
       .def_property_readonly("count", &CloudInput::count)
       .def_property_readonly("columns", &columnsOf)
-      .def_property_readonly("channels", &channelsOf)
+      .def_property_readonly("channels", &channelsOfCloud)
       .def_property_readonly("comments", &CloudInput::comments)
       .def_property_readonly("notes", &CloudInput::notes);
   py::class_<OutputFile>(module, "CloudOutput")

@@ -82,7 +82,7 @@ py::dict merge(const std::string& scene, const std::string& receivers, const std
   }));
 }
 
-py::dict forecast(const std::string& scene, const std::string& receivers, const py::dict& given,
+py::dict forecastGather(const std::string& scene, const std::string& receivers, const py::dict& given,
                   const py::object& watcher) {
   const GatherOptions options = gatherJobOptions(given);
   return record(runFor<GatherForecast>(watcher, [&](Progress& progress) {
@@ -189,7 +189,7 @@ void addGathering(py::module_& module) {
   module.def("gather_shards", &gatherShardsOf);
   module.def("gather_resumable", &resume);
   module.def("merge", &merge);
-  module.def("forecast_gather", &forecast);
+  module.def("forecast_gather", &forecastGather);
   module.def("tune", &tune);
   module.def("read_receiver", &readReceiver);
   module.def("cube", &cube);

@@ -93,7 +93,7 @@ py::dict mergeIndex(const std::vector<std::string>& inputs, const std::string& o
   }));
 }
 
-py::dict forecast(const std::vector<std::string>& inputs, const std::string& output,
+py::dict forecastIndex(const std::vector<std::string>& inputs, const std::string& output,
                   const py::dict& given, const py::object& watcher) {
   const IndexOptions options = indexOptions(given);
   return record(runFor<IndexForecast>(watcher, [&](Progress& progress) {
@@ -108,7 +108,7 @@ void addIndexing(py::module_& module) {
   module.def("index_arrays", &indexArrays);
   module.def("index_shards", &indexShardsOf);
   module.def("merge_index", &mergeIndex);
-  module.def("forecast_index", &forecast);
+  module.def("forecast_index", &forecastIndex);
 }
 
 }  // namespace surfeit::python

@@ -1,4 +1,5 @@
-// Texts whose case does not matter: extensions, names of channels, statements of files.
+// Characters, and texts whose case does not matter: extensions, names of channels, statements of
+// files.
 #pragma once
 
 #include <algorithm>
@@ -6,6 +7,8 @@
 #include <string_view>
 
 namespace surfeit {
+
+constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 
 inline bool isSameInAnyCase(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](unsigned char x, unsigned char y) {

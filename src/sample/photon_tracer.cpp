@@ -91,8 +91,6 @@ Status writeRows(std::span<const Photon> photons, const glm::dvec3& origin, RowW
   return writer.writeRows(std::as_bytes(std::span(far)));
 }
 
-float largest(const glm::vec3& rgb) { return std::max({rgb.x, rgb.y, rgb.z}); }
-
 // Everything that sends photons. Immutable; safe from any thread.
 class Emitters {
  public:
@@ -224,7 +222,7 @@ class PhotonTracer {
       PhotonRandom random(options_.seed, i);
       PhotonRay ray;
       emitters_.emit(i, options_.photons, random, ray);
-      if (largest(ray.power) > 0) follow(ray, random, batch);  // not from where a lamp is black
+      if (ray.power != glm::vec3(0)) follow(ray, random, batch);  // not from where a lamp is black
     }
   }
 

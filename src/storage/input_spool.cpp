@@ -16,7 +16,7 @@
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kCopyBytes = 1 << 20;
+constexpr std::size_t kSpooledBytes = 1 << 20;
 
 struct Spool {
   dev_t device;
@@ -59,7 +59,7 @@ Result<FileDescriptor> createSpool() {
 }
 
 Status copyAll(int from, int to, const std::string& path) {
-  std::vector<char> buffer(kCopyBytes);
+  std::vector<char> buffer(kSpooledBytes);
   for (std::uint64_t offset = 0;;) {
     const ssize_t got = ::read(from, buffer.data(), buffer.size());
     if (got < 0 && errno == EINTR) continue;

@@ -52,7 +52,7 @@ commands=(
   "convert scene.sft -o out.prt"
   "convert cloud.ply -o out.csv.gz"
   "index scene.sft -o out.sft"
-  "ptfilter cloud.ply -o out.ply --filter occlusion"
+  "ptfilter dim.ply -o out.ply --filter occlusion"
   "ptfilter bright.ply -o out.ply --filter colorbleeding --bounces 2"
   "ptfilter photons.ply -o out.ply --filter photonmap --nphotons 20"
   "brickmake brick.ply -o out.vdb --maxerror 0.01"
@@ -82,6 +82,7 @@ makeInputs() {
   run 0 sample cornell.obj -o photons.ply --photons 50000 --quiet
   run 0 brick cloud.ply --channel radiosity -o map.vdb --quiet
   run 0 convert cloud.ply -o bright.ply --every 50 --quiet
+  run 0 convert cloud.ply -o dim.ply --every 8 --quiet # the receivers, too: all would take most of the time
   run 0 convert cloud.ply -o brick.ply --keep position,normal,area,radiosity --quiet
   local shard pass
   for pass in count distribute build places sizes; do

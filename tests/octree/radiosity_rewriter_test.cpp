@@ -173,19 +173,26 @@ TEST_F(RadiosityRewriterTest, FacetsOfEachOpacityHaveLightOfTheirOwn) {
 TEST_F(RadiosityRewriterTest, AtFullPrecisionItIsWhatIndexingGives) {
   IndexOptions options;
   options.full_precision = true;
-  std::vector<Surfel> cloud = randomCloud(60000);
-  const std::string scene = index(cloud, kAllChannels, options);
-  for (Surfel& surfel : cloud) surfel.radiosity = wavesOfLight(surfel);
-  const ReadScene expected = read(index(cloud, kAllChannels, options));
-  const ReadScene found = read(rewrite(scene, "new.sft", wavesOfLight));
+  CloudChannels dark = kAllChannels;
+  dark.radiosity = false;
+  for (const CloudChannels& channels : {kAllChannels, dark}) {
+    SCOPED_TRACE(channels.radiosity);
+    std::vector<Surfel> cloud = randomCloud(60000);
+    const std::string scene = index(cloud, channels, options);
+    for (Surfel& surfel : cloud) surfel.radiosity = wavesOfLight(surfel);
+    const ReadScene expected = read(index(cloud, kAllChannels, options));
+    const ReadScene found = read(rewrite(scene, "new.sft", wavesOfLight));
+    EXPECT_EQ(read(scene).header.has_variances, channels.radiosity);
+    EXPECT_TRUE(found.header.has_variances);
 
-  ASSERT_EQ(found.surfels.size(), expected.surfels.size());
-  EXPECT_EQ(std::memcmp(found.surfels.data(), expected.surfels.data(),
-                        expected.surfels.size() * sizeof(Surfel)),
-            0);
-  ASSERT_EQ(found.nodes.size(), expected.nodes.size());
-  for (std::size_t i = 0; i < found.nodes.size(); ++i) {
-    ASSERT_TRUE(sameBytes(found.nodes[i].node, expected.nodes[i].node)) << "node " << i;
+    ASSERT_EQ(found.surfels.size(), expected.surfels.size());
+    EXPECT_EQ(std::memcmp(found.surfels.data(), expected.surfels.data(),
+                          expected.surfels.size() * sizeof(Surfel)),
+              0);
+    ASSERT_EQ(found.nodes.size(), expected.nodes.size());
+    for (std::size_t i = 0; i < found.nodes.size(); ++i) {
+      ASSERT_TRUE(sameBytes(found.nodes[i].node, expected.nodes[i].node)) << "node " << i;
+    }
   }
 }
 

@@ -14,7 +14,7 @@ namespace surfeit {
 namespace {
 
 // Records that are read at once: they stay in the second-level cache until they are decoded
-constexpr std::size_t kBlockBytes = 512 << 10;
+constexpr std::size_t kReadBytes = 512 << 10;
 
 }  // namespace
 
@@ -60,7 +60,7 @@ Result<Bytes> FixedRecordReader::readNext(std::size_t max_rows, AlignedBuffer& b
     // The size of the file has proven the count; only a compressed one may still lie
     const std::size_t size = row_count * row_bytes;
     buffer.reserve(input_.isCompressed() ? std::min(size, kUnprovenBytes) : size);
-    const std::size_t block_rows = std::max<std::size_t>(1, kBlockBytes / record_bytes_);
+    const std::size_t block_rows = std::max<std::size_t>(1, kReadBytes / record_bytes_);
     for (std::size_t done = 0; done < row_count;) {
       const std::size_t count = std::min(block_rows, row_count - done);
       SURFEIT_ASSIGN_OR_RETURN(const Bytes records, readRecords(count, records_));

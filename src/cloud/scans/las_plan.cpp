@@ -17,7 +17,7 @@
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kMaxRecordBytes = 65535, kMaxNameBytes = 32;
+constexpr std::size_t kLargestRecordBytes = 65535, kMaxNameBytes = 32;
 constexpr std::size_t kMaxDescriptors = 65535 / kLasDescriptorBytes;
 
 class Planner {
@@ -33,11 +33,11 @@ class Planner {
     for (const RowProperty& property : wish_.element->properties) {
       if (!taken_.contains(property.name)) addExtraBytes(property);
     }
-    if (plan_.record_bytes > kMaxRecordBytes || descriptor_count_ > kMaxDescriptors) {
+    if (plan_.record_bytes > kLargestRecordBytes || descriptor_count_ > kMaxDescriptors) {
       return Status::invalidArgument(fmt::format(
           "{}: {} extra values of {} bytes, expected at most {} values and {} bytes: convert with "
           "--keep or --drop first",
-          path_, descriptor_count_, plan_.record_bytes, kMaxDescriptors, kMaxRecordBytes));
+          path_, descriptor_count_, plan_.record_bytes, kMaxDescriptors, kLargestRecordBytes));
     }
     if (!has_described_) plan_.descriptors.clear();
     return std::move(plan_);

@@ -13,11 +13,11 @@
 #include <type_traits>
 
 #include "cloud/ply/ply_number.h"
+#include "core/text_case.h"
 
 namespace surfeit {
 namespace {
 
-constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 constexpr bool endsWord(char c) { return isTextBlank(c) || isTextComma(c); }
 
 const char* skipBlanks(const char* at, const char* end) {

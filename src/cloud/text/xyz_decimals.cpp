@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cloud/rows/row_layout.h"
+#include "core/text_case.h"
 
 namespace surfeit {
 namespace {
@@ -16,8 +17,6 @@ constexpr std::size_t kFirstLines = 1000;
 constexpr std::size_t kMostValues = 256;
 constexpr std::string_view kChoice =
     "say which: --text decimal-comma, or --text decimal-point where commas part values";
-
-constexpr bool isDigit(char c) { return c >= '0' && c <= '9'; }
 
 std::size_t digitsAt(std::string_view text) {
   const auto end = std::find_if_not(text.begin(), text.end(), isDigit);

@@ -152,8 +152,6 @@ bool containsAny(const Words& words, const std::string_view (&names)[kCount]) {
                      [&](std::string_view name) { return contains(words, name); });
 }
 
-bool isPlace(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
-
 constexpr std::string_view kAngles =
     ", which are angles, expected lengths: project the points first, to UTM for example";
 
@@ -161,7 +159,7 @@ constexpr std::string_view kAngles =
 std::string refusalOfAngles(const Words& names, const Words& file_names) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::string_view unit = splitUnit(file_names[i]).unit;
-    if (!isPlace(names[i]) || !isAngularUnit(unit)) continue;
+    if (!isPlaceName(names[i]) || !isAngularUnit(unit)) continue;
     return fmt::format("found {} in {}{}", names[i], quoteText(unit), kAngles);
   }
   return {};
@@ -378,7 +376,7 @@ bool addUnits(std::string_view line, XyzHeader& header) {
     std::string_view unit = words[i];
     while (!unit.empty() && kAroundUnits.find(unit.front()) != unit.npos) unit.remove_prefix(1);
     while (!unit.empty() && kAroundUnits.find(unit.back()) != unit.npos) unit.remove_suffix(1);
-    if (isPlace(header.names[i]) && !isKnownUnit(unit)) return false;
+    if (isPlaceName(header.names[i]) && !isKnownUnit(unit)) return false;
     if (!unit.empty()) with_units[i] = fmt::format("{} [{}]", with_units[i], unit);
   }
   header.refusal = refusalOfAngles(header.names, with_units);

@@ -11,6 +11,11 @@ namespace surfeit {
 
 inline constexpr std::size_t kMaxXyzColumns = 256;
 
+// Whether a column is one of a position.
+constexpr bool isPlaceName(std::string_view name) {
+  return name == "x" || name == "y" || name == "z";
+}
+
 struct XyzHeader {
   // Of the columns, as rows have them; empty when the line does not name a position.
   std::vector<std::string> names;

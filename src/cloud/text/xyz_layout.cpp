@@ -6,6 +6,7 @@
 #include <initializer_list>
 
 #include "cloud/parts/property_renames.h"
+#include "cloud/text/xyz_header.h"
 
 namespace surfeit {
 namespace {
@@ -14,11 +15,10 @@ constexpr double kLargestExactFloat = 1 << 24;
 constexpr double kByteColor = 255, kWordColor = 65535;
 constexpr std::uint64_t kLeastNumbered = 8;
 
-bool contains(std::span<const std::string> names, std::string_view name) {
+bool hasName(std::span<const std::string> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-bool isPlace(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
 bool isColor(std::string_view name) { return name == "red" || name == "green" || name == "blue"; }
 bool isSmallCount(std::string_view name) {
   return name == "group" || name == "light_group" || name == "two_sided";
@@ -165,7 +165,7 @@ Result<std::vector<std::string>> nameXyzColumns(const XyzTable& table, bool is_p
   while (names.size() < columns.size()) {
     const std::size_t first = names.size();
     const auto is_normal = [&](std::size_t i) {
-      return !contains(names, "nx") && i + 3 <= columns.size() && table.are_unit_vectors[i];
+      return !hasName(names, "nx") && i + 3 <= columns.size() && table.are_unit_vectors[i];
     };
     if (is_normal(first)) {
       add(kNormal);
@@ -174,7 +174,7 @@ Result<std::vector<std::string>> nameXyzColumns(const XyzTable& table, bool is_p
     std::size_t end = first + 1;
     while (end < columns.size() && !is_normal(end)) ++end;
     const std::size_t count = end - first;
-    const bool may_be_color = count >= 3 && !contains(names, "red");
+    const bool may_be_color = count >= 3 && !hasName(names, "red");
     std::vector<Names> readings;
     if (may_be_color) readings = Readings(columns.subspan(first, count)).all();
     if (is_pts && count == 4 && readings.size() == 2) readings.erase(readings.begin());
@@ -198,14 +198,15 @@ std::vector<ValueType> typeXyzColumns(const XyzTable& table, std::span<const std
     if (isSmallCount(names[i]) && column.are_wholes && column.least >= 0 && column.largest <= 255) {
       types[i] = ValueType::kUint8;
     }
-    if (isPlace(names[i]) && !column.are_floats) are_places_floats = false;
+    if (isPlaceName(names[i]) && !column.are_floats) are_places_floats = false;
     if (!isColor(names[i])) continue;
     are_colors_wholes = are_colors_wholes && column.are_wholes && column.least >= 0;
     largest_color = std::max(largest_color, column.largest);
   }
   const bool are_coded = are_colors_wholes && largest_color > 1 && largest_color <= kWordColor;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (isPlace(names[i])) types[i] = are_places_floats ? ValueType::kFloat32 : ValueType::kFloat64;
+    if (isPlaceName(names[i]))
+      types[i] = are_places_floats ? ValueType::kFloat32 : ValueType::kFloat64;
     const XyzColumn& column = table.columns[i];
     const double range = largest_color <= kByteColor ? kByteColor : kWordColor;
     const bool is_coded_alpha = names[i] == "alpha" && column.are_wholes && column.least >= 0 &&

@@ -37,8 +37,6 @@ constexpr const char* kAnglesAdvice =
     "they "
     "are no angles, name the columns (--channels 1=x,2=y,3=z)";
 
-bool isPlaceColumn(std::string_view name) { return name == "x" || name == "y" || name == "z"; }
-
 class XyzReader final : public CountedRowReader {
  public:
   explicit XyzReader(ByteInput input) : source_(std::move(input)) {
@@ -228,8 +226,8 @@ class XyzReader final : public CountedRowReader {
     typed_.resize(names_.size());
     for (std::size_t i = 0; i < names_.size(); ++i) {
       const bool is_text = i < words.size() && !isTextNumber(words[i]) && !isMissingText(words[i]);
-      first_row_.push_back({names_[i], ValueType::kFloat32, 0, !is_text && !isDropped(i),
-                            !isPlaceColumn(names_[i])});
+      first_row_.push_back(
+          {names_[i], ValueType::kFloat32, 0, !is_text && !isDropped(i), !isPlaceName(names_[i])});
     }
     return {};
   }
@@ -422,7 +420,7 @@ class XyzReader final : public CountedRowReader {
             "{}: column {} would be a second {}, expected another name", path_, i + 1, name));
       }
       columns.push_back({names[i], types[i], element_.row_bytes, !name.empty(),
-                         isFloatType(types[i]) && !isPlaceColumn(name)});
+                         isFloatType(types[i]) && !isPlaceName(name)});
       if (name.empty()) continue;
       element_.properties.push_back(called[i]);
       if (!typed_[i].empty()) element_.properties.back().typed = typed_[i];

@@ -7,13 +7,13 @@
 namespace surfeit {
 namespace {
 
-struct VdbValueType {
+struct NamedVdbType {
   std::string_view name;
   std::size_t components;
   StoredType stored;
 };
 
-constexpr VdbValueType kVdbValueTypes[] = {
+constexpr NamedVdbType kVdbValueTypes[] = {
     {"bool", 1, StoredType::kUint8},     {"int8", 1, StoredType::kInt8},
     {"uint8", 1, StoredType::kUint8},    {"int16", 1, StoredType::kInt16},
     {"uint16", 1, StoredType::kUint16},  {"int32", 1, StoredType::kInt32},
@@ -37,7 +37,7 @@ struct Coded {
 };
 
 // How a component is stored under a codec.
-std::optional<Coded> codedAs(const VdbValueType& type, std::string_view codec) {
+std::optional<Coded> codedAs(const NamedVdbType& type, std::string_view codec) {
   if (codec == "null") return Coded{type.stored, VdbCodec::kPlain};
   if (codec == "trnc" && type.stored == StoredType::kFloat32) {
     return Coded{StoredType::kFloat16, VdbCodec::kPlain};
@@ -117,7 +117,7 @@ void decodeReals(VdbCodec codec, const StoredPlace& place, const std::byte* from
 
 std::optional<VdbAttributeType> vdbAttributeType(std::string_view value_type,
                                                  std::string_view codec) {
-  for (const VdbValueType& known : kVdbValueTypes) {
+  for (const NamedVdbType& known : kVdbValueTypes) {
     if (known.name != value_type) continue;
     const std::optional<Coded> coded = codedAs(known, codec);
     if (!coded.has_value()) return {};

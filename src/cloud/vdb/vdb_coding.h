@@ -18,6 +18,14 @@ namespace surfeit {
 // Flags of a grid's compression word.
 inline constexpr std::uint32_t kVdbZip = 1, kVdbActiveMask = 2, kVdbBlosc = 4;
 
+// The identifier of a file, which nobody reads.
+inline constexpr std::size_t kVdbUuidBytes = 36;
+
+// Flags of the array of an attribute, and of how it is written.
+inline constexpr std::uint8_t kVdbConstantStride = 0x8;
+inline constexpr std::uint8_t kVdbStrided = 0x1, kVdbUniform = 0x2, kVdbPackedInMemory = 0x4,
+                              kVdbPaged = 0x8;
+
 // The array of an attribute in a leaf may take this, read or written: 44 million positions. The
 // format has it packed and unpacked as a whole.
 inline constexpr std::uint64_t kVdbMaxArrayBytes = std::uint64_t{1} << 29;

@@ -13,7 +13,6 @@ namespace {
 
 constexpr std::uint32_t kOldestVersion = 222;
 constexpr std::uint32_t kMaxGrids = 1 << 12, kMaxMetadata = 1 << 16;
-constexpr std::size_t kUuidBytes = 36;
 // Longer ones (thumbnails, tables for OpenVDB's delayed loading) are passed over.
 constexpr std::uint32_t kMaxMetadataBytes = 1 << 16;
 
@@ -170,7 +169,7 @@ Status readHeader(VdbCursor& cursor, std::uint32_t& version) {
   if (has_offsets == 0) {
     return cursor.corrupt("written as a stream, without places of grids: save it as a file");
   }
-  return cursor.skip(kUuidBytes);
+  return cursor.skip(kVdbUuidBytes);
 }
 
 }  // namespace

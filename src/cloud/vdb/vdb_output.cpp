@@ -15,7 +15,6 @@ namespace {
 
 constexpr std::uint32_t kFileVersion = 224;
 constexpr std::array<std::uint32_t, 2> kLibraryVersion = {10, 0};  // the one that we test with
-constexpr std::size_t kUuidBytes = 36;
 
 // Bits of a key below the children of the root, and of inner nodes
 constexpr int kRootShift = 36;
@@ -170,7 +169,7 @@ Result<VdbOutput> VdbOutput::create(const std::string& path, std::span<const std
   SURFEIT_RETURN_IF_ERROR(output.appendValue(kLibraryVersion));
   SURFEIT_RETURN_IF_ERROR(output.appendValue(char{1}));  // grids have places
   output.state_->uuid_begin = output.size();
-  SURFEIT_RETURN_IF_ERROR(output.appendValue(std::array<char, kUuidBytes>()));
+  SURFEIT_RETURN_IF_ERROR(output.appendValue(std::array<char, kVdbUuidBytes>()));
   std::vector<VdbMetadata> metadata = {vdbText("creator", "Surfeit")};
   for (std::size_t i = 0; i < comments.size(); ++i) {
     metadata.push_back(vdbText(fmt::format("comment{:04}", i + 1), comments[i]));

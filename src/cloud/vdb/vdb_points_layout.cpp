@@ -18,10 +18,6 @@ constexpr std::uint64_t kMostExpansion = 256;
 constexpr std::size_t kVoxelBytes = 4 * kVdbLeafVoxels;
 // In place of the size of voxel offsets that are not packed
 constexpr std::uint16_t kNotPacked = 0xFFFF;
-
-// Flags of an array, and of how it is written
-constexpr std::uint8_t kConstantStride = 0x8;
-constexpr std::uint8_t kStrided = 0x1, kUniform = 0x2, kPackedInMemory = 0x4, kPaged = 0x8;
 // A record's size counts this much of the record itself
 constexpr std::uint64_t kCountedRecordBytes = 6;
 
@@ -126,9 +122,9 @@ Status VdbArrayRecords::readRecord(VdbArrayRecord& record) {
   SURFEIT_RETURN_IF_ERROR(cursor_.read(how));
   SURFEIT_RETURN_IF_ERROR(cursor_.read(record.size));
   record.stride = 1;
-  if ((how & kStrided) != 0) SURFEIT_RETURN_IF_ERROR(cursor_.read(record.stride));
-  const bool varies = (how & kStrided) != 0 && (flags & kConstantStride) == 0;
-  if (how >= 2 * kPaged || (how & kPackedInMemory) != 0 || varies) {
+  if ((how & kVdbStrided) != 0) SURFEIT_RETURN_IF_ERROR(cursor_.read(record.stride));
+  const bool varies = (how & kVdbStrided) != 0 && (flags & kVdbConstantStride) == 0;
+  if (how >= 2 * kVdbPaged || (how & kVdbPackedInMemory) != 0 || varies) {
     return cursor_.corrupt(fmt::format("an array with flags {:#x}, {:#x}: not read", flags, how));
   }
   if (bytes < kCountedRecordBytes || bytes > std::uint64_t{1} << 40 || record.stride == 0 ||
@@ -137,8 +133,8 @@ Status VdbArrayRecords::readRecord(VdbArrayRecord& record) {
         fmt::format("an array of {} bytes, {} values per point", bytes, record.stride));
   }
   record.bytes = bytes - kCountedRecordBytes;
-  record.is_uniform = (how & kUniform) != 0;
-  record.is_paged = (how & kPaged) != 0;
+  record.is_uniform = (how & kVdbUniform) != 0;
+  record.is_paged = (how & kVdbPaged) != 0;
   return {};
 }
 

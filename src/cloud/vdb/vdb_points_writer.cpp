@@ -233,7 +233,6 @@ std::vector<VdbMetadata> VdbPointsWriter::gridMetadata() const {
 
 // A descriptor for all leaves, then what each leaf's arrays are.
 Status VdbPointsWriter::writeRecords(VdbOutput& output) {
-  constexpr std::uint8_t kConstantStride = 0x8, kStrided = 0x1, kPaged = 0x8;
   SURFEIT_RETURN_IF_ERROR(output.appendValue(std::uint8_t{1}));  // for all leaves
   SURFEIT_RETURN_IF_ERROR(output.appendValue(static_cast<std::uint64_t>(attributes_.size())));
   std::vector<std::pair<std::string, std::uint64_t>> names;
@@ -262,9 +261,9 @@ Status VdbPointsWriter::writeRecords(VdbOutput& output) {
       }
       const bool is_strided = attribute.stride != 1;
       SURFEIT_RETURN_IF_ERROR(output.appendValue(bytes + 6));
-      SURFEIT_RETURN_IF_ERROR(output.appendValue(kConstantStride));
-      SURFEIT_RETURN_IF_ERROR(
-          output.appendValue(static_cast<std::uint8_t>(kPaged | (is_strided ? kStrided : 0))));
+      SURFEIT_RETURN_IF_ERROR(output.appendValue(kVdbConstantStride));
+      SURFEIT_RETURN_IF_ERROR(output.appendValue(
+          static_cast<std::uint8_t>(kVdbPaged | (is_strided ? kVdbStrided : 0))));
       SURFEIT_RETURN_IF_ERROR(output.appendValue(static_cast<std::uint32_t>(size)));
       if (is_strided) SURFEIT_RETURN_IF_ERROR(output.appendValue(attribute.stride));
     }

@@ -12,7 +12,7 @@ namespace {
 constexpr float kLeastConeCosine = 0.1f;
 
 // Lengths are rounded; what is a bound must stay one.
-constexpr float kRoundingSlack = 1.00001f;
+constexpr float kRoundingFactor = 1.00001f;
 constexpr float kAngleSlack = 1e-3f;  // acos of what is nearly 1
 
 // Pixels at the edge of a cone count in part, so somewhat farther out things matter, too.
@@ -45,8 +45,8 @@ PacketView viewPacket(std::span<const LocalReceiver> receivers) {
     lift = std::max(lift, glm::dot(to_centre, receiver.normal));
     cosine = std::min(cosine, glm::dot(view.axis, receiver.normal));
   }
-  view.radius = std::sqrt(radius_sq) * kRoundingSlack;
-  view.lift = lift * kRoundingSlack;
+  view.radius = std::sqrt(radius_sq) * kRoundingFactor;
+  view.lift = lift * kRoundingFactor;
   view.has_horizon = view.has_horizon && cosine > kLeastConeCosine;
   view.cone_cosine = std::min(1.f, cosine);
   view.cone_sine = std::sqrt(std::max(0.f, 1 - cosine * cosine));

@@ -38,11 +38,11 @@
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kBatchBytes = 1 << 20;
+constexpr std::size_t kConvertedBytes = 1 << 20;
 constexpr std::size_t kMostNamesTold = 12;
 // Buffers of readers and writer, and batches.
 constexpr std::uint64_t kStreamBytes = std::uint64_t{8} << 20;
-constexpr std::uint64_t kUsualMemory = std::uint64_t{2} << 30;
+constexpr std::uint64_t kConvertMemory = std::uint64_t{2} << 30;
 
 std::string listNames(const std::vector<std::string>& names) {
   std::string text;
@@ -383,7 +383,7 @@ class Converter {
     const bool keeps_rows = copier.keepsRows() && options_.every == 1 && transform_.isIdentity() &&
                             !cropper_ && !thinner_ && assignments_.empty();
     const std::size_t batch_rows =
-        std::max<std::size_t>(1, kBatchBytes / std::max(from.row_bytes, to.row_bytes));
+        std::max<std::size_t>(1, kConvertedBytes / std::max(from.row_bytes, to.row_bytes));
     for (std::uint64_t record = 0;;) {
       if (progress_.isCancelled()) return Status::interrupted();
       SURFEIT_ASSIGN_OR_RETURN(const Bytes rows, reader.readRows(batch_rows, buffer_));
@@ -483,7 +483,7 @@ Result<ConvertStats> convertClouds(const std::vector<std::string>& inputs,
                                    const std::string& output, const ConvertOptions& given,
                                    Progress& progress) {
   ConvertOptions options = given;
-  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kUsualMemory);
+  if (options.memory_bytes == 0) options.memory_bytes = defaultMemoryBytes(kConvertMemory);
   return guarded(output, [&]() -> Result<ConvertStats> {
     SURFEIT_RETURN_IF_ERROR(checkOptions(inputs, options));
     SURFEIT_ASSIGN_OR_RETURN(RowTransform transform,

@@ -13,14 +13,14 @@
 namespace surfeit {
 namespace {
 
-constexpr double kMega = 1 << 20;
+constexpr double kMegabyte = 1 << 20;
 // Files of the distribution and of the build, over the scene (docs/farm.md, "10^11 surfels on
 // paper": 55 and 89 bytes a surfel, of 32).
 constexpr double kRangesOverScene = 2, kSlabsOverScene = 3;
 // The largest range over the mean one: ranges begin near the places that make equal parts.
 constexpr double kUnevenRanges = 1.25;
 // What each thread beyond the second takes of an index.
-constexpr double kThreadBytes = 13 * kMega;
+constexpr double kThreadBytes = 13 * kMegabyte;
 // Open and full blocks of a range while surfels are distributed.
 constexpr double kRangeBytes = 128 << 10;
 // The sample of places, with keys.
@@ -34,7 +34,7 @@ constexpr double kBytesPerSecond = 100e6;
 // Files at full precision, of a surfel: slabs of places, and the scene of places.
 constexpr double kPlaceSlabBytes = 100, kPlaceBytes = 40;
 // Caches of what neighbours are looked up in.
-constexpr double kSearchCacheBytes = 64 * kMega;
+constexpr double kSearchCacheBytes = 64 * kMegabyte;
 // Part of an index that finding sides and building anew is.
 constexpr double kSidesPart = 0.5;
 // Part of an index that the merge is, beside moving bytes: node pages, and the top of the octree.

@@ -34,9 +34,6 @@ static_assert(sizeof(Lobe) == 10);
 // sends evenly.
 using NodeLobes = std::array<Lobe, kMostFacets>;
 
-// How many flat pieces a node has: 1, its facets, or none.
-inline std::size_t pieceCount(const Node& node) { return node.isFlat() ? 1 : node.facet_count; }
-
 // What the lobes of a flat piece add up over its surfels, in double. Plain data.
 struct LobeSums {
   double power[3] = {};  // sum A o B

@@ -143,4 +143,7 @@ struct LeafRange {
 
 inline LeafRange surfelsOf(const Node& leaf) { return {leaf.page, leaf.first, leaf.surfel_count}; }
 
+// How many flat pieces a node has: 1, its facets, or none.
+inline std::size_t pieceCount(const Node& node) { return node.isFlat() ? 1 : node.facet_count; }
+
 }  // namespace surfeit

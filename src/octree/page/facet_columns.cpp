@@ -77,8 +77,6 @@ MutableAxes colorColumns(std::size_t count) {
 // Numbers of facets have this bit where hidden sides follow for the pieces of the node.
 constexpr std::uint8_t kHasHidden = 0x80;
 
-std::size_t pieceCount(const Node& node) { return node.isFlat() ? 1 : node.facet_count; }
-
 std::size_t countFacets(std::span<const Node> nodes) {
   std::size_t count = 0;
   for (const Node& node : nodes) count += node.facet_count;

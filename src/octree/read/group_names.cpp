@@ -7,6 +7,7 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
+#include "core/text_case.h"
 #include "octree/read/provenance.h"
 #include "octree/read/scene_file.h"
 #include "surfeit/scene.h"
@@ -15,8 +16,6 @@ namespace surfeit {
 namespace {
 
 constexpr std::size_t kLongestName = 200;
-
-bool isDigit(char c) { return c >= '0' && c <= '9'; }
 
 std::string listOf(const std::vector<GroupName>& names) {
   std::string text;

@@ -12,12 +12,11 @@
 #include <vector>
 
 #include "cloud/rows/surfel_names.h"
+#include "surfels/rows/sampled_rows.h"
 
 namespace surfeit {
 namespace {
 
-constexpr std::uint64_t kPlaces = 64, kRowsOfPlace = 1024;
-constexpr std::size_t kPassBytes = 256 << 10;
 constexpr std::size_t kMostProperties = 64, kMostTold = 4;
 
 // Smaller numbers are values.
@@ -184,25 +183,14 @@ std::vector<Column> columnsOf(const RowLayout& element) {
 
 // Returns how many rows were seen.
 Result<std::uint64_t> look(RowReader& reader, std::vector<Column>& columns, Origins& origins) {
-  const std::uint64_t row_count = reader.element().count;
-  const std::size_t row_bytes = reader.element().row_bytes;
-  const bool takes_places = reader.isSeekable() && row_count > kPlaces * kRowsOfPlace;
-  const std::uint64_t step = takes_places ? (row_count - kRowsOfPlace) / (kPlaces - 1) : 0;
-  // Rows may be long: hostile ones a MiB
-  const std::size_t most_rows = std::max<std::size_t>(1, kPassBytes / row_bytes);
   std::uint64_t seen = 0;
-  AlignedBuffer buffer;
-  const std::size_t at_once =
-      takes_places ? std::min(std::size_t{kRowsOfPlace}, most_rows) : most_rows;
-  for (std::uint64_t place = 0; !takes_places || place < kPlaces; ++place) {
-    if (takes_places && !reader.seekRow(place * step).ok()) break;
-    const Result<Bytes> rows = reader.readRows(at_once, buffer);
-    if (!rows.ok() || rows->empty()) break;
-    for (Column& column : columns) column.add(*rows);
-    origins.add(*rows);
-    seen += rows->size() / row_bytes;
-  }
-  SURFEIT_RETURN_IF_ERROR(reader.rewind());
+  SURFEIT_RETURN_IF_ERROR(
+      sampleRows(reader, {.places = 64, .rows_of_place = 1024}, [&](Bytes rows) {
+        for (Column& column : columns) column.add(rows);
+        origins.add(rows);
+        seen += rows.size() / reader.element().row_bytes;
+        return true;
+      }));
   return seen;
 }
 

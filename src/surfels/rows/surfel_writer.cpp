@@ -14,7 +14,7 @@
 namespace surfeit {
 namespace {
 
-constexpr std::size_t kRowBufferBytes = 256 << 10;
+constexpr std::size_t kWrittenBytes = 256 << 10;
 
 }  // namespace
 
@@ -58,7 +58,7 @@ SurfelWriter::~SurfelWriter() = default;
 
 Status SurfelWriter::write(std::span<const Surfel> surfels) {
   const std::size_t row_bytes = state_->packing.rowBytes();
-  const std::size_t most = kRowBufferBytes / row_bytes;
+  const std::size_t most = kWrittenBytes / row_bytes;
   state_->rows.resize(most * row_bytes);
   while (!surfels.empty()) {
     const std::size_t count = std::min(most, surfels.size());

@@ -8,12 +8,10 @@
 #include <type_traits>
 
 #include "cloud/rows/channels.h"
+#include "surfels/rows/sampled_rows.h"
 
 namespace surfeit {
 namespace {
-
-constexpr std::uint64_t kPlaces = 1024, kRowsOfPlace = 64;
-constexpr std::size_t kPassBytes = 256 << 10;
 
 // How many of the rows seen have an alpha below its largest value.
 struct AlphaCounts {
@@ -55,24 +53,13 @@ std::uint64_t countBelow(const RowProperty& alpha, const AlphaCounts& counts) {
 }
 
 Result<AlphaCounts> look(RowReader& reader, const RowProperty& alpha) {
-  const std::uint64_t row_count = reader.element().count;
-  const std::size_t row_bytes = reader.element().row_bytes;
-  const bool takes_places = reader.isSeekable() && row_count > kPlaces * kRowsOfPlace;
-  const std::uint64_t step = takes_places ? (row_count - kRowsOfPlace) / (kPlaces - 1) : 0;
-  // Rows may be long: hostile ones a MiB
-  const std::size_t most_rows = std::max<std::size_t>(1, kPassBytes / row_bytes);
-  const std::size_t at_once =
-      takes_places ? std::min(std::size_t{kRowsOfPlace}, most_rows) : most_rows;
   AlphaCounts counts;
-  AlignedBuffer buffer;
-  for (std::uint64_t place = 0; !takes_places || place < kPlaces; ++place) {
-    if (takes_places && !reader.seekRow(place * step).ok()) break;
-    const Result<Bytes> rows = reader.readRows(at_once, buffer);
-    if (!rows.ok() || rows->empty()) break;
-    count(*rows, row_bytes, alpha, counts);
-    if (!takes_places && countBelow(alpha, counts) > 0) break;
-  }
-  SURFEIT_RETURN_IF_ERROR(reader.rewind());
+  constexpr RowSampling kSampling = {.places = 1024, .rows_of_place = 64};
+  SURFEIT_RETURN_IF_ERROR(sampleRows(reader, kSampling, [&](Bytes rows) {
+    count(rows, reader.element().row_bytes, alpha, counts);
+    return counts.rows < kSampling.places * kSampling.rows_of_place ||
+           countBelow(alpha, counts) == 0;
+  }));
   return counts;
 }
 
