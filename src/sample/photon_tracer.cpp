@@ -222,7 +222,8 @@ class PhotonTracer {
       PhotonRandom random(options_.seed, i);
       PhotonRay ray;
       emitters_.emit(i, options_.photons, random, ray);
-      if (ray.power != glm::vec3(0)) follow(ray, random, batch);  // not from where a lamp is black
+      const float largest = std::max({ray.power.x, ray.power.y, ray.power.z});
+      if (largest > 0) follow(ray, random, batch);  // not from where a lamp is black
     }
   }
 
