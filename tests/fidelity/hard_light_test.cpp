@@ -30,11 +30,11 @@ struct LitMesh {
 };
 void PrintTo(const LitMesh& mesh, std::ostream* out) { *out << mesh.name; }
 constexpr LitMesh kMeshes[] = {
-    {"bunny", "meshes/bunny.ply", false, 1'000'000, .04, .02, .012},
-    {"igea", "meshes/igea.ply", false, 1'000'000, .04, .021, .016},
-    {"koala", "meshes/koala.ply", false, 1'000'000, .036, .02, .01},
-    {"dragon", "meshes/dragon_res2.ply", false, 1'000'000, .05, .032, .01},
-    {"sponza", "scenes/sponza/sponza.obj", true, 4'000'000, .1, .085, .02}};
+    {"bunny", "meshes/bunny.ply", false, 1'000'000, .025, .015, .006},
+    {"igea", "meshes/igea.ply", false, 1'000'000, .027, .015, .006},
+    {"koala", "meshes/koala.ply", false, 1'000'000, .034, .015, .01},
+    {"dragon", "meshes/dragon_res2.ply", false, 1'000'000, .04, .029, .008},
+    {"sponza", "scenes/sponza/sponza.obj", true, 4'000'000, .09, .085, .02}};
 
 class UnderHardLight : public Fidelity,
                        public testing::WithParamInterface<std::tuple<LitMesh, HardLight>> {

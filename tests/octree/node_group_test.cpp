@@ -189,7 +189,7 @@ TEST_F(NodeGroupTest, PagesOfVersionOneHaveNoBounds) {
 
 TEST_F(NodeGroupTest, ReplacingRadiosityByItselfChangesNoByte) {
   for (PageForm form : kForms) {
-    form.has_variances = true;
+    form.has_variances = form.has_slopes = true;
     std::vector<std::byte> payload, replaced;
     encodeNodeGroup(someNodes(50), form, payload);
     ASSERT_TRUE(decode(payload, form).ok());

@@ -205,7 +205,8 @@ constexpr PageForm kAllOfNodes = {.has_groups = true,
                                   .has_opacity = true,
                                   .has_lobes = true,
                                   .has_tints = true,
-                                  .has_variances = true};
+                                  .has_variances = true,
+                                  .has_slopes = true};
 const std::vector<const char*> kNodeFields = {
     "position", "radius",    "area",         "normal", "flatness",     "thickness",
     "cone",     "radiosity", "variance",     "flags",  "child count",  "child level",

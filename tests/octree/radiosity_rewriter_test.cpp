@@ -183,7 +183,8 @@ TEST_F(RadiosityRewriterTest, AtFullPrecisionItIsWhatIndexingGives) {
     const ReadScene expected = read(index(cloud, kAllChannels, options));
     const ReadScene found = read(rewrite(scene, "new.sft", wavesOfLight));
     EXPECT_EQ(read(scene).header.has_variances, channels.radiosity);
-    EXPECT_TRUE(found.header.has_variances);
+    EXPECT_EQ(read(scene).header.has_slopes, channels.radiosity);
+    EXPECT_TRUE(found.header.has_variances && found.header.has_slopes);
 
     ASSERT_EQ(found.surfels.size(), expected.surfels.size());
     EXPECT_EQ(std::memcmp(found.surfels.data(), expected.surfels.data(),

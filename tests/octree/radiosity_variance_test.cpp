@@ -29,12 +29,6 @@ std::vector<Surfel> floorOf(int across) {
   return surfels;
 }
 
-Node nodeOf(std::span<const Surfel> cloud) {
-  NodeSums sums;
-  for (const Surfel& surfel : cloud) sums.add(surfel);
-  return sums.toNode(kDefaultFlatnessLimit, 100);
-}
-
 TEST(RadiosityVariance, IsNoneOfWhatShinesEvenlyOrNot) {
   std::vector<Surfel> floor = floorOf(4);
   EXPECT_NEAR(nodeOf(floor).radiosity_variance, 0, 1e-6);

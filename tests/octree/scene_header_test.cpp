@@ -82,7 +82,7 @@ TEST(SceneHeader, UnknownBitsAreRefused) {
   constexpr std::size_t kFeatures = 0, kChannels = 4;
   for (int bit = 0; bit < 32; ++bit) {
     for (const auto& [at, known, told] :
-         {std::tuple{kFeatures, 8, "feature bits"}, std::tuple{kChannels, 9, "channel bits"}}) {
+         {std::tuple{kFeatures, 9, "feature bits"}, std::tuple{kChannels, 9, "channel bits"}}) {
       std::vector<std::byte> fields = right;
       fields[at + std::size_t(bit / 8)] |= std::byte(1 << bit % 8);
       const Result<SceneHeader> decoded = decodeSceneHeader(fields, kNodePages, kSurfelPages);

@@ -15,6 +15,8 @@
 #include <vector>
 
 #include "io/test_directory.h"
+#include "octree/build/scene_writer.h"
+#include "octree/node/node_sums.h"
 #include "octree/read/paged_octree.h"
 #include "surfeit/index.h"
 #include "surfeit/scene.h"
@@ -75,6 +77,13 @@ inline Surfel surfelAt(const glm::vec3& position, const glm::vec3& normal, float
   surfel.radiosity = random.point();
   surfel.albedo = random.point();
   return surfel;
+}
+
+// What stands for all of them; its radius is of no account.
+inline Node nodeOf(std::span<const Surfel> cloud) {
+  NodeSums sums;
+  for (const Surfel& surfel : cloud) sums.add(surfel);
+  return sums.toNode(kDefaultFlatnessLimit, 100);
 }
 
 // `count` surfels anywhere in the unit cube, of every kind.

@@ -265,6 +265,7 @@ TEST_F(VerifySumsTest, FacetsThatAreNotThoseBelowAreFound) {
                with("covariance of facets", [](Node& n) { n.facets[4].covariance[4] ^= 0x80; }),
                with("covariance of facets", [](Node& n) { n.facets[4].covariance[5] ^= 0x80; }),
                with("variance of the radiosity", [](Node& n) { n.radiosity_variance = 50; }),
+               with("slope of the radiosity in red", [](Node& n) { n.slopes[2].codes[1] ^= 0x40; }),
                with("opacity of facets", [](Node& n) { n.facets[4].transparency = 0; }),
                with("facet radiosity in red", [](Node& n) { n.facets[0].radiosity.x *= 1.05f; }),
                with("facet radiosity in red", [](Node& n) { n.facets[5].radiosity.x *= .9f; }),
@@ -364,6 +365,22 @@ TEST_F(VerifySumsTest, PlaceNormalAndSpreadThatAreNotThoseBelowAreFound) {
   std::vector<Surfel> cloud = sphereCloud(700);
   for (Surfel& surfel : cloud) surfel.area *= surfel.position.x > 0 ? 3 : 1;  // one side has more
   expectFound(cloud, edits);
+}
+
+TEST_F(VerifySumsTest, SlopesThatAreNotThoseBelowAreFound) {
+  const NodeEdit blue = {"slope of the radiosity in blue",
+                         [](Node& n) { n.slopes[0].codes[8] ^= 0x40; }};
+  expectFound(planeCloud(20, .1f), {blue});
+  std::vector<Surfel> cap = sphereCloud(6000);
+  std::erase_if(cap, [](const Surfel& surfel) { return surfel.normal.z < .95f; });
+  ASSERT_GT(cap.size(), 50u);
+  for (Surfel& surfel : cap) surfel.radiosity = glm::vec3(1, 1, 2) * (1 + surfel.normal.x);
+  expectFound(cap, {blue,
+                    {"slope of the radiosity in red", [](Node& n) { n.slopes = {}; }},
+                    {"slope of the radiosity in red",
+                     [](Node& n) { n.slopes[0] = n.slopes[0].turned(); }}});
+  expectFound(twoSided(cap),
+              {blue, {"slope of the radiosity in red", [](Node& n) { n.slopes = {}; }}});
 }
 
 TEST_F(VerifySumsTest, FlatNodesThatAreNotFlatBelowAreFound) {

@@ -39,7 +39,7 @@ std::uint32_t PacketRaster::addFacetHull(const Node& node, const Facet& facet,
   if (lanes == 0) return 0;
   LaneParts seen;
   for (std::size_t i = 0; i < seen.size(); ++i) seen[i] = float(lanes >> i & 1) * partOf(parts, i);
-  addFacet(node, facet, true, keepParts(lanes == kAllLanes ? parts : &seen), nullptr);
+  addFacet(node, facet, true, keepParts(lanes == kAllLanes ? parts : &seen), nullptr, {});
   return lanes;
 }
 

@@ -18,6 +18,7 @@ PacketKernel Kernel() {
           .findSeenPixels = FindSeenPixels,
           .facesThatSee = FacesThatSee,
           .seeLobe = SeeLobe,
+          .seeSlope = SeeSlope,
           .seeRoughNode = SeeRoughNode,
           .draw = Draw,
           .integrate = Integrate,

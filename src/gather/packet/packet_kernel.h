@@ -181,6 +181,10 @@ struct PacketKernel {
   // What the receivers see of a patch with this lobe.
   void (*seeLobe)(const PacketLanes& lanes, std::size_t receiver_count, const Patch& patch,
                   const LobeLight& lobe, PacketLights& lights);
+  // How much brighter they see a facet with these slopes of colors, in world axes, and this range
+  // of normals, than its mean: times what `lights` holds.
+  void (*seeSlope)(const PacketLanes& lanes, std::size_t receiver_count, const Patch& patch,
+                   const std::array<glm::vec3, 3>& slopes, float range, PacketLights& lights);
   // What the receivers see of a rough node in unit direction `direction` from them.
   void (*seeRoughNode)(const Node& node, const glm::vec3& direction, RoughSight& sight);
   // Draws patches in this order, all of one face after those of another.

@@ -1,4 +1,5 @@
-// Lobes of patches as the receivers of a packet see them; for one instruction set (see
+// How brightly the receivers of a packet see patches that do not shine evenly, with lobes or
+// slopes; for one instruction set (see
 // packet_kernel-inl.h).
 #if defined(SURFEIT_PACKET_LOBE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SURFEIT_PACKET_LOBE_INL_H_
@@ -46,6 +47,37 @@ void SeeLobe(const PacketLanes& lanes, std::size_t receiver_count, const Patch& 
       const V part = hn::MulAdd(Splat(lobe.shares[c]), hn::Sub(gain, one), one);
       hn::Store(hn::Mul(Splat(patch.radiosity[c]), part), d,
                 lights.colors[std::size_t(c)].data() + lane);
+    }
+  }
+}
+
+// docs/algorithm.md, "Contributions": x = n.v is spread evenly over [m - r, m + r], and brightness
+// is 1 + slope.v (x - m) / r. Returned is the mean of (x - m) / r, over what is seen.
+HWY_INLINE V SeenSlope(V m_over_r, bool is_two_sided) {
+  const V one = Splat(1), third = Splat(1.f / 3);
+  const V x = is_two_sided ? hn::Abs(m_over_r) : hn::Max(Splat(-1), m_over_r);
+  const V square = hn::Mul(x, x);
+  const V of_both = hn::Sub(
+      hn::Div(hn::Mul(hn::Mul(Splat(2.f / 3), x), hn::Add(square, Splat(3))), hn::Add(square, one)),
+      x);
+  const V partly = is_two_sided ? of_both : hn::Mul(third, hn::Sub(Splat(2), x));
+  return hn::IfThenElse(hn::Ge(x, one), hn::Div(third, hn::Max(x, one)), partly);
+}
+
+void SeeSlope(const PacketLanes& lanes, std::size_t receiver_count, const Patch& patch,
+              const std::array<glm::vec3, 3>& slopes, float range, PacketLights& lights) {
+  const D d;
+  const bool is_two_sided = patch.seen == Patch::Seen::kBoth;
+  for (std::size_t lane = 0; lane < receiver_count; lane += kStep) {
+    const V3 offset = Receivers(lanes, lane).To(patch.position);
+    const V inverse = InverseSqrt(hn::Max(Dot(offset, offset), Splat(1e-30f)));
+    const V m = hn::Mul(hn::Neg(Dot(offset, patch.normal)), inverse);
+    V seen = hn::Mul(SeenSlope(hn::Mul(m, Splat(1 / range)), is_two_sided), inverse);
+    if (is_two_sided) seen = hn::IfThenElse(hn::Lt(m, hn::Zero(d)), hn::Neg(seen), seen);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const V gain = hn::NegMulAdd(Dot(offset, slopes[c]), seen, Splat(1));
+      float* const at = lights.colors[c].data() + lane;
+      hn::Store(hn::Mul(hn::Max(hn::Zero(d), gain), hn::Load(d, at)), d, at);
     }
   }
 }

@@ -157,7 +157,7 @@ void PacketRaster::addNode(const Node& node, const LaneParts* lane_parts, const 
       const auto seen_of = [&](const glm::vec3& eye) { return seenOfPiece(node, i, eye); };
       if (!keepSeenParts(seen_of, lane_parts, seen)) return;
     }
-    addFacet(node, facet, false, seen, lobeOf(i));
+    addFacet(node, facet, false, seen, lobeOf(i), node.slopes[i]);
   };
   if (node.isFlat()) return add(0, facetOf(node));
   for (std::size_t i = 0; i < node.facet_count; ++i) {
@@ -209,8 +209,24 @@ void PacketRaster::addLobe(const Lobe& lobe, const glm::vec3& normal) {
   kernel_.seeLobe(lanes_, receiver_count_, patch, light, lights_.emplace_back());
 }
 
+// Of the last patch, as addLobe. `range`: of its normals.
+void PacketRaster::addSlope(const RadiositySlope& slope, float range) {
+  if (slope.isNone() || !(range > 0)) return;
+  Patch& patch = patches_.back();
+  if (patch.lights == 0) {
+    patch.lights = static_cast<std::uint32_t>(lights_.size());
+    PacketLights& lights = lights_.emplace_back();
+    for (int c = 0; c < 3; ++c) lights.colors[std::size_t(c)].fill(patch.radiosity[c]);
+  }
+  std::array<glm::vec3, 3> slopes;
+  for (std::size_t c = 0; c < 3; ++c) {
+    slopes[c] = frame_ ? frame_->directionToWorld(slope.value(c)) : slope.value(c);
+  }
+  kernel_.seeSlope(lanes_, receiver_count_, patch, slopes, range, lights_[patch.lights]);
+}
+
 void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
-                            const Lobe* lobe) {
+                            const Lobe* lobe, const RadiositySlope& slope) {
   const GatherSides sides = rules_.quality.sides;
   const glm::vec3 to_facet = facet.position - local_centre_;
   const float distance = glm::length(to_facet);
@@ -251,6 +267,7 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
   patch.parts = parts;
   bringToWorld(patch);
   if (lobe != nullptr) addLobe(*lobe, facet.normal);
+  if (sides != GatherSides::kBack && rules_.hasLight()) addSlope(slope, range);
   orderLastPatch(canvas());
 }
 

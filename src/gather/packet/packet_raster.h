@@ -37,7 +37,7 @@ class PacketRaster {
  public:
   static constexpr std::size_t kReservedPatches = 4096;
   static constexpr std::size_t kReservedParts = 1024;    // of what fades
-  static constexpr std::size_t kReservedLights = 256;    // of what is glossy
+  static constexpr std::size_t kReservedLights = 1024;   // of what is glossy, or curved
   static constexpr std::size_t kReservedEntries = 8192;  // of the order
 
   // `rules` must be valid, as gatherCloud checks them: even resolution within its limits, the rest
@@ -103,13 +103,14 @@ class PacketRaster {
   bool keepSeenParts(const SeenOf& seenOf, const LaneParts* parts, std::uint32_t& place);
   // Adds a facet of the node, or all of a flat one, or the hull of that alone.
   void addFacet(const Node& node, const Facet& facet, bool is_hull, std::uint32_t parts,
-                const Lobe* lobe);
+                const Lobe* lobe, const RadiositySlope& slope);
   bool mayLeaveHull(const Node& node) const;
   std::uint32_t lanesBeyond(const glm::vec3& position, float distance) const;
   // Adds a hull for those of these lanes that see it, and says which need no other.
   std::uint32_t addFacetHull(const Node& node, const Facet& facet, const LaneParts* parts,
                              std::uint32_t lanes);
   void addLobe(const Lobe& lobe, const glm::vec3& normal);
+  void addSlope(const RadiositySlope& slope, float range);
   void addRoughNode(const Node& node, const LaneParts* lane_parts, std::uint32_t parts);
   void addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts);
   glm::vec3 toWorld(const glm::vec3& place) const {

@@ -59,10 +59,6 @@ FacingAreas facingAreas(float total, float mean, float second, float fourth) {
   return {0.5f * total * (both + m), 0.5f * total * (both - m)};
 }
 
-float normalRange(const glm::vec3& normal) {
-  return std::sqrt(std::max(0.f, 1.5f * (1 - glm::dot(normal, normal))));
-}
-
 Facet facetOf(const Node& node) {
   return {.position = node.position,
           .radius = std::sqrt(3 * node.covariance.trace()),

@@ -30,9 +30,6 @@ float shownArea(const Node& node, const FacingAreas& facing, GatherSides sides);
 // w P4(x) to sum w max(x, 0) and sum w max(-x, 0). Exact when all |x| but those of 0 are alike, and
 // for evenly spread normals.
 FacingAreas facingAreas(float total, float mean, float second, float fourth);
-// The normals of something that is nearly flat spread by this much to either side of their mean, as
-// cosines. `normal`: that mean, shorter where they spread more.
-float normalRange(const glm::vec3& normal);
 
 // A flat node is one facet.
 Facet facetOf(const Node& node);

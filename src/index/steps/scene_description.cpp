@@ -30,7 +30,7 @@ SceneHeader SceneDescription::header(bool full_precision) const {
       header.channels.long_side || totals.missing_both + totals.missing_radius > 0;
   header.format_version = formatVersionFor(header.channels);
   header.full_precision = full_precision;
-  header.has_variances = header.channels.radiosity;
+  header.has_variances = header.has_slopes = header.channels.radiosity;
   return header;
 }
 

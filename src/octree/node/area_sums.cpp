@@ -52,6 +52,9 @@ AreaSums::AreaSums(const Surfel& surfel, const double (&origin)[3]) {
     // Both sides of a two-sided disk face everywhere: it gives a node no direction
     if (!surfel.isTwoSided()) normal[axis] = a * n[axis];
   }
+  for (int color = 0; color < 3 && !surfel.isTwoSided(); ++color) {
+    for (int axis = 0; axis < 3; ++axis) power_normal[color][axis] = radiosity[color] * n[axis];
+  }
   for (std::size_t i = 0; i < SymmetricMatrix::kEntries; ++i) {
     const int row = SymmetricMatrix::kRow[i], column = SymmetricMatrix::kColumn[i];
     second_moment[i] = a * (x[row] * x[column] + spread[i]);
@@ -76,6 +79,9 @@ void AreaSums::add(const AreaSums& other) {
   for (int axis = 0; axis < 3; ++axis) {
     position[axis] += other.position[axis];
     normal[axis] += other.normal[axis];
+    for (int color = 0; color < 3; ++color) {
+      power_normal[color][axis] += other.power_normal[color][axis];
+    }
     covered[axis] += other.covered[axis];
     radiosity[axis] += other.radiosity[axis];
   }

@@ -19,6 +19,7 @@ struct AreaSums {
   double covered[3] = {};                                // sum A o, by color
   double radiosity[3] = {};                              // sum A o B
   double radiosity_sq = 0;                               // sum A o B.B
+  double power_normal[3][3] = {};  // sum A o B n over one-sided disks, by color
 
   AreaSums() = default;
   // One surfel.

@@ -64,7 +64,12 @@ FacetGroup::FacetGroup(const AreaSums& sums, const Surfel& surfel)
       is_two_sided(surfel.isTwoSided()),
       is_translucent(surfel.isTranslucent()),
       hidden(hiddenSidesOf(surfel)) {
-  for (int axis = 0; axis < 3; ++axis) normal[axis] = sums.area * double(surfel.normal[axis]);
+  for (int axis = 0; axis < 3; ++axis) {
+    normal[axis] = area * double(surfel.normal[axis]);
+    for (int color = 0; color < 3; ++color) {
+      power_normal[color][axis] = radiosity[color] * double(surfel.normal[axis]);
+    }
+  }
 }
 
 void FacetGroup::add(const FacetGroup& other) {
@@ -72,7 +77,10 @@ void FacetGroup::add(const FacetGroup& other) {
   hidden &= is_turned ? turnedSides(other.hidden) : other.hidden;
   AreaSums sums = other;
   if (is_turned) {
-    for (double& n : sums.normal) n = -n;
+    for (int axis = 0; axis < 3; ++axis) {
+      sums.normal[axis] = -sums.normal[axis];
+      for (auto& by_color : sums.power_normal) by_color[axis] = -by_color[axis];
+    }
   }
   AreaSums::add(sums);
 }

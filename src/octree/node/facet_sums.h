@@ -20,7 +20,8 @@ inline constexpr double kAlikeOpacitySq = 1 - kAlikeCosineSq;
 
 // Surfels that face about one way; two-sided ones of a plane may face the other way as well.
 struct FacetGroup : AreaSums {
-  bool is_two_sided = false;  // `normal` is the sum of those turned to one side, within a plane
+  // `normal` and `power_normal` are sums of those turned to one side, within a plane.
+  bool is_two_sided = false;
   bool is_translucent = false;
   std::uint8_t hidden = 0;  // HiddenSides of all of them, by that normal
 

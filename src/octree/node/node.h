@@ -9,6 +9,7 @@
 #include "core/spherical_harmonics.h"
 #include "core/symmetric_matrix.h"
 #include "octree/node/node_facet.h"
+#include "octree/node/radiosity_slope.h"
 #include "surfeit/surfel.h"
 
 namespace surfeit {
@@ -85,7 +86,8 @@ struct Node {
   // How far surfels lie off the planes that a flat node or one of facets is drawn on, at most or by
   // their moments; 0 in a rough node. Not stored.
   float off_plane;
-  float radiosity_variance;  // RadiosityVariance; 0 where nothing is known
+  float radiosity_variance;                        // RadiosityVariance; 0 where nothing is known
+  std::array<RadiositySlope, kMostFacets> slopes;  // of its pieces, none of others
   union {
     RoughNode rough;  // without facets; zero in a flat node
     std::array<NodeFacet, kMostFacets> facets;
@@ -121,7 +123,7 @@ struct Node {
     return facet;
   }
 };
-static_assert(sizeof(Node) == 336);
+static_assert(sizeof(Node) == 392);
 
 // Siblings: `count` nodes side by side in one node page.
 struct NodeRange {

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include "core/symmetric_matrix.h"
@@ -32,6 +34,12 @@ struct Facet {
 
   bool isTranslucent() const { return opacity != glm::vec3(1); }
 };
+
+// The normals of something that is nearly flat spread by this much to either side of their mean, as
+// cosines. `normal`: that mean, shorter where they spread more.
+inline float normalRange(const glm::vec3& normal) {
+  return std::sqrt(std::max(0.f, 1.5f * (1 - glm::dot(normal, normal))));
+}
 
 // How differently surfels of two opacities hide, from 0 to 1: the square of the greatest difference
 // of a color.

@@ -130,6 +130,12 @@ RoughNode NodeSums::toRough() const {
   return rough;
 }
 
+AreaSums NodeSums::flatPiece(bool is_two_sided, float flatness_limit) const {
+  if (!is_two_sided) return *this;
+  const FacetSums fewest = facets.fewest(flatness_limit);
+  return fewest.groups().empty() ? AreaSums(*this) : AreaSums(fewest.groups().front());
+}
+
 Node NodeSums::toNode(float flatness_limit, float radius) const {
   Node node{};
   node.radius = radius;
@@ -151,6 +157,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   if (is_flat && !facets.hideDifferently()) {
     node.flags |= kNodeFlat;
     node.hidden = facets.hiddenSides();
+    node.slopes[0] = RadiositySlope::of(*this);
     return node;
   }
   const FacetSums fewest = facets.fewest(flatness_limit);
@@ -162,6 +169,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
     setNormal(fewest.groups().front(), node);
     node.flags |= kNodeFlat | kNodeTwoSided;
     node.hidden = fewest.groups().front().hidden;
+    node.slopes[0] = RadiositySlope::of(fewest.groups().front());
     return node;
   }
   node.facets = {};
@@ -169,6 +177,7 @@ Node NodeSums::toNode(float flatness_limit, float radius) const {
   for (const FacetGroup& group : fewest.groups()) {
     variance.add(group);
     if (group.is_two_sided) node.flags |= std::uint8_t(kNodeTwoSided << node.facet_count);
+    node.slopes[node.facet_count] = RadiositySlope::of(group);
     NodeFacet& facet = node.facets[node.facet_count++];
     facet = NodeFacet::encode(toFacet(group), node.position, node.radius, node.area);
     facet.hidden = group.hidden;

@@ -36,6 +36,8 @@ struct NodeSums : AreaSums {
   // that holds all disks. `flatness_limit` decides what is flat, and what is made of facets that
   // are.
   Node toNode(float flatness_limit, float radius) const;
+  // What a flat node is a piece of; normals of two-sided surfels are turned to one side there.
+  AreaSums flatPiece(bool is_two_sided, float flatness_limit) const;
 
  private:
   Facet toFacet(const AreaSums& group) const;

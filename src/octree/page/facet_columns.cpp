@@ -74,6 +74,13 @@ MutableAxes colorColumns(std::size_t count) {
   return {all.first(count), all.subspan(count, count), all.subspan(2 * count)};
 }
 
+// Of all pieces, code by code.
+std::vector<std::uint8_t>& slopeBytes(std::size_t pieces) {
+  std::vector<std::uint8_t>& bytes = threadScratch<std::vector<std::uint8_t>>([] {});
+  bytes.resize(RadiositySlope::kCodes * pieces);
+  return bytes;
+}
+
 // Numbers of facets have this bit where hidden sides follow for the pieces of the node.
 constexpr std::uint8_t kHasHidden = 0x80;
 
@@ -102,14 +109,31 @@ bool getHidden(PayloadReader& reader, std::span<const std::uint8_t> counts,
   return true;
 }
 
+bool getSlopes(PayloadReader& reader, std::span<Node> nodes) {
+  std::size_t pieces = 0, next = 0;
+  for (const Node& node : nodes) pieces += pieceCount(node);
+  std::vector<std::uint8_t>& bytes = slopeBytes(pieces);
+  if (!getBytes8(reader, bytes)) return false;
+  for (Node& node : nodes) {
+    for (std::size_t k = 0; k < pieceCount(node); ++k, ++next) {
+      for (std::size_t i = 0; i < RadiositySlope::kCodes; ++i) {
+        node.slopes[k].codes[i] = static_cast<std::int8_t>(bytes[i * pieces + next]);
+      }
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 FacetColumns::FacetColumns()
     : counts_(threadScratch<std::vector<std::uint8_t>>([] {})),
       facets_(threadScratch<std::vector<NodeFacet>>([] {})),
+      slopes_(threadScratch<std::vector<RadiositySlope>>([] {})),
       hidden_(threadScratch<std::vector<std::uint8_t>>([] {})) {
   counts_.clear();
   facets_.clear();
+  slopes_.clear();
   hidden_.clear();
 }
 
@@ -121,6 +145,7 @@ void FacetColumns::add(const Node& node) {
     hidden_.push_back(node.hiddenSides(k));
   }
   facets_.insert(facets_.end(), node.facets.begin(), node.facets.begin() + node.facet_count);
+  slopes_.insert(slopes_.end(), node.slopes.begin(), node.slopes.begin() + pieceCount(node));
 }
 
 void FacetColumns::put(PayloadWriter& writer, const PageForm& form) const {
@@ -132,12 +157,20 @@ void FacetColumns::put(PayloadWriter& writer, const PageForm& form) const {
   if (!hidden_.empty()) putBytes8(writer, hidden_);
 }
 
-void FacetColumns::putRadiosity(PayloadWriter& writer, bool full_precision) const {
+void FacetColumns::putLight(PayloadWriter& writer, const PageForm& form) const {
   const MutableAxes columns = colorColumns(facets_.size());
   for (std::size_t i = 0; i < facets_.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) columns[c][i] = facets_[i].radiosity[static_cast<int>(c)];
   }
-  putColors(writer, constAxes(columns), full_precision);
+  putColors(writer, constAxes(columns), form.full_precision);
+  if (!form.has_slopes) return;
+  std::vector<std::uint8_t>& bytes = slopeBytes(slopes_.size());
+  for (std::size_t i = 0; i < slopes_.size(); ++i) {
+    for (std::size_t k = 0; k < RadiositySlope::kCodes; ++k) {
+      bytes[k * slopes_.size() + i] = static_cast<std::uint8_t>(slopes_[i].codes[k]);
+    }
+  }
+  putBytes8(writer, bytes);
 }
 
 bool FacetColumns::pass(PayloadReader& reader, const PageForm& form) const {
@@ -171,16 +204,16 @@ bool FacetColumns::get(PayloadReader& reader, std::span<Node> nodes, const PageF
   return hidden_count == 0 || getHidden(reader, counts, hidden_count, nodes);
 }
 
-bool FacetColumns::getRadiosity(PayloadReader& reader, std::span<Node> nodes) {
+bool FacetColumns::getLight(PayloadReader& reader, std::span<Node> nodes, const PageForm& form) {
   const MutableAxes columns = colorColumns(countFacets(nodes));
-  if (!surfeit::getRadiosity(reader, columns)) return false;
+  if (!getRadiosity(reader, columns)) return false;
   std::size_t next = 0;
   for (Node& node : nodes) {
     for (std::size_t k = 0; k < node.facet_count; ++k, ++next) {
       node.facets[k].radiosity = {columns[0][next], columns[1][next], columns[2][next]};
     }
   }
-  return true;
+  return !form.has_slopes || getSlopes(reader, nodes);
 }
 
 }  // namespace surfeit

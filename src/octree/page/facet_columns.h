@@ -18,20 +18,21 @@ class FacetColumns {
   FacetColumns();
   void add(const Node& node);
 
-  // Numbers of facets and all of them but radiosities, and these.
+  // Numbers of facets and all of them but light, and this.
   void put(PayloadWriter& writer, const PageForm& form) const;
-  void putRadiosity(PayloadWriter& writer, bool full_precision) const;
+  void putLight(PayloadWriter& writer, const PageForm& form) const;
   // Takes what put() gives for as many nodes and facets; false when it ends early.
   bool pass(PayloadReader& reader, const PageForm& form) const;
 
   // Gives nodes their facets: flags and child counts are there. False when the columns end early,
-  // or cannot be those of such nodes. First get(), then getRadiosity().
+  // or cannot be those of such nodes. First get(), then getLight().
   static bool get(PayloadReader& reader, std::span<Node> nodes, const PageForm& form);
-  static bool getRadiosity(PayloadReader& reader, std::span<Node> nodes);
+  static bool getLight(PayloadReader& reader, std::span<Node> nodes, const PageForm& form);
 
  private:
   std::vector<std::uint8_t>& counts_;
   std::vector<NodeFacet>& facets_;
+  std::vector<RadiositySlope>& slopes_;  // of all pieces, flat nodes as well
   std::vector<std::uint8_t>& hidden_;  // of the pieces of nodes of which some is
 };
 

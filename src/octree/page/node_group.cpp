@@ -156,6 +156,7 @@ class Columns {
       node.flags = flags[i];
       node.facet_count = 0;
       node.hidden = 0;
+      node.slopes = {};
       node.rough = {};
       node.surfel_count = surfel_count[i];
       node.groups = form.has_groups ? groups[i] : groupBit(0);
@@ -277,12 +278,13 @@ Status decodeMoments(PayloadReader& reader, bool full_precision, std::span<Node>
 }
 
 // Harmonics of rough nodes, and the radiosities of facets amid them.
-Status decodeCoefficients(PayloadReader& reader, bool full_precision, std::span<Node> nodes) {
+Status decodeCoefficients(PayloadReader& reader, const PageForm& form, std::span<Node> nodes) {
+  const bool full_precision = form.full_precision;
   const std::size_t rough = countRough(nodes);
   const auto floats = coefficientColumns<float>(rough);
   const auto codes = coefficientColumns<std::int16_t>(rough);
   for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
-    if (kind == kAreaKind + 1 && !FacetColumns::getRadiosity(reader, nodes)) {
+    if (kind == kAreaKind + 1 && !FacetColumns::getLight(reader, nodes, form)) {
       return damaged("facet radiosity");
     }
     if (!(full_precision ? getFloats(reader, floats[kind])
@@ -396,7 +398,7 @@ std::size_t encodeNodeGroup(std::span<const LevelNode> nodes, const PageForm& fo
   for (const LevelNode& node : nodes) moments.add(node.node);
   moments.put(writer);
   for (std::size_t kind = 0; kind < kCoefficientKinds; ++kind) {
-    if (kind == kAreaKind + 1) facets.putRadiosity(writer, full_precision);
+    if (kind == kAreaKind + 1) facets.putLight(writer, form);
     encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
   }
   if (form.has_lobes) {
@@ -432,7 +434,7 @@ Result<std::uint32_t> decodeNodeGroup(Bytes payload, const PageForm& form, std::
   if (!FacetColumns::get(reader, out, form)) return damaged("facets");
   SURFEIT_RETURN_IF_ERROR(checkFlags(out));
   SURFEIT_RETURN_IF_ERROR(decodeMoments(reader, full_precision, out));
-  SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, full_precision, out));
+  SURFEIT_RETURN_IF_ERROR(decodeCoefficients(reader, form, out));
   for (Node& node : out) node.findOffPlane();
   if (form.has_lobes && !getNodeLobes(reader, out, lobes)) return damaged("lobes");
   if (reader.remaining() != 0) {
@@ -483,7 +485,7 @@ Result<std::size_t> replaceNodeRadiosity(Bytes payload, const PageForm& form,
                      : getSmallIntegers(reader, rough.codes);
   if (!has_area) return damaged("coefficients");
   copyTaken(references, reader, writer);
-  facets.putRadiosity(writer, full_precision);
+  facets.putLight(writer, form.relit());
   for (std::size_t kind = kAreaKind + 1; kind < kCoefficientKinds; ++kind) {
     encodeKind(rough.nodes, kind, full_precision, rough.codes, writer);
   }

@@ -15,6 +15,14 @@ struct PageForm {
   bool has_lobes = false;      // since format version 4
   bool has_tints = false;      // of what has an opacity
   bool has_variances = false;  // of the radiosities of nodes
+  bool has_slopes = false;     // of the radiosities of their pieces
+
+  // Of these pages with other radiosities, whatever they had.
+  PageForm relit() const {
+    PageForm form = *this;
+    form.has_variances = form.has_slopes = true;
+    return form;
+  }
 };
 
 }  // namespace surfeit

@@ -36,7 +36,8 @@ enum FeatureBits : std::uint32_t {
   kHasSharers = 32,
   kHasTiles = 64,
   kHasVariances = 128,
-  kAllFeatures = 255
+  kHasSlopes = 256,
+  kAllFeatures = 511
 };
 
 // Largest groups that a reader accepts: they bound what a page can make it allocate.
@@ -146,7 +147,7 @@ std::vector<std::byte> encodeSceneHeader(const SceneHeader& header) {
              (header.has_layers ? kHasLayers : 0u) | (header.has_loose ? kHasLoose : 0u) |
              (header.has_rectangles ? kHasRectangles : 0u) |
              (header.has_sharers ? kHasSharers : 0u) | (header.has_tiles ? kHasTiles : 0u) |
-             (header.has_variances ? kHasVariances : 0u));
+             (header.has_variances ? kHasVariances : 0u) | (header.has_slopes ? kHasSlopes : 0u));
   writer.put(channelBits(header.channels));
   writer.put(header.surfel_count);
   writer.put(header.node_count);
@@ -182,6 +183,7 @@ Result<SceneHeader> decodeSceneHeader(Bytes fields, std::uint32_t node_page_coun
   header.has_sharers = (features & kHasSharers) != 0;
   header.has_tiles = (features & kHasTiles) != 0;
   header.has_variances = (features & kHasVariances) != 0;
+  header.has_slopes = (features & kHasSlopes) != 0;
   const std::uint32_t channels = reader.get<std::uint32_t>();
   if ((channels & ~kAllChannels) != 0) {
     return wrongField("channel bits", fmt::format("{:#x}", channels), "known channels");

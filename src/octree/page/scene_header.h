@@ -51,13 +51,15 @@ struct SceneHeader {
   bool has_tiles = false;    // of some disks neighbours tell how much they hide (the same)
   // Nodes have radiosity_variance: those of programs that know of it, where there are radiosities.
   bool has_variances = false;
+  bool has_slopes = false;  // the same of slopes
   // First node page of each level 0..21, and the number of node pages at index 22.
   std::uint32_t level_first_page[kCurveLevels + 2] = {};
 
   PageForm pageForm() const {
     return {full_precision,     channels.albedo,     channels.group,
             channels.long_side, format_version >= 2, channels.opacity,
-            has_lobes,          channels.tint,       has_variances};
+            has_lobes,          channels.tint,       has_variances,
+            has_slopes};
   }
 };
 

@@ -115,7 +115,8 @@ class BoundsWalk {
         has_bounds_(octree.file().header().pageForm().has_bounds),
         has_rectangles_(octree.file().header().has_rectangles),
         tolerance_{octree.file().header().full_precision, octree.file().header().has_variances,
-                   octree.file().header().flatness_limit, brightest},
+                   octree.file().header().has_slopes, octree.file().header().flatness_limit,
+                   brightest},
         progress_(progress),
         report_(report) {}
 

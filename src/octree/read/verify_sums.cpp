@@ -81,6 +81,10 @@ class NodeCheck {
     node_.isFlat() && node_.isTwoSided() ? checkTwoSided() : checkNormal();
     checkCovariance();
     if (tolerance_.has_variances) checkVariance();
+    if (tolerance_.has_slopes && node_.isFlat()) {
+      checkSlope(node_.slopes[0], sums_.flatPiece(node_.isTwoSided(), tolerance_.flatness_limit),
+                 node_.normal);
+    }
     if (node_.isRough()) checkRough();
     if (node_.hasFacets()) checkFacets();
     return wrong_;
@@ -107,6 +111,7 @@ class NodeCheck {
   void checkTwoSided();
   void checkCovariance();
   void checkVariance();
+  void checkSlope(const RadiositySlope& slope, const AreaSums& piece, const glm::vec3& normal);
   void checkRough();
   void checkPower();
   void checkFacets();
@@ -206,6 +211,29 @@ void NodeCheck::checkVariance() {
   const double slack = (.05 + lost) * std::min(most, 62761.);
   if (node_.hasFacets() && found <= most + slack) return;
   expect("variance of the radiosity", "", found - 1, std::min(most, 62761.) - 1, slack);
+}
+
+// Of a piece as it is turned. Normals as they are stored move what they and the brightness have in
+// common, and decide whether they differ at all.
+void NodeCheck::checkSlope(const RadiositySlope& slope, const AreaSums& piece,
+                           const glm::vec3& normal) {
+  const double length = piece.normalLength() / piece.area;
+  const double range_sq = 1.5 * (1 - length * length);
+  constexpr double kLeast = RadiositySlope::kLeastRangeSq;
+  if (range_sq > .8 * kLeast && range_sq < 1.2 * kLeast) return;
+  const double range = std::sqrt(std::max(range_sq, kLeast));
+  RadiositySlope expected = RadiositySlope::of(piece);
+  const glm::dvec3 own(piece.normal[0], piece.normal[1], piece.normal[2]);
+  if (glm::dot(own, glm::dvec3(normal)) < 0) expected = expected.turned();
+  for (std::size_t color = 0; color < 3; ++color) {
+    const double mean = piece.radiosity[color] / piece.area;
+    if (!(mean > 0)) continue;
+    const double lost = 3e-6 * double(tolerance_.brightest) / mean;
+    for (int axis = 0; axis < 3; ++axis) {
+      expect("slope of the radiosity in", kColorNames[color], double(slope.value(color)[axis]),
+             double(expected.value(color)[axis]), 0.02 + 3 / range * (1e-3 + lost));
+    }
+  }
 }
 
 void NodeCheck::checkRough() {
@@ -392,7 +420,11 @@ void NodeCheck::checkFacetLight() {
   const FacetSums groups = sums_.facets.fewest(tolerance_.flatness_limit);
   const std::optional<FacetMatch> match = matchFacets(groups, sums_.origin, node_);
   for (std::size_t i = 0; i < node_.facet_count; ++i) {
-    const NodeFacet& facet = node_.facets[match ? (*match)[i] : i];
+    const std::size_t at = match ? (*match)[i] : i;
+    const NodeFacet& facet = node_.facets[at];
+    if (match && tolerance_.has_slopes) {
+      checkSlope(node_.slopes[at], groups.groups()[i], facet.meanNormal());
+    }
     for (int color = 0; color < 3; ++color) {
       const double found = double(facet.radiosity[color]);
       if (match) {

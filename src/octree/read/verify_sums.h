@@ -25,7 +25,7 @@ struct SumsBelow {
 // What tells how much a file may differ from the sums.
 struct SumsTolerance {
   bool full_precision = false;
-  bool has_variances = false;
+  bool has_variances = false, has_slopes = false;
   float flatness_limit = 0;
   float brightest = 0;  // radiosity of a surfel or a node of the file
 };

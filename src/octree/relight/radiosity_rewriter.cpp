@@ -204,7 +204,7 @@ std::uint32_t rewrittenVersion(const SceneFile& scene, bool has_lobes) {
 
 std::vector<std::byte> rewrittenSceneFields(const SceneFile& scene, bool has_lobes) {
   SceneHeader header = scene.header();
-  header.channels.radiosity = header.has_variances = true;
+  header.channels.radiosity = header.has_variances = header.has_slopes = true;
   header.has_lobes = has_lobes;
   return encodeSceneHeader(header);
 }
