@@ -85,6 +85,9 @@ void PacketRaster::begin(std::span<const LocalReceiver> receivers, const PacketV
       lanes_.frame[std::size_t(6 + axis)][i] = frame.z[axis];
     }
   }
+  centre_lane_.x.fill(view.centre.x);
+  centre_lane_.y.fill(view.centre.y);
+  centre_lane_.z.fill(view.centre.z);
   kernel_.findSeenPixels(canvas(), seen_);
   seen_faces_ = 0;
   for (std::size_t i = 0; i < RasterGeometry::kFaces; ++i) {
@@ -209,18 +212,25 @@ void PacketRaster::addLobe(const Lobe& lobe, const glm::vec3& normal) {
   kernel_.seeLobe(lanes_, receiver_count_, patch, light, lights_.emplace_back());
 }
 
-// Of the last patch, as addLobe. `range`: of its normals.
+// Of the last patch, as addLobe: as the centre sees it, or, where receivers see it from too
+// different directions, each by itself. `range`: of its normals.
 void PacketRaster::addSlope(const RadiositySlope& slope, float range) {
   if (slope.isNone() || !(range > 0)) return;
   Patch& patch = patches_.back();
-  if (patch.lights == 0) {
-    patch.lights = static_cast<std::uint32_t>(lights_.size());
-    PacketLights& lights = lights_.emplace_back();
-    for (int c = 0; c < 3; ++c) lights.colors[std::size_t(c)].fill(patch.radiosity[c]);
-  }
   std::array<glm::vec3, 3> slopes;
   for (std::size_t c = 0; c < 3; ++c) {
     slopes[c] = frame_ ? frame_->directionToWorld(slope.value(c)) : slope.value(c);
+  }
+  PacketLights own;
+  for (int c = 0; c < 3; ++c) own.colors[std::size_t(c)].fill(patch.radiosity[c]);
+  if (patch.lights == 0 && isSharedLook(patch.position)) {
+    kernel_.seeSlope(centre_lane_, 1, patch, slopes, range, own);
+    for (int c = 0; c < 3; ++c) patch.radiosity[c] = own.colors[std::size_t(c)][0];
+    return;
+  }
+  if (patch.lights == 0) {
+    patch.lights = static_cast<std::uint32_t>(lights_.size());
+    lights_.push_back(own);
   }
   kernel_.seeSlope(lanes_, receiver_count_, patch, slopes, range, lights_[patch.lights]);
 }
@@ -274,7 +284,7 @@ void PacketRaster::addFacet(const Node& node, const Facet& facet, bool is_hull, 
 // As seen from the centre, or, where receivers see it from too different directions, by each.
 void PacketRaster::addRoughNode(const Node& node, const LaneParts* lane_parts,
                                 std::uint32_t parts) {
-  if (local_radius_ <= kFidelity.shared_look * glm::distance(node.position, local_centre_)) {
+  if (isSharedLook(toWorld(node.position))) {
     return addRoughNode(node, local_centre_, parts);
   }
   for (std::size_t i = 0; i < receiver_count_; ++i) {

@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <span>
 #include <vector>
 
@@ -110,6 +111,10 @@ class PacketRaster {
   std::uint32_t addFacetHull(const Node& node, const Facet& facet, const LaneParts* parts,
                              std::uint32_t lanes);
   void addLobe(const Lobe& lobe, const glm::vec3& normal);
+  // Whether all receivers see a thing there as the centre does.
+  bool isSharedLook(const glm::vec3& world_place) const {
+    return view_.radius <= kFidelity.shared_look * glm::distance(world_place, view_.centre);
+  }
   void addSlope(const RadiositySlope& slope, float range);
   void addRoughNode(const Node& node, const LaneParts* lane_parts, std::uint32_t parts);
   void addRoughNode(const Node& node, const glm::vec3& eye, std::uint32_t parts);
@@ -135,6 +140,7 @@ class PacketRaster {
   mutable std::array<bool, RasterGeometry::kFaces> is_face_used_{};
 
   PacketLanes lanes_;
+  PacketLanes centre_lane_{};  // the centre, in every lane
   std::size_t receiver_count_ = 0;
   SeenPixels seen_;
   std::uint32_t seen_faces_ = 0;  // set of those with pixels that count
