@@ -174,7 +174,7 @@ largeIndexesStayBelowTheBudget() {
   local limit threads
   skipWhereSanitized
   run 0 generate -o city.ply --surfels 4M --quiet
-  for limit in "66 2" "72 2"; do
+  for limit in "68 2" "74 2"; do
     read -r limit threads <<< "$limit"
     runWithin "$limit" "index city.ply -o out.sft" --memory "${limit}M" --threads "$threads" ||
       fail "$limit MiB do not do"
