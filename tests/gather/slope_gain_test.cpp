@@ -65,7 +65,8 @@ TEST(SlopeGain, IsThatOfTheNormalsThatAreSeen) {
       for (const glm::vec3& normal : normals) {
         bright += (1 + glm::dot(change, normal - mean)) / float(normals.size()) * normal;
       }
-      const glm::vec3 slope = 3 / range * (bright - mean);  // RadiositySlope
+      // RadiositySlope
+      const glm::vec3 slope = 3 / range * glm::vec3(bright.x, bright.y, 0);
       for (const bool is_two_sided : {false, true}) {
         Patch patch;
         patch.normal = mean;

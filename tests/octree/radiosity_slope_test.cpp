@@ -73,6 +73,21 @@ TEST(RadiositySlope, IsOfEachColorByItself) {
   EXPECT_EQ(slope.value(2), glm::vec3(0));
 }
 
+// Spheres and two-sided surfels in a flat node may have most of its power.
+TEST(RadiositySlope, ComesFromNothingThatFacesNowhere) {
+  for (const auto flag : {kSurfelSphere, kSurfelTwoSided}) {
+    std::vector<Surfel> cap = capOf(.2f, [](auto) { return 1.f; });
+    for (std::size_t i = 0; i < cap.size(); i += 100) {
+      cap[i].flags |= flag;
+      cap[i].radiosity = glm::vec3(1e4f);
+    }
+    const Node node = nodeOf(cap);
+    ASSERT_TRUE(node.isFlat() && !node.isTwoSided());
+    EXPECT_GT(node.radiosity.x, 50);
+    expectSlope(node.slopes[0], glm::vec3(0), 2 * kStep);
+  }
+}
+
 TEST(RadiositySlope, TurnsWithTheSideOfTwoSidedSurfels) {
   const auto brightness = [](const glm::vec3& n) { return 1 + n.x; };
   std::vector<Surfel> cap = capOf(.2f, brightness);

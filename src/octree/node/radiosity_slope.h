@@ -12,10 +12,10 @@
 namespace surfeit {
 
 // Of a flat node or a facet with the mean normal N and the range r of its normals (normalRange), by
-// color: the mean of the normals weighted by power is N + r slope / 3. So it is where a surfel with
-// the normal n is 1 + slope . (n - N) / r times as bright as the mean of the piece. Lit from one
-// side, a curved piece is brighter where it faces that side: from there it looks brighter than its
-// mean, and from the other side darker.
+// color: r slope / 3 is the part across N of the mean of the normals weighted by power. So it is
+// where a surfel with the normal n is 1 + slope . (n - N) / r times as bright as the mean of the
+// piece. Lit from one side, a curved piece is brighter where it faces that side, and looks so from
+// there.
 struct RadiositySlope {
   // No slope is steeper along an axis: from 1 on, a part of the piece is dark.
   static constexpr float kMost = 2;
