@@ -30,4 +30,10 @@ RadiositySlope RadiositySlope::of(const AreaSums& piece) {
   return slope;
 }
 
+RadiositySlope RadiositySlope::towards(const glm::vec3& normal, const AreaSums& piece) {
+  const RadiositySlope slope = of(piece);
+  const glm::dvec3 own(piece.normal[0], piece.normal[1], piece.normal[2]);
+  return glm::dot(own, glm::dvec3(normal)) < 0 ? slope.turned() : slope;
+}
+
 }  // namespace surfeit

@@ -27,6 +27,8 @@ struct RadiositySlope {
 
   // None in a color in which the piece does not shine, or where it is as good as plane.
   static RadiositySlope of(const AreaSums& piece);
+  // The same of a piece that may be turned the other way than `normal`, as two-sided ones may.
+  static RadiositySlope towards(const glm::vec3& normal, const AreaSums& piece);
 
   bool isNone() const { return codes == std::array<std::int8_t, kCodes>{}; }
   glm::vec3 value(std::size_t color) const {

@@ -222,9 +222,7 @@ void NodeCheck::checkSlope(const RadiositySlope& slope, const AreaSums& piece,
   constexpr double kLeast = RadiositySlope::kLeastRangeSq;
   if (range_sq > .8 * kLeast && range_sq < 1.2 * kLeast) return;
   const double range = std::sqrt(std::max(range_sq, kLeast));
-  RadiositySlope expected = RadiositySlope::of(piece);
-  const glm::dvec3 own(piece.normal[0], piece.normal[1], piece.normal[2]);
-  if (glm::dot(own, glm::dvec3(normal)) < 0) expected = expected.turned();
+  const RadiositySlope expected = RadiositySlope::towards(normal, piece);
   for (std::size_t color = 0; color < 3; ++color) {
     const double mean = piece.radiosity[color] / piece.area;
     if (!(mean > 0)) continue;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <glm/geometric.hpp>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -49,14 +48,6 @@ std::size_t nearestFacet(const Node& node, const FacetGroup& group) {
   return nearest;
 }
 
-// As the facet is turned, or the flat node: two-sided groups may be the other way round.
-RadiositySlope slopeOf(const AreaSums& light, const glm::vec3& normal) {
-  const glm::dvec3 own(light.normal[0], light.normal[1], light.normal[2]);
-  if (!(light.area > 0)) return {};
-  const RadiositySlope slope = RadiositySlope::of(light);
-  return glm::dot(own, glm::dvec3(normal)) < 0 ? slope.turned() : slope;
-}
-
 // Each group gives its light to the facet that it is. Surfels as they are stored may group a little
 // otherwise than the indexer found them: then to the facet that faces most as it does.
 void setFacetRadiosity(const NodeSums& node_sums, float flatness_limit, Node& node) {
@@ -74,7 +65,8 @@ void setFacetRadiosity(const NodeSums& node_sums, float flatness_limit, Node& no
   for (std::size_t k = 0; k < facets.size(); ++k) {
     const AreaSums& light = lights[k];
     variance.add(light);
-    node.slopes[k] = slopeOf(light, facets[k].meanNormal());
+    node.slopes[k] =
+        light.area > 0 ? RadiositySlope::towards(facets[k].meanNormal(), light) : RadiositySlope();
     for (int c = 0; c < 3; ++c) {
       facets[k].radiosity[c] =
           light.covered[c] > 0 ? float(light.radiosity[c] / light.covered[c]) : node.radiosity[c];
@@ -89,7 +81,8 @@ void setRadiosity(const NodeSums& sums, float flatness_limit, Node& node) {
   node.radiosity_variance = RadiosityVariance::of(sums);
   node.slopes = {};
   if (node.isFlat()) {
-    node.slopes[0] = slopeOf(sums.flatPiece(node.isTwoSided(), flatness_limit), node.normal);
+    node.slopes[0] =
+        RadiositySlope::towards(node.normal, sums.flatPiece(node.isTwoSided(), flatness_limit));
   }
   if (node.hasFacets()) setFacetRadiosity(sums, flatness_limit, node);
   if (!node.isRough()) return;
